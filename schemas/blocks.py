@@ -1,0 +1,54 @@
+"""BML blocks and what became of them."""
+
+from typing import Literal
+
+from msgspec import Struct
+
+from schemas.behaviors import BlockBehavior, Constraint
+from schemas.faults import Fault
+from schemas.requests import Outcome, Request
+
+Composition = Literal["MERGE", "APPEND", "REPLACE"]
+Dialect = Literal["draft", "bml-1.0"]
+
+
+class Block(Struct, frozen=True, kw_only=True, tag="block", omit_defaults=True):
+    """A BML behavior block: behaviors and the constraints between their sync points.
+
+    dialect: how its author spells sync points; feedback about the block is spelled the same way.
+    """
+
+    id: str
+    behaviors: tuple[BlockBehavior, ...] = ()
+    constraints: tuple[Constraint, ...] = ()
+    composition: Composition = "MERGE"
+    dialect: Dialect = "draft"
+
+
+class PerformBlock(Request, frozen=True, kw_only=True, tag="perform_block", omit_defaults=True):
+    """cmd: collaboration or generation -> realizer. Terminal state: `BlockOutcome`."""
+
+    block: Block
+
+
+class SpokenText(Struct, frozen=True, kw_only=True, omit_defaults=True):
+    """What was said of a speech: all of it, or the words before the interruption."""
+
+    behavior: str
+    text: str
+    complete: bool = True
+
+
+class BlockOutcome(Outcome, frozen=True, kw_only=True, tag="block_outcome", omit_defaults=True):
+    """evt: realizer -> requester. Exactly one per accepted block.
+
+    interrupted with `replaced_by` set: another block's REPLACE ended it.
+    """
+
+    block: str
+    status: Literal["done", "failed", "interrupted"]
+    spoken: tuple[SpokenText, ...] = ()
+    dropped: tuple[str, ...] = ()
+    """Ids of behaviors that were dropped, each with its warning on the feedback stream."""
+    replaced_by: str = ""
+    fault: Fault | None = None

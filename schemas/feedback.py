@@ -1,0 +1,65 @@
+"""What the realizer tells about a block while it runs: the feedback of BML 1.0."""
+
+from typing import Literal
+
+from msgspec import Struct
+
+from schemas.units import Seconds, Stamp
+
+WarningKind = Literal[
+    "PARSING_FAILURE", "NO_SUCH_TARGET", "IMPOSSIBLE_TO_SCHEDULE", "BEHAVIOR_TYPE_NOT_SUPPORTED",
+    "CANNOT_CREATE_BEHAVIOR", "EXECUTION_FAILURE", "LATE",
+]  # fmt: skip
+
+
+class BlockProgress(Struct, frozen=True, kw_only=True, tag="block_progress", omit_defaults=True):
+    """evt: a block has started, or ended with a status. time: since the block's start."""
+
+    block: str | None
+    progress: Literal["start", "end"]
+    at: Stamp
+    time: Seconds = 0.0
+    status: Literal["", "done", "failed", "interrupted"] = ""
+
+
+class SyncPointProgress(Struct, frozen=True, kw_only=True, tag="sync_point_progress", omit_defaults=True):
+    """evt: a sync point as realised. Each default point of each behavior exactly once, in order.
+
+    sync: in the spelling of the block's dialect. predicted: where the plan had it, from the block's start.
+    skew: from the first to this point of its class. source: who says so.
+    """
+
+    block: str
+    behavior: str
+    sync: str
+    at: Stamp
+    time: Seconds
+    predicted: Seconds | None = None
+    arrived: Seconds | None = None
+    skew: Seconds = 0.0
+    source: Literal["body", "clock"] = "body"
+
+
+class PlannedPoint(Struct, frozen=True, kw_only=True, omit_defaults=True):
+    behavior: str
+    sync: str
+    time: Seconds
+
+
+class PredictionFeedback(Struct, frozen=True, kw_only=True, tag="prediction", omit_defaults=True):
+    """evt: when the points that are still to come are expected, from the block's start."""
+
+    block: str
+    points: tuple[PlannedPoint, ...]
+
+
+class WarningFeedback(Struct, frozen=True, kw_only=True, tag="warning", omit_defaults=True):
+    """evt: something was refused or dropped. behavior empty: the whole block."""
+
+    block: str | None
+    kind: WarningKind
+    message: str
+    behavior: str = ""
+
+
+Feedback = BlockProgress | SyncPointProgress | PredictionFeedback | WarningFeedback

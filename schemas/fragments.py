@@ -1,0 +1,81 @@
+"""Turn fragments: what a collaboration manager hands to generation, and the outcome it gets back."""
+
+from typing import Literal
+
+from msgspec import Struct
+
+from schemas.behaviors import Action, Constraint, FragmentBehavior
+from schemas.blocks import SpokenText
+from schemas.faults import Fault
+from schemas.recognition import ConnectionEvent
+from schemas.requests import Outcome, Request
+from schemas.units import Probability, Seconds
+
+TurnStatus = Literal["beginning", "middle", "end", "full", "backchannel"]
+GestureChoice = Literal["none", "gaze", "directed_gaze", "directed_gaze_with_pointing"]
+
+
+class TurnFragment(Struct, frozen=True, kw_only=True, tag="fragment", omit_defaults=True):
+    """Part or whole of a turn. Thesis 3.2.
+
+    turn_index: first, second or third turn of an adjacency pair.
+    addressee: id of the person spoken to; empty: the only person the world knows.
+    delay: hold the turn after this fragment while the manager thinks, eyes on `delay_target`.
+    accept: which actions answer the adjacency pair this turn starts; empty: recognition's default.
+    """
+
+    id: str
+    turn_index: Literal[1, 2, 3] = 1
+    turn_status: TurnStatus = "full"
+    behaviors: tuple[FragmentBehavior, ...] = ()
+    constraints: tuple[Constraint, ...] = ()
+    addressee: str = ""
+    delay: bool = False
+    delay_target: str = ""
+    accept: tuple[Action, ...] = ()
+
+
+class PerformFragment(Request, frozen=True, kw_only=True, tag="perform_fragment", omit_defaults=True):
+    """cmd: collaboration -> generation. Terminal state: `FragmentOutcome`."""
+
+    fragment: TurnFragment
+
+
+class PairConsidered(Struct, frozen=True, kw_only=True, omit_defaults=True):
+    """One row of the table behind a choice: a gesture-speech pair with its numbers and its verdict."""
+
+    gesture: GestureChoice
+    phrase: str
+    distractors: tuple[str, ...]
+    channel: float
+    reliability: float
+    minimum: float
+    cost: Seconds
+    feasible: bool
+    chosen: bool = False
+    reason: str = ""
+
+
+class ReferenceChoice(Struct, frozen=True, kw_only=True, omit_defaults=True):
+    """How a reference was made, and every pair that was considered. Thesis 3.3.2."""
+
+    reference: str
+    target: str
+    gesture: GestureChoice
+    phrase: str
+    reliability: Probability
+    cost: Seconds
+    pairs: tuple[PairConsidered, ...] = ()
+
+
+class FragmentOutcome(Outcome, frozen=True, kw_only=True, tag="fragment_outcome", omit_defaults=True):
+    """evt: generation -> requester. Sent when the block has ended and its DG and MFG are decided."""
+
+    fragment: str
+    status: Literal["done", "failed", "interrupted"]
+    spoken: tuple[SpokenText, ...] = ()
+    events: tuple[ConnectionEvent, ...] = ()
+    """Each connection event of the turn in its last known state, by start."""
+    choices: tuple[ReferenceChoice, ...] = ()
+    warnings: tuple[str, ...] = ()
+    fault: Fault | None = None

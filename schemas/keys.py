@@ -1,0 +1,102 @@
+"""Key expressions, spelled once. Relative to the robot's namespace: on the wire `<robot>/engage/v1/...`.
+
+`engage/v1/<class>/<producer or server>/<subject>`; the class decides how a key travels (`QUALITY`):
+
+| class  | for | how |
+|--------|-----|-----|
+| cmd    | requests to a server | each, in order; late subscribers get the last 2 s; idempotent by id |
+| evt    | request states, feedback, sync points, actions, connection events, faults | as cmd |
+| state  | posture, world, statistics, claims | last value, also for a late subscriber |
+| stream | joints, raw perception | newest only, may be dropped |
+| rpc    | short reads | query, short timeout, no reply = failure |
+| alive  | who is there | liveliness; delivered as `PeerAlive` and `PeerGone` |
+"""
+
+from typing import Literal, get_args
+
+PREFIX = "engage/v1"
+KeyClass = Literal["cmd", "evt", "state", "stream", "rpc", "alive"]
+HISTORY_MAX_AGE = 2.0
+"""Seconds: how old a command or event may be when a late subscriber still gets it."""
+
+FRAGMENT = f"{PREFIX}/cmd/generation/fragment"
+INHIBIT = f"{PREFIX}/cmd/generation/inhibit"
+BLOCK = f"{PREFIX}/cmd/realizer/block"
+EVENT = f"{PREFIX}/cmd/recognition/event"
+TURN = f"{PREFIX}/cmd/recognition/turn"
+BEHAVIOR = f"{PREFIX}/cmd/control/behavior"
+
+FEEDBACK = f"{PREFIX}/evt/realizer/feedback"
+SYNC_POINT = f"{PREFIX}/evt/control/sync_point"
+ROBOT_ACTION = f"{PREFIX}/evt/control/action"
+PERCEIVED_ACTION = f"{PREFIX}/evt/perception/action"
+CONNECTION_EVENT = f"{PREFIX}/evt/recognition/connection_event"
+
+WORLD = f"{PREFIX}/state/perception/world"
+HEAD_OWNER = f"{PREFIX}/state/generation/head_owner"
+
+ROBOT_STATE = f"{PREFIX}/stream/control/robot_state"
+
+ESTIMATE = f"{PREFIX}/rpc/control/estimate"
+DESCRIBE = f"{PREFIX}/rpc/control/describe"
+
+ANY_REQUEST_STATE = f"{PREFIX}/evt/*/request"
+ANY_FAULT = f"{PREFIX}/evt/*/fault"
+ANY_ACTION = f"{PREFIX}/evt/*/action"
+ANY_STATISTICS = f"{PREFIX}/state/recognition/statistics/*"
+ANY_ALIVE = f"{PREFIX}/alive/*"
+EVERYTHING = f"{PREFIX}/**"
+
+
+def commands(server: str) -> str:
+    """Every command for `server`; cancellations too."""
+    return f"{PREFIX}/cmd/{server}/*"
+
+
+def cancel(server: str) -> str:
+    return f"{PREFIX}/cmd/{server}/cancel"
+
+
+def request_state(server: str) -> str:
+    """Where `server` answers requests: `Accepted`, `Refused`, outcomes."""
+    return f"{PREFIX}/evt/{server}/request"
+
+
+def fault(service: str) -> str:
+    return f"{PREFIX}/evt/{service}/fault"
+
+
+def statistics(actor: str) -> str:
+    """actor: a person's id, or `all`."""
+    return f"{PREFIX}/state/recognition/statistics/{actor}"
+
+
+def alive(participant: str) -> str:
+    return f"{PREFIX}/alive/{participant}"
+
+
+def key_class(key: str) -> KeyClass:
+    """Raises ValueError for a key outside the table, or one whose class is a wildcard."""
+    chunks = key.split("/")
+    name = chunks[2] if key.startswith(f"{PREFIX}/") and len(chunks) > 2 else ""
+    if name not in get_args(KeyClass):
+        raise ValueError(f"{key!r} is not a key of engage: expected {PREFIX}/<{'|'.join(get_args(KeyClass))}>/...")
+    return name  # type: ignore[return-value]
+
+
+def server_of(key: str) -> str:
+    """`cmd/<server>/...` -> server."""
+    return key.split("/")[3]
+
+
+def matches(pattern: str, key: str) -> bool:
+    """Does key expression `pattern` (`*` one chunk, `**` any number) include the concrete `key`?"""
+    return _matches(pattern.split("/"), key.split("/"))
+
+
+def _matches(pattern: list[str], key: list[str]) -> bool:
+    if not pattern:
+        return not key
+    if pattern[0] == "**":
+        return _matches(pattern[1:], key) or (bool(key) and _matches(pattern, key[1:]))
+    return bool(key) and pattern[0] in ("*", key[0]) and _matches(pattern[1:], key[1:])

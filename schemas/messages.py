@@ -1,0 +1,86 @@
+"""Every message of the bus in one tagged union, and its two encodings."""
+
+from typing import Any
+
+import msgspec
+
+from schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost
+from schemas.attention import HeadOwner, Inhibit, InhibitionEnded
+from schemas.blocks import BlockOutcome, PerformBlock
+from schemas.body import (
+    AbortBehavior,
+    BehaviorOutcome,
+    Capabilities,
+    DescribeBody,
+    EstimateBehaviors,
+    Estimates,
+    GoHome,
+    HomeReached,
+    PerformBehavior,
+    RobotState,
+    SyncPointArrived,
+    SyncPointReached,
+    WordSpoken,
+)
+from schemas.faults import Fault, InputRefused
+from schemas.feedback import BlockProgress, PredictionFeedback, SyncPointProgress, WarningFeedback
+from schemas.fragments import FragmentOutcome, PerformFragment
+from schemas.presence import PeerAlive, PeerGone
+from schemas.recognition import (
+    ConnectionEvent,
+    EventOutcome,
+    RequestEvent,
+    SignalTurn,
+    Statistics,
+    TurnOutcome,
+)
+from schemas.requests import Accepted, Cancel, Refused
+from schemas.world import World
+
+MAJOR = 1
+
+Message = (
+    Accepted | Refused | Cancel | Fault
+    | PerformFragment | FragmentOutcome | Inhibit | InhibitionEnded | HeadOwner
+    | PerformBlock | BlockOutcome | BlockProgress | SyncPointProgress | PredictionFeedback | WarningFeedback
+    | PerformBehavior | AbortBehavior | GoHome | HomeReached | BehaviorOutcome
+    | SyncPointArrived | SyncPointReached | WordSpoken | RobotState
+    | DescribeBody | Capabilities | EstimateBehaviors | Estimates
+    | ActionBegan | ActionEnded | ActorFound | ActorLost | World
+    | RequestEvent | EventOutcome | SignalTurn | TurnOutcome | ConnectionEvent | Statistics
+    | PeerAlive | PeerGone
+)  # fmt: skip
+"""What may travel. A union of tagged structs: the `type` field of the encoded form says which."""
+
+_msgpack_encoder = msgspec.msgpack.Encoder()
+_json_encoder = msgspec.json.Encoder()
+_msgpack_decoder: msgspec.msgpack.Decoder[Any] = msgspec.msgpack.Decoder(Message)
+_json_decoder: msgspec.json.Decoder[Any] = msgspec.json.Decoder(Message)
+
+
+def encoding_of(message: Message, form: str = "msgpack") -> str:
+    """`application/msgpack;engage.SyncPointReached/1`."""
+    return f"application/{form};engage.{type(message).__name__}/{MAJOR}"
+
+
+def encode(message: Message) -> bytes:
+    return _msgpack_encoder.encode(message)
+
+
+def encode_json(message: Message) -> bytes:
+    return _json_encoder.encode(message)
+
+
+def decode(payload: bytes, encoding: str = "application/msgpack") -> Message:
+    """The message in `payload`. Raises InputRefused: another major version, an unknown form, or bad content."""
+    form, _, schema = encoding.partition(";")
+    if schema and schema.rpartition("/")[2] not in ("", str(MAJOR)):
+        raise InputRefused(Fault(reason=f"{schema} is not version {MAJOR}", advice="run the same engage everywhere"))
+    try:
+        if form == "application/json":
+            return _json_decoder.decode(payload)  # type: ignore[no-any-return]
+        if form == "application/msgpack":
+            return _msgpack_decoder.decode(payload)  # type: ignore[no-any-return]
+    except (msgspec.DecodeError, RecursionError) as error:
+        raise InputRefused(Fault(reason=str(error), where=schema or form)) from error
+    raise InputRefused(Fault(reason=f"encoding {form!r}", advice="application/msgpack or application/json"))

@@ -1,0 +1,11 @@
+"""Who is on the bus. These two never travel: each bus makes them from liveliness, for its own subscribers."""
+
+from msgspec import Struct
+
+
+class PeerAlive(Struct, frozen=True, kw_only=True, tag="peer_alive"):
+    participant: str
+
+
+class PeerGone(Struct, frozen=True, kw_only=True, tag="peer_gone"):
+    participant: str

@@ -1,0 +1,121 @@
+"""Connection events, the requests for them, and their statistics. Thesis chapter 2."""
+
+from typing import Literal
+
+from msgspec import Struct
+
+from schemas.behaviors import Action, Cause, Event, EventKind, TurnSignal
+from schemas.requests import Outcome, Request
+from schemas.units import Probability, Seconds, Stamp
+
+EventState = Literal["started", "succeeded", "failed", "preempted", "withdrawn", "superseded", "completed"]
+
+
+class ConnectionEvent(Struct, frozen=True, kw_only=True, tag="connection_event", omit_defaults=True):
+    """evt: one change in the life of a connection event; the same id from `started` to the end.
+
+    delay: responder's start - initiator's start (adjacency pair: from the end of the turn, may be negative);
+    of a failed event the time from its start to its failure; None while undecided and for backchannels.
+    duration: of the shared phase, when `completed`.
+    """
+
+    id: str
+    kind: EventKind
+    initiator: str
+    responder: str
+    state: EventState
+    at: Stamp
+    """When this change happened."""
+    started: Stamp
+    objects: tuple[str, ...] = ()
+    cause: Cause = "human"
+    optional: bool = False
+    delay: Seconds | None = None
+    duration: Seconds | None = None
+    limit: Seconds | None = None
+    """How long the responder has, when `started`."""
+    response: Action | None = None
+    """Adjacency pair: which action answered."""
+    block: str = ""
+    behavior: str = ""
+    """Robot-initiated: the block and the event behavior that asked for it."""
+    turn: str = ""
+
+
+class RequestEvent(Request, frozen=True, kw_only=True, tag="request_event", omit_defaults=True):
+    """cmd: realizer -> recognition (thesis Fig. 5.2). Refused when invalid (unknown actor, no objects).
+
+    at: when the event began, that is when the realizer released it.
+    """
+
+    block: str
+    event: Event
+    at: Stamp
+
+
+class SignalTurn(Request, frozen=True, kw_only=True, tag="signal_turn", omit_defaults=True):
+    """cmd: realizer or generation -> recognition. Ends at once."""
+
+    signal: TurnSignal
+    at: Stamp
+    block: str = ""
+
+
+class EventOutcome(Outcome, frozen=True, kw_only=True, tag="event_outcome", omit_defaults=True):
+    """evt: recognition -> requester: the decision. Terminal state of `RequestEvent`."""
+
+    event: str
+    """Id of the connection event."""
+    state: EventState
+    at: Stamp
+    delay: Seconds | None = None
+    response: Action | None = None
+
+
+class TurnOutcome(Outcome, frozen=True, kw_only=True, tag="turn_outcome", omit_defaults=True):
+    """evt: terminal state of `SignalTurn`."""
+
+    at: Stamp
+
+
+class KindStatistics(Struct, frozen=True, kw_only=True, omit_defaults=True):
+    """Table 2.1, one kind. Optional, preempted and withdrawn events never count as failures."""
+
+    kind: EventKind
+    count: int = 0
+    succeeded: int = 0
+    failed: int = 0
+    delay_min: Seconds | None = None
+    delay_mean: Seconds | None = None
+    delay_max: Seconds | None = None
+    failure_rate: Probability | None = None
+
+
+class WindowStatistics(Struct, frozen=True, kw_only=True, omit_defaults=True):
+    """Whole session or recent window. Times between events are differences of successive starts."""
+
+    kinds: tuple[KindStatistics, ...] = ()
+    mtbce: Seconds | None = None
+    """Mean time between connection events."""
+    mtbce_without_maintenance: Seconds | None = None
+    """The same without the glances the maintenance policy caused itself."""
+    max_gap: Seconds | None = None
+    events: int = 0
+    last_start: Stamp | None = None
+    last_start_without_maintenance: Stamp | None = None
+
+
+class Statistics(Struct, frozen=True, kw_only=True, tag="statistics", omit_defaults=True):
+    """state: recognition. `actor` empty: overall.
+
+    engagement: estimate in 0..1 with its reasons and level.
+    """
+
+    actor: str
+    at: Stamp
+    session: WindowStatistics
+    recent: WindowStatistics
+    engagement: Probability | None = None
+    level: Literal["engaged", "weakening", "disengaged", "unknown"] = "unknown"
+    reasons: tuple[str, ...] = ()
+    busy: bool = False

@@ -1,0 +1,50 @@
+"""The world as perception reports it: entities with places, and what they look like."""
+
+from typing import Literal
+
+from msgspec import Struct
+
+from schemas.units import Meters, Probability, Radians, Stamp, Vector
+
+EntityKind = Literal["object", "person", "hand", "surface"]
+
+
+class Entity(Struct, frozen=True, kw_only=True, omit_defaults=True):
+    """A thing or a person. position of a person: the face; of an object: its centre.
+
+    footprint: corners in the entity's own frame, metres (x, y), before turning by `yaw` about z.
+    Only `object` entities can be distractors.
+    """
+
+    id: str
+    kind: EntityKind
+    position: Vector
+    yaw: Radians = 0.0
+    footprint: tuple[tuple[float, float], ...] = ()
+    radius: Meters = 0.0
+    color: str = ""
+    shape: str = ""
+    name: str = ""
+    owner: str = ""
+    """Of a hand: the person."""
+    velocity: Vector = (0.0, 0.0, 0.0)
+    """m/s"""
+    confidence: Probability = 1.0
+
+
+class World(Struct, frozen=True, kw_only=True, tag="world", omit_defaults=True):
+    """state: perception. The whole world each time it changes."""
+
+    entities: tuple[Entity, ...]
+    at: Stamp | None = None
+
+    def entity(self, id: str) -> Entity | None:
+        return next((entity for entity in self.entities if entity.id == id), None)
+
+    @property
+    def objects(self) -> tuple[Entity, ...]:
+        return tuple(entity for entity in self.entities if entity.kind == "object")
+
+    @property
+    def people(self) -> tuple[Entity, ...]:
+        return tuple(entity for entity in self.entities if entity.kind == "person")

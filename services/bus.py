@@ -1,0 +1,194 @@
+"""The bus, as services see it: one interface, two implementations (`memory_bus`, `zenoh_bus`), one contract suite.
+
+A `Hub` is what a process opens once; each service joins it under its own name and gets a `Bus`. Delivery is by
+the class of the key (`schemas.keys`). Messages are frozen structs. Nothing here starts a thread.
+"""
+
+import asyncio
+from abc import ABC, abstractmethod
+from collections import deque
+from collections.abc import Callable, Iterable
+from enum import Enum, auto
+from types import TracebackType
+from typing import Self
+
+from msgspec import Struct
+
+from schemas import keys
+from schemas.messages import Message
+from schemas.units import Seconds, Stamp
+
+
+class Keep(Enum):
+    """What a subscription keeps while its reader is busy."""
+
+    EVERY = auto()
+    LATEST = auto()
+    """Only the newest of each key."""
+
+
+class Received(Struct, frozen=True):
+    """A message as it arrived. source: the participant that published it. at: local time of arrival."""
+
+    key: str
+    message: Message
+    source: str
+    at: Seconds
+
+
+class Subscription:
+    """A bounded queue of received messages, in order across all its keys; read it with `async for` or `next`.
+
+    Used by one task at a time. When full the oldest message is dropped and counted in `overflowed`.
+    """
+
+    def __init__(
+        self, patterns: Iterable[str], keep: Keep, capacity: int, on_close: Callable[["Subscription"], None]
+    ) -> None:
+        self.patterns = tuple(patterns)
+        self.keep = keep
+        self.capacity = capacity
+        self.overflowed = 0
+        self._queue: deque[Received] = deque()
+        self._waiting: asyncio.Future[None] | None = None
+        self._on_close = on_close
+        self._closed = False
+
+    def wants(self, key: str) -> bool:
+        return any(keys.matches(pattern, key) for pattern in self.patterns)
+
+    def offer(self, received: Received) -> None:
+        """For the bus: put a message in the queue."""
+        if self._closed:
+            return
+        if self.keep is Keep.LATEST:
+            for index, queued in enumerate(self._queue):
+                if queued.key == received.key:
+                    del self._queue[index]
+                    break
+        elif len(self._queue) >= self.capacity:
+            self._queue.popleft()
+            self.overflowed += 1
+        self._queue.append(received)
+        self._wake()
+
+    def _wake(self) -> None:
+        if self._waiting is not None and not self._waiting.done():
+            self._waiting.set_result(None)
+
+    def __len__(self) -> int:
+        return len(self._queue)
+
+    async def next(self, deadline: Seconds | None = None) -> Received | None:
+        """The next message, or None once loop time has reached `deadline` with nothing waiting, or after `close`."""
+        loop = asyncio.get_running_loop()
+        while not self._queue and not self._closed:
+            if deadline is not None and loop.time() >= deadline:
+                return None
+            self._waiting = waiting = loop.create_future()
+            timer = None if deadline is None else loop.call_at(deadline, self._wake)
+            try:
+                await waiting
+            finally:
+                self._waiting = None
+                if timer is not None:
+                    timer.cancel()
+        return self._queue.popleft() if self._queue else None
+
+    def __aiter__(self) -> Self:
+        return self
+
+    async def __anext__(self) -> Received:
+        received = await self.next()
+        if received is None:
+            raise StopAsyncIteration
+        return received
+
+    def close(self) -> None:
+        if not self._closed:
+            self._closed = True
+            self._on_close(self)
+            self._wake()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+
+Answer = Callable[[Message], Message]
+
+
+class Bus(ABC):
+    """One participant's view of the bus.
+
+    robot: the namespace. name: who this is; appears as `Received.source` and on its liveliness token.
+    clock: the clock that `now` reads, the same for all processes that can compare their times directly.
+    """
+
+    robot: str
+    name: str
+    clock: str
+
+    @abstractmethod
+    def now(self) -> Seconds:
+        """Loop time."""
+
+    def stamp(self, at: Seconds | None = None) -> Stamp:
+        """Now, or `at`, on this clock."""
+        return Stamp(self.clock, self.now() if at is None else at)
+
+    @abstractmethod
+    def local(self, stamp: Stamp) -> Seconds:
+        """The stamp as local loop time, through the estimated offset of its clock."""
+
+    @abstractmethod
+    def publish(self, key: str, message: Message) -> None:
+        """Send to all subscribers of `key`, this process' own included. Never raises for want of a listener."""
+
+    @abstractmethod
+    def subscribe(self, *patterns: str, keep: Keep = Keep.EVERY, capacity: int = 4096) -> Subscription:
+        """Key expressions to one queue. Past messages come first as the class of each key says.
+
+        A pattern of class `alive` delivers `PeerAlive` for all who are there, then every change.
+        """
+
+    @abstractmethod
+    async def query(self, key: str, message: Message, timeout: Seconds = 1.0) -> Message:
+        """Ask the server of an `rpc` key. Raises NoReply (absent, late) or InputRefused (it answered a Fault)."""
+
+    @abstractmethod
+    def answer(self, key: str, answer: Answer) -> None:
+        """Serve an `rpc` key for the life of this bus. `answer` is quick and pure; an EngageError becomes a Fault."""
+
+    @abstractmethod
+    def declare_alive(self) -> None:
+        """Show this participant's liveliness token: to be called once its subscribers stand."""
+
+    @abstractmethod
+    async def leave(self) -> None:
+        """Withdraw subscriptions, answers and token. Idempotent."""
+
+
+class Hub(ABC):
+    """A process' connection to the bus."""
+
+    robot: str
+
+    @abstractmethod
+    def join(self, name: str) -> Bus:
+        """A participant's own view. Names are unique on a robot's bus; a client makes its own unique."""
+
+    @abstractmethod
+    async def close(self) -> None: ...
+
+    async def __aenter__(self) -> Self:
+        return self
+
+    async def __aexit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        await self.close()

@@ -1,0 +1,54 @@
+"""How a service lives: joins the hub under its name, subscribes, shows its token, serves until cancelled.
+
+A service is one coroutine function of its bus, its configuration and `ready`, which it calls once its
+subscribers stand. A bug in a service ends its process, loudly; bad messages from others never do.
+"""
+
+import asyncio
+from collections.abc import AsyncIterator, Awaitable, Callable, Mapping
+from contextlib import asynccontextmanager
+from functools import partial
+from typing import Any
+
+from services.bus import Bus, Hub
+
+Ready = Callable[[], None]
+Service = Callable[[Bus, Ready], Awaitable[None]]
+"""With its configuration bound already (`functools.partial(realize, config=...)`)."""
+
+
+async def serve(hub: Hub, name: str, service: Service, ready: Ready = lambda: None) -> None:
+    """Run one service on the hub until it is cancelled or fails."""
+    bus = hub.join(name)
+
+    def stands() -> None:
+        bus.declare_alive()
+        ready()
+
+    try:
+        await service(bus, stands)
+    finally:
+        await bus.leave()
+
+
+@asynccontextmanager
+async def running(hub: Hub, services: Mapping[str, Service]) -> AsyncIterator[None]:
+    """Run services in this process; the body of `async with` starts when all stand, and its end stops them."""
+    loop = asyncio.get_running_loop()
+    standing = {name: loop.create_future() for name in services}
+    async with asyncio.TaskGroup() as group:
+        tasks = [
+            group.create_task(serve(hub, name, service, partial(_resolve, standing[name])), name=f"service {name}")
+            for name, service in services.items()
+        ]
+        try:
+            await asyncio.gather(*standing.values())
+            yield
+        finally:
+            for task in reversed(tasks):
+                task.cancel()
+
+
+def _resolve(future: "asyncio.Future[Any]") -> None:
+    if not future.done():
+        future.set_result(None)
