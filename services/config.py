@@ -1,4 +1,4 @@
-"""One configuration for all services: TOML in, frozen structs out. A bad one is refused at start, by name and place."""
+"""One configuration for all services: TOML in, frozen structs out. A bad one is refused at start, by key."""
 
 from pathlib import Path
 
