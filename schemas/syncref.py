@@ -1,0 +1,157 @@
+"""References to sync points, as text and as data, and the names that the dialects give to sync points.
+
+    [block:]behavior:sync[:n][±offset]      speech-1:end + 0.5     g:stroke:2-1     block-2:gaze-1:start
+    [block:]number                          seconds after the block's start
+    bml:start, bml:end                      the block itself; `bml` is reserved
+
+Spaces around `:` and the sign mean nothing. Ids and names are case-sensitive and may hold hyphens, so only the
+tail of a reference can hold an offset: `gaze-1:stroke-2` is two seconds before `gaze-1:stroke`. A sync name may
+end in hyphen and number too (a mark `word-2`). Then the text alone does not say which is meant: it is read as an
+offset, unless `parse` is told that such a name exists. The codecs know the marks of what they read and write such
+a reference with an explicit offset (`speech-1:word-2+0`), which everyone reads alike.
+"""
+
+import math
+import re
+from collections.abc import Collection
+from decimal import Decimal
+from typing import Literal, Self
+
+from msgspec import Struct
+
+from schemas.units import Seconds
+
+BLOCK_ITSELF = "bml"
+SYNC_POINTS = ("start", "ready", "stroke_start", "stroke", "stroke_end", "relax", "end")
+"""What the drafts give every behavior but speech, in order. The system's own spelling."""
+LONGEST = 1000
+"""Characters; nobody's reference is longer, and no input gets to keep a regular expression busy."""
+
+_NUMBER = r"(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)"
+_SIGNED = re.compile(rf"([+-]?)\s*({_NUMBER})")
+_WITH_OFFSET = re.compile(rf"(.*?)\s*([+-])\s*({_NUMBER})")
+_NAME = re.compile(r"[^\s:+-][^\s:+]*")
+
+
+class SyncRef(Struct, frozen=True, omit_defaults=True):
+    """A parsed reference. behavior "": `offset` seconds from the start of `block`; block "": this block.
+
+    repetition: which stroke of a repeated behavior, from 1; 0 where the text names none.
+    """
+
+    block: str = ""
+    behavior: str = ""
+    sync: str = ""
+    repetition: int = 0
+    offset: Seconds = 0.0
+
+    @classmethod
+    def parse(cls, text: str, names: Collection[str] = ()) -> Self:
+        """Read a reference. Raises ValueError, naming the text and what is wrong with it.
+
+        names: sync points known to exist though they look like an offset (`word-2`).
+        """
+        if len(text) > LONGEST:
+            raise _bad(text, f"longer than {LONGEST} characters")
+        *heads, tail = (part.strip() for part in text.split(":"))
+        if len(heads) > 3:
+            raise _bad(text, "more than four parts")
+        for head in heads:
+            if not _NAME.fullmatch(head):
+                raise _bad(text, f"{head!r} is not an id" if head else "an empty part")
+        if len(heads) < 2 and (number := _signed(tail)) is not None:
+            return cls(block=heads[0] if heads else "", offset=_finite(text, number))
+        if not heads:
+            raise _bad(text, "expected behavior:sync or a number of seconds")
+        last, offset = _split_offset(tail, names)
+        parts = [*heads, last]
+        repetition = 0
+        if len(parts) > 2 and re.fullmatch("[0-9]+", last):
+            repetition = int(parts.pop())
+            if parts[-1] != "stroke" or repetition < 1:
+                raise _bad(text, "a repetition counts from 1 and is legal only after 'stroke'")
+        elif len(parts) == 4:
+            raise _bad(text, "the fourth part is the number of a repetition")
+        *block, behavior, sync = parts
+        if not _NAME.fullmatch(sync) or _SIGNED.fullmatch(sync):
+            raise _bad(text, f"{sync!r} is not a sync point" if sync else "no sync point")
+        if behavior == BLOCK_ITSELF and sync not in ("start", "end"):
+            raise _bad(text, "a block has only 'start' and 'end'")
+        return cls(block[0] if block else "", behavior, sync, repetition, _finite(text, offset))
+
+    def __str__(self) -> str:
+        """The canonical text: no spaces, no needless offset. Parses to an equal reference."""
+        block = f"{self.block}:" if self.block else ""
+        if not self.behavior:
+            return f"{block}{_plain(self.offset)}"
+        name = f"{self.sync}:{self.repetition}" if self.repetition else self.sync
+        needs_offset = self.offset != 0 or _WITH_OFFSET.fullmatch(name) is not None
+        offset = f"{'-' if self.offset < 0 else '+'}{_plain(abs(self.offset))}" if needs_offset else ""
+        return f"{block}{self.behavior}:{name}{offset}"
+
+
+def _split_offset(tail: str, names: Collection[str]) -> tuple[str, float]:
+    if tail not in names and (match := _WITH_OFFSET.fullmatch(tail)):
+        name, sign, number = match.groups()
+        return name, float(f"{sign}{number}") + 0.0
+    return tail, 0.0
+
+
+def _signed(text: str) -> float | None:
+    match = _SIGNED.fullmatch(text)
+    return float(f"{match[1]}{match[2]}") + 0.0 if match else None  # + 0.0: no negative zero
+
+
+def _finite(text: str, number: float) -> float:
+    if not math.isfinite(number):
+        raise _bad(text, "the number is too large")
+    return number
+
+
+def _plain(number: float) -> str:
+    """Exact, without exponent and without a needless fraction."""
+    text = format(Decimal(repr(number)), "f")
+    return text.removesuffix(".0")
+
+
+def _bad(text: str, reason: str) -> ValueError:
+    shown = text if len(text) <= 80 else f"{text[:77]}..."
+    return ValueError(f"sync reference {shown!r}: {reason}")
+
+
+_FROM_CAMEL = {"strokeStart": "stroke_start", "strokeEnd": "stroke_end", "attackPeak": "ready"}
+_TO_CAMEL = {"stroke_start": "strokeStart", "stroke_end": "strokeEnd"}
+_ON_TARGET = ("gaze", "posture")
+"""Types whose BML 1.0 `ready` is the arrival, which the drafts call `stroke`."""
+_FACES = ("face", "faceLexeme", "faceFacs")
+_WITH_STROKE = ("gesture", "pointing", "head")
+
+
+def canonical_sync(name: str, type: str = "", dialect: Literal["draft", "bml-1.0"] = "draft") -> str:
+    """The system's own (draft, snake_case) spelling of a sync point; marks and unknown names stay as they are.
+
+    type: the behavior's element name. It matters in BML 1.0, where `ready` of a gaze or posture is what the
+    drafts call `stroke`, and in speech, whose marks are nobody's to rename.
+    """
+    if type == "speech":
+        return name
+    if dialect == "bml-1.0" and type in _ON_TARGET and name == "ready":
+        return "stroke"
+    return _FROM_CAMEL.get(name, name)
+
+
+def dialect_sync(name: str, type: str = "", dialect: Literal["draft", "bml-1.0"] = "draft") -> str | None:
+    """The spelling that feedback uses for canonical `name`; None where the dialect does not report the point.
+
+    The drafts report all of `SYNC_POINTS`. BML 1.0 has four for gaze and posture (start ready relax end) and
+    for faces (start attackPeak relax end); all seven, in camelCase, for what has a stroke.
+    """
+    if dialect == "draft" or name not in SYNC_POINTS or type == "speech":
+        return name
+    if type in _ON_TARGET:
+        return {"stroke": "ready", "start": "start", "relax": "relax", "end": "end"}.get(name)
+    if type in _FACES:
+        return {"ready": "attackPeak", "start": "start", "relax": "relax", "end": "end"}.get(name)
+    if type in _WITH_STROKE or not type:
+        return _TO_CAMEL.get(name, name)
+    return name if name in ("start", "end") else None
