@@ -1,0 +1,36 @@
+# Two commands do everything: `make demo` and `make test`. They need Python >= 3.11, make and a package index;
+# the first run makes .venv, later ones reuse it until pyproject.toml or constraints.txt change.
+
+BIN := .venv/bin
+READY := .venv/.ready
+
+.PHONY: demo test lint bench clean
+
+demo: $(READY)
+	@$(BIN)/engage demo $(ARGS)
+
+test: lint
+	@$(BIN)/pytest $(ARGS)
+
+lint: $(READY)
+	@$(BIN)/ruff check --quiet .
+	@$(BIN)/ruff format --check --quiet . || { echo "run: $(BIN)/ruff format ." >&2; exit 1; }
+	@$(BIN)/mypy --no-error-summary
+
+bench: $(READY)
+	@for file in benchmarks/[a-z]*.py; do echo "== $$file"; $(BIN)/python "$$file" $(ARGS) || exit 1; done
+
+clean:
+	@rm -rf .venv build *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis
+
+# Which `python3.x` works is found by running it: a name on PATH may be a shim, or lack venv.
+$(READY): pyproject.toml constraints.txt
+	@python=$$(for name in "$$PYTHON" python3 python3.14 python3.13 python3.12 python3.11 python; do \
+		"$$name" -c 'import sys, venv, ensurepip; sys.exit(sys.version_info < (3, 11))' >/dev/null 2>&1 \
+		&& { echo "$$name"; break; }; done); \
+	test -n "$$python" || { echo "engage needs Python >= 3.11 with venv (Debian: apt install python3-venv)" >&2; exit 1; }; \
+	$(BIN)/python -m pip --version >/dev/null 2>&1 \
+		|| { echo "making .venv (once, about a minute)"; "$$python" -m venv --clear .venv; }
+	@PIP_CONSTRAINT=constraints.txt PIP_BUILD_CONSTRAINT=constraints.txt PIP_DISABLE_PIP_VERSION_CHECK=1 \
+		$(BIN)/python -m pip install -qq -e '.[test]'
+	@touch $@
