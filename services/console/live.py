@@ -1,0 +1,69 @@
+"""The two ways to show a scene as it changes: redrawn in place on a terminal, or told line by line anywhere else."""
+
+import asyncio
+from types import TracebackType
+from typing import Self
+
+from rich.console import Console
+from rich.live import Live
+
+from schemas.messages import Message
+from schemas.units import Seconds
+from services.console import log, view
+from services.console.render import render
+
+REDRAW: Seconds = 0.1
+"""At most ten pictures a second, each drawn because something happened."""
+
+
+class LiveView:
+    """A sink that keeps a picture of the scene on the terminal. Rich's own refresh thread stays off."""
+
+    def __init__(self, console: Console, robot: str, began: Seconds) -> None:
+        self.scene = view.empty(robot, began)
+        self._live = Live(render(self.scene), console=console, auto_refresh=False, vertical_overflow="crop")
+        self._due: asyncio.TimerHandle | None = None
+
+    def __call__(self, message: Message, at: Seconds) -> None:
+        self.scene = view.feed(self.scene, message, at)
+        if self._due is None:
+            self._due = asyncio.get_running_loop().call_later(REDRAW, self._draw)
+
+    def _draw(self) -> None:
+        self._due = None
+        self._live.update(render(self.scene), refresh=True)
+
+    def __enter__(self) -> Self:
+        self._live.start()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if self._due is not None:
+            self._due.cancel()
+        self._live.update(render(self.scene), refresh=True)
+        self._live.stop()
+
+
+class Log:
+    """A sink that prints a line for each thing that matters."""
+
+    def __init__(self, console: Console, robot: str, began: Seconds, telling: log.Telling | None = None) -> None:
+        self.scene = view.empty(robot, began)
+        self._console = console
+        self._telling = telling or log.Telling()
+
+    def __call__(self, message: Message, at: Seconds) -> None:
+        before, self.scene = self.scene, view.feed(self.scene, message, at)
+        line = log.told(message, before, self.scene, at, self._telling)
+        if line is not None:
+            self._console.print(line, markup=False, highlight=False, soft_wrap=True)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        return None

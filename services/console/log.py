@@ -1,0 +1,84 @@
+"""The same news as plain lines, one per thing that matters: for a log file, a pipe, or a screen reader."""
+
+from msgspec import Struct
+
+from schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost
+from schemas.attention import HeadOwner
+from schemas.behaviors import Action
+from schemas.faults import Fault
+from schemas.feedback import BlockProgress, SyncPointProgress, WarningFeedback
+from schemas.messages import Message
+from schemas.recognition import ConnectionEvent
+from schemas.units import Seconds
+from services.console import wording
+from services.console.view import OWN_BLOCKS, Scene
+
+VERBS: dict[Action, str] = {
+    "look": "looks",
+    "point": "points",
+    "nod": "nods",
+    "shake": "shakes the head",
+    "speak": "speaks",
+    "act": "moves",
+}
+AT: dict[Action, str] = {"look": "at ", "point": "at ", "nod": "to ", "shake": "to ", "speak": "to ", "act": ""}
+
+
+class Telling(Struct, frozen=True, kw_only=True):
+    """What the log tells. actions: what people and the robot do; points: sync points; head: who owns the head."""
+
+    actions: bool = True
+    points: bool = True
+    head: bool = True
+
+
+def told(message: Message, before: Scene, after: Scene, at: Seconds, telling: Telling) -> str | None:
+    """The line for one message, None for most. before, after: the scene around it. at: the instant it speaks of."""
+    text = _text(message, before, after, telling)
+    return None if text is None else f"{wording.clock(at - after.began):>8}  {text}"
+
+
+def _text(message: Message, before: Scene, after: Scene, telling: Telling) -> str | None:
+    match message:
+        case ActionBegan() | ActionEnded() | ActorFound() | ActorLost():
+            return _action(message, before) if telling.actions else None
+        case SyncPointProgress(block=block) if telling.points and not block.startswith(OWN_BLOCKS):
+            planned = "" if message.predicted is None else f" (planned {wording.seconds(message.predicted)})"
+            return f"{block}:{message.behavior}:{message.sync} at {wording.seconds(message.time)}{planned}"
+        case ConnectionEvent(state=state) if state != "completed":
+            about = f" about {wording.names(message.objects)}" if message.objects else ""
+            who = f"{message.initiator} → {message.responder}"
+            kind = wording.KINDS[message.kind]
+            return f"* {kind}, {who}{about} ({message.cause}): {wording.decision(message)}"
+        case HeadOwner() if telling.head:
+            waiting = wording.names([claim.kind for claim in message.waiting])
+            return f"head: {wording.claim(message.owner)}" + (f"; waiting: {waiting}" if waiting else "")
+        case BlockProgress(progress="end", block=str() as block) if not block.startswith(OWN_BLOCKS):
+            return f"block {block}: {message.status}"
+        case WarningFeedback():
+            place = ":".join(part for part in (message.block, message.behavior) if part)
+            return f"! {message.kind} {place}: {message.message}"
+        case Fault():
+            return f"! {message.service or 'fault'}: {message}"
+    return None
+
+
+def _action(message: ActionBegan | ActionEnded | ActorFound | ActorLost, before: Scene) -> str | None:
+    actor = message.actor
+    match message:
+        case ActorFound():
+            return f"{actor} is here"
+        case ActorLost():
+            return f"{actor} has left"
+        case ActionEnded(action="speak"):
+            # An utterance is told once its last word is out; of people the words are not known.
+            said = [u.text for u in before.said if u.open and u.actor == actor and u.text]
+            return f'{actor}: "{said[-1]}"' if said else None
+        case ActionBegan(action="speak") if actor == before.robot:
+            return None
+        case ActionBegan(action="look", targets=targets):
+            return f"{actor} looks {'at ' if targets else ''}{wording.look(targets, before.robot)}"
+        case ActionBegan(action=action, targets=targets):
+            to = f" {AT[action]}{wording.look(targets, before.robot)}" if targets else ""
+            return f"{actor} {VERBS[action]}{to}"
+    return None

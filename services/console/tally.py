@@ -1,0 +1,126 @@
+"""The end of a session in numbers: events per kind with outcome and delays, MTBCE, duration."""
+
+import msgspec
+from msgspec import Struct
+from rich import box
+from rich.console import Group, RenderableType
+from rich.table import Table
+from rich.text import Text
+
+from schemas.behaviors import EventKind
+from schemas.feedback import BlockProgress
+from schemas.fragments import FragmentOutcome
+from schemas.messages import Message
+from schemas.recognition import ConnectionEvent, Statistics, WindowStatistics
+from schemas.units import Seconds
+from services.console import wording
+
+
+class Counted(Struct, frozen=True, kw_only=True):
+    """Events of one kind and one side. Optional failures are counted apart: they never count in failure rates."""
+
+    count: int = 0
+    succeeded: int = 0
+    failed: int = 0
+    failed_optional: int = 0
+    other: int = 0
+    """Preempted, withdrawn or superseded."""
+    open: int = 0
+    delays: tuple[Seconds, ...] = ()
+    """Of those that succeeded."""
+
+
+class Tally(Struct, frozen=True, kw_only=True):
+    """began, now: local instants. events: the decision (or last state) of each event, by id."""
+
+    began: Seconds
+    now: Seconds
+    events: tuple[ConnectionEvent, ...] = ()
+    session: WindowStatistics | None = None
+    fragments: int = 0
+    unfinished: int = 0
+    """Fragments that failed or were interrupted."""
+    blocks: int = 0
+
+    @property
+    def duration(self) -> Seconds:
+        return self.now - self.began
+
+
+def empty(at: Seconds) -> Tally:
+    return Tally(began=at, now=at)
+
+
+def feed(tally: Tally, message: Message, at: Seconds) -> Tally:
+    """The tally after `message`, which speaks of the local instant `at`."""
+    tally = msgspec.structs.replace(tally, now=max(tally.now, at))
+    match message:
+        case ConnectionEvent():
+            known = {event.id: event for event in tally.events}
+            if message.state == "completed" and message.id in known:
+                return tally  # its decision is what counts
+            known[message.id] = message
+            return msgspec.structs.replace(tally, events=tuple(known.values()))
+        case Statistics(actor="", session=session):
+            return msgspec.structs.replace(tally, session=session)
+        case FragmentOutcome(status=status):
+            unfinished = tally.unfinished + (status != "done")
+            return msgspec.structs.replace(tally, fragments=tally.fragments + 1, unfinished=unfinished)
+        case BlockProgress(progress="end"):
+            return msgspec.structs.replace(tally, blocks=tally.blocks + 1)
+    return tally
+
+
+def count(tally: Tally, kind: EventKind, initiator: str | None, robot: str) -> Counted:
+    """One row: events of `kind` initiated by the robot, or by people (initiator None)."""
+    counted = Counted()
+    for event in tally.events:
+        if event.kind != kind or (event.initiator == robot) != (initiator == robot):
+            continue
+        succeeded = event.state in ("succeeded", "completed")
+        failed = event.state == "failed"
+        counted = Counted(
+            count=counted.count + 1,
+            succeeded=counted.succeeded + succeeded,
+            failed=counted.failed + (failed and not event.optional),
+            failed_optional=counted.failed_optional + (failed and event.optional),
+            other=counted.other + (event.state in ("preempted", "withdrawn", "superseded")),
+            open=counted.open + (event.state == "started"),
+            delays=(*counted.delays, event.delay) if succeeded and event.delay is not None else counted.delays,
+        )
+    return counted
+
+
+def render(tally: Tally, robot: str) -> RenderableType:
+    table = Table(box=box.SIMPLE_HEAD, title="connection events", title_justify="left", title_style="bold")
+    table.add_column("initiator")
+    table.add_column("kind")
+    for name in ("count", "succeeded", "failed", "optional, failed", "given up", "delay min", "mean", "max"):
+        table.add_column(name, justify="right")
+    for side, who in ((robot, robot), (None, "people")):
+        for kind, name in WORDS:
+            row = count(tally, kind, side, robot)
+            if row.count:
+                delays = row.delays
+                table.add_row(
+                    who,
+                    name,
+                    *map(str, (row.count, row.succeeded, row.failed, row.failed_optional, row.other + row.open)),
+                    wording.seconds(min(delays)) if delays else "-",
+                    wording.seconds(sum(delays) / len(delays)) if delays else "-",
+                    wording.seconds(max(delays)) if delays else "-",
+                )
+    return Group(table, Text(_last_line(tally)))
+
+
+WORDS: tuple[tuple[EventKind, str], ...] = tuple(wording.KINDS.items())
+
+
+def _last_line(tally: Tally) -> str:
+    parts = [f"duration {wording.clock(tally.duration)}"]
+    if tally.session is not None:
+        parts.append(f"MTBCE {wording.seconds(tally.session.mtbce)}")
+        parts.append(f"without own glances {wording.seconds(tally.session.mtbce_without_maintenance)}")
+        parts.append(f"longest gap {wording.seconds(tally.session.max_gap)}")
+    parts.append(f"{tally.fragments} fragments" + (f", {tally.unfinished} not finished" if tally.unfinished else ""))
+    return "; ".join(parts)

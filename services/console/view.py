@@ -1,0 +1,256 @@
+"""What is going on, as one value: who speaks, who looks where, what is planned and realised, which events are open.
+
+`feed(scene, message, at)` gives the next scene; `services.console.render` draws one. Nothing here knows the bus.
+"""
+
+import msgspec
+from msgspec import Struct
+
+from schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost
+from schemas.attention import Claim, HeadOwner
+from schemas.behaviors import Action
+from schemas.body import WordSpoken
+from schemas.faults import Fault
+from schemas.feedback import BlockProgress, PredictionFeedback, SyncPointProgress, WarningFeedback
+from schemas.fragments import PerformFragment
+from schemas.messages import Message
+from schemas.presence import PeerAlive, PeerGone
+from schemas.recognition import ConnectionEvent, Statistics, WindowStatistics
+from schemas.units import Seconds
+
+UTTERANCES_KEPT = 8
+EVENTS_KEPT = 12
+NOTES_KEPT = 3
+ENDED_BLOCKS_KEPT = 2
+OWN_BLOCKS = ("maintenance-", "response-")
+"""How generation names the blocks of its gaze arbiter; the view shows their effect, not their points."""
+
+
+class Doing(Struct, frozen=True):
+    """One action under way. targets: entity ids; empty with `look`: away."""
+
+    action: Action
+    targets: tuple[str, ...]
+    since: Seconds
+
+
+class Actor(Struct, frozen=True, kw_only=True):
+    id: str
+    doing: tuple[Doing, ...] = ()
+    present: bool = True
+
+    @property
+    def look(self) -> Doing | None:
+        return next((doing for doing in self.doing if doing.action == "look"), None)
+
+
+class Utterance(Struct, frozen=True, kw_only=True):
+    """text: the words said so far; of people the words are not known."""
+
+    actor: str
+    began: Seconds
+    behavior: str = ""
+    text: str = ""
+    open: bool = True
+
+
+class Point(Struct, frozen=True, kw_only=True):
+    """A sync point of a block; both times count from the block's start."""
+
+    behavior: str
+    sync: str
+    planned: Seconds | None = None
+    realised: Seconds | None = None
+
+    @property
+    def slip(self) -> Seconds | None:
+        """How much later it came than planned."""
+        return None if self.planned is None or self.realised is None else self.realised - self.planned
+
+
+class BlockInView(Struct, frozen=True, kw_only=True):
+    id: str
+    began: Seconds
+    points: tuple[Point, ...] = ()
+    status: str = ""
+    """Empty while it runs."""
+
+
+class EventInView(Struct, frozen=True, kw_only=True):
+    """A connection event in its last known state."""
+
+    event: ConnectionEvent
+    began: Seconds
+
+
+class Scene(Struct, frozen=True, kw_only=True):
+    """robot: its actor id. began: the instant that the view calls zero."""
+
+    robot: str
+    began: Seconds
+    now: Seconds
+    actors: tuple[Actor, ...] = ()
+    said: tuple[Utterance, ...] = ()
+    blocks: tuple[BlockInView, ...] = ()
+    events: tuple[EventInView, ...] = ()
+    owner: Claim | None = None
+    waiting: tuple[Claim, ...] = ()
+    session: WindowStatistics | None = None
+    services: tuple[str, ...] = ()
+    fragment: str = ""
+    notes: tuple[str, ...] = ()
+
+    def actor(self, id: str) -> Actor:
+        return next((actor for actor in self.actors if actor.id == id), Actor(id=id))
+
+    @property
+    def block(self) -> BlockInView | None:
+        """The block worth showing: the newest that runs, else the last that ended."""
+        running = [block for block in self.blocks if not block.status]
+        return running[-1] if running else (self.blocks[-1] if self.blocks else None)
+
+
+def empty(robot: str, at: Seconds) -> Scene:
+    return Scene(robot=robot, began=at, now=at)
+
+
+def feed(scene: Scene, message: Message, at: Seconds) -> Scene:
+    """The scene after `message`, which speaks of the local instant `at`."""
+    scene = msgspec.structs.replace(scene, now=max(scene.now, at))
+    match message:
+        case ActionBegan() | ActionEnded() | ActorFound() | ActorLost():
+            return _act(scene, message, at)
+        case WordSpoken():
+            return _speak(scene, message, at)
+        case BlockProgress(block=str() as block) if not block.startswith(OWN_BLOCKS):
+            return _block(scene, message, at)
+        case SyncPointProgress(block=block) if not block.startswith(OWN_BLOCKS):
+            point = Point(
+                behavior=message.behavior, sync=message.sync, planned=message.predicted, realised=message.time
+            )
+            return _points(scene, block, (point,))
+        case PredictionFeedback(block=block) if not block.startswith(OWN_BLOCKS):
+            points = tuple(Point(behavior=p.behavior, sync=p.sync, planned=p.time) for p in message.points)
+            return _points(scene, block, points)
+        case ConnectionEvent():
+            return _event(scene, message, at)
+        case HeadOwner(owner=owner, waiting=waiting):
+            return msgspec.structs.replace(scene, owner=owner, waiting=waiting)
+        case Statistics(actor="", session=session):
+            return msgspec.structs.replace(scene, session=session)
+        case PerformFragment(fragment=fragment):
+            return msgspec.structs.replace(scene, fragment=f"{fragment.id} ({fragment.turn_status})")
+        case PeerAlive(participant=name):
+            return msgspec.structs.replace(scene, services=tuple(sorted({*scene.services, name})))
+        case PeerGone(participant=name):
+            return msgspec.structs.replace(scene, services=tuple(s for s in scene.services if s != name))
+        case WarningFeedback(block=block, behavior=behavior, kind=kind, message=text):
+            place = ":".join(part for part in (block, behavior) if part)
+            return _note(scene, f"{kind} {place}: {text}")
+        case Fault():
+            return _note(scene, f"{message.service or 'fault'}: {message}")
+    return scene
+
+
+def _act(scene: Scene, message: ActionBegan | ActionEnded | ActorFound | ActorLost, at: Seconds) -> Scene:
+    actor = scene.actor(message.actor)
+    match message:
+        case ActionBegan(action=action, targets=targets):
+            # Whoever looks at something new has stopped looking at the last thing.
+            others = tuple(
+                d for d in actor.doing if d.action != action or (action != "look" and d.targets != targets)
+            )
+            actor = Actor(id=actor.id, doing=(*others, Doing(action, targets, at)))
+        case ActionEnded(action=action, targets=targets):
+            kept = [d for d in actor.doing if (d.action, d.targets) != (action, targets)]
+            actor = Actor(id=actor.id, doing=tuple(kept))
+        case ActorFound():
+            actor = Actor(id=actor.id)
+        case ActorLost():
+            actor = Actor(id=actor.id, present=False)
+    known = any(other.id == actor.id for other in scene.actors)
+    actors = tuple(actor if other.id == actor.id else other for other in scene.actors)
+    scene = msgspec.structs.replace(scene, actors=actors if known else (*scene.actors, actor))
+    if isinstance(message, ActionBegan | ActionEnded) and message.action == "speak":
+        return _voice(scene, message, at)
+    return scene
+
+
+def _voice(scene: Scene, message: ActionBegan | ActionEnded, at: Seconds) -> Scene:
+    if isinstance(message, ActionEnded):
+        said = tuple(
+            msgspec.structs.replace(u, open=False) if u.open and u.actor == message.actor else u for u in scene.said
+        )
+        return msgspec.structs.replace(scene, said=said)
+    utterance = Utterance(actor=message.actor, behavior=message.behavior, began=at)
+    if any(u.open and (u.actor, u.behavior) == (message.actor, message.behavior) for u in scene.said):
+        return scene
+    return msgspec.structs.replace(scene, said=(*scene.said, utterance)[-UTTERANCES_KEPT:])
+
+
+def _speak(scene: Scene, word: WordSpoken, at: Seconds) -> Scene:
+    behavior = f"{word.block}:{word.behavior}"
+    said = list(scene.said)
+    for index in reversed(range(len(said))):
+        if said[index].behavior == behavior and said[index].open:
+            text = f"{said[index].text} {word.word}".strip()
+            said[index] = msgspec.structs.replace(said[index], text=text)
+            break
+    else:
+        said.append(Utterance(actor=scene.robot, behavior=behavior, began=at, text=word.word))
+    return msgspec.structs.replace(scene, said=tuple(said)[-UTTERANCES_KEPT:])
+
+
+def _block(scene: Scene, message: BlockProgress, at: Seconds) -> Scene:
+    assert message.block is not None
+    if message.progress == "start":
+        others = tuple(block for block in scene.blocks if block.id != message.block)
+        return msgspec.structs.replace(scene, blocks=(*others, BlockInView(id=message.block, began=at)))
+    blocks = [
+        msgspec.structs.replace(block, status=message.status) if block.id == message.block else block
+        for block in scene.blocks
+    ]
+    ended = [block for block in blocks if block.status]
+    forgotten = {block.id for block in ended[:-ENDED_BLOCKS_KEPT]}
+    return msgspec.structs.replace(scene, blocks=tuple(block for block in blocks if block.id not in forgotten))
+
+
+def _points(scene: Scene, id: str, news: tuple[Point, ...]) -> Scene:
+    """A plan never unsays what was realised, and a realised point keeps the newest plan made before it."""
+    return msgspec.structs.replace(
+        scene,
+        blocks=tuple(
+            msgspec.structs.replace(block, points=_merged(block.points, news)) if block.id == id else block
+            for block in scene.blocks
+        ),
+    )
+
+
+def _merged(known: tuple[Point, ...], news: tuple[Point, ...]) -> tuple[Point, ...]:
+    points = {(point.behavior, point.sync): point for point in known}
+    for new in news:
+        old = points.get((new.behavior, new.sync))
+        if old is not None:
+            if old.realised is not None:
+                continue
+            new = msgspec.structs.replace(new, planned=old.planned if new.planned is None else new.planned)
+        points[new.behavior, new.sync] = new
+    return tuple(points.values())
+
+
+def _event(scene: Scene, event: ConnectionEvent, at: Seconds) -> Scene:
+    known = [other for other in scene.events if other.event.id == event.id]
+    began = known[0].began if known else at
+    if event.state == "completed" and known:
+        # The shared phase is over; what the reader wants to keep seeing is the decision.
+        event = msgspec.structs.replace(event, state=known[0].event.state, delay=known[0].event.delay)
+    new = EventInView(event=event, began=began)
+    if known:
+        events = tuple(new if other.event.id == event.id else other for other in scene.events)
+    else:
+        events = (*scene.events, new)[-EVENTS_KEPT:]
+    return msgspec.structs.replace(scene, events=events)
+
+
+def _note(scene: Scene, text: str) -> Scene:
+    return msgspec.structs.replace(scene, notes=(*scene.notes, text)[-NOTES_KEPT:])

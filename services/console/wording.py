@@ -1,0 +1,59 @@
+"""How the console says things: one spelling for the live view, the log and the tally."""
+
+from collections.abc import Sequence
+
+from schemas.attention import Claim
+from schemas.behaviors import EventKind
+from schemas.recognition import ConnectionEvent
+from schemas.units import Seconds
+
+KINDS: dict[EventKind, str] = {
+    "directed_gaze": "directed gaze",
+    "mutual_facial_gaze": "mutual facial gaze",
+    "adjacency_pair": "adjacency pair",
+    "backchannel": "backchannel",
+}
+"""Event kinds as people write them, in the order of the tables."""
+
+
+def seconds(value: Seconds | None, sign: bool = False) -> str:
+    """`1.24 s`, with `+` or `-` if asked; `-` for None."""
+    if value is None:
+        return "-"
+    text = f"{value:{'+' if sign else ''}.2f}"
+    return f"{text.replace('-0.00', '0.00').replace('+0.00', '0.00')} s"
+
+
+def clock(value: Seconds) -> str:
+    """`1:23.4` since the view began."""
+    minutes, rest = divmod(max(0.0, value), 60)
+    return f"{int(minutes)}:{rest:04.1f}"
+
+
+def look(targets: Sequence[str], robot: str) -> str:
+    """What someone looks at. An actor's id as a target means its face."""
+    if not targets:
+        return "away"
+    names = ["the robot" if target == robot else target for target in targets]
+    return " and ".join(names)
+
+
+def decision(event: ConnectionEvent) -> str:
+    """`succeeded after 0.42 s`, `waiting`, `failed (optional)`..."""
+    if event.state == "started":
+        text = "waiting"
+    elif event.state in ("succeeded", "failed", "completed") and event.delay is not None:
+        text = f"{event.state} after {seconds(event.delay)}"
+    else:
+        text = event.state
+    return f"{text} (optional)" if event.optional and event.state == "failed" else text
+
+
+def claim(claim: Claim) -> str:
+    """`fragment: rectangle (turn-3)`."""
+    text = f"{claim.kind}: {claim.target}" if claim.target else claim.kind
+    return f"{text} ({claim.reason})" if claim.reason else text
+
+
+def names(ids: Sequence[str]) -> str:
+    return ", ".join(ids)
