@@ -57,7 +57,7 @@ class SyncRef(Struct, frozen=True, omit_defaults=True):
         if len(heads) > 3:
             raise _bad(text, "more than four parts")
         for head in heads:
-            if not _NAME.fullmatch(head):
+            if not is_id(head):
                 raise _bad(text, f"{head!r} is not an id" if head else "an empty part")
         if len(heads) < 2 and (number := _signed(tail)) is not None:
             return cls(block=heads[0] if heads else "", offset=_finite(text, number))
@@ -73,7 +73,7 @@ class SyncRef(Struct, frozen=True, omit_defaults=True):
         elif len(parts) == 4:
             raise _bad(text, "the fourth part is the number of a repetition")
         *block, behavior, sync = parts
-        if not _NAME.fullmatch(sync) or _SIGNED.fullmatch(sync):
+        if not is_sync_point(sync):
             raise _bad(text, f"{sync!r} is not a sync point" if sync else "no sync point")
         if behavior == BLOCK_ITSELF and sync not in ("start", "end"):
             raise _bad(text, "a block has only 'start' and 'end'")
@@ -88,6 +88,16 @@ class SyncRef(Struct, frozen=True, omit_defaults=True):
         needs_offset = self.offset != 0 or _WITH_OFFSET.fullmatch(name) is not None
         offset = f"{'-' if self.offset < 0 else '+'}{_plain(abs(self.offset))}" if needs_offset else ""
         return f"{block}{self.behavior}:{name}{offset}"
+
+
+def is_id(text: str) -> bool:
+    """May this be the id of a block or behavior?"""
+    return _NAME.fullmatch(text) is not None
+
+
+def is_sync_point(text: str) -> bool:
+    """May this be the name of a sync point or mark? A number may not: `s:2` is two seconds into block `s`."""
+    return is_id(text) and not _SIGNED.fullmatch(text)
 
 
 def _split_offset(tail: str, names: Collection[str]) -> tuple[str, float]:

@@ -1,0 +1,145 @@
+"""The sync references inside a block or turn fragment: where each stands, and rewriting them all."""
+
+from collections.abc import Callable, Iterator, Mapping
+from typing import Literal, NamedTuple, TypeVar
+
+from msgspec.structs import replace
+
+from schemas.behaviors import Behavior, Constraint, Event, Reference, Speech, Synchronize, Timing
+from schemas.blocks import Block
+from schemas.fragments import TurnFragment
+from schemas.syncref import SyncRef, canonical_sync
+
+Input = Block | TurnFragment
+AnyInput = TypeVar("AnyInput", Block, TurnFragment)
+AnyBehavior = TypeVar("AnyBehavior", bound=Behavior)
+
+
+class Site(NamedTuple):
+    """One reference. path: JSON path. name: of the behavior or constraint that holds it. line: of the XML."""
+
+    text: str
+    path: str
+    name: str
+    line: int
+
+
+def type_name(behavior: Behavior) -> str:
+    """The BML element name: `gazeShift`. The `type` of the JSON form."""
+    return str(type(behavior).__struct_config__.tag)
+
+
+def marks(thing: Input) -> dict[str, frozenset[str]]:
+    """The marks of each speech, by the speech's id."""
+    return {
+        behavior.id: frozenset(mark.id for mark in behavior.marks)
+        for behavior in thing.behaviors
+        if isinstance(behavior, Speech)
+    }
+
+
+def sites(thing: Input) -> Iterator[Site]:
+    """Every reference in document order: behaviors, then constraints."""
+    for index, behavior in enumerate(thing.behaviors):
+        path = f"$.behaviors[{index}]"
+        for number, timing in enumerate(behavior.timing):
+            yield Site(timing.ref, f"{path}.timing[{number}].ref", behavior.id, behavior.line)
+        if isinstance(behavior, Event):
+            for number, anchor in enumerate(behavior.anchors):
+                yield Site(anchor, f"{path}.anchors[{number}]", behavior.id, behavior.line)
+    for index, constraint in enumerate(thing.constraints):
+        for number, operator in enumerate(constraint.operators):
+            path = f"$.constraints[{index}].operators[{number}]"
+            name, line = constraint.id or "constraint", operator.line or constraint.line
+            if operator.ref or not isinstance(operator, Synchronize):
+                yield Site(operator.ref, f"{path}.ref", name, line)
+            for place, sync in enumerate(operator.syncs):
+                yield Site(sync, f"{path}.syncs[{place}]", name, line)
+
+
+def rewritten(thing: AnyInput, change: Callable[[str], str]) -> AnyInput:
+    """The same with `change` applied to every reference."""
+    behaviors = tuple(_with_references(behavior, change) for behavior in thing.behaviors)
+    constraints = tuple(_constraint(constraint, change) for constraint in thing.constraints)
+    return replace(thing, behaviors=behaviors, constraints=constraints)
+
+
+def _with_references(behavior: AnyBehavior, change: Callable[[str], str]) -> AnyBehavior:
+    if behavior.timing:
+        behavior = replace(behavior, timing=tuple(Timing(each.sync, change(each.ref)) for each in behavior.timing))
+    if isinstance(behavior, Event) and behavior.anchors:
+        behavior = replace(behavior, anchors=tuple(change(anchor) for anchor in behavior.anchors))
+    return behavior
+
+
+def _constraint(constraint: Constraint, change: Callable[[str], str]) -> Constraint:
+    operators = tuple(
+        replace(
+            operator,
+            ref=change(operator.ref) if operator.ref else "",
+            syncs=tuple(change(sync) for sync in operator.syncs),
+        )
+        for operator in constraint.operators
+    )
+    return replace(constraint, operators=operators)
+
+
+def disambiguated(thing: AnyInput) -> AnyInput:
+    """The same, where a reference to a mark that looks like an offset (`word-2`) is given an explicit offset."""
+    known = marks(thing)
+    if not any(known.values()):
+        return thing
+    return rewritten(thing, lambda text: _explicit(text, known))
+
+
+def _explicit(text: str, known: Mapping[str, frozenset[str]]) -> str:
+    try:
+        plain = SyncRef.parse(text)
+        told = SyncRef.parse(text, known.get(plain.behavior, ()))
+    except ValueError:
+        return text  # schemas.check says what is wrong, and where
+    return text if told == plain else str(told)
+
+
+def in_draft_spelling(thing: AnyInput, dialect: Literal["draft", "bml-1.0"]) -> AnyInput:
+    """The same with every sync point spelled as the drafts do (`schemas.syncref.canonical_sync`)."""
+    types = {behavior.id: type_name(behavior) for behavior in thing.behaviors}
+
+    def change(text: str) -> str:
+        try:
+            reference = SyncRef.parse(text)
+        except ValueError:
+            return text
+        sync = canonical_sync(reference.sync, types.get(reference.behavior, ""), dialect)
+        return text if sync == reference.sync else str(replace(reference, sync=sync))
+
+    def canonical(behavior: AnyBehavior) -> AnyBehavior:
+        timing = tuple(
+            Timing(canonical_sync(each.sync, type_name(behavior), dialect), each.ref) for each in behavior.timing
+        )
+        return replace(behavior, timing=timing)
+
+    return rewritten(replace(thing, behaviors=tuple(canonical(each) for each in thing.behaviors)), change)
+
+
+def without_lines(thing: AnyInput) -> AnyInput:
+    """The same as if it had not come from XML: every `line` 0."""
+    return replace(
+        thing,
+        behaviors=tuple(_behavior_without_lines(behavior) for behavior in thing.behaviors),
+        constraints=tuple(
+            Constraint(
+                id=each.id,
+                required=each.required,
+                operators=tuple(replace(operator, line=0) for operator in each.operators),
+            )
+            for each in thing.constraints
+        ),
+    )
+
+
+def _behavior_without_lines(behavior: AnyBehavior) -> AnyBehavior:
+    behavior = replace(behavior, line=0)
+    if isinstance(behavior, Reference):
+        return replace(behavior, options=tuple(replace(option, line=0) for option in behavior.options))
+    return behavior
