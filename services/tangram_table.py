@@ -1,0 +1,180 @@
+"""The tangram on the table: its pieces, where they lie, the figure they make, and the geometry of their edges.
+
+Simulation and the collaboration manager both read `tangram_table.toml` through this file, so that there is one table.
+Directions are named as the human sees them, who sits opposite the robot: their right is the robot's left (+y), and
+their top, the far side of the table, is toward the robot (-x).
+"""
+
+import math
+from collections.abc import Iterable
+from functools import cache
+from pathlib import Path
+from typing import Literal, NamedTuple
+
+import msgspec
+from msgspec import Struct
+
+from schemas.units import Degrees, Meters, Radians, Vector
+from schemas.world import Entity
+
+Side = Literal["right", "top right", "top", "top left", "left", "bottom left", "bottom", "bottom right"]
+SIDES: tuple[Side, ...] = ("right", "top right", "top", "top left", "left", "bottom left", "bottom", "bottom right")
+"""Counterclockwise as the human sees the table, 45 degrees apart."""
+Point = tuple[float, float]
+"""Metres on the table: x ahead of the robot, y to its left."""
+
+LENGTH_TOLERANCE: Meters = 0.005
+GAP_TOLERANCE: Meters = 0.012
+ANGLE_TOLERANCE: Radians = math.radians(12.0)
+
+
+class Pose(Struct, frozen=True, array_like=True):
+    """Where a piece lies. Degrees because people write this in a file."""
+
+    x: Meters
+    y: Meters
+    yaw: Degrees = 0.0
+
+
+class Piece(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """start: on the table when the human comes. goal: in the finished figure. footprint: counterclockwise."""
+
+    id: str
+    color: str
+    shape: str
+    footprint: tuple[Point, ...]
+    start: Pose
+    goal: Pose
+
+
+class Person(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    id: str
+    face: Vector
+    left_hand: Vector
+    right_hand: Vector
+
+
+class Surface(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    id: str
+    center: Vector
+    footprint: tuple[Point, ...]
+
+
+class TangramTable(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """base: the piece that is never moved; the figure grows around it."""
+
+    base: str
+    surface: Surface
+    person: Person
+    pieces: tuple[Piece, ...]
+
+    def piece(self, id: str) -> Piece:
+        """Raises KeyError for an id that is not a piece."""
+        for piece in self.pieces:
+            if piece.id == id:
+                return piece
+        raise KeyError(id)
+
+    def lying(self, piece: Piece, pose: Pose) -> Entity:
+        """The piece as perception reports it when it lies at `pose`."""
+        return Entity(
+            id=piece.id,
+            kind="object",
+            position=(pose.x, pose.y, self.surface.center[2]),
+            yaw=math.radians(pose.yaw),
+            footprint=piece.footprint,
+            radius=max(math.hypot(x, y) for x, y in piece.footprint),
+            color=piece.color,
+            shape=piece.shape,
+            name=f"{piece.color} {piece.shape}",
+        )
+
+    def figure(self) -> tuple[Entity, ...]:
+        """Every piece at its place in the finished figure."""
+        return tuple(self.lying(piece, piece.goal) for piece in self.pieces)
+
+
+@cache
+def tangram_table() -> TangramTable:
+    """The table of the study, from the file beside this one."""
+    source = Path(__file__).with_suffix(".toml").read_bytes()
+    return msgspec.toml.decode(source, type=TangramTable)
+
+
+class Edge(NamedTuple):
+    """One side of a piece on the table, its outside to the right of start -> end."""
+
+    start: Point
+    end: Point
+
+    @property
+    def length(self) -> Meters:
+        return math.dist(self.start, self.end)
+
+    @property
+    def middle(self) -> Point:
+        return ((self.start[0] + self.end[0]) / 2, (self.start[1] + self.end[1]) / 2)
+
+    @property
+    def facing(self) -> Radians:
+        """Direction of the outward normal, about z, from the robot's x axis."""
+        return math.atan2(self.start[0] - self.end[0], self.end[1] - self.start[1])
+
+    @property
+    def side(self) -> Side:
+        """Which way the edge faces, as the human sees it."""
+        seen = math.atan2(-math.cos(self.facing), math.sin(self.facing))
+        return SIDES[round(math.degrees(seen) / 45.0) % 8]
+
+
+def corners(piece: Entity) -> tuple[Point, ...]:
+    """The corners of the footprint where the piece lies."""
+    x, y, _ = piece.position
+    cos, sin = math.cos(piece.yaw), math.sin(piece.yaw)
+    return tuple((x + cos * fx - sin * fy, y + sin * fx + cos * fy) for fx, fy in piece.footprint)
+
+
+def edges(piece: Entity) -> tuple[Edge, ...]:
+    points = corners(piece)
+    return tuple(Edge(point, points[(index + 1) % len(points)]) for index, point in enumerate(points))
+
+
+def touches(edge: Edge, other: Edge) -> bool:
+    """Parallel, of equal length, and edge exactly on edge, within the tolerances. The rule of thesis Appendix A."""
+    turned = math.remainder(edge.facing - other.facing - math.pi, math.tau)
+    return (
+        abs(edge.length - other.length) <= LENGTH_TOLERANCE
+        and abs(turned) <= ANGLE_TOLERANCE
+        and math.dist(edge.middle, other.middle) <= GAP_TOLERANCE
+    )
+
+
+def poses_touching(piece: Entity, landmark: Entity, side: Side) -> Iterable[Pose]:
+    """Every pose in which an edge of `piece` lies on an equal edge of `landmark` that faces `side`."""
+    for place in edges(landmark):
+        if place.side != side:
+            continue
+        for edge in edges(piece):
+            if abs(edge.length - place.length) > LENGTH_TOLERANCE:
+                continue
+            turn = place.facing + math.pi - edge.facing
+            cos, sin = math.cos(turn), math.sin(turn)
+            dx, dy = edge.middle[0] - piece.position[0], edge.middle[1] - piece.position[1]
+            yaw = math.degrees(math.remainder(piece.yaw + turn, math.tau))
+            yield Pose(place.middle[0] - (cos * dx - sin * dy), place.middle[1] - (sin * dx + cos * dy), yaw)
+
+
+def overlap(piece: Entity, other: Entity, margin: Meters = 0.004) -> bool:
+    """Do two pieces (convex) lie on one another by more than `margin`?"""
+    for edge in (*edges(piece), *edges(other)):
+        normal = (math.cos(edge.facing), math.sin(edge.facing))
+        low, high = _extent(piece, normal)
+        other_low, other_high = _extent(other, normal)
+        if high - other_low <= margin or other_high - low <= margin:
+            return False
+    return True
+
+
+def _extent(piece: Entity, axis: Point) -> tuple[float, float]:
+    along = [x * axis[0] + y * axis[1] for x, y in corners(piece)]
+    return min(along), max(along)
