@@ -5,6 +5,7 @@ lxml reports the line on which a start tag ends; people look for the line on whi
 
 import re
 from collections.abc import Iterator
+from typing import cast
 
 from lxml import etree
 
@@ -22,7 +23,7 @@ DEEPEST = 64
 """Levels of nesting."""
 
 _UNDECLARED_PREFIX = "NS_ERR_UNDEFINED_NAMESPACE"
-_DOCTYPE = re.compile(r"\A\ufeff?(?:\s+|<\?.*?\?>|<!--.*?-->)*<!DOCTYPE", re.DOTALL)
+_DOCTYPE = re.compile(r"\A\ufeff?(?>\s+|<\?.*?\?>|<!--.*?-->)*+<!DOCTYPE", re.DOTALL)
 _TAGS = re.compile(r"<!--.*?-->|<!\[CDATA\[.*?\]\]>|<\?.*?\?>|<([^\s/>!?][^\s/>]*)", re.DOTALL)
 
 
@@ -45,7 +46,7 @@ class Source:
 
     def line(self, element: etree._Element) -> int:
         """Where the element begins, from 1."""
-        return self._lines.get(element, element.sourceline or 0)
+        return self._lines.get(element, 0) or _last_line(element)
 
     def refusal(
         self, reason: str, element: etree._Element | None = None, *, line: int = 0, advice: str = ""
@@ -55,7 +56,7 @@ class Source:
         return InputRefused(Fault(reason=reason, where=self.name, line=line, advice=advice))
 
     def _elements(self) -> Iterator[etree._Element]:
-        return self.root.iter(etree.Element)  # type: ignore[arg-type]
+        return self.root.iter(etree.Element)
 
     def _parse(self, data: bytes | str) -> etree._Element:
         raw, encoding = (data, None) if isinstance(data, bytes) else (data.encode(), "utf-8")
@@ -64,7 +65,7 @@ class Source:
             root = etree.fromstring(raw, parser)
         except etree.XMLSyntaxError as error:
             root = self._without_undeclared(raw, encoding, parser, error)
-        if root.getroottree().docinfo.doctype:
+        if root.getroottree().docinfo.doctype:  # type: ignore[union-attr]
             raise self.refusal("a document type (<!DOCTYPE>) is not read", advice="remove it: no entities, no DTD")
         return root
 
@@ -75,16 +76,16 @@ class Source:
         bad = [entry for entry in parser.error_log if entry.level_name != "WARNING"]
         for entry in bad or [None]:
             if entry is None or entry.type_name != _UNDECLARED_PREFIX:
-                line = entry.line if entry else error.lineno or 0
-                reason = entry.message if entry else str(error)
+                line = int(entry.line if entry else error.lineno or 0)
+                reason = entry.message.strip() if entry else str(error)
                 raise self.refusal(
                     f"malformed XML: {reason}", line=line, advice="close and quote everything"
                 ) from error
         root = etree.fromstring(raw, _parser(encoding, recover=True))
-        for element in root.iter(etree.Element):  # type: ignore[arg-type]
-            if ":" in etree.QName(element.tag).localname:
+        for element in root.iter(etree.Element):
+            if ":" in split(str(element.tag))[1]:
                 advice = 'declare the prefix, for example xmlns:ebml="edu.wpi.ebml"'
-                line = element.sourceline or 0
+                line = _last_line(element)
                 raise self.refusal(
                     f"malformed XML: prefix of <{element.tag}> is not declared", line=line, advice=advice
                 )
@@ -110,6 +111,10 @@ def _parser(encoding: str | None, *, recover: bool) -> etree.XMLParser:
         remove_comments=True,
         remove_pis=True,
     )
+
+
+def _last_line(element: etree._Element) -> int:
+    return cast(int, element.sourceline or 0)
 
 
 def _decoded(data: bytes) -> str:

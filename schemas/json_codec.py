@@ -1,0 +1,120 @@
+"""Blocks and fragments from JSON, and back; and `read`, which takes either form. Errors carry the JSON path.
+
+The form is that of the structs, as in the exported schemas. Unknown keys are refused: a misspelled `turn_status`
+must not silently become a full turn.
+"""
+
+from typing import Any, TypeVar
+
+import msgspec
+from msgspec import Struct
+
+from schemas.blocks import Block
+from schemas.check import check
+from schemas.faults import Fault, InputRefused
+from schemas.fragments import TurnFragment
+from schemas.references import disambiguated
+from schemas.xml_codec import decode_xml
+from schemas.xml_source import LARGEST
+
+T = TypeVar("T", Block, TurnFragment)
+
+_FRAGMENT_ONLY = frozenset(TurnFragment.__struct_fields__) - frozenset(Block.__struct_fields__)
+_UTF_16 = (b"\xff\xfe", b"\xfe\xff")
+
+
+def encode_json(thing: Block | TurnFragment) -> bytes:
+    return msgspec.json.format(msgspec.json.encode(thing), indent=2)
+
+
+def decode_json(data: bytes | str, source: str = "") -> Block | TurnFragment:
+    """One block or fragment. Raises InputRefused with source, JSON path, reason and advice.
+
+    Without `type` it is a fragment if it has a field that only fragments have, or holds a reference.
+    """
+    return _thing(_parsed(data, source), source, "$")
+
+
+def read(data: bytes, source: str = "") -> tuple[Block | TurnFragment, ...]:
+    """Everything in a file: one XML document, one JSON object, or a JSON array of several. Raises InputRefused."""
+    start = data[:64].removeprefix(b"\xef\xbb\xbf").lstrip()
+    if start.startswith((b"<", *_UTF_16)):
+        return (decode_xml(data, source),)
+    if not start.startswith((b"{", b"[")):
+        advice = "BML or EBML (XML), or the same as JSON"
+        raise InputRefused(Fault(reason="neither XML nor JSON" if start else "empty", where=source, advice=advice))
+    parsed = _parsed(data, source)
+    if not isinstance(parsed, list):
+        return (_thing(parsed, source, "$"),)
+    return tuple(_thing(item, source, f"$[{index}]") for index, item in enumerate(parsed))
+
+
+def _parsed(data: bytes | str, source: str) -> Any:
+    if len(data) > LARGEST:
+        reason = f"{len(data)} bytes; at most {LARGEST} are read"
+        raise InputRefused(Fault(reason=reason, where=source, advice="split it into several blocks"))
+    raw = data.encode() if isinstance(data, str) else data
+    raw = raw.removeprefix(b"\xef\xbb\xbf")
+    try:
+        return msgspec.json.decode(raw)
+    except RecursionError as error:
+        raise InputRefused(Fault(reason="nested too deep", where=source)) from error
+    except (msgspec.DecodeError, UnicodeDecodeError) as error:
+        line = _line(raw, str(error))
+        raise InputRefused(Fault(reason=str(error), where=source, line=line, advice="a JSON object")) from error
+
+
+def _line(raw: bytes, message: str) -> int:
+    """The line of `... (byte 17)`; that of the end where the document just stops."""
+    _, _, byte = message.rpartition("(byte ")
+    return raw.count(b"\n", 0, int(byte.rstrip(")"))) + 1 if byte.rstrip(")").isdigit() else raw.count(b"\n") + 1
+
+
+def _thing(parsed: Any, source: str, path: str) -> Block | TurnFragment:
+    if not isinstance(parsed, dict):
+        raise _refusal(f"expected an object, found {type(parsed).__name__}", path, source)
+    kind = parsed.get("type") or ("fragment" if _looks_like_fragment(parsed) else "block")
+    if kind == "fragment":
+        return _converted(parsed, TurnFragment, source, path)
+    if kind == "block":
+        return _converted(parsed, Block, source, path)
+    raise _refusal(f"unknown type {kind!r}", f"{path}.type", source, 'use "fragment" or "block"')
+
+
+def _looks_like_fragment(parsed: dict[str, Any]) -> bool:
+    behaviors = parsed.get("behaviors")
+    refers = isinstance(behaviors, list) and any(
+        isinstance(each, dict) and each.get("type") == "reference" for each in behaviors
+    )
+    return refers or not _FRAGMENT_ONLY.isdisjoint(parsed)
+
+
+def _converted(parsed: dict[str, Any], kind: type[T], source: str, path: str) -> T:
+    try:
+        thing = msgspec.convert({**parsed, "type": kind.__struct_config__.tag}, kind)
+    except msgspec.ValidationError as error:
+        reason, _, where = str(error).partition(" - at `$")
+        raise _refusal(reason, f"{path}{where.rstrip('`')}", source, "see docs/protocol.md") from error
+    except RecursionError as error:
+        raise _refusal("nested too deep", path, source) from error
+    _refuse_unknown_keys(parsed, thing, path, source)
+    thing = disambiguated(thing)
+    check(thing, source, prefix=path, paths=True)
+    return thing
+
+
+def _refuse_unknown_keys(parsed: Any, decoded: Any, path: str, source: str) -> None:
+    if isinstance(decoded, Struct) and isinstance(parsed, dict):
+        fields = dict(zip(decoded.__struct_encode_fields__, decoded.__struct_fields__, strict=True))
+        for key, value in parsed.items():
+            if key in fields:
+                _refuse_unknown_keys(value, getattr(decoded, fields[key]), f"{path}.{key}", source)
+            elif key != decoded.__struct_config__.tag_field:
+                raise _refusal(f"unknown key {key!r}", f"{path}.{key}", source, f"known: {', '.join(fields)}")
+    elif isinstance(decoded, tuple) and isinstance(parsed, list):
+        for index, (value, item) in enumerate(zip(parsed, decoded, strict=True)):
+            _refuse_unknown_keys(value, item, f"{path}[{index}]", source)
+
+
+def _refusal(reason: str, path: str, source: str, advice: str = "") -> InputRefused:
+    return InputRefused(Fault(reason=reason, where=f"{source}: {path}" if source else path, advice=advice))
