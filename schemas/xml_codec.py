@@ -138,7 +138,9 @@ class _Document:
 
     def _behavior(self, element: etree._Element, local: str, kind: type[of.Behavior], required: bool) -> of.Behavior:
         plain = _attributes(element)
-        raw = self._own_fields(element, kind) if local in EXTENSIONS else dict(_fields(plain))
+        raw: dict[str, Any] = _fields(plain)
+        if local in EXTENSIONS:
+            raw = self._own_fields(element, kind)
         raw["id"] = self._id(element)
         raw["line"] = self._source.line(element)
         if required:
@@ -296,12 +298,13 @@ def _attributes(element: etree._Element) -> dict[str, str]:
     found = {}
     for name, value in element.items():
         namespace, local = split(str(name))
-        if namespace in CORE or namespace == EBML:
+        undeclared = ":" in local
+        if (namespace in CORE or namespace == EBML) and not undeclared:
             found[local] = str(value)
     return found
 
 
-def _fields(plain: dict[str, str]) -> dict[str, str]:
+def _fields(plain: dict[str, str]) -> dict[str, Any]:
     """offsetAngle, offset-angle -> offset_angle. `line` is ours to say."""
     snake = {re.sub("(?<=[a-z])([A-Z])", r"_\1", name).replace("-", "_").lower(): plain[name] for name in plain}
     return {name: value for name, value in snake.items() if name not in ("line", "timing", "marks")}

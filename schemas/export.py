@@ -1,0 +1,84 @@
+"""JSON Schemas of everything that travels, for other languages: `python -m schemas.export [--check]`.
+
+One file per message of the bus, and one each for a block and a turn fragment. Draft 2020-12; quantities carry
+their unit as `description`.
+"""
+
+import argparse
+import inspect
+import sys
+from pathlib import Path
+from typing import Any, get_args
+
+import msgspec
+
+from schemas.blocks import Block
+from schemas.fragments import TurnFragment
+from schemas.messages import MAJOR, Message
+
+EXPORTED = Path(__file__).parent / "exported"
+
+
+def exported_types() -> tuple[type[msgspec.Struct], ...]:
+    return (Block, TurnFragment, *get_args(Message))
+
+
+def schema(kind: type[msgspec.Struct]) -> dict[str, Any]:
+    """The JSON Schema of one struct, complete in itself."""
+    reference, components = msgspec.json.schema_components((kind,), ref_template="#/$defs/{name}")
+    for component in components.values():
+        if "description" in component:
+            component["description"] = inspect.cleandoc(component["description"])
+    return {
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        "$id": f"urn:engage:{MAJOR}:{kind.__name__}",
+        **reference[0],
+        "$defs": {name: components[name] for name in sorted(components)},
+    }
+
+
+def files() -> dict[str, bytes]:
+    """What the folder should hold: name to content."""
+    return {
+        f"{kind.__name__}.json": msgspec.json.format(msgspec.json.encode(schema(kind)), indent=2) + b"\n"
+        for kind in exported_types()
+    }
+
+
+def stale(folder: Path = EXPORTED) -> list[str]:
+    """Names of files that are missing, differ from the code, or belong to nothing any more."""
+    expected = files()
+    present = {path.name: path.read_bytes() for path in folder.glob("*.json")}
+    return sorted(name for name in expected.keys() | present.keys() if expected.get(name) != present.get(name))
+
+
+def write(folder: Path = EXPORTED) -> list[str]:
+    """Make the folder hold exactly `files()`. Returns the names that changed."""
+    changed = stale(folder)
+    expected = files()
+    folder.mkdir(exist_ok=True)
+    for name in changed:
+        if name in expected:
+            (folder / name).write_bytes(expected[name])
+        else:
+            (folder / name).unlink()
+    return changed
+
+
+def main(arguments: list[str] | None = None) -> int:
+    parser = argparse.ArgumentParser(
+        prog="python -m schemas.export", description=inspect.getdoc(sys.modules[__name__])
+    )
+    parser.add_argument("--check", action="store_true", help="write nothing; fail if a file is stale")
+    if parser.parse_args(arguments).check:
+        names = stale()
+        if names:
+            print(f"stale: {', '.join(names)}; run python -m schemas.export", file=sys.stderr)
+        return 1 if names else 0
+    for name in write():
+        print(name)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
