@@ -1,0 +1,326 @@
+"""The public client: what a collaboration manager needs of an engaged robot, from any process.
+
+    async with connect(connect=["tcp/robot:7447"]) as robot:
+        outcome = await robot.perform(Path("greeting.xml"))
+        async for event in robot.connection_events():
+            ...
+
+It may start before the services it talks to: requests wait for them, at most `timeout` seconds where one is given.
+Refused input raises InputRefused, failure at run time RunFailed, each with the `fault` that says where and why.
+"""
+
+import asyncio
+import uuid
+from collections.abc import AsyncIterator, Awaitable, Callable, Iterable, Sequence
+from contextlib import asynccontextmanager
+from itertools import count
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Generic, Literal, Self, TypeVar
+
+from msgspec import Struct
+
+from schemas import keys
+from schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost
+from schemas.attention import HeadOwner, Inhibit
+from schemas.behaviors import BlockBehavior, Constraint
+from schemas.blocks import Block, BlockOutcome, Composition, PerformBlock
+from schemas.faults import Fault, InputRefused, NoReply, RunFailed
+from schemas.feedback import Feedback
+from schemas.fragments import FragmentOutcome, PerformFragment, TurnFragment
+from schemas.json_codec import read
+from schemas.recognition import ConnectionEvent, Statistics
+from schemas.requests import Outcome, Request
+from schemas.units import Seconds, Stamp
+from schemas.world import World
+from services.bus import Bus, Hub, Keep, Subscription
+from services.requests import Pending, Requester, RequestRefused
+
+M = TypeVar("M")
+FragmentSource = TurnFragment | str | bytes | Path
+"""A fragment, or EBML or JSON that describes one, or the file it stands in."""
+
+RENEWALS_PER_LEASE = 3
+"""An inhibition is renewed this many times within its time to live, so that two renewals may be lost."""
+
+
+class PerformFailed(RunFailed):
+    """A fragment or block failed while it ran. `outcome` tells what was done of it."""
+
+    def __init__(self, fault: Fault, outcome: FragmentOutcome | BlockOutcome) -> None:
+        super().__init__(fault)
+        self.outcome = outcome
+
+
+class Feed(Generic[M]):
+    """Messages of one kind, from when it was made: `async for`, or `next` with a timeout. Ends with the client."""
+
+    def __init__(self, subscription: Subscription, kinds: tuple[type, ...], now: Callable[[], Seconds]) -> None:
+        self._subscription = subscription
+        self._kinds = kinds
+        self._now = now
+
+    async def next(self, timeout: Seconds | None = None) -> M | None:
+        """The next message; None after `timeout` seconds without one, or at the end."""
+        deadline = None if timeout is None else self._now() + timeout
+        while (received := await self._subscription.next(deadline)) is not None:
+            if isinstance(received.message, self._kinds):
+                return received.message  # type: ignore[return-value]
+        return None
+
+    def __aiter__(self) -> Self:
+        return self
+
+    async def __anext__(self) -> M:
+        message = await self.next()
+        if message is None:
+            raise StopAsyncIteration
+        return message
+
+    def close(self) -> None:
+        self._subscription.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+
+class Robot:
+    """An engaged robot, as its collaboration manager sees it. Made by `connect` or, in a service, `Robot.on(bus)`."""
+
+    def __init__(self, bus: Bus, requests: Requester) -> None:
+        self._bus = bus
+        self._requests = requests
+        self._numbers = count(1)
+
+    @classmethod
+    @asynccontextmanager
+    async def on(cls, bus: Bus) -> AsyncIterator["Robot"]:
+        """The client of a participant that has its own bus already."""
+        async with Requester(bus) as requests:
+            yield cls(bus, requests)
+
+    @property
+    def id(self) -> str:
+        """The robot's actor id, which is its namespace."""
+        return self._bus.robot
+
+    def now(self) -> Seconds:
+        return self._bus.now()
+
+    def local(self, stamp: Stamp) -> Seconds:
+        """A message's stamp on this process' clock, comparable with `now`."""
+        return self._bus.local(stamp)
+
+    # -- requests -----------------------------------------------------------------------------------------------
+
+    async def perform(self, fragment: FragmentSource, *, timeout: Seconds | None = None) -> FragmentOutcome:
+        """Perform a turn fragment; returns when it is done or was interrupted.
+
+        timeout: how long to wait for it to be accepted, for example until generation is there.
+        Raises InputRefused (nothing has moved), PerformFailed, or RunFailed (generation is gone, or never came).
+        """
+        parsed = _fragment(fragment)
+        request = PerformFragment(id=self._request_id(parsed.id), requester=self._bus.name, fragment=parsed)
+        outcome = await self._ask(keys.FRAGMENT, request, timeout)
+        assert isinstance(outcome, FragmentOutcome)
+        return _unless_failed(outcome, parsed.id)
+
+    async def realize(
+        self,
+        block: Block | str,
+        behaviors: Iterable[BlockBehavior] = (),
+        constraints: Iterable[Constraint] = (),
+        *,
+        composition: Composition = "MERGE",
+        timeout: Seconds | None = None,
+    ) -> BlockOutcome:
+        """Realize a BML block, past the policies: `realize(block)`, or `realize("greet", [Gaze(...), ...])`.
+
+        Raises as `perform` does.
+        """
+        if isinstance(block, str):
+            block = Block(
+                id=block, behaviors=tuple(behaviors), constraints=tuple(constraints), composition=composition
+            )
+        request = PerformBlock(id=self._request_id(block.id), requester=self._bus.name, block=block)
+        outcome = await self._ask(keys.BLOCK, request, timeout)
+        assert isinstance(outcome, BlockOutcome)
+        return _unless_failed(outcome, block.id)
+
+    @asynccontextmanager
+    async def inhibit_gaze(
+        self,
+        mode: Literal["release", "hold", "target"] = "hold",
+        *,
+        target: str = "",
+        part: Literal["gaze", "point-left", "point-right"] = "gaze",
+        ttl: Seconds = 5.0,
+        timeout: Seconds | None = None,
+    ) -> AsyncIterator[None]:
+        """Hold a lease on the gaze (or an arm) while the body of `async with` runs, renewing it as long as we live.
+
+        Raises InputRefused, for example when `target` is unknown. If the lease is lost the body runs on.
+        """
+        request = Inhibit(
+            id=self._request_id("inhibit"), requester=self._bus.name, part=part, mode=mode, target=target, ttl=ttl
+        )
+        pending = self._requests.send(keys.INHIBIT, request)
+        await self._answer_of(pending, pending.accepted, timeout)
+        renewal = asyncio.create_task(self._renew(request, pending), name=f"renew {request.id}")
+        try:
+            yield
+        finally:
+            renewal.cancel()
+            await asyncio.gather(renewal, return_exceptions=True)
+            if not pending.outcome.done():
+                self._requests.cancel(request.id, "released")
+                await self._answer_of(pending, asyncio.shield(pending.outcome), ttl)
+
+    async def _renew(self, request: Inhibit, pending: Pending) -> None:
+        while not pending.outcome.done():
+            await asyncio.sleep(request.ttl / RENEWALS_PER_LEASE)
+            self._bus.publish(keys.INHIBIT, request)
+
+    async def _ask(self, key: str, request: Request, timeout: Seconds | None) -> Outcome:
+        pending = self._requests.send(key, request)
+        try:
+            if timeout is not None:
+                await self._answer_of(pending, pending.accepted, timeout)
+            outcome: Outcome = await self._answer_of(pending, pending.outcome, None)
+            return outcome
+        except (asyncio.CancelledError, RunFailed):
+            self._requests.cancel(request.id, "requester gave up")
+            raise
+
+    async def _answer_of(self, pending: Pending, answer: Awaitable[Any], timeout: Seconds | None) -> Any:
+        server = keys.server_of(pending.key)
+        try:
+            return await asyncio.wait_for(answer, timeout)
+        except TimeoutError as error:
+            advice = f"is {server} running?"
+            raise RunFailed(
+                Fault(reason=f"no answer within {timeout} s", where=pending.request.id, advice=advice, service=server)
+            ) from error
+        except RequestRefused as error:
+            raise InputRefused(error.fault) from error
+
+    def _request_id(self, subject: str) -> str:
+        return f"{self._bus.name}/{subject}#{next(self._numbers)}"
+
+    # -- what happens -------------------------------------------------------------------------------------------
+
+    def connection_events(self) -> Feed[ConnectionEvent]:
+        """Every change in the life of every connection event, from now on."""
+        return self._feed((ConnectionEvent,), keys.CONNECTION_EVENT)
+
+    def feedback(self) -> Feed[Feedback]:
+        """What the realizer tells of blocks: progress, sync points as realised, warnings."""
+        return self._feed(Feedback.__args__, keys.FEEDBACK)
+
+    def actions(self) -> Feed[ActionBegan | ActionEnded | ActorFound | ActorLost]:
+        """What the robot and the people are seen to do."""
+        return self._feed((ActionBegan, ActionEnded, ActorFound, ActorLost), keys.ANY_ACTION)
+
+    def faults(self) -> Feed[Fault]:
+        return self._feed((Fault,), keys.ANY_FAULT)
+
+    def worlds(self) -> Feed[World]:
+        """The world now, if anything is perceived, and then whenever it has changed; only the newest is kept."""
+        return self._feed((World,), keys.WORLD, keep=Keep.LATEST)
+
+    def head_owners(self) -> Feed[HeadOwner]:
+        """Who owns the robot's head, and why: now, and at every change."""
+        return self._feed((HeadOwner,), keys.HEAD_OWNER)
+
+    async def world(self, timeout: Seconds | None = None) -> World:
+        """What is perceived now; waits for perception. Raises NoReply after `timeout` seconds without it."""
+        with self.worlds() as worlds:
+            return _there(await worlds.next(timeout), "world", timeout)
+
+    async def statistics(self, actor: str = "all", timeout: Seconds | None = None) -> Statistics:
+        """The statistics of a person, or of `all`; waits for recognition. Raises NoReply after `timeout` seconds."""
+        feed: Feed[Statistics]
+        with self._feed((Statistics,), keys.statistics(actor), keep=Keep.LATEST) as feed:
+            return _there(await feed.next(timeout), f"statistics of {actor}", timeout)
+
+    def _feed(self, kinds: tuple[type, ...], *patterns: str, keep: Keep = Keep.EVERY) -> Feed[Any]:
+        return Feed(self._bus.subscribe(*patterns, keep=keep), kinds, self._bus.now)
+
+
+@asynccontextmanager
+async def connect(
+    robot: str = "robot",
+    *,
+    connect: Sequence[str] = (),
+    listen: Sequence[str] = (),
+    hub: Hub | None = None,
+    name: str = "",
+) -> AsyncIterator[Robot]:
+    """Join a robot's bus as a collaboration manager.
+
+    connect, listen: Zenoh endpoints. hub: use this one instead; it stays open.
+    name: the participant's, unique on the robot's bus; made up when empty.
+    """
+    if hub is not None:
+        async with _joined(hub, name) as client:
+            yield client
+        return
+    from services.zenoh_bus import open_hub  # only here: a client on an existing hub needs no Zenoh
+
+    async with await open_hub(robot, connect=connect, listen=listen) as opened, _joined(opened, name) as client:
+        yield client
+
+
+@asynccontextmanager
+async def _joined(hub: Hub, name: str) -> AsyncIterator[Robot]:
+    bus = hub.join(name or f"client-{uuid.uuid4().hex[:8]}")
+    try:
+        async with Robot.on(bus) as client:
+            bus.declare_alive()
+            yield client
+    finally:
+        await bus.leave()
+
+
+def _fragment(source: FragmentSource) -> TurnFragment:
+    """Raises InputRefused with file, line or JSON path."""
+    match source:
+        case TurnFragment():
+            return source
+        case Path():
+            try:
+                data, place = source.read_bytes(), str(source)
+            except OSError as error:
+                raise InputRefused(Fault(reason=error.strerror or str(error), where=str(source))) from error
+        case str():
+            data, place = source.encode(), ""
+    things = read(data, place)
+    match things:
+        case (TurnFragment() as fragment,):
+            return fragment
+        case (Block(),):
+            raise InputRefused(Fault(reason="a BML block, not a turn fragment", where=place, advice="use `realize`"))
+    raise InputRefused(Fault(reason=f"{len(things)} things, not one turn fragment", where=place))
+
+
+O = TypeVar("O", FragmentOutcome, BlockOutcome)  # noqa: E741
+
+
+def _unless_failed(outcome: O, subject: str) -> O:
+    if outcome.status == "failed":
+        raise PerformFailed(outcome.fault or Fault(reason="it failed", where=subject), outcome)
+    return outcome
+
+
+S = TypeVar("S", bound=Struct)
+
+
+def _there(message: S | None, what: str, timeout: Seconds | None) -> S:
+    if message is None:
+        raise NoReply(Fault(reason=f"no {what} within {timeout} s", advice="is its service running?"))
+    return message

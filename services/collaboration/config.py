@@ -1,0 +1,41 @@
+"""How the collaboration manager plays the tangram."""
+
+from typing import Literal
+
+from msgspec import Struct
+
+from schemas.units import Probability, Seconds
+
+
+class CollaborationConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """mode: `scripted` plays Appendix B; `task` chooses pieces and words itself from the goal figure."""
+
+    mode: Literal["scripted", "task"] = "scripted"
+    placement: Seconds = 15.0
+    """How long the person has to place a piece before the robot asks again."""
+    attempts: int = 3
+    """How often the robot asks for one placement before it goes on without."""
+    settle: Seconds = 1.6
+    """After a placement, before the robot speaks: the person looks up, and their gaze is returned (limit 1.9 s)."""
+    pause: Seconds = 0.4
+    """Between two turns of the robot."""
+    thinking: Seconds = 1.0
+    """Between "Ummmm," and "good."."""
+    arrival: Seconds = 4.0
+    """From when a person is seen until the robot greets them."""
+    farewell: Seconds = 15.0
+    """How long the robot waits for the person to leave after its goodbye."""
+    piece_reliability: Probability = 0.95
+    """Rmin of the piece to move and of the trapezoid when introduced. Scenario page, after Appendix B."""
+    landmark_reliability: Probability = 0.85
+    """Rmin of a landmark, and of the rectangle when introduced."""
+
+    def __post_init__(self) -> None:
+        for name in ("placement", "settle", "pause", "thinking", "arrival", "farewell"):
+            if getattr(self, name) < 0:
+                raise ValueError(f"collaboration.{name} must not be negative, not {getattr(self, name)}")
+        if self.attempts < 1:
+            raise ValueError(f"collaboration.attempts must be at least 1, not {self.attempts}")
+        for name in ("piece_reliability", "landmark_reliability"):
+            if not 0 < getattr(self, name) < 1:
+                raise ValueError(f"collaboration.{name} must be in (0, 1), not {getattr(self, name)}")

@@ -1,0 +1,186 @@
+"""The person of thesis Appendix B, step by step, as rules. Steps 7-17 are missing in the source: those are ours.
+
+Delays are human reaction times, chosen so that every event of the scenario has at least 0.1 s to either side of it.
+"""
+
+from msgspec import structs
+
+from services.simulation.human import (
+    AWAY,
+    FACE,
+    TABLE,
+    Begun,
+    Ended,
+    Entrance,
+    Event,
+    Grab,
+    Lay,
+    Leave,
+    LookAt,
+    Pause,
+    RobotDoes,
+    Rule,
+    Sit,
+    Withdraw,
+    Word,
+)
+from services.tangram_table import Side
+
+GLANCE = 0.2
+"""From a word to the gaze it causes."""
+FOLLOW = 0.3
+"""From seeing where the robot points to looking there."""
+
+
+def rules() -> tuple[Rule, ...]:
+    """The whole script."""
+    return (*GREETING, *FIRST_PIECE, *OURS, *LAST_PIECES, *GOODBYE, *FIXES)
+
+
+def misplacing_rules() -> tuple[Rule, ...]:
+    """The script, but in step 14 (one of ours) the piece is laid on the wrong side of its landmark."""
+    wrong = Lay("pink-square", "bottom left", "red-square")
+    return tuple(
+        structs.replace(rule, do=tuple(wrong if isinstance(act, Lay) else act for act in rule.do))
+        if rule.step == "step-14"
+        else rule
+        for rule in rules()
+    )
+
+
+# -- steps 1 to 4 -----------------------------------------------------------------------------------------------
+
+GREETING = (
+    Rule(
+        "step-1",
+        Entrance(),
+        (
+            LookAt(TABLE), Pause(0.8), Sit(), Pause(0.8),
+            LookAt(FACE), Pause(1.6), LookAt(TABLE), Pause(1.2), LookAt(FACE),
+        ),
+    ),
+    Rule("step-3", Word("table"), (LookAt(TABLE),), GLANCE),
+    Rule("step-3", Word("see"), (LookAt(FACE),), GLANCE),
+    Rule("step-3", Word("triangles"), (LookAt(TABLE),), 0.05),
+    Rule("step-3", Word("and"), (LookAt("rectangle"),), 0.05),
+    Rule("step-3", RobotDoes("point", "trapezoid"), (LookAt("trapezoid"),), FOLLOW),
+    Rule("step-3", Word("of"), (LookAt(FACE),), 0.1),
+    Rule("step-3", Ended(), (LookAt(TABLE),), FOLLOW),
+    Rule("step-4", Word("okay"), (LookAt(TABLE),), GLANCE),
+)  # fmt: skip
+
+
+# -- moving pieces ----------------------------------------------------------------------------------------------
+
+
+def moves(step: str, piece: str, side: Side, landmark: str, name: str) -> tuple[Rule, ...]:
+    """The person follows an instruction as in steps 5 and 6. name: last word of the phrase for the landmark."""
+    return (
+        Rule(step, RobotDoes("point", piece), (LookAt(piece),), FOLLOW),
+        Rule(step, Word("so"), (Grab(piece),), GLANCE),
+        Rule(step, Event("directed_gaze", "started", landmark), (LookAt(landmark),), 0.6),
+        Rule(step, Word(name), (LookAt(landmark),), GLANCE),
+        Rule(step, Ended(), (Lay(piece, side, landmark), Withdraw(), Pause(0.2), LookAt(FACE)), 0.6),
+    )
+
+
+FIRST_PIECE = moves("step-5", "blue-square", "top", "rectangle", "rectangle")
+
+
+def approves(step: str) -> tuple[Rule, ...]:
+    """The person while the robot says "Ummmm, good", as in steps 20 and 23."""
+    return (
+        Rule(f"{step}-a", Word("ummmm"), (LookAt(TABLE),), GLANCE),
+        Rule(f"{step}-b", Begun(), (LookAt(FACE),), 0.1),
+        Rule(f"{step}-b", Ended(), (LookAt(TABLE),), FOLLOW),
+    )
+
+
+OURS = (
+    *approves("step-7"),
+    *moves("step-8", "trapezoid", "top", "blue-square", "blue"),
+    *approves("step-9"),
+    *moves("step-10", "yellow-triangle", "bottom", "rectangle", "rectangle"),
+    *approves("step-11"),
+    *moves("step-12", "red-square", "bottom left", "yellow-triangle", "yellow"),
+    *approves("step-13"),
+    *moves("step-14", "pink-square", "bottom right", "yellow-triangle", "yellow"),
+    *approves("step-15"),
+    *moves("step-16", "pink-triangle", "top left", "red-square", "red"),
+    *moves("step-17", "purple-square", "right", "blue-square", "blue"),
+)
+
+
+# -- steps 18 to 26 ---------------------------------------------------------------------------------------------
+
+LAST_PIECES = (
+    # Inattentive while the robot says which piece: its directed gaze fails.
+    Rule("step-18", Begun(), (LookAt(AWAY),), 0.05),
+    Rule("step-18", Word("that"), (LookAt(FACE),), GLANCE),
+    # On the table in time for the landmark, but not while the first event still waits.
+    Rule("step-18", Event("directed_gaze", "started", "pink-square"), (LookAt(TABLE),), 0.3),
+    Rule("step-18", Word("square"), (LookAt("purple-triangle"),), FOLLOW),
+    Rule(
+        "step-18",
+        Ended(),
+        (Grab("purple-triangle"), Lay("purple-triangle", "top right", "trapezoid"), Withdraw()),
+        0.5,
+    ),
+    Rule("step-20-a", Begun(), (LookAt(TABLE),), 0.1),
+    Rule("step-20-a", Word("ummmm"), (LookAt(FACE),), GLANCE),
+    Rule("step-20-b", Ended(), (LookAt(TABLE),), FOLLOW),
+    Rule("step-21", Word("please"), (LookAt(FACE),), GLANCE),
+    Rule("step-21", RobotDoes("point", "green-square"), (LookAt("green-square"),), FOLLOW),
+    Rule("step-21", Word("this"), (LookAt(FACE),), 0.4),
+    Rule("step-21", Word("of"), (LookAt(TABLE),), 0.05),
+    Rule(
+        "step-21",
+        Ended(),
+        (
+            LookAt("green-square"), Pause(0.3), Grab("green-square"),
+            Lay("green-square", "left", "blue-square"), Withdraw(), Pause(0.2), LookAt(FACE),
+        ),
+        0.4,
+    ),
+    Rule("step-23-a", Begun(), (LookAt(FACE),), 0.1),
+    Rule("step-23-a", Word("ummmm"), (LookAt(TABLE),), GLANCE),
+    Rule("step-23-b", Begun(), (LookAt(FACE),), 0.1),
+)  # fmt: skip
+
+GOODBYE = (
+    Rule("step-24", Word("an"), (LookAt(TABLE),), GLANCE),
+    Rule("step-25", Word("thanks"), (LookAt(FACE),), GLANCE),
+    Rule(
+        "step-25",
+        Ended(),
+        (LookAt(TABLE), Pause(1.2), LookAt(FACE), Pause(1.2), LookAt(TABLE), Pause(0.8), Leave()),
+        0.5,
+    ),
+)
+
+
+# -- when the robot asks again ----------------------------------------------------------------------------------
+
+PLACES: tuple[tuple[str, str, Side, str], ...] = (
+    ("step-5", "blue-square", "top", "rectangle"),
+    ("step-8", "trapezoid", "top", "blue-square"),
+    ("step-10", "yellow-triangle", "bottom", "rectangle"),
+    ("step-12", "red-square", "bottom left", "yellow-triangle"),
+    ("step-14", "pink-square", "bottom right", "yellow-triangle"),
+    ("step-16", "pink-triangle", "top left", "red-square"),
+    ("step-17", "purple-square", "right", "blue-square"),
+    ("step-18", "purple-triangle", "top right", "pink-square"),
+    ("step-21", "green-square", "left", "blue-square"),
+)
+"""Step, piece, side, landmark: where pieces belong, as the robot said."""
+
+FIXES = tuple(
+    Rule(
+        f"{step}-{again}",
+        Ended(),
+        (LookAt(piece), Pause(0.3), Grab(piece), Lay(piece, side, landmark), Withdraw(), Pause(0.2), LookAt(FACE)),
+        0.5,
+    )
+    for step, piece, side, landmark in PLACES
+    for again in ("fix", "again")
+)

@@ -1,0 +1,124 @@
+"""What the simulated cameras report: the person and the table put together, as messages.
+
+Pure. A look is reported while the person sits at the table; `act` while a piece really moves.
+"""
+
+from collections.abc import Callable, Iterator
+
+from schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost
+from schemas.messages import Message
+from schemas.units import Seconds, Stamp
+from schemas.world import Entity, World
+from services.simulation.human import FACE, Act, Grab, Human, Lay, Leave, LookAt, Pause, Sit, Withdraw
+from services.simulation.table import Table
+from services.tangram_table import Pose, overlap, poses_touching
+
+Stamper = Callable[[Seconds], Stamp]
+
+
+class Scene:
+    """A person at the table. `feed` it with what the robot does; `advance` gives what perception reports by `now`.
+
+    frame: seconds between two reports of the world while something moves.
+    """
+
+    def __init__(self, human: Human, table: Table, *, robot: str, frame: Seconds, stamp: Stamper) -> None:
+        self._human = human
+        self._table = table
+        self._robot = robot
+        self._frame = frame
+        self._stamp = stamp
+        self._actor = table.layout.person.id
+        self._look: str | None = None
+        self._last_world: Seconds | None = None
+
+    @property
+    def deadline(self) -> Seconds | None:
+        """When `advance` has something to do again; None: not before the robot does something."""
+        times = [self._human.deadline, self._table.deadline]
+        if self._table.moving and self._last_world is not None:
+            times.append(self._last_world + self._frame)
+        return min((time for time in times if time is not None), default=None)
+
+    def enter(self, now: Seconds) -> None:
+        self._human.enter(now)
+
+    def feed(self, message: Message, now: Seconds) -> None:
+        self._human.feed(message, now)
+
+    def world(self, now: Seconds) -> World:
+        self._last_world = now
+        return World(entities=self._table.entities(now), at=self._stamp(now))
+
+    def advance(self, now: Seconds) -> Iterator[Message]:
+        """What is to be reported now: first what people did, then the world if it has changed."""
+        changed = self._table.moving and self._last_world is not None and now >= self._last_world + self._frame
+        for moved in self._table.settle(now):
+            changed = True
+            yield self._act(ActionEnded, moved.piece, moved.at)
+        while acts := self._human.due(now):
+            changed = changed or not isinstance(acts[0], LookAt | Pause)
+            yield from self._do(acts[0], acts[1:], now)
+        if changed:
+            yield self.world(now)
+
+    def _do(self, act: Act, then: tuple[Act, ...], now: Seconds) -> Iterator[Message]:
+        following = now
+        match act:
+            case LookAt(target=target):
+                yield from self._looks_at(self._robot if target == FACE else target, now)
+            case Sit():
+                self._table.seated = True
+                yield ActorFound(actor=self._actor, at=self._stamp(now))
+                if self._look is not None:
+                    yield self._looking(ActionBegan, self._look, now)
+            case Leave():
+                if self._look is not None:
+                    yield self._looking(ActionEnded, self._look, now)
+                self._table.seated, self._look = False, None
+                yield ActorLost(actor=self._actor, at=self._stamp(now))
+            case Grab() | Lay() if self._table.carrying:
+                # Hands are busy with another piece: this comes after it.
+                self._human.go_on((act, *then), self._table.deadline or now)
+                return
+            case Grab(piece=piece):
+                following = self._table.reach(piece, now)
+            case Lay(piece=piece) as lay:
+                if pose := lay.pose or self._place_for(lay, now):
+                    following = self._table.carry(piece, pose, now)
+                    yield self._act(ActionBegan, piece, now)
+            case Withdraw():
+                self._table.withdraw(now)
+            case Pause(seconds=seconds):
+                following = now + seconds
+        self._human.go_on(then, following)
+
+    def _looks_at(self, target: str, now: Seconds) -> Iterator[Message]:
+        if target == self._look:
+            return
+        if self._table.seated:
+            if self._look is not None:
+                yield self._looking(ActionEnded, self._look, now)
+            yield self._looking(ActionBegan, target, now)
+        self._look = target
+
+    def _looking(self, kind: type[ActionBegan] | type[ActionEnded], target: str, now: Seconds) -> Message:
+        return kind(actor=self._actor, action="look", targets=(target,) if target else (), at=self._stamp(now))
+
+    def _act(self, kind: type[ActionBegan] | type[ActionEnded], piece: str, at: Seconds) -> Message:
+        return kind(actor=self._actor, action="act", targets=(piece,), at=self._stamp(at))
+
+    def _place_for(self, lay: Lay, now: Seconds) -> Pose | None:
+        """The first place with room, or the first if there is none; None if no edges fit."""
+        piece = self._table.piece(lay.piece, now)
+        others = [other for other in self._table.pieces(now) if other.id != lay.piece]
+        places = sorted(
+            poses_touching(piece, self._table.piece(lay.landmark, now), lay.side), key=lambda pose: abs(pose.yaw)
+        )
+        return next(
+            (pose for pose in places if self._has_room(lay.piece, pose, others)), places[0] if places else None
+        )
+
+    def _has_room(self, piece: str, pose: Pose, others: list[Entity]) -> bool:
+        lying = self._table.layout.lying(self._table.layout.piece(piece), pose)
+        return not any(overlap(lying, other) for other in others)

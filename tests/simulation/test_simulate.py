@@ -1,0 +1,119 @@
+"""The simulation on the bus: the world, the person's coming, and what moves."""
+
+from functools import partial
+
+import pytest
+
+from schemas import keys
+from schemas.actions import ActionBegan, ActionEnded
+from schemas.body import WordSpoken
+from schemas.feedback import BlockProgress
+from schemas.world import World
+from services.bus import Bus, Keep
+from services.memory_bus import MemoryHub
+from services.runtime import running
+from services.simulation.config import SimulationConfig
+from services.simulation.service import simulate
+
+QUICK = SimulationConfig(await_participants=(), entrance=1.0, jitter=0.0)
+
+
+async def perceived(bus: Bus, until: float) -> list[tuple[float, str, str]]:
+    """Time, kind and target of everything perceived until then."""
+    seen = []
+    with bus.subscribe(keys.PERCEIVED_ACTION) as inbox:
+        while (received := await inbox.next(until)) is not None:
+            message = received.message
+            target = message.targets[0] if isinstance(message, ActionBegan | ActionEnded) and message.targets else ""
+            seen.append((round(received.at, 3), type(message).__name__, target))
+    return seen
+
+
+async def test_step_1_is_seen_from_when_the_person_sits_down(hub: MemoryHub) -> None:
+    async with running(hub, {"simulation": partial(simulate, config=QUICK)}):
+        seen = await perceived(hub.join("test"), until=10.0)
+
+    assert seen == [
+        (1.8, "ActorFound", ""),
+        (1.8, "ActionBegan", "table"),
+        (2.6, "ActionEnded", "table"),
+        (2.6, "ActionBegan", "robot"),
+        (4.2, "ActionEnded", "robot"),
+        (4.2, "ActionBegan", "table"),
+        (5.4, "ActionEnded", "table"),
+        (5.4, "ActionBegan", "robot"),
+    ]
+
+
+async def test_the_person_waits_for_the_robot_to_be_there(hub: MemoryHub) -> None:
+    config = SimulationConfig(await_participants=("control",), entrance=1.0, jitter=0.0)
+    bus = hub.join("test")
+    async with running(hub, {"simulation": partial(simulate, config=config)}):
+        assert await perceived(bus, until=60.0) == []
+
+        hub.join("control").declare_alive()
+        seen = await perceived(bus, until=62.0)
+
+    assert seen[0] == (61.8, "ActorFound", "")
+
+
+async def test_a_late_subscriber_gets_the_whole_world_at_once(hub: MemoryHub) -> None:
+    async with running(hub, {"simulation": partial(simulate, config=QUICK)}):
+        with hub.join("test").subscribe(keys.WORLD, keep=Keep.LATEST) as inbox:
+            received = await inbox.next(0.0)
+
+    assert received is not None
+    assert isinstance(received.message, World)
+    assert len(received.message.objects) == 10
+    assert received.message.people == ()
+
+
+async def test_the_person_moves_the_blue_square_to_the_top_of_the_rectangle(hub: MemoryHub) -> None:
+    bus = hub.join("test")
+    async with running(hub, {"simulation": partial(simulate, config=QUICK)}):
+        await perceived(bus, until=6.0)
+        bus.publish(keys.FEEDBACK, BlockProgress(block="step-5", progress="start", at=bus.stamp()))
+        word = WordSpoken(block="step-5", behavior="speech-2", word="so", position=2, at=bus.stamp())
+        bus.publish(keys.SYNC_POINT, word)
+        await perceived(bus, until=8.0)
+        bus.publish(keys.FEEDBACK, BlockProgress(block="step-5", progress="end", status="done", at=bus.stamp()))
+        seen = await perceived(bus, until=12.0)
+        with bus.subscribe(keys.WORLD, keep=Keep.LATEST) as inbox:
+            received = await inbox.next(12.0)
+
+    assert [(kind, target) for _, kind, target in seen] == [
+        ("ActionBegan", "blue-square"),
+        ("ActionEnded", "blue-square"),
+    ]
+    assert seen[0][0] == pytest.approx(8.6)
+    assert received is not None
+    assert isinstance(received.message, World)
+    blue = received.message.entity("blue-square")
+    assert blue is not None
+    assert blue.position == pytest.approx((0.48, 0.0, 0.72), abs=1e-6)
+
+
+async def test_the_world_is_reported_often_while_something_moves_and_not_at_all_otherwise(hub: MemoryHub) -> None:
+    bus = hub.join("test")
+    with bus.subscribe(keys.WORLD) as inbox:
+        async with running(hub, {"simulation": partial(simulate, config=QUICK)}):
+            await perceived(bus, until=20.0)
+            at_rest = len(inbox)
+            bus.publish(keys.FEEDBACK, BlockProgress(block="step-5", progress="end", status="done", at=bus.stamp()))
+            await perceived(bus, until=21.5)
+            while_moving = len(inbox) - at_rest
+
+    assert at_rest == 2
+    assert 8 <= while_moving <= 20
+
+
+async def test_who_does_not_come_is_never_found(hub: MemoryHub) -> None:
+    config = SimulationConfig(await_participants=(), human="none")
+    async with running(hub, {"simulation": partial(simulate, config=config)}):
+        assert await perceived(hub.join("test"), until=60.0) == []
+
+
+@pytest.mark.parametrize("wrong", [{"frame": 0.0}, {"hand_speed": -1.0}, {"entrance": -0.1}, {"jitter": -0.1}])
+def test_a_wrong_number_in_the_configuration_is_refused_by_name(wrong: dict[str, float]) -> None:
+    with pytest.raises(ValueError, match=next(iter(wrong))):
+        SimulationConfig(**wrong)  # type: ignore[arg-type]

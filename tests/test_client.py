@@ -1,0 +1,219 @@
+"""The client against a server that answers as the protocol says."""
+
+import asyncio
+from collections.abc import Awaitable, Callable
+from functools import partial
+from pathlib import Path
+
+import pytest
+
+from schemas import keys
+from schemas.attention import Inhibit, InhibitionEnded
+from schemas.behaviors import Speech
+from schemas.blocks import Block, BlockOutcome, PerformBlock
+from schemas.faults import Fault, InputRefused, NoReply, RunFailed
+from schemas.fragments import FragmentOutcome, PerformFragment, TurnFragment
+from schemas.recognition import ConnectionEvent, Statistics, WindowStatistics
+from schemas.requests import Cancel
+from schemas.units import Stamp
+from schemas.world import Entity, World
+from services.bus import Bus
+from services.client import PerformFailed, connect
+from services.memory_bus import MemoryHub
+from services.requests import RequestDesk
+from services.runtime import Ready, running
+
+HELLO = TurnFragment(id="hello", behaviors=(Speech(id="speech-1", text="Hello"),))
+Answering = Callable[[RequestDesk, PerformFragment], Awaitable[None]]
+
+
+async def server(bus: Bus, ready: Ready, seen: list[object], answer: Answering | None = None) -> None:
+    """A stand-in for generation: accepts, and ends requests as done unless `answer` says otherwise."""
+    desk = RequestDesk(bus, "generation", lambda cancel: None)
+    with bus.subscribe(*RequestDesk.patterns("generation")) as inbox:
+        ready()
+        async for received in inbox:
+            request = desk.take(received)
+            if isinstance(received.message, Inhibit):
+                seen.append(received.message)
+            match request:
+                case PerformFragment() if answer is not None:
+                    await answer(desk, request)
+                case PerformFragment(id=id, fragment=fragment):
+                    seen.append(fragment)
+                    desk.accept(id)
+                    desk.end(FragmentOutcome(id=id, fragment=fragment.id, status="done"))
+                case Inhibit(id=id):
+                    desk.accept(id)
+                case Cancel(id=id):
+                    seen.append(request)
+                    desk.end(InhibitionEnded(id=id, reason="released"))
+
+
+async def test_perform_returns_the_outcome(hub: MemoryHub) -> None:
+    async with running(hub, {"generation": partial(server, seen=[])}), connect(hub=hub) as robot:
+        outcome = await robot.perform(HELLO)
+
+    assert (outcome.fragment, outcome.status) == ("hello", "done")
+
+
+@pytest.mark.parametrize(
+    "source",
+    [
+        '<ebml xmlns="edu.wpi.ebml" id="hello" turnIndex="1" turnStatus="full">'
+        '<speech xmlns="org.mindmakers.bml" id="speech-1"><text>Hello</text></speech></ebml>',
+        '{"type": "fragment", "id": "hello", "behaviors": [{"type": "speech", "id": "speech-1", "text": "Hello"}]}',
+    ],
+    ids=["xml", "json"],
+)
+async def test_a_fragment_may_be_xml_or_json(hub: MemoryHub, source: str) -> None:
+    seen: list[object] = []
+    async with running(hub, {"generation": partial(server, seen=seen)}), connect(hub=hub) as robot:
+        await robot.perform(source)
+
+    (fragment,) = seen
+    assert isinstance(fragment, TurnFragment)
+    assert [(type(it), it.id) for it in fragment.behaviors] == [(Speech, "speech-1")]
+
+
+async def test_the_client_may_come_before_the_robot(hub: MemoryHub) -> None:
+    loop = asyncio.get_running_loop()
+    async with connect(hub=hub) as robot, asyncio.TaskGroup() as tasks:
+        performing = tasks.create_task(robot.perform(HELLO))
+        await asyncio.sleep(3600)
+        assert not performing.done()
+
+        async with running(hub, {"generation": partial(server, seen=[])}):
+            outcome = await performing
+
+    assert outcome.status == "done"
+    assert loop.time() < 3602
+
+
+async def test_a_robot_that_does_not_come_in_time_is_a_failure_that_says_so(hub: MemoryHub) -> None:
+    async with connect(hub=hub) as robot:
+        with pytest.raises(RunFailed, match=r"no answer within 5 s.*is generation running"):
+            await robot.perform(HELLO, timeout=5)
+
+    assert asyncio.get_running_loop().time() == 5.0
+
+
+async def test_refused_input_raises_with_the_robots_fault(hub: MemoryHub) -> None:
+    async def refuse(desk: RequestDesk, request: PerformFragment) -> None:
+        desk.refuse(request.id, Fault(reason="no object 'hexagon'", where="hello: ref-1", line=7))
+
+    service = partial(server, seen=[], answer=refuse)
+    async with running(hub, {"generation": service}), connect(hub=hub) as robot:
+        with pytest.raises(InputRefused) as refusal:
+            await robot.perform(HELLO)
+
+    assert refusal.value.fault == Fault(reason="no object 'hexagon'", where="hello: ref-1", line=7)
+
+
+async def test_a_failure_while_running_raises_with_what_was_done(hub: MemoryHub) -> None:
+    async def fail(desk: RequestDesk, request: PerformFragment) -> None:
+        desk.accept(request.id)
+        fault = Fault(reason="the arm is stuck")
+        desk.end(FragmentOutcome(id=request.id, fragment="hello", status="failed", fault=fault))
+
+    async with running(hub, {"generation": partial(server, seen=[], answer=fail)}), connect(hub=hub) as robot:
+        with pytest.raises(PerformFailed, match="the arm is stuck") as failure:
+            await robot.perform(HELLO)
+
+    assert failure.value.outcome.status == "failed"
+
+
+async def test_a_cancelled_caller_cancels_what_it_asked_for(hub: MemoryHub) -> None:
+    async def never(desk: RequestDesk, request: PerformFragment) -> None:
+        desk.accept(request.id)
+
+    seen: list[object] = []
+    async with running(hub, {"generation": partial(server, seen=seen, answer=never)}), connect(hub=hub) as robot:
+        with pytest.raises(TimeoutError):
+            await asyncio.wait_for(robot.perform(HELLO), 1.0)
+        await asyncio.sleep(0.1)
+
+    assert [type(it) for it in seen] == [Cancel]
+
+
+async def test_bad_xml_is_refused_here_and_nothing_is_sent(hub: MemoryHub, tmp_path: Path) -> None:
+    file = tmp_path / "bad.xml"
+    file.write_text("<ebml>\n<speech</ebml>")
+    seen: list[object] = []
+    async with running(hub, {"generation": partial(server, seen=seen)}), connect(hub=hub) as robot:
+        with pytest.raises(InputRefused, match=r"bad\.xml"):
+            await robot.perform(file)
+
+    assert seen == []
+
+
+async def test_a_lease_is_renewed_while_it_is_held_and_then_released(hub: MemoryHub) -> None:
+    seen: list[object] = []
+    async with (
+        running(hub, {"generation": partial(server, seen=seen)}),
+        connect(hub=hub) as robot,
+        robot.inhibit_gaze("target", target="table", ttl=3.0),
+    ):
+        await asyncio.sleep(10.0)
+
+    leases = [it for it in seen if isinstance(it, Inhibit)]
+    assert len(leases) >= 10
+    assert {(it.mode, it.target, it.ttl) for it in leases} == {("target", "table", 3.0)}
+    assert isinstance(seen[-1], Cancel)
+
+
+async def test_a_block_goes_past_the_policies_to_the_realizer(hub: MemoryHub) -> None:
+    async def realizer(bus: Bus, ready: Ready) -> None:
+        desk = RequestDesk(bus, "realizer", lambda cancel: None)
+        with bus.subscribe(*RequestDesk.patterns("realizer")) as inbox:
+            ready()
+            async for received in inbox:
+                if isinstance(request := desk.take(received), PerformBlock):
+                    desk.accept(request.id)
+                    desk.end(BlockOutcome(id=request.id, block=request.block.id, status="done"))
+
+    async with running(hub, {"realizer": realizer}), connect(hub=hub) as robot:
+        outcome = await robot.realize(Block(id="wave"))
+        again = await robot.realize("wave", HELLO.behaviors)  # type: ignore[arg-type]
+
+    assert (outcome.block, outcome.status) == ("wave", "done")
+    assert again.status == "done"
+
+
+async def test_connection_events_come_from_the_moment_they_are_asked_for(hub: MemoryHub) -> None:
+    recognition = hub.join("recognition")
+    event = ConnectionEvent(
+        id="event-1", kind="directed_gaze", initiator="robot", responder="human", state="started",
+        at=Stamp("loop", 0.0), started=Stamp("loop", 0.0), objects=("rectangle",), cause="reference",
+    )  # fmt: skip
+    async with connect(hub=hub) as robot:
+        with robot.connection_events() as events:
+            recognition.publish(keys.CONNECTION_EVENT, event)
+
+            assert await events.next() == event
+            assert await events.next(timeout=1.0) is None
+
+
+async def test_iterating_ends_when_the_client_leaves(hub: MemoryHub) -> None:
+    async with connect(hub=hub) as robot:
+        events = robot.connection_events()
+
+    assert [event async for event in events] == []
+
+
+async def test_world_and_statistics_are_what_was_last_said(hub: MemoryHub) -> None:
+    world = World(entities=(Entity(id="cup", kind="object", position=(0.5, 0.0, 0.7)),))
+    statistics = Statistics(
+        actor="human",
+        at=Stamp("loop", 0.0),
+        session=WindowStatistics(events=97, mtbce=5.7),
+        recent=WindowStatistics(),
+    )
+    hub.join("simulation").publish(keys.WORLD, world)
+    hub.join("recognition").publish(keys.statistics("human"), statistics)
+
+    async with connect(hub=hub) as robot:
+        assert await robot.world() == world
+        assert await robot.statistics("human") == statistics
+        with pytest.raises(NoReply, match="no statistics of all within 2 s"):
+            await robot.statistics(timeout=2)
