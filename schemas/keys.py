@@ -75,6 +75,22 @@ def alive(participant: str) -> str:
     return f"{PREFIX}/alive/{participant}"
 
 
+# The bus' own. `@` chunks are verbatim: no wildcard includes them, so nobody hears these by accident.
+ANY_TOKEN = f"{PREFIX}/@bus/*/**"
+ANY_PULSE = f"{PREFIX}/@bus/*/pulse"
+ANY_FLUSH = f"{PREFIX}/@bus/*/flush"
+
+
+def own(run: str, subject: str) -> str:
+    """Of the process with id `run`: tokens `process`, `alive/<name>`; `pulse`; answers `past`, `clock`, `flush`."""
+    return f"{PREFIX}/@bus/{run}/{subject}"
+
+
+def run_of(key: str) -> str:
+    """`@bus/<run>/...` -> run."""
+    return key.split("/")[3]
+
+
 def key_class(key: str) -> KeyClass:
     """Raises ValueError for a key outside the table, or one whose class is a wildcard."""
     chunks = key.split("/")
@@ -98,5 +114,7 @@ def _matches(pattern: list[str], key: list[str]) -> bool:
     if not pattern:
         return not key
     if pattern[0] == "**":
-        return _matches(pattern[1:], key) or (bool(key) and _matches(pattern, key[1:]))
-    return bool(key) and pattern[0] in ("*", key[0]) and _matches(pattern[1:], key[1:])
+        more = bool(key) and not key[0].startswith("@")
+        return _matches(pattern[1:], key) or (more and _matches(pattern, key[1:]))
+    wild = pattern[0] == "*" and not key[0].startswith("@") if key else False
+    return bool(key) and (wild or pattern[0] == key[0]) and _matches(pattern[1:], key[1:])

@@ -10,10 +10,14 @@ from schemas.faults import Fault
 
 
 class Request(Struct, frozen=True, kw_only=True, omit_defaults=True):
-    """What every command has: who asks, and the id by which everything about it is known."""
+    """What every command has: who asks, and the id by which everything about it is known.
+
+    revision: how often its content was changed; a server ignores an older one. Counted by `Requester.send`.
+    """
 
     id: str
     requester: str
+    revision: int = 0
 
 
 class Cancel(Request, frozen=True, kw_only=True, tag="cancel", omit_defaults=True):

@@ -28,12 +28,16 @@ class Keep(Enum):
 
 
 class Received(Struct, frozen=True):
-    """A message as it arrived. source: the participant that published it. at: local time of arrival."""
+    """A message as it arrived. source: the participant that published it. at: local time of arrival.
+
+    past: from before the subscription, given to a late subscriber as the class of its key says.
+    """
 
     key: str
     message: Message
     source: str
     at: Seconds
+    past: bool = False
 
 
 class Subscription:
@@ -53,9 +57,16 @@ class Subscription:
         self._waiting: asyncio.Future[None] | None = None
         self._on_close = on_close
         self._closed = False
+        self._carriers: dict[str, str | None] = {}
 
     def wants(self, key: str) -> bool:
-        return any(keys.matches(pattern, key) for pattern in self.patterns)
+        return self.carrier(key) is not None
+
+    def carrier(self, key: str) -> str | None:
+        """The first pattern that includes the key: each message comes once, however many patterns include it."""
+        if key not in self._carriers:
+            self._carriers[key] = next((pattern for pattern in self.patterns if keys.matches(pattern, key)), None)
+        return self._carriers[key]
 
     def offer(self, received: Received) -> None:
         """For the bus: put a message in the queue."""

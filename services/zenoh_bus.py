@@ -1,0 +1,244 @@
+"""The bus over Zenoh: one session per process, its participants beside each other on it.
+
+Zenoh carries; what it leaves open is settled here and in `zenoh_order`: order across keys, history for late
+subscribers, loss in a cut (it never raises), who is there, and answers that do not come.
+"""
+
+import asyncio
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import zenoh
+from msgspec import Struct
+
+from schemas import keys
+from schemas.faults import EngageError, Fault, InputRefused, NoReply
+from schemas.messages import Message, decode, encode, encoding_of
+from schemas.units import Seconds, Stamp
+from services.bus import Answer, Bus, Hub, Keep, Received, Subscription
+from services.zenoh_clocks import Clocks
+from services.zenoh_order import Envelope, Ledger, Pulse
+from services.zenoh_peers import Peers, finish, pack
+from services.zenoh_readers import Readers
+from services.zenoh_session import QOS, RENDEZVOUS, STREAM_QOS, Doorway, Traffic, open_session
+
+FIRST_PULSE: Seconds = 0.25
+NEXT_PULSE: Seconds = 1.0
+OPENING: Seconds = 0.25
+"""How long `open_hub` waits to learn who is there, when somebody is."""
+
+
+async def open_hub(
+    robot: str,
+    *,
+    connect: Sequence[str] = (),
+    listen: Sequence[str] = (),
+    rendezvous: str | None = RENDEZVOUS,
+    mode: str = "peer",
+) -> "ZenohHub":
+    """Join the bus of `robot`. Never waits for anybody: processes may start in any order.
+
+    connect, listen: Zenoh endpoints (`tcp/HOST:PORT`). Without any, the processes of this machine find one another
+    at `rendezvous`. Raises RunFailed when an endpoint is wrong or taken.
+    """
+    # Blocks the loop for milliseconds, before its work has started: Zenoh has no async API, and we start no thread.
+    session = open_session(robot, connect, listen, None if connect or listen else rendezvous, mode)
+    return ZenohHub(robot, session)
+
+
+class Health(Struct, frozen=True):
+    """How the bus is doing. refused: bad payloads. lost: messages gone for good. peers: names of who is there."""
+
+    traffic: Traffic
+    refused: int
+    lost: int
+    peers: tuple[str, ...]
+
+
+class ZenohHub(Hub):
+    def __init__(self, robot: str, session: zenoh.Session) -> None:
+        self.robot = robot
+        self.run = str(session.zid())
+        self.session = session
+        self.doorway = Doorway()
+        self._loop = asyncio.get_running_loop()
+        self.clocks = Clocks(_clock_name(self._loop, self.run), self._loop.time)
+        self._ledger = Ledger(self.run)
+        self._publishers: dict[str, zenoh.Publisher] = {}
+        self._buses: dict[str, ZenohBus] = {}
+        self._pulse: asyncio.TimerHandle | None = None
+        self._closed = False
+        self.peers = Peers(session, self.doorway, self._ledger, self.clocks)
+        self.readers = Readers(session, self.doorway, self._ledger, self.peers)
+        self.peers.stand(self.readers.process_came, self.readers.participant_changed)
+
+    @property
+    def health(self) -> Health:
+        names = tuple(sorted(self.peers.names))
+        return Health(self.doorway.traffic, self.readers.refused, self.readers.lost, names)
+
+    def join(self, name: str) -> "ZenohBus":
+        if name in self._buses:
+            raise ValueError(f"participant {name!r} is on the bus already")
+        self._buses[name] = bus = ZenohBus(self, name)
+        return bus
+
+    def forget(self, name: str) -> None:
+        self._buses.pop(name, None)
+
+    async def close(self) -> None:
+        if self._closed:
+            return
+        for bus in list(self._buses.values()):
+            await bus.leave()
+        await self.peers.flush()
+        self._closed = True
+        self.doorway.close()
+        if self._pulse is not None:
+            self._pulse.cancel()
+        self.readers.close()
+        self.peers.close()
+        for publisher in self._publishers.values():
+            publisher.undeclare()  # type: ignore[no-untyped-call]
+        self.session.close()  # type: ignore[no-untyped-call]
+
+    # -- publishing ---------------------------------------------------------------------------------------------
+
+    def publish(self, bus: "ZenohBus", key: str, message: Message) -> None:
+        ordered = keys.key_class(key) != "stream"
+        now = self._loop.time()
+        payload, encoding = encode(message), encoding_of(message)
+        if ordered:
+            envelope = self._ledger.write(key, encoding, payload, bus.name, self.clocks.own, now).envelope
+            if self._pulse is None:
+                self._pulse = self._loop.call_later(FIRST_PULSE, self._send_pulse)
+        else:
+            envelope = Envelope(bus.name, self.clocks.own, now, self.run)
+        self._put(key, payload, encoding, pack(envelope), ordered)
+        self.readers.offer(Received(key, message, bus.name, now))
+
+    def _put(self, key: str, payload: bytes, encoding: str, attachment: bytes | None, ordered: bool) -> None:
+        publisher = self._publishers.get(key)
+        if publisher is None:
+            qos = QOS if ordered else STREAM_QOS
+            publisher = self.session.declare_publisher(key, allowed_destination=zenoh.Locality.REMOTE, **qos)
+            self._publishers[key] = publisher
+        publisher.put(payload, encoding=encoding, attachment=attachment)
+
+    def _send_pulse(self) -> None:
+        """Tell the recent counts, a few times: a receiver that lost the last message of a burst sees it by them."""
+        counts = self._ledger.recent(self._loop.time())
+        self._pulse = self._loop.call_later(NEXT_PULSE, self._send_pulse) if counts else None
+        if counts:
+            self._put(keys.own(self.run, "pulse"), pack(Pulse(counts)), "application/msgpack", None, True)
+
+
+class ZenohBus(Bus):
+    def __init__(self, hub: ZenohHub, name: str) -> None:
+        self.robot = hub.robot
+        self.name = name
+        self.clock = hub.clocks.own
+        self._hub = hub
+        self._loop = asyncio.get_running_loop()
+        self._subscriptions: list[Subscription] = []
+        self._answers: list[Any] = []
+        self._token: Any = None
+        self._gone = False
+
+    def now(self) -> Seconds:
+        return self._loop.time()
+
+    def local(self, stamp: Stamp) -> Seconds:
+        return self._hub.clocks.local(stamp)
+
+    def publish(self, key: str, message: Message) -> None:
+        if not self._gone:
+            self._hub.publish(self, key, message)
+
+    def subscribe(self, *patterns: str, keep: Keep = Keep.EVERY, capacity: int = 4096) -> Subscription:
+        subscription = Subscription(patterns, keep, capacity, self._drop)
+        self._subscriptions.append(subscription)
+        self._hub.readers.attach(self, subscription)
+        return subscription
+
+    def _drop(self, subscription: Subscription) -> None:
+        if subscription in self._subscriptions:
+            self._subscriptions.remove(subscription)
+            self._hub.readers.detach(subscription)
+
+    async def query(self, key: str, message: Message, timeout: Seconds = 1.0) -> Message:
+        deadline = self._loop.time() + timeout
+        payload, encoding = encode(message), encoding_of(message)
+        while (left := deadline - self._loop.time()) > 0:
+            reply = await self._ask(key, payload, encoding, left)
+            if reply is not None and reply.ok is not None:
+                return decode(reply.ok.payload.to_bytes(), str(reply.ok.encoding))
+            if reply is not None and reply.err is not None:
+                raise InputRefused(_fault(reply.err.payload.to_bytes()))
+            # Nobody serves it, or its server died over it: there is hope only if somebody comes.
+            if not await self._hub.peers.change(deadline):
+                break
+        raise NoReply(Fault(reason=f"no reply within {timeout} s", where=key, advice="is its server running?"))
+
+    async def _ask(self, key: str, payload: bytes, encoding: str, timeout: Seconds) -> zenoh.Reply | None:
+        answered: asyncio.Future[zenoh.Reply | None] = self._loop.create_future()
+
+        def settle(reply: zenoh.Reply | None) -> None:
+            if not answered.done():
+                answered.set_result(reply)
+
+        self._hub.peers.ask(key, payload, settle, settle, timeout, encoding)
+        return await answered
+
+    def answer(self, key: str, answer: Answer) -> None:
+        def reply(query: zenoh.Query) -> None:
+            try:
+                question = decode(query.payload.to_bytes() if query.payload else b"", str(query.encoding))
+                message = answer(question)
+                query.reply(key, encode(message), encoding=encoding_of(message), **QOS)
+            except EngageError as error:
+                query.reply_err(encode(error.fault), encoding=encoding_of(error.fault))
+            finally:
+                finish(query)
+
+        session = self._hub.session
+        self._answers.append(session.declare_queryable(key, self._hub.doorway.entrance(reply)))
+        # Whoever asked too early hears by this token that it is worth asking again.
+        self._answers.append(session.liveliness().declare_token(keys.own(self._hub.run, f"answers/{key}")))
+
+    def declare_alive(self) -> None:
+        if self._token is None and not self._gone:
+            token = keys.own(self._hub.run, f"alive/{self.name}")
+            self._token = self._hub.session.liveliness().declare_token(token)
+            self._hub.peers.note(self.name, self._hub.run, True)
+
+    async def leave(self) -> None:
+        if self._gone:
+            return
+        self._gone = True
+        for subscription in list(self._subscriptions):
+            subscription.close()
+        for declared in reversed(self._answers):
+            declared.undeclare()
+        if self._token is not None:
+            self._token.undeclare()
+            self._hub.peers.note(self.name, self._hub.run, False)
+        self._hub.forget(self.name)
+
+
+def _fault(payload: bytes) -> Fault:
+    try:
+        fault = decode(payload)
+    except EngageError as error:
+        return error.fault
+    return fault if isinstance(fault, Fault) else Fault(reason=f"answered with {type(fault).__name__}")
+
+
+def _clock_name(loop: asyncio.AbstractEventLoop, run: str) -> str:
+    """Loop time is the machine's monotonic clock, one for all its processes since boot; other loops stand alone."""
+    boot = Path("/proc/sys/kernel/random/boot_id")
+    if abs(loop.time() - time.monotonic()) < 0.1 and boot.exists():
+        return f"boot-{boot.read_text()[:8]}"
+    return f"loop-{run[:8]}"

@@ -1,0 +1,195 @@
+"""Order, history and loss on top of a wire that keeps order only per link. Pure: no zenoh, no clock, no loop.
+
+Every process numbers what it publishes on ordered keys (`Envelope`), keeps the last of it (`Ledger`) and hands it
+out on request. Every subscription follows each publishing process (`Follower`): it starts by asking for the past,
+holds what arrives meanwhile, and merges both by number; a gap in a key's count makes it ask again. So messages of
+one process arrive in its order across keys, each once, whether they came live, from history, or after a cut.
+
+Zenoh's own advanced subscribers do this per key: the first message of each new key waits for a query while those
+of other keys pass it, and a replayed history comes in no order across keys. Sync points and outcomes live on
+different keys and must not overtake one another, hence this file.
+"""
+
+from collections import deque
+from collections.abc import Iterable
+from itertools import chain
+
+from msgspec import Struct
+
+from schemas import keys
+from schemas.units import Seconds
+
+KEPT = 4096
+"""How many messages a process keeps for those who missed them."""
+PULSE_FOR: Seconds = 3.0
+"""How long after a message its count is still told, for receivers that lost the last one of a burst."""
+
+
+class Envelope(Struct, frozen=True, array_like=True):
+    """The attachment of a sample: who sent it, when by which clock, and its place in the order.
+
+    run: the publishing process' life. number: of all its ordered messages, from 1; 0 on a stream.
+    nth: of its messages on this key.
+    """
+
+    source: str
+    clock: str
+    sent: Seconds
+    run: str = ""
+    number: int = 0
+    nth: int = 0
+
+
+class Written(Struct, frozen=True, array_like=True):
+    """A message as it travels, live or in a `Past`."""
+
+    key: str
+    encoding: str
+    payload: bytes
+    envelope: Envelope
+
+
+class Missing(Struct, frozen=True):
+    """What a follower asks for. seen: per key the last count it has; since: -1 if it has never caught up."""
+
+    patterns: tuple[str, ...]
+    seen: dict[str, int]
+    since: int = -1
+
+
+class Past(Struct, frozen=True):
+    """The answer: messages in order, and the counts of all matching keys at this moment."""
+
+    number: int
+    counts: dict[str, int]
+    written: tuple[Written, ...]
+
+
+class Pulse(Struct, frozen=True):
+    """Recent counts by key: who has less has lost something."""
+
+    counts: dict[str, int]
+
+
+class Ledger:
+    """What one process has published: numbers it, keeps it, gives it out again."""
+
+    def __init__(self, run: str, kept: int = KEPT) -> None:
+        self.run = run
+        self.number = 0
+        self.counts: dict[str, int] = {}
+        self._written_at: dict[str, Seconds] = {}
+        self._kept: deque[Written] = deque(maxlen=kept)
+        self._states: dict[str, Written] = {}
+
+    def write(self, key: str, encoding: str, payload: bytes, source: str, clock: str, now: Seconds) -> Written:
+        """The next message in order, kept."""
+        self.number += 1
+        nth = self.counts[key] = self.counts.get(key, 0) + 1
+        written = Written(key, encoding, payload, Envelope(source, clock, now, self.run, self.number, nth))
+        self._written_at[key] = now
+        if keys.key_class(key) == "state":
+            self._states[key] = written
+        else:
+            self._kept.append(written)
+        return written
+
+    def past(self, missing: Missing, now: Seconds) -> Past:
+        """What `missing` asks for; a first joiner gets the last states and `HISTORY_MAX_AGE` of the rest."""
+        counts = {key: nth for key, nth in self.counts.items() if _wanted(missing.patterns, key)}
+        written = [
+            one
+            for one in chain(self._kept, self._states.values())
+            if one.key in counts and self._is_missing(one, missing, now)
+        ]
+        written.sort(key=_number)
+        return Past(self.number, counts, tuple(written))
+
+    def _is_missing(self, one: Written, missing: Missing, now: Seconds) -> bool:
+        if one.key in missing.seen:
+            return one.envelope.nth > missing.seen[one.key]
+        if missing.since >= 0:
+            return one.envelope.number > missing.since
+        return one.key in self._states or now - one.envelope.sent <= keys.HISTORY_MAX_AGE
+
+    def recent(self, now: Seconds) -> dict[str, int]:
+        """Counts of the keys written in the last `PULSE_FOR`."""
+        return {key: self.counts[key] for key, at in self._written_at.items() if now - at <= PULSE_FOR}
+
+
+class Follower:
+    """One publishing process as one subscription sees it.
+
+    behind: the past is needed; until `catch_up` nothing is delivered. lost: messages that were gone for good.
+    asking: for the shell: the question is on its way.
+    """
+
+    def __init__(self, patterns: Iterable[str]) -> None:
+        self.patterns = tuple(patterns)
+        self.behind = True
+        self.asking = False
+        self.lost = 0
+        self._since = -1
+        self._seen: dict[str, int] = {}
+        self._held: list[Written] = []
+
+    def take(self, written: Written) -> list[Written]:
+        """What to deliver now that this one has arrived."""
+        envelope = written.envelope
+        expected = self._seen.get(written.key, 0) + 1
+        if envelope.nth < expected:
+            return []
+        if envelope.nth > expected and not self._may_skip(written.key):
+            self.behind = True
+        if self.behind:
+            self._held.append(written)
+            return []
+        self._seen[written.key] = envelope.nth
+        return [written]
+
+    def pulse(self, pulse: Pulse) -> None:
+        """Compare counts; may set `behind`."""
+        for key, nth in pulse.counts.items():
+            if nth > self._seen.get(key, 0) and _wanted(self.patterns, key):
+                self.behind = True
+
+    def missing(self) -> Missing:
+        return Missing(self.patterns, dict(self._seen), self._since)
+
+    def catch_up(self, past: Past | None) -> list[tuple[Written, bool]]:
+        """What to deliver now that the past, or None if there was no answer, has arrived; True: it is history."""
+        first = self._since < 0
+        live = {one.envelope.number for one in self._held}
+        merged = {one.envelope.number: one for one in chain(past.written if past else (), self._held)}
+        deliver = []
+        for number in sorted(merged):
+            one = merged[number]
+            seen = self._seen.get(one.key, 0)
+            if one.envelope.nth <= seen:
+                continue
+            if not (first and one.key not in self._seen) and not self._may_skip(one.key):
+                self.lost += one.envelope.nth - seen - 1
+            self._seen[one.key] = one.envelope.nth
+            deliver.append((one, first and number not in live))
+        for key, nth in past.counts.items() if past else ():
+            seen = self._seen.get(key, 0)
+            if nth > seen:
+                self.lost += 0 if first or self._may_skip(key) else nth - seen
+                self._seen[key] = nth
+        if past is not None:
+            self._since = past.number
+        self._held = []
+        self.behind = False
+        return deliver
+
+    def _may_skip(self, key: str) -> bool:
+        """A state is its last value: older ones may be missing without harm."""
+        return keys.key_class(key) == "state"
+
+
+def _number(written: Written) -> int:
+    return written.envelope.number
+
+
+def _wanted(patterns: tuple[str, ...], key: str) -> bool:
+    return any(keys.matches(pattern, key) for pattern in patterns)

@@ -1,0 +1,175 @@
+"""Opening a Zenoh session the way bus.md asks for, and the one place where Zenoh's threads meet the loop."""
+
+import asyncio
+import json
+from collections import deque
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import zenoh
+from msgspec import Struct
+
+from schemas.faults import Fault, RunFailed
+from schemas.units import Seconds
+
+RENDEZVOUS = "tcp/127.0.0.1:7447"
+"""Where the processes of one machine find one another: the first listens there, all others connect."""
+LOOPBACK = "tcp/127.0.0.1:0"
+LEASE_MS = 2000
+"""Shorter leases flap on cuts of 0.4 s."""
+STALL_US = 200_000
+"""How long a full link may stall `put`, and so the loop, before it is closed. Zenoh's default is 5 s."""
+RETRY_MS = {"period_init_ms": 100, "period_max_ms": 500, "period_increase_factor": 2}
+BATCH = 256
+CROWD = 65_536
+"""Messages waiting for the loop before even ordered ones are dropped (and then asked for again)."""
+STREAM_CROWD = 1024
+
+CAUSAL = zenoh.Priority.DATA
+"""One priority for everything whose order matters: mixed ones reorder."""
+QOS: dict[str, Any] = {
+    "congestion_control": zenoh.CongestionControl.BLOCK,
+    "priority": CAUSAL,
+    "express": True,
+}
+STREAM_QOS: dict[str, Any] = {
+    "congestion_control": zenoh.CongestionControl.DROP,
+    "priority": zenoh.Priority.DATA_LOW,
+    "express": False,
+}
+
+
+def open_session(
+    robot: str, connect: Sequence[str], listen: Sequence[str], rendezvous: str | None, mode: str = "peer"
+) -> zenoh.Session:
+    """A session in the robot's namespace. Blocks for some milliseconds; an endpoint where nobody is costs nothing.
+
+    rendezvous None: only the endpoints given. Raises RunFailed when an endpoint is wrong or taken.
+    """
+    if rendezvous is not None:
+        try:
+            return zenoh.open(_config(robot, connect, (*listen, LOOPBACK, rendezvous), mode))
+        except zenoh.ZError:
+            # Somebody listens there already. Never both listen and connect: the holder would call itself for ever.
+            connect = (*connect, rendezvous)
+    try:
+        return zenoh.open(_config(robot, connect, tuple(listen) or (LOOPBACK,), mode))
+    except zenoh.ZError as error:
+        where = ", ".join((*listen, *connect))
+        raise RunFailed(Fault(reason=f"cannot open the bus: {error}", where=where, advice="tcp/HOST:PORT")) from error
+
+
+def _config(robot: str, connect: Sequence[str], listen: Sequence[str], mode: str) -> zenoh.Config:
+    config = zenoh.Config()
+    settings: dict[str, object] = {
+        "mode": mode,
+        "namespace": robot,
+        "listen/endpoints": list(listen),
+        "listen/exit_on_failure": True,
+        # A background retry of listening makes close() hang for 10 s (1.10.2).
+        "listen/timeout_ms": 0,
+        "connect/endpoints": list(connect),
+        "connect/exit_on_failure": False,
+        "connect/timeout_ms": 0,
+        "connect/retry": RETRY_MS,
+        "scouting/multicast/enabled": False,
+        "scouting/gossip/enabled": True,
+        "scouting/delay": 1,
+        "timestamping/enabled": True,
+        "transport/link/tx/lease": LEASE_MS,
+        "transport/link/tx/queue/congestion_control/block/wait_before_close": STALL_US,
+        "transport/shared_memory/enabled": False,
+    }
+    for key, value in settings.items():
+        config.insert_json5(key, json.dumps(value))
+    return config
+
+
+class Traffic(Struct):
+    """What the doorway has seen. depth: most that ever waited. lag: longest wait of a batch for the loop."""
+
+    passed: int = 0
+    dropped: int = 0
+    depth: int = 0
+    lag: Seconds = 0.0
+
+
+class Doorway:
+    """From Zenoh's threads to the loop: one queue for all keys, in order; streams apart, the oldest dropped first.
+
+    A callback appends and wakes the loop if nobody has, nothing else: whatever blocks there stalls the link.
+    """
+
+    def __init__(self) -> None:
+        self.traffic = Traffic()
+        self._loop = asyncio.get_running_loop()
+        self._ordered: deque[tuple[Callable[[Any], None], Any]] = deque()
+        self._streams: deque[tuple[Callable[[Any], None], Any]] = deque(maxlen=STREAM_CROWD)
+        self._woken = False
+        self._woken_at = 0.0
+        self._open = True
+
+    def entrance(self, enter: Callable[[Any], None], end: Callable[[Any], None] | None = None) -> Any:
+        """A handler for Zenoh: `enter` runs on the loop with each item, `end` when there will be no more."""
+
+        def ended() -> None:
+            if end is not None:
+                self._let_in(end, None)
+
+        # indirect=False: else Zenoh starts a Python thread for each of these.
+        return zenoh.handlers.Callback(lambda item: self._let_in(enter, item), ended, indirect=False)
+
+    def samples(self, enter: Callable[[zenoh.Sample], None]) -> Any:
+        """As `entrance`, for subscribers: samples that may be dropped take the streams' queue."""
+
+        def sort(sample: zenoh.Sample) -> None:
+            if sample.congestion_control == zenoh.CongestionControl.DROP:
+                if len(self._streams) == STREAM_CROWD:
+                    self.traffic.dropped += 1
+                self._streams.append((enter, sample))
+                self._wake()
+            else:
+                self._let_in(enter, sample)
+
+        return zenoh.handlers.Callback(sort, indirect=False)
+
+    def close(self) -> None:
+        """Let nothing in any more."""
+        self._open = False
+        self._ordered.clear()
+        self._streams.clear()
+
+    def _let_in(self, enter: Callable[[Any], None], item: Any) -> None:
+        if len(self._ordered) >= CROWD:
+            self.traffic.dropped += 1
+            return
+        self._ordered.append((enter, item))
+        self._wake()
+
+    def _wake(self) -> None:
+        if not self._woken and self._open:
+            self._woken = True
+            self._woken_at = self._loop.time()
+            try:
+                self._loop.call_soon_threadsafe(self._drain)
+            except RuntimeError:  # the loop is closed: the process is ending
+                self._open = False
+
+    def _drain(self) -> None:
+        # The flag first: what is appended from here on wakes again, so nothing is left behind.
+        self._woken = False
+        self.traffic.lag = max(self.traffic.lag, self._loop.time() - self._woken_at)
+        waiting = len(self._ordered) + len(self._streams)
+        self.traffic.depth = max(self.traffic.depth, waiting)
+        try:
+            for _ in range(min(waiting, BATCH)):
+                if not self._open:
+                    return
+                enter, item = (self._ordered or self._streams).popleft()
+                self.traffic.passed += 1
+                enter(item)
+        finally:
+            if (self._ordered or self._streams) and not self._woken:
+                self._woken = True
+                self._woken_at = self._loop.time()
+                self._loop.call_soon(self._drain)
