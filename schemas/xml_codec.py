@@ -8,6 +8,8 @@ names of sync points, which stay as written (`schemas.syncref.canonical_sync`); 
 
 import re
 from collections.abc import Iterator
+from contextlib import suppress
+from functools import cache
 from typing import Any, TypeVar, get_args, get_type_hints
 
 import msgspec
@@ -266,7 +268,7 @@ class _Document:
         """Texts to the types of the struct. Raises InputRefused with the attribute that is wrong."""
         try:
             # BML has attributes called `type`; the struct's own says which element it is.
-            return msgspec.convert({**raw, "type": kind.__struct_config__.tag}, kind, strict=False)
+            return msgspec.convert({**_numbers(raw, kind), "type": kind.__struct_config__.tag}, kind, strict=False)
         except msgspec.ValidationError as error:
             reason, _, path = str(error).partition(" - at `$")
             field = path.strip(".`")
@@ -278,9 +280,25 @@ class _Document:
             raise self._source.refusal(f"{name}: {what}", element, advice=advice) from error
 
 
+@cache
+def _hints(kind: type[msgspec.Struct]) -> dict[str, Any]:
+    return get_type_hints(kind)
+
+
+def _numbers(raw: dict[str, Any], kind: type[msgspec.Struct]) -> dict[str, Any]:
+    """Numbers as XML may write them (`.5`, `+2`), which JSON may not."""
+    decimals = [name for name, hint in _hints(kind).items() if float in (hint, *get_args(hint))]
+    numbers = {}
+    for name in decimals:
+        with suppress(ValueError):
+            if isinstance(text := raw.get(name), str):
+                numbers[name] = float(text)
+    return raw | numbers
+
+
 def _allowed(kind: type[msgspec.Struct], field: str) -> str:
     """The values of a field that has only a few, as advice."""
-    hint = get_type_hints(kind).get(field)
+    hint = _hints(kind).get(field)
     choices = [str(value) for value in get_args(hint) if isinstance(value, str | int)]
     return f"one of {', '.join(choices)}" if choices else ""
 
@@ -311,6 +329,8 @@ def _fields(plain: dict[str, str]) -> dict[str, Any]:
 
 
 def _camel(field: str) -> str:
+    if field == "minimum_reliability":
+        return "minReliability"
     return re.sub("_([a-z])", lambda match: match[1].upper(), field)
 
 

@@ -42,6 +42,7 @@ class Source:
             raise self.refusal("a document type (<!DOCTYPE>) is not read", advice="remove it: no entities, no DTD")
         self.root = self._parse(data)
         self._lines = dict(zip(self._elements(), _start_lines(text), strict=False))
+        self._require_declared()
         self._require_shallow()
 
     def line(self, element: etree._Element) -> int:
@@ -81,15 +82,15 @@ class Source:
                 raise self.refusal(
                     f"malformed XML: {reason}", line=line, advice="close and quote everything"
                 ) from error
-        root = etree.fromstring(raw, _parser(encoding, recover=True))
-        for element in root.iter(etree.Element):
+        return etree.fromstring(raw, _parser(encoding, recover=True))
+
+    def _require_declared(self) -> None:
+        for element in self._elements():
             if ":" in split(str(element.tag))[1]:
-                advice = 'declare the prefix, for example xmlns:ebml="edu.wpi.ebml"'
-                line = _last_line(element)
+                advice = f'declare the prefix, for example xmlns:ebml="{EBML}"'
                 raise self.refusal(
-                    f"malformed XML: prefix of <{element.tag}> is not declared", line=line, advice=advice
+                    f"malformed XML: prefix of <{element.tag}> is not declared", element, advice=advice
                 )
-        return root
 
     def _require_shallow(self) -> None:
         depth = 0

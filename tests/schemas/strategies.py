@@ -1,0 +1,136 @@
+"""Random valid blocks and turn fragments: whatever the structs can hold and `schemas.check` accepts."""
+
+from typing import get_args
+
+from hypothesis import strategies as st
+from msgspec.structs import replace
+
+from schemas import behaviors as of
+from schemas.blocks import Block, Composition, Dialect
+from schemas.fragments import TurnFragment, TurnStatus
+from schemas.syncref import SYNC_POINTS, SyncRef
+
+# Letters that XML must escape, white space that it would collapse, and some beyond ASCII.
+LETTERS = "ab cXYZ09<>&\"'\t\n-:é€😀"
+words = st.text(LETTERS, max_size=12)
+ids = st.from_regex(r"[a-z][a-z0-9]{0,3}(-[0-9]{1,2})?", fullmatch=True).filter(lambda id: id != "bml")
+amounts = st.floats(0, 1)
+numbers = st.floats(allow_nan=False, allow_infinity=False)
+hands = st.none() | st.sampled_from(get_args(of.Hand))
+sides = st.sampled_from(["LEFT", "RIGHT", "BOTH"])
+actions = st.lists(st.sampled_from(get_args(of.Action)), max_size=3).map(tuple)
+offsets = st.floats(-1e3, 1e3).map(lambda number: number + 0.0)
+
+
+@st.composite
+def behaviors(draw: st.DrawFn, id: str, reference: st.SearchStrategy[str], *, in_fragment: bool) -> of.Behavior:
+    kinds = [
+        st.builds(of.Gaze, id=st.just(id), target=words, influence=words, offset_angle=numbers),
+        st.builds(of.GazeShift, id=st.just(id), target=words, offset_direction=words),
+        st.builds(of.Pointing, id=st.just(id), target=words, mode=hands),
+        st.builds(of.Gesture, id=st.just(id), lexeme=words, mode=hands),
+        st.builds(of.Head, id=st.just(id), lexeme=words, repetition=st.integers(1, 9), amount=amounts),
+        st.builds(of.HeadDirectionShift, id=st.just(id), target=words),
+        st.builds(of.Face, id=st.just(id), amount=amounts, overshoot=numbers),
+        st.builds(of.FaceLexeme, id=st.just(id), lexeme=words, amount=amounts),
+        st.builds(of.FaceFacs, id=st.just(id), au=st.integers(1, 60), side=sides, amount=amounts),
+        st.builds(of.FaceShift, id=st.just(id), lexeme=words, au=st.integers(0, 60), side=sides),
+        st.builds(of.Posture, id=st.just(id), stance=words, lexeme=words, part=words),
+        st.builds(of.PostureShift, id=st.just(id), stance=words),
+        st.builds(of.Pose, id=st.just(id), lexeme=words, part=words),
+        st.builds(of.Locomotion, id=st.just(id), target=words, manner=words),
+        st.builds(of.Wait, id=st.just(id), duration=st.none() | st.floats(0, 1e6)),
+        st.builds(of.Emit, id=st.just(id), event=words),
+        speeches(id),
+        st.builds(
+            of.Event, id=st.just(id), kind=st.sampled_from(get_args(of.EventKind)), responder=words,
+            objects=st.lists(words, max_size=2).map(tuple), cause=st.sampled_from(get_args(of.Cause)),
+            optional=st.booleans(), accept=actions, limit=st.none() | st.floats(0.1, 1e3),
+            anchors=st.lists(reference, max_size=2).map(tuple), turn=words,
+        ),
+        st.builds(of.TurnSignal, id=st.just(id), turn=words, signal=st.sampled_from(["ended", "aborted"])),
+    ]  # fmt: skip
+    if in_fragment:
+        option = st.builds(
+            of.SpeechOption,
+            text=words,
+            cost=st.floats(0, 1e3),
+            distractors=st.lists(words, max_size=2).map(tuple),
+            deictic=st.booleans(),
+        )
+        options = st.lists(option, min_size=1, max_size=3).map(tuple)
+        reliability = st.floats(0, 1, exclude_min=True, exclude_max=True)
+        kinds.append(
+            st.builds(of.Reference, id=st.just(id), target=words, minimum_reliability=reliability, options=options)
+        )
+    return draw(st.one_of(kinds))
+
+
+@st.composite
+def speeches(draw: st.DrawFn, id: str) -> of.Speech:
+    text = draw(words)
+    names = draw(st.lists(ids.filter(lambda id: id not in ("start", "end")), unique=True, max_size=3))
+    positions = sorted(draw(st.integers(0, len(text))) for _ in names)
+    marks = tuple(of.Mark(name, position) for name, position in zip(names, positions, strict=True))
+    markup = draw(st.just("") | words | st.just('<prosody rate="slow">a</prosody>'))
+    return of.Speech(id=id, text=text, marks=marks, markup=markup)
+
+
+@st.composite
+def _inputs(draw: st.DrawFn, *, in_fragment: bool) -> tuple[tuple[of.Behavior, ...], tuple[of.Constraint, ...]]:
+    names = draw(st.lists(ids, unique=True, max_size=4))
+    points = st.sampled_from(("start", "end") if in_fragment else SYNC_POINTS)
+    times = st.builds(SyncRef, block=st.just("") | ids, offset=offsets)
+    if names:
+        named = st.builds(SyncRef, behavior=st.sampled_from(names), sync=points, offset=offsets)
+        references = (times | named).map(str)
+    else:
+        references = times.map(str)
+    syncs = st.lists(references, max_size=3).map(tuple)
+    operators = st.one_of(
+        st.builds(of.Synchronize, ref=st.just("") | references, syncs=syncs),
+        st.builds(of.Before, ref=references, syncs=syncs),
+        st.builds(of.After, ref=references, syncs=syncs),
+    )
+    made = []
+    for name in names:
+        behavior = draw(behaviors(name, references, in_fragment=in_fragment))
+        timed = draw(st.lists(st.sampled_from([*SYNC_POINTS, "strokeStart", "m-1"]), unique=True, max_size=2))
+        timing = tuple(of.Timing(sync, draw(references)) for sync in timed)
+        made.append(replace(behavior, timing=timing, required=draw(st.booleans())))
+    free = [id for id in draw(st.lists(ids, unique=True, max_size=2)) if id not in names]
+    constraints = tuple(
+        of.Constraint(
+            id=id, operators=tuple(draw(st.lists(operators, max_size=3))), required=draw(st.booleans())
+        )
+        for id in ["", *free]
+    )  # fmt: skip
+    return tuple(made), constraints
+
+
+@st.composite
+def blocks(draw: st.DrawFn) -> Block:
+    made, constraints = draw(_inputs(in_fragment=False))
+    return Block(
+        id=draw(ids),
+        behaviors=made,  # type: ignore[arg-type]
+        constraints=constraints,
+        composition=draw(st.sampled_from(get_args(Composition))),
+        dialect=draw(st.sampled_from(get_args(Dialect))),
+    )
+
+
+@st.composite
+def fragments(draw: st.DrawFn) -> TurnFragment:
+    made, constraints = draw(_inputs(in_fragment=True))
+    return TurnFragment(
+        id=draw(ids),
+        turn_index=draw(st.sampled_from([1, 2, 3])),
+        turn_status=draw(st.sampled_from(get_args(TurnStatus))),
+        behaviors=made,  # type: ignore[arg-type]
+        constraints=constraints,
+        addressee=draw(words),
+        delay=draw(st.booleans()),
+        delay_target=draw(words),
+        accept=draw(actions),
+    )
