@@ -79,7 +79,10 @@ class TurnOutcome(Outcome, frozen=True, kw_only=True, tag="turn_outcome", omit_d
 
 
 class KindStatistics(Struct, frozen=True, kw_only=True, omit_defaults=True):
-    """Table 2.1, one kind. Optional, preempted and withdrawn events never count as failures."""
+    """Table 2.1, one kind. Optional, preempted and withdrawn events never count as failures.
+
+    delay: of the succeeded; failed_delay: of the failed, from start to failure. failure_rate: of both together.
+    """
 
     kind: EventKind
     count: int = 0
@@ -89,6 +92,9 @@ class KindStatistics(Struct, frozen=True, kw_only=True, omit_defaults=True):
     delay_mean: Seconds | None = None
     delay_max: Seconds | None = None
     failure_rate: Probability | None = None
+    failed_delay_min: Seconds | None = None
+    failed_delay_mean: Seconds | None = None
+    failed_delay_max: Seconds | None = None
 
 
 class WindowStatistics(Struct, frozen=True, kw_only=True, omit_defaults=True):

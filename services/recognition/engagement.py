@@ -1,0 +1,108 @@
+"""How engaged somebody seems: pace times quality, with reasons, and levels that do not flutter. Thesis 2.3.
+
+Pace compares the usual time between connection events with the recent one, or with the interval that is still
+open if that is longer. Quality is the share of recent events that did not fail. While somebody is busy with a
+task nothing is concluded from silence: that explains the 70 s gap of the canapé study.
+"""
+
+from typing import Literal, NamedTuple
+
+from schemas.units import Probability, Seconds
+from services.recognition.config import RecognitionConfig
+from services.recognition.statistics import Tally
+
+Level = Literal["engaged", "weakening", "disengaged", "unknown"]
+
+JUST_AFTER: Seconds = 0.001
+"""The estimate must have passed the threshold, not be on it."""
+
+
+class Estimate(NamedTuple):
+    value: Probability | None
+    level: Level
+    reasons: tuple[str, ...]
+
+
+UNKNOWN = Estimate(None, "unknown", ("no connection event yet",))
+
+
+def pace(usual: Seconds, recent: Seconds | None, open: Seconds) -> Probability:
+    """1 while events come at least as fast as usual, falling towards 0 as they stay away."""
+    longest = max(recent or 0.0, open)
+    return 1.0 if longest <= usual else usual / longest
+
+
+def next_level(level: Level, value: Probability, config: RecognitionConfig) -> Level:
+    """The level of `value`; it changes only when the value has passed a threshold by the hysteresis."""
+    margin = config.hysteresis
+    engaged_from = config.engaged_from + {"engaged": -margin, "unknown": 0.0}.get(level, margin)
+    disengaged_below = config.disengaged_below + {"disengaged": margin, "unknown": 0.0}.get(level, -margin)
+    if value >= engaged_from:
+        return "engaged"
+    return "disengaged" if value < disengaged_below else "weakening"
+
+
+class Engagement:
+    """The estimate for one actor (or all), from its tally."""
+
+    def __init__(self, config: RecognitionConfig, tally: Tally) -> None:
+        self.estimate = UNKNOWN
+        self.busy = False
+        self._config = config
+        self._tally = tally
+        self._busy_until: Seconds = float("-inf")
+
+    def update(self, now: Seconds, *, busy: bool) -> Estimate:
+        """The estimate now. busy: with a task, so that it stays as it was."""
+        if self.busy and not busy:
+            self._busy_until = now
+        self.busy = busy
+        last = self._tally.starts.last
+        if busy:
+            kept = [reason for reason in self.estimate.reasons if not reason.startswith("busy")]
+            self.estimate = self.estimate._replace(reasons=("busy with a task: estimate frozen", *kept))
+        elif last is not None:
+            self.estimate = self._estimate(now, max(0.0, now - max(last, self._busy_until)))
+        return self.estimate
+
+    def _estimate(self, now: Seconds, open: Seconds) -> Estimate:
+        usual, recent = self._usual, self._recent(now)
+        failed, judged = self._tally.judged(now)
+        quality = 1.0 - failed / judged if judged else 1.0
+        speed = pace(usual, recent, open)
+        value = speed * quality
+        between = f"{recent:.1f} s between recent events" if recent is not None else "no recent pace"
+        return Estimate(
+            value,
+            next_level(self.estimate.level, value, self._config),
+            (
+                f"pace {speed:.2f}: {between}, {open:.1f} s since the last, usually {usual:.1f} s",
+                f"quality {quality:.2f}: {failed} of {judged} recent events failed",
+            ),
+        )
+
+    @property
+    def _usual(self) -> Seconds:
+        mean = self._tally.starts.mean_difference
+        if mean is None or mean <= 0.0 or self._tally.starts.count < self._config.enough_events:
+            return self._config.reference_mtbce
+        return mean
+
+    def _recent(self, now: Seconds) -> Seconds | None:
+        """Recent mean time between events; None while the window holds time in which somebody was busy."""
+        return self._tally.recent(now).mtbce if now - self._tally.window > self._busy_until else None
+
+    def next_change(self, now: Seconds) -> Seconds | None:
+        """When the level falls if nothing happens any more; None if it can't, or is frozen."""
+        last = self._tally.starts.last
+        level = self.estimate.level
+        if self.busy or last is None or level not in ("engaged", "weakening"):
+            return None
+        threshold = self._config.engaged_from if level == "engaged" else self._config.disengaged_below
+        threshold -= self._config.hysteresis
+        failed, judged = self._tally.judged(now)
+        quality = 1.0 - failed / judged if judged else 1.0
+        if threshold <= 0.0 or quality <= threshold:
+            return None
+        at = max(last, self._busy_until) + self._usual * quality / threshold + JUST_AFTER
+        return at if at > now else None

@@ -1,0 +1,96 @@
+"""What recognition knows besides the events: where everybody looks, who speaks, what is on the table."""
+
+from msgspec import Struct
+
+from schemas.attention import Claim
+from schemas.units import Seconds
+from schemas.world import World
+from services.recognition.config import GazeResolution
+
+SAME_INSTANT: Seconds = 0.001
+"""A look that ends and begins again at the same target within this has not been interrupted."""
+
+
+class Gaze(Struct):
+    """Where an actor looks, and since when. ended: it has looked away at that instant, unless it is still there."""
+
+    targets: tuple[str, ...] = ()
+    since: Seconds = 0.0
+    ended: Seconds | None = None
+    spent: bool = False
+    """This look answers the robot, or has directed it already: it directs nothing (any more)."""
+
+    def begin(self, targets: tuple[str, ...], at: Seconds) -> bool:
+        """A look at `targets`; True if that is a change. What is older than the present look is ignored."""
+        if at < self.since:
+            return False
+        if targets == self.targets and (self.ended is None or at - self.ended <= SAME_INSTANT):
+            self.ended = None
+            return False
+        self.targets, self.since, self.ended, self.spent = targets, at, None, False
+        return True
+
+    def end(self, targets: tuple[str, ...], at: Seconds) -> None:
+        """The end of the look at `targets`: takes effect only if it does not begin again at once."""
+        if self.targets and targets in ((), self.targets) and at >= self.since:
+            self.ended = at
+
+    @property
+    def deadline(self) -> Seconds | None:
+        return None if self.ended is None else self.ended + SAME_INSTANT
+
+    def expire(self) -> Seconds:
+        """The look is over; when it was."""
+        assert self.ended is not None
+        at = self.ended
+        self.targets, self.since, self.ended, self.spent = (), at, None, False
+        return at
+
+
+class Scene:
+    """The robot and the world, shared by all persons of a session."""
+
+    def __init__(self, robot: str, resolution: GazeResolution) -> None:
+        self.robot = robot
+        self.resolution = resolution
+        self.gaze = Gaze()
+        self.robot_speaks_since: Seconds | None = None
+        self.robot_silent_since: Seconds | None = None
+        """When the robot fell silent; None while it speaks or if it never spoke."""
+        self.head_owner = Claim(kind="none", priority=0)
+        self.people_in_world: frozenset[str] = frozenset()
+        self._objects: set[str] = set()
+        self._surfaces: set[str] = {"table"}
+        self._others: set[str] = set()
+
+    def see(self, world: World) -> None:
+        """Objects once seen stay known: a covered piece has not gone (thesis 5.4.2)."""
+        self._objects.update(entity.id for entity in world.objects)
+        self._surfaces.update(entity.id for entity in world.entities if entity.kind == "surface")
+        self._others.update(entity.id for entity in world.entities if entity.kind in ("person", "hand"))
+        self.people_in_world = frozenset(person.id for person in world.people) - {self.robot}
+
+    def knows(self, entity: str) -> bool:
+        """Has it ever been seen? Without any world nobody can tell, so yes."""
+        return not self._objects or entity in self._objects | self._surfaces | self._others
+
+    def is_object(self, entity: str) -> bool:
+        if entity in self._objects:
+            return True
+        return not self._objects and entity not in self._surfaces | self._others | {self.robot}
+
+    def person_looks_at(self, gaze: Gaze, objects: tuple[str, ...]) -> bool:
+        """Does a person's look count as one at `objects`? At resolution `table` anything on the table will do."""
+        if any(target in objects for target in gaze.targets):
+            return True
+        if self.resolution == "object":
+            return False
+        on_table = any(target in self._surfaces or self.is_object(target) for target in gaze.targets)
+        return on_table and any(map(self.is_object, objects))
+
+    def robot_looks_at(self, entities: tuple[str, ...]) -> bool:
+        return any(target in entities for target in self.gaze.targets)
+
+    def fragment_looks_elsewhere(self, entities: tuple[str, ...]) -> bool:
+        """A fragment's own gaze holds the head, and not for one of these."""
+        return self.head_owner.kind == "fragment" and self.head_owner.target not in entities

@@ -1,0 +1,191 @@
+"""The service on a memory bus in virtual time, with the test in the places of realizer, body and perception."""
+
+from functools import partial
+
+import pytest
+
+from schemas import keys
+from schemas.actions import ActionBegan, ActionEnded
+from schemas.behaviors import Event, TurnSignal
+from schemas.feedback import BlockProgress, SyncPointProgress
+from schemas.recognition import ConnectionEvent, EventOutcome, RequestEvent, SignalTurn, Statistics
+from schemas.units import Stamp
+from services.bus import Bus, Subscription
+from services.memory_bus import MemoryHub
+from services.recognition.config import RecognitionConfig
+from services.recognition.service import recognize
+from services.requests import Requester, RequestRefused
+from services.runtime import Service, running
+from tests.recognition.observations import HUMAN, ROBOT, world
+
+
+def recognition(**config: object) -> dict[str, Service]:
+    return {"recognition": partial(recognize, config=RecognitionConfig(**config))}  # type: ignore[arg-type]
+
+
+def request(bus: Bus, kind: str, *objects: str, id: str = "r-1", **event: object) -> RequestEvent:
+    asked = Event(id=f"{kind}-1", kind=kind, responder=HUMAN, objects=objects, **event)  # type: ignore[arg-type]
+    return RequestEvent(id=id, requester=bus.name, block="block-1", at=bus.stamp(), event=asked)
+
+
+def perceive(bus: Bus, target: str, at: float | None = None) -> None:
+    look = ActionBegan(actor=HUMAN, action="look", at=bus.stamp(at), targets=(target,))
+    bus.publish(keys.PERCEIVED_ACTION, look)
+
+
+def drain(inbox: Subscription) -> list[ConnectionEvent]:
+    return [queued.message for queued in list(inbox._queue)]  # type: ignore[misc]
+
+
+async def test_directed_gaze_is_decided_by_the_look_of_the_person(hub: MemoryHub):
+    bus = hub.join("realizer")
+    async with running(hub, recognition()), Requester(bus) as requests:
+        bus.publish(keys.WORLD, world())
+        pending = requests.send(keys.EVENT, request(bus, "directed_gaze", "blue-square"))
+        await pending.accepted
+        at = bus.now()
+        hub._loop.call_later(0.75, perceive, bus, "blue-square")
+        outcome = await pending.outcome
+
+    assert isinstance(outcome, EventOutcome)
+    assert (outcome.state, outcome.delay, outcome.at) == ("succeeded", 0.75, Stamp("loop", at + 0.75))
+
+
+async def test_directed_gaze_fails_at_its_limit_after_the_last_anchor(hub: MemoryHub):
+    bus = hub.join("realizer")
+    async with running(hub, recognition()), Requester(bus) as requests:
+        bus.publish(keys.WORLD, world())
+        anchors = ("gaze-1:stroke", "phrase-1:start")
+        pending = requests.send(keys.EVENT, request(bus, "directed_gaze", "blue-square", anchors=anchors))
+        for behavior, sync, after in (("gaze-1", "stroke", 0.4), ("phrase-1", "start", 1.0)):
+            point = SyncPointProgress(block="block-1", behavior=behavior, sync=sync, at=bus.stamp(after), time=after)
+            hub._loop.call_at(after, bus.publish, keys.FEEDBACK, point)
+        outcome = await pending.outcome
+
+    assert isinstance(outcome, EventOutcome)
+    assert (outcome.state, bus.now(), outcome.delay) == ("failed", 3.5, 3.5)
+
+
+async def test_mutual_gaze_and_adjacency_pair_over_the_bus(hub: MemoryHub):
+    bus = hub.join("realizer")
+    async with running(hub, recognition()), Requester(bus) as requests:
+        bus.publish(keys.WORLD, world())
+        pair = requests.send(keys.EVENT, request(bus, "adjacency_pair", id="ap", turn="t-1"))
+        gaze = requests.send(keys.EVENT, request(bus, "mutual_facial_gaze", id="mfg", optional=True))
+        ended = TurnSignal(id="turn", turn="t-1", signal="ended", actor=HUMAN)
+        turn = requests.send(keys.TURN, SignalTurn(id="s", requester=bus.name, signal=ended, at=bus.stamp()))
+        perceived = ActionBegan(actor=HUMAN, action="nod", at=bus.stamp(1.0))
+        hub._loop.call_at(1.0, bus.publish, keys.PERCEIVED_ACTION, perceived)
+        await turn.outcome
+        answered, looked = await pair.outcome, await gaze.outcome
+
+    assert isinstance(answered, EventOutcome)
+    assert isinstance(looked, EventOutcome)
+    assert (answered.state, answered.response, answered.delay) == ("succeeded", "nod", 1.0)
+    assert (looked.state, looked.delay) == ("failed", 1.9)
+
+
+async def test_unknown_actor_is_refused_with_the_known_ones(hub: MemoryHub):
+    bus = hub.join("realizer")
+    async with running(hub, recognition()), Requester(bus) as requests:
+        bus.publish(keys.WORLD, world())
+        pending = requests.send(keys.EVENT, request(bus, "mutual_facial_gaze"))
+        stranger = Event(id="mfg-1", kind="mutual_facial_gaze", responder="stranger")
+        refused = requests.send(
+            keys.EVENT,
+            RequestEvent(id="r-2", requester=bus.name, block="block-1", at=bus.stamp(), event=stranger),
+        )
+
+        with pytest.raises(RequestRefused, match="block-1: mfg-1: unknown actor 'stranger' .known: human"):
+            await refused.outcome
+        await pending.accepted
+
+
+async def test_time_is_that_of_the_stamps_not_of_the_arrival(hub: MemoryHub):
+    bus = hub.join("realizer")
+    async with running(hub, recognition()), Requester(bus) as requests:
+        bus.publish(keys.WORLD, world())
+        pending = requests.send(keys.EVENT, request(bus, "mutual_facial_gaze"))
+        hub._loop.call_at(1.0, perceive, bus, ROBOT, 0.8)
+        outcome = await pending.outcome
+
+    assert isinstance(outcome, EventOutcome)
+    assert (bus.now(), outcome.delay) == (1.0, 0.8)
+
+
+async def test_statistics_are_there_for_a_late_joiner(hub: MemoryHub):
+    bus = hub.join("perception")
+    async with running(hub, recognition()):
+        bus.publish(keys.WORLD, world())
+        robot_look = ActionBegan(actor=ROBOT, action="look", at=bus.stamp(), targets=(HUMAN,))
+        bus.publish(keys.ROBOT_ACTION, robot_look)
+        perceive(bus, ROBOT)
+        with bus.subscribe(keys.CONNECTION_EVENT) as inbox:
+            received = await inbox.next()
+        with hub.join("console").subscribe(keys.ANY_STATISTICS) as late:
+            statistics = [await late.next(), await late.next()]
+
+    assert received is not None
+    assert isinstance(received.message, ConnectionEvent)
+    assert (received.message.id, received.message.state) == ("0-mfg-1", "started")
+    assert {one.key for one in statistics if one} == {keys.statistics("all"), keys.statistics(HUMAN)}
+    assert all(isinstance(one.message, Statistics) and one.message.session.events == 1 for one in statistics if one)
+
+
+async def test_only_the_body_says_what_the_robot_does(hub: MemoryHub):
+    bus = hub.join("perception")
+    async with running(hub, recognition()):
+        bus.publish(keys.WORLD, world())
+        bus.publish(keys.PERCEIVED_ACTION, ActionBegan(actor=ROBOT, action="look", at=bus.stamp(), targets=(HUMAN,)))
+        perceive(bus, ROBOT)
+        with bus.subscribe(keys.CONNECTION_EVENT) as inbox:
+            first, second = await inbox.next(), await inbox.next()
+
+    assert first is not None
+    assert second is not None
+    assert [first.message.state, second.message.state] == ["started", "failed"]  # type: ignore[union-attr]
+
+
+async def test_the_death_of_the_requester_withdraws_its_events(hub: MemoryHub):
+    realizer, watcher = hub.join("realizer"), hub.join("console")
+    realizer.declare_alive()
+    async with running(hub, recognition()):
+        realizer.publish(keys.WORLD, world())
+        realizer.publish(keys.EVENT, request(realizer, "directed_gaze", "blue-square", anchors=("gaze-1:stroke",)))
+        with watcher.subscribe(keys.CONNECTION_EVENT) as inbox:
+            started = await inbox.next()
+            hub.kill("realizer")
+            ended = await inbox.next()
+
+    assert started is not None
+    assert ended is not None
+    assert ended.message.state == "withdrawn"  # type: ignore[union-attr]
+    assert ended.at == 2.0
+
+
+async def test_a_block_that_ends_stops_the_wait_for_its_anchors(hub: MemoryHub):
+    bus = hub.join("realizer")
+    async with running(hub, recognition()), Requester(bus) as requests:
+        bus.publish(keys.WORLD, world())
+        pending = requests.send(keys.EVENT, request(bus, "directed_gaze", "blue-square", anchors=("gone-1:start",)))
+        end = BlockProgress(block="block-1", progress="end", at=bus.stamp(1.0), status="done")
+        hub._loop.call_at(1.0, bus.publish, keys.FEEDBACK, end)
+        await pending.outcome
+
+    assert bus.now() == 2.5
+
+
+async def test_bad_names_never_end_the_service(hub: MemoryHub):
+    bus = hub.join("perception")
+    async with running(hub, recognition()):
+        for actor in ("", "a/b", "**", "#"):
+            bus.publish(
+                keys.PERCEIVED_ACTION, ActionBegan(actor=actor, action="look", at=bus.stamp(), targets=(ROBOT,))
+            )
+            bus.publish(keys.PERCEIVED_ACTION, ActionEnded(actor=actor, action="look", at=bus.stamp()))
+        bus.publish(keys.PERCEIVED_ACTION, ActionBegan(actor="ann", action="look", at=bus.stamp(), targets=(ROBOT,)))
+        with bus.subscribe(keys.CONNECTION_EVENT) as inbox:
+            received = await inbox.next()
+
+    assert received is not None
+    assert received.message.initiator == "ann"  # type: ignore[union-attr]
