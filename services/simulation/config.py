@@ -20,7 +20,7 @@ class SimulationConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=
     """Of the person's reaction times."""
     jitter: Seconds = 0.03
     """Reaction times vary by up to this, either way. The scenario's order has room for 0.1 s."""
-    await_participants: tuple[str, ...] = ("control", "generation", "realizer", "recognition", "collaboration")
+    await_participants: tuple[str, ...] = ("control", "generation", "realizer", "recognition")
     """The person comes when these are on the bus. Their services may start in any order, hours apart."""
     entrance: Seconds = 1.0
     """From then until the person comes."""

@@ -1,0 +1,24 @@
+"""When a piece has been laid down anew. Pure."""
+
+import math
+from collections.abc import Iterable
+
+from schemas.units import Meters, Radians
+from schemas.world import Entity
+
+MOVED: Meters = 0.01
+TURNED: Radians = math.radians(10.0)
+RESTING = 0.01
+"""m/s"""
+
+
+def has_been_placed(piece: str, before: Iterable[Entity], now: Iterable[Entity]) -> bool:
+    """Does the piece rest where, or how, it did not lie `before`? False while it is not seen at all."""
+    old = next((entity for entity in before if entity.id == piece), None)
+    new = next((entity for entity in now if entity.id == piece), None)
+    if new is None or math.hypot(*new.velocity) > RESTING:
+        return False
+    if old is None:
+        return True
+    turned = abs(math.remainder(new.yaw - old.yaw, math.tau))
+    return math.dist(new.position, old.position) > MOVED or turned > TURNED

@@ -1,0 +1,192 @@
+"""What the manager does, as generators: a plan yields what it wants done and is sent what came of it.
+
+Pure: neither bus nor clock. The service performs the wishes; a test plays the robot and the human by hand.
+"""
+
+from collections.abc import Generator, Iterable
+from typing import TypeVar
+
+from msgspec import Struct
+
+from schemas.fragments import FragmentOutcome, TurnFragment
+from schemas.units import Seconds
+from schemas.world import Entity
+from services.collaboration.config import CollaborationConfig
+from services.collaboration.fragments import MANIPULATION, Mention, Sentence, fragment, request
+from services.collaboration.task import Goal, Instruction, check
+from services.tangram_table import TangramTable
+
+# -- what a plan may wish for -----------------------------------------------------------------------------------
+
+
+class Perform(Struct, frozen=True):
+    """Perform the fragment. Answer: its outcome, None if it was refused or failed."""
+
+    fragment: TurnFragment
+
+
+class Observe(Struct, frozen=True):
+    """Answer: the objects that perception sees now."""
+
+
+class AwaitPlacement(Struct, frozen=True):
+    """Wait until the piece has been moved from where it was `before`, and rests. Answer: the objects, or None."""
+
+    piece: str
+    before: tuple[Entity, ...]
+    timeout: Seconds
+
+
+class AwaitPerson(Struct, frozen=True):
+    """Wait until a person is there. Answer: their id."""
+
+
+class AwaitDeparture(Struct, frozen=True):
+    """Wait until nobody is there any more. Answer: whether they have gone."""
+
+    timeout: Seconds
+
+
+class Pause(Struct, frozen=True):
+    seconds: Seconds
+
+
+Wish = Perform | Observe | AwaitPlacement | AwaitPerson | AwaitDeparture | Pause
+Answer = FragmentOutcome | tuple[Entity, ...] | str | bool | None
+R = TypeVar("R")
+Plan = Generator[Wish, Answer, R]
+
+
+# -- parts of plans ---------------------------------------------------------------------------------------------
+
+
+class Manager:
+    """The parts that the scripted run and the task have in common."""
+
+    def __init__(self, config: CollaborationConfig, table: TangramTable) -> None:
+        self.config = config
+        self.table = table
+        self.goal = Goal(table)
+        self._universe = tuple(piece.id for piece in table.pieces)
+        self._person = table.person.id
+
+    def welcome(self) -> Plan[None]:
+        """Wait for a person, and let them settle."""
+        person = yield AwaitPerson()
+        assert isinstance(person, str)
+        self._person = person
+        yield Pause(self.config.arrival)
+
+    def say(self, id: str, sentence: Sentence, *, look: bool = True) -> Plan[None]:
+        """A full turn that asks for nothing."""
+        yield Perform(fragment(id, sentence, addressee=self._person, universe=self._universe, look=look))
+        yield Pause(self.config.pause)
+
+    def approve(self, id: str) -> Plan[None]:
+        """ "Ummmm, good.": look away as if thinking, then look back. Steps 20 and 23 of Appendix B."""
+        begin, end = f"{id}-a", f"{id}-b"
+        yield Perform(
+            fragment(
+                begin, ("Ummmm,",), addressee=self._person, universe=self._universe,
+                status="beginning", delay_target=self.table.surface.id,
+            )
+        )  # fmt: skip
+        yield Pause(self.config.thinking)
+        yield Perform(
+            fragment(end, ("good.",), addressee=self._person, universe=self._universe, status="end", look=False)
+        )
+        yield Pause(self.config.pause)
+
+    def instruct(self, id: str, instruction: Instruction) -> Plan[bool]:
+        """Ask for a placement until it is right: again if nothing happens, for a fix if it is wrong.
+
+        Returns whether it was right in the end.
+        """
+        asked = self._request(id, instruction)
+        for attempt in range(1, self.config.attempts + 1):
+            before = yield Observe()
+            assert isinstance(before, tuple)
+            yield Perform(asked)
+            after = yield AwaitPlacement(instruction.wanted.piece, before, self.config.placement)
+            yield Pause(self.config.settle)
+            suffix = "fix" if after is not None else "again"
+            if isinstance(after, tuple) and check(instruction, after).right:
+                return True
+            number = f"-{attempt}" if attempt > 1 else ""
+            asked = self._request(f"{id}-{suffix}{number}", instruction, fix=suffix == "fix")
+        return False
+
+    def farewell(self) -> Plan[None]:
+        yield AwaitDeparture(self.config.farewell)
+
+    def _request(self, id: str, instruction: Instruction, *, fix: bool = False) -> TurnFragment:
+        sentence = request(
+            instruction.wanted,
+            self.table,
+            verb="fix" if fix else "move",
+            deictic="" if fix else instruction.deictic,
+            piece_reliability=self.config.piece_reliability,
+            landmark_reliability=self.config.landmark_reliability,
+        )
+        return fragment(id, sentence, addressee=self._person, universe=self._universe, accept=MANIPULATION)
+
+    def introduction(self) -> tuple[str | Mention, ...]:
+        """Step 3: what lies on the table."""
+        return (
+            "We are going to use the pieces on the table to make a picture together. "
+            "As you can see, on the table we have: squares, triangles,",
+            Mention(piece="rectangle", phrase="a rectangle", reliability=self.config.landmark_reliability),
+            "and",
+            Mention(piece="trapezoid", phrase="a trapezoid", reliability=self.config.piece_reliability),
+            "of different colors.",
+        )
+
+
+# -- whole plans ------------------------------------------------------------------------------------------------
+
+
+class Turn(Struct, frozen=True, kw_only=True):
+    """A row of a script. Exactly one of the three: something said, a placement asked for, or "Ummmm, good."."""
+
+    step: str
+    say: tuple[str | Mention, ...] = ()
+    instruction: Instruction | None = None
+    look: bool = True
+
+
+def script(manager: Manager, turns: Iterable[Turn]) -> Plan[None]:
+    """Play a script row by row; a placement that stays wrong does not end it."""
+    yield from manager.welcome()
+    for turn in turns:
+        if turn.instruction is not None:
+            yield from manager.instruct(turn.step, turn.instruction)
+        elif turn.say:
+            yield from manager.say(turn.step, turn.say, look=turn.look)
+        else:
+            yield from manager.approve(turn.step)
+    yield from manager.farewell()
+
+
+def task(manager: Manager) -> Plan[None]:
+    """Make the figure with the person: always the next piece that the table as it is asks for."""
+    yield from manager.welcome()
+    yield from manager.say("hello", ("Hello, let's make a tangram.",))
+    yield from manager.say("pieces", manager.introduction(), look=False)
+    yield from manager.say("start", ("Okay, let's start.",))
+    given_up: set[str] = set()
+    number = 0
+    while True:
+        pieces = yield Observe()
+        assert isinstance(pieces, tuple)
+        instruction = manager.goal.next(pieces, given_up)
+        if instruction is None:
+            break
+        number += 1
+        if (yield from manager.instruct(f"move-{number}", instruction)):
+            yield from manager.approve(f"good-{number}")
+        else:
+            given_up.add(instruction.wanted.piece)
+    finished = "Look, we made an anchor." if not given_up else "Look, we almost made an anchor."
+    yield from manager.say("finished", (finished,), look=False)
+    yield from manager.say("goodbye", ("Thanks for playing. That was fun, goodbye.",), look=False)
+    yield from manager.farewell()

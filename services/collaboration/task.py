@@ -1,0 +1,88 @@
+"""The tangram task: what belongs where, what comes next, and whether it was done. Thesis 5.2.1.
+
+Pure. The figure is known by its pieces' poses alone: what touches what is computed, for the figure and for the table
+as it is. Pieces are counted as placed from the base outward, so that one beside a misplaced one is not.
+"""
+
+from collections.abc import Collection, Iterable
+
+from msgspec import Struct
+
+from schemas.world import Entity
+from services.collaboration.relations import Relation, relation, relations
+from services.tangram_table import TangramTable
+
+
+class Instruction(Struct, frozen=True, kw_only=True):
+    """What the human is asked to do.
+
+    deictic: a word with which the piece may be pointed out instead of named. also: other placements that will do.
+    """
+
+    wanted: Relation
+    deictic: str = ""
+    also: tuple[Relation, ...] = ()
+
+
+class Placement(Struct, frozen=True):
+    """What became of an instruction. found: how the piece lies to others now, `wanted` among them if it is right."""
+
+    right: bool
+    found: tuple[Relation, ...] = ()
+
+
+def check(instruction: Instruction, pieces: Iterable[Entity]) -> Placement:
+    """Does the piece lie where it was to be laid?"""
+    lying = {piece.id: piece for piece in pieces}
+    piece = lying.pop(instruction.wanted.piece, None)
+    if piece is None:
+        return Placement(False)
+    found = tuple(rel for other in lying.values() if (rel := relation(piece, other)) is not None)
+    return Placement(any(rel in found for rel in (instruction.wanted, *instruction.also)), found)
+
+
+class Goal:
+    """The figure to be made."""
+
+    def __init__(self, table: TangramTable) -> None:
+        self.base = table.base
+        self.order = tuple(piece.id for piece in table.pieces)
+        self.relations = relations(table.figure())
+
+    def placed(self, pieces: Iterable[Entity]) -> frozenset[str]:
+        """The pieces that are where they belong, the base included."""
+        held = self.relations & relations(pieces)
+        placed = {self.base}
+        while grown := {rel.piece for rel in held if rel.landmark in placed} - placed:
+            placed |= grown
+        return frozenset(placed)
+
+    def next(self, pieces: Collection[Entity], given_up: Collection[str] = ()) -> Instruction | None:
+        """The next piece to ask for, beside one that is placed; None when none is left that could be asked for.
+
+        Pieces nearest the base come first, then the order of the table's file. given_up: not to be asked for.
+        """
+        placed = self.placed(pieces)
+        candidates = [
+            rel
+            for rel in self.relations
+            if rel.landmark in placed and rel.piece not in placed and rel.piece not in given_up
+        ]
+        if not candidates:
+            return None
+        steps = self._steps_from_base()
+        return Instruction(
+            wanted=min(
+                candidates,
+                key=lambda rel: (steps[rel.piece], self.order.index(rel.piece), self.order.index(rel.landmark)),
+            )
+        )
+
+    def _steps_from_base(self) -> dict[str, int]:
+        steps = {self.base: 0}
+        while grown := {rel.piece: steps[rel.landmark] + 1 for rel in self.relations if rel.landmark in steps}:
+            new = {piece: count for piece, count in grown.items() if piece not in steps}
+            if not new:
+                break
+            steps |= new
+        return steps
