@@ -1,24 +1,87 @@
-"""One configuration for all services: TOML in, frozen structs out. A bad one is refused at start, by key."""
+"""One configuration for all services: TOML in, frozen structs out. A bad one is refused at start, by file and key.
 
+Each service documents its own section in its `config.py`; docs/configuration.md is made from those.
+"""
+
+import tomllib
+from collections.abc import Iterable
 from pathlib import Path
+from typing import Any
 
 import msgspec
 from msgspec import Struct
 
 from schemas.faults import Fault, InputRefused
+from services.collaboration.config import CollaborationConfig
+from services.control.config import ControlConfig
+from services.generation.config import GenerationConfig
+from services.realizer.config import RealizerConfig
+from services.recognition.config import RecognitionConfig
+from services.simulation.config import SimulationConfig
+
+_ADVICE = "see docs/configuration.md"
 
 
 class Config(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """robot: the namespace on the bus and the robot's actor id. Each service adds its own section here."""
+    """robot: the namespace on the bus and the robot's actor id. One section (TOML table) for each service."""
 
     robot: str = "robot"
+    generation: GenerationConfig = GenerationConfig()
+    realizer: RealizerConfig = RealizerConfig()
+    recognition: RecognitionConfig = RecognitionConfig()
+    control: ControlConfig = ControlConfig()
+    simulation: SimulationConfig = SimulationConfig()
+    collaboration: CollaborationConfig = CollaborationConfig()
+
+    def __post_init__(self) -> None:
+        if not self.robot or not set(self.robot).isdisjoint("/*$#?@ "):
+            raise ValueError(f"robot {self.robot!r} cannot be part of a key: it has one of / * $ # ? @ or a space")
 
 
-def load(path: Path) -> Config:
-    """Read a TOML file. Raises InputRefused with the file and the key that is wrong."""
+def load(path: Path | None = None, *, settings: Iterable[str] = (), defaults: Iterable[str] = ()) -> Config:
+    """The configuration of a TOML file. Raises InputRefused with the file and the key that is wrong.
+
+    settings: `section.key=value`, each stronger than the file. defaults: the same, weaker than the file.
+    """
+    merged: dict[str, Any] = {}
+    for setting in defaults:
+        _merge(merged, _setting(setting))
+    if path is not None:
+        _merge(merged, _file(path))
+    for setting in settings:
+        _merge(merged, _setting(setting))
     try:
-        return msgspec.toml.decode(path.read_bytes(), type=Config)
+        return msgspec.convert(merged, Config)
+    except msgspec.ValidationError as error:
+        reason = str(error).replace(" - at `$.", ", in `").replace("Object contains", "there is an")
+        raise InputRefused(Fault(reason=reason, where=str(path) if path else "settings", advice=_ADVICE)) from error
+
+
+def _file(path: Path) -> dict[str, Any]:
+    try:
+        return tomllib.loads(path.read_text(encoding="utf-8"))
     except OSError as error:
         raise InputRefused(Fault(reason=error.strerror or str(error), where=str(path))) from error
-    except msgspec.DecodeError as error:
-        raise InputRefused(Fault(reason=str(error), where=str(path), advice="see docs/configuration.md")) from error
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise InputRefused(Fault(reason=f"not TOML: {error}", where=str(path), advice=_ADVICE)) from error
+
+
+def _setting(text: str) -> dict[str, Any]:
+    """`recognition.gaze_resolution=table`; the value is TOML, or else a plain word."""
+    key, equals, value = text.partition("=")
+    if not equals:
+        raise InputRefused(Fault(reason=f"no value in setting {text!r}", advice="section.key=value"))
+    for form in (f"{key} = {value}", f"{key} = {msgspec.json.encode(value).decode()}"):
+        try:
+            return tomllib.loads(form)
+        except tomllib.TOMLDecodeError:
+            continue
+    raise InputRefused(Fault(reason=f"bad setting {text!r}", advice="section.key=value"))
+
+
+def _merge(into: dict[str, Any], news: dict[str, Any]) -> None:
+    for key, value in news.items():
+        if isinstance(value, dict) and isinstance(into.get(key), dict):
+            _merge(into[key], value)
+        else:
+            into[key] = value

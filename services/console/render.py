@@ -57,7 +57,7 @@ def _people(scene: Scene) -> Panel:
             waiting = ", ".join(claim.kind for claim in scene.waiting)
             table.add_row("", Text(f"waiting: {waiting}", style="dim"))
     mtbce = wording.seconds(scene.session.mtbce if scene.session else None)
-    title = f"[bold]engage[/] {wording.clock(scene.now - scene.began)}  MTBCE {mtbce}"
+    title = Text(f"engage {wording.clock(scene.now - scene.began)}  MTBCE {mtbce}", style="bold")
     return Panel(table, title=title, title_align="left", box=box.ROUNDED, height=7)
 
 
@@ -89,7 +89,8 @@ def _points(scene: Scene) -> Panel:
             Text(wording.seconds(point.realised), style="green" if came else "dim"),
             Text(wording.seconds(slip, sign=True), style="yellow" if late else "dim"),
         )
-    title = f"block {block.id} {block.status or 'running'}" if block else "no block yet"
+    # Ids are other people's: as Text, so that brackets in them are not read as markup.
+    title = Text(f"block {block.id} {block.status or 'running'}" if block else "no block yet")
     return Panel(table, title=title, title_align="left", box=box.ROUNDED, height=POINTS_SHOWN + 4)
 
 
@@ -120,8 +121,8 @@ def _event(row: EventInView, scene: Scene) -> tuple[RenderableType, ...]:
     return (
         wording.clock(row.began - scene.began),
         Text(wording.KINDS[event.kind]),
-        f"{event.initiator} → {event.responder}",
-        wording.names(event.objects) or "",
-        event.cause,
+        Text(f"{event.initiator} → {event.responder}"),
+        Text(wording.names(event.objects)),
+        Text(event.cause),
         Text(wording.decision(event), style=STATE_STYLES[event.state]),
     )

@@ -1,0 +1,232 @@
+"""The command line. Options are declared here; what they do is in `services.commandline`, loaded only when called."""
+
+import os
+import sys
+from pathlib import Path
+from typing import Annotated, Any, Literal, NoReturn
+
+import typer
+
+from schemas.faults import EngageError, InputRefused
+from services.commandline.errors import readable
+from services.commandline.process import FAILED, INTERRUPTED, REFUSED
+from services.commandline.roster import ServiceName
+
+app = typer.Typer(
+    name="engage",
+    help="The engagement layer for robots that talk with people.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+
+Files = Annotated[
+    list[Path], typer.Argument(metavar="FILE...", help="EBML turn fragments or BML blocks (XML), or JSON of either.")
+]
+ConfigFile = Annotated[
+    Path | None, typer.Option("--config", metavar="FILE", help="TOML; see docs/configuration.md.", show_default=False)
+]
+Settings = Annotated[
+    list[str] | None,
+    typer.Option("--set", metavar="KEY=VALUE", help="One setting, stronger than the file: realizer.late=1."),
+]
+Events = Annotated[
+    Path | None, typer.Option(metavar="FILE", help="Write connection events as JSON lines; - for standard output.")
+]
+Feedback = Annotated[
+    Path | None, typer.Option(metavar="FILE", help="Write the blocks' feedback as JSON lines; - for standard output.")
+]
+VirtualTime = Annotated[bool, typer.Option("--virtual-time", help="As fast as it goes, on a clock that jumps.")]
+Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")]
+Robot = Annotated[
+    str | None, typer.Option(metavar="NAME", help="The robot's namespace on the bus.", show_default="robot")
+]
+Connect = Annotated[
+    list[str] | None, typer.Option(metavar="ENDPOINT", help="Zenoh endpoint to connect to; may be repeated.")
+]
+Listen = Annotated[
+    list[str] | None, typer.Option(metavar="ENDPOINT", help="Zenoh endpoint to listen on; may be repeated.")
+]
+Human = Annotated[
+    Literal["appendix-b", "misplacing", "listening"] | None,
+    typer.Option(help="How the scripted human behaves: the transcript, or one who misplaces a piece."),
+]
+Resolution = Annotated[
+    Literal["table", "object"] | None,
+    typer.Option(help="How finely perception tells what people look at."),
+]
+Seed = Annotated[int | None, typer.Option(metavar="N", help="Of all chance in the simulated body.")]
+WorldFile = Annotated[
+    Path | None, typer.Option("--world", metavar="FILE", help="JSON of the entities; without it the tangram table.")
+]
+
+
+@app.command()
+def demo(
+    virtual_time: VirtualTime = False,
+    seed: Seed = None,
+    human: Human = None,
+    resolution: Resolution = None,
+    events: Events = None,
+    feedback: Feedback = None,
+    config: ConfigFile = None,
+    settings: Settings = None,
+    quiet: Quiet = False,
+) -> None:
+    """Watch a robot and a person make a tangram: everything in this one process."""
+    from services.commandline import demo
+    from services.commandline import run as run_
+
+    where = run_.Where(config, settings=(*demo.choices(seed, human, resolution), *(settings or ())))
+    raise typer.Exit(demo.main(demo.Options(where, virtual_time, events, feedback, quiet)))
+
+
+@app.command()
+def up(
+    task: Annotated[bool, typer.Option("--task", help="Also run the tangram task, and end when it ends.")] = False,
+    seed: Seed = None,
+    human: Human = None,
+    resolution: Resolution = None,
+    events: Events = None,
+    feedback: Feedback = None,
+    robot: Robot = None,
+    connect: Connect = None,
+    listen: Listen = None,
+    config: ConfigFile = None,
+    settings: Settings = None,
+    quiet: Quiet = False,
+) -> None:
+    """Run the services as separate processes on this machine; Ctrl-C stops them all."""
+    from services.commandline import demo, up
+
+    chosen = (*demo.choices(seed, human, resolution), *(settings or ()))
+    where = up.Where(config, robot, tuple(connect or ()), tuple(listen or ()), chosen)
+    raise typer.Exit(up.main(up.Options(where, task, events, feedback, quiet)))
+
+
+@app.command()
+def run(
+    service: Annotated[ServiceName, typer.Argument(help="Which service.", show_default=False)],
+    robot: Robot = None,
+    connect: Connect = None,
+    listen: Listen = None,
+    config: ConfigFile = None,
+    settings: Settings = None,
+    attended: Annotated[bool, typer.Option("--attended", hidden=True)] = False,
+) -> None:
+    """Run one service, on whatever machine this is, until Ctrl-C."""
+    from services.commandline import run
+
+    where = run.Where(config, robot, tuple(connect or ()), tuple(listen or ()), tuple(settings or ()))
+    raise typer.Exit(run.main(service, where, attended))
+
+
+@app.command()
+def play(
+    files: Files,
+    embedded: Annotated[
+        bool, typer.Option("--embedded", help="In a private system with a simulated body, instead of a running one.")
+    ] = False,
+    world: WorldFile = None,
+    virtual_time: VirtualTime = False,
+    at: Annotated[
+        str | None,
+        typer.Option(metavar="S,S,...", help="When to submit each file, seconds; else one after the other."),
+    ] = None,
+    events: Events = None,
+    feedback: Feedback = None,
+    robot: Robot = None,
+    connect: Connect = None,
+    config: ConfigFile = None,
+    settings: Settings = None,
+    quiet: Quiet = False,
+) -> None:
+    """Perform turn fragments and BML blocks. Exit 0 done, 2 input refused, 3 failed while running."""
+    from services.commandline import play, run
+
+    where = run.Where(config, robot, tuple(connect or ()), settings=tuple(settings or ()))
+    raise typer.Exit(
+        play.main(play.Options(tuple(files), where, embedded, world, virtual_time, at, events, feedback, quiet))
+    )
+
+
+@app.command()
+def plan(
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="A BML block (XML or JSON).", show_default=False)],
+    format: Annotated[
+        Literal["text", "json", "dot"], typer.Option("--format", help="How to print the net.")
+    ] = "text",
+    world: WorldFile = None,
+    config: ConfigFile = None,
+    settings: Settings = None,
+) -> None:
+    """Check a block and print its Petri net and predicted schedule. Nothing moves."""
+    from services.commandline import plan, run
+
+    where = run.Where(config, settings=tuple(settings or ()))
+    raise typer.Exit(plan.main(file, format, world, where))
+
+
+@app.command()
+def watch(
+    json: Annotated[bool, typer.Option("--json", help="JSON lines of every kind instead of text.")] = False,
+    robot: Robot = None,
+    connect: Connect = None,
+    config: ConfigFile = None,
+) -> None:
+    """Follow a running system: connection events, feedback, claims on the head, as they come."""
+    from services.commandline import run, watch
+
+    raise typer.Exit(watch.main(run.Where(config, robot, tuple(connect or ()), ()), json))
+
+
+UsageError: type[Exception] = next(kind for kind in typer.BadParameter.__mro__ if kind.__name__ == "UsageError")
+"""Typer carries its own copy of click and does not show this class."""
+
+
+def main(arguments: list[str] | None = None) -> NoReturn:
+    """Run a command. Bad input is one line on standard error, never a traceback; a bug of ours is a traceback."""
+    try:
+        code = app(arguments, standalone_mode=False)
+    except UsageError as error:
+        code = _misused(error)
+    except EngageError as error:
+        code = _refuse([error])
+    except BaseExceptionGroup as group:
+        expected, bugs = group.split(EngageError)
+        if expected is None or bugs is not None:
+            raise
+        code = _refuse(_leaves(expected))
+    except KeyboardInterrupt:
+        code = INTERRUPTED
+    except BrokenPipeError:
+        # Whoever read our output (`| head`) has had enough; Python would complain again when it flushes at exit.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        code = INTERRUPTED
+    sys.exit(code or 0)
+
+
+def _misused(error: Any) -> int:
+    """One line instead of Typer's box. Without any argument the help has been printed and there is nothing to add."""
+    if message := error.format_message().replace("\n", " ").replace("Value error, ", ""):
+        command = error.ctx.command_path if error.ctx else "engage"
+        print(f"{command}: {message} (see {command} --help)", file=sys.stderr)
+    return REFUSED
+
+
+def _leaves(group: BaseExceptionGroup[EngageError]) -> list[EngageError]:
+    found: list[EngageError] = []
+    for error in group.exceptions:
+        found += _leaves(error) if isinstance(error, BaseExceptionGroup) else [error]
+    return found
+
+
+def _refuse(errors: list[EngageError]) -> int:
+    for error in errors:
+        print(readable(error.fault), file=sys.stderr)
+    return FAILED if any(not isinstance(error, InputRefused) for error in errors) else REFUSED
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,92 @@
+"""`engage demo`: the whole system in this process, playing the anchor tangram with a simulated person."""
+
+import asyncio
+from pathlib import Path
+from typing import NamedTuple
+
+from rich.console import Console
+
+from schemas.messages import Message
+from schemas.units import Seconds
+from services.bus import Bus
+from services.commandline import roster
+from services.commandline.outputs import Outputs
+from services.commandline.process import DONE, run
+from services.commandline.run import Where
+from services.config import Config
+from services.console import tally
+from services.console.follow import Sink, following
+from services.console.live import LiveView, Log
+from services.console.log import Telling
+from services.memory_bus import MemoryHub
+from services.runtime import Ready, Service, running
+
+DEFAULTS = ("recognition.gaze_resolution=table",)
+"""The transcript was annotated by people who saw that a look went to the table, rarely to which piece."""
+HUMANS = {"appendix-b": "scripted", "misplacing": "misplacing", "listening": "listening"}
+
+
+class Options(NamedTuple):
+    where: Where = Where()
+    virtual_time: bool = False
+    events: Path | None = None
+    feedback: Path | None = None
+    quiet: bool = False
+
+
+def choices(seed: int | None, human: str | None, resolution: str | None) -> tuple[str, ...]:
+    """The command line's choices about the simulation as settings of the configuration."""
+    chosen = {
+        "control.variability.seed": seed,
+        "simulation.seed": seed,
+        "simulation.human": HUMANS[human] if human else None,
+        "recognition.gaze_resolution": resolution,
+    }
+    return tuple(f"{key}={value}" for key, value in chosen.items() if value is not None)
+
+
+class Tallying:
+    """A sink that keeps the tally."""
+
+    def __init__(self, began: Seconds) -> None:
+        self.tally = tally.empty(began)
+
+    def __call__(self, message: Message, at: Seconds) -> None:
+        self.tally = tally.feed(self.tally, message, at)
+
+
+def main(options: Options) -> int:
+    config = options.where.load(defaults=DEFAULTS)
+    with Outputs(options.events, options.feedback) as outputs:
+        console = Console(stderr=outputs.own_stdout, quiet=options.quiet)
+        live = console.is_terminal and not options.virtual_time and not options.quiet
+        result = run(demonstrate(config, outputs, console, live), virtual_time=options.virtual_time)
+    console.print(tally.render(result, config.robot))
+    return DONE
+
+
+async def demonstrate(config: Config, outputs: Sink, console: Console, live: bool) -> tally.Tally:
+    """Run everything until the task is over; the tally of what happened."""
+    finished = asyncio.Event()
+
+    def ending(service: Service) -> Service:
+        async def collaborate(bus: Bus, ready: Ready) -> None:
+            await service(bus, ready)
+            finished.set()
+
+        return collaborate
+
+    async with MemoryHub(config.robot) as hub:
+        bus = hub.join("console")
+        services = {name: roster.service(name, config) for name in roster.NAMES}
+        services["collaboration"] = ending(services["collaboration"])
+        tallying = Tallying(bus.now())
+        with shown(console, config.robot, bus.now(), live) as show:
+            async with following(bus, (show, tallying, outputs)), running(hub, services):
+                await finished.wait()
+    return tallying.tally
+
+
+def shown(console: Console, robot: str, began: Seconds, live: bool) -> LiveView | Log:
+    """A live view on a terminal, a line for each thing that matters anywhere else."""
+    return LiveView(console, robot, began) if live else Log(console, robot, began, Telling(points=False, head=False))

@@ -1,0 +1,228 @@
+"""`engage play FILE...`: perform fragments and blocks, in a running system or in a private one."""
+
+import asyncio
+import sys
+from collections.abc import AsyncIterator, Sequence
+from contextlib import asynccontextmanager
+from pathlib import Path
+from typing import NamedTuple
+
+from rich.console import Console
+
+from schemas.blocks import Block, BlockOutcome
+from schemas.faults import EngageError, Fault, InputRefused
+from schemas.feedback import BlockProgress, SyncPointProgress, WarningFeedback
+from schemas.fragments import FragmentOutcome, TurnFragment
+from schemas.messages import Message
+from schemas.recognition import ConnectionEvent
+from schemas.units import Seconds
+from schemas.world import World
+from services.bus import Bus, Hub
+from services.client import Robot, connect
+from services.commandline import roster
+from services.commandline.errors import readable
+from services.commandline.outputs import Outputs
+from services.commandline.process import DONE, FAILED, REFUSED, run
+from services.commandline.run import Where, unique
+from services.commandline.sources import Source, Thing, read_source, read_world
+from services.config import Config
+from services.console.follow import Sink, following
+from services.console.live import Log
+from services.console.log import Telling
+from services.memory_bus import MemoryHub
+from services.runtime import Ready, Service, running
+
+PATIENCE: Seconds = 5.0
+"""How long a running system may take to answer at all."""
+
+
+class Options(NamedTuple):
+    files: tuple[Path, ...]
+    where: Where = Where()
+    embedded: bool = False
+    world: Path | None = None
+    virtual_time: bool = False
+    at: str | None = None
+    events: Path | None = None
+    feedback: Path | None = None
+    quiet: bool = False
+
+
+class Played:
+    """Which blocks are ours: the filter of what is written and told, and the judge of interruptions."""
+
+    def __init__(self, sources: Sequence[Source]) -> None:
+        self.blocks = frozenset(thing.id for source in sources for thing in source.things)
+
+    def concerns(self, message: Message) -> bool:
+        match message:
+            case BlockProgress(block=block) | SyncPointProgress(block=block) | WarningFeedback(block=block):
+                return block is None or block in self.blocks
+            case ConnectionEvent(block=block):
+                return block in self.blocks
+        return True
+
+    def exit_code(self, outcome: FragmentOutcome | BlockOutcome) -> int:
+        """A block that another file's REPLACE ended counts as done."""
+        replaced = isinstance(outcome, BlockOutcome) and outcome.replaced_by in self.blocks
+        return DONE if outcome.status == "done" or replaced else FAILED
+
+
+class Job(NamedTuple):
+    """times: when to submit each source, seconds from the start; None: one after the other."""
+
+    sources: tuple[Source, ...]
+    times: tuple[Seconds, ...] | None
+    played: Played
+    outputs: Outputs
+    console: Console
+
+
+def main(options: Options) -> int:
+    for given, option in ((options.world, "--world"), (options.virtual_time, "--virtual-time")):
+        if given and not options.embedded:
+            raise InputRefused(Fault(reason=f"{option} is for a private system", advice="add --embedded"))
+    config = options.where.load()
+    times = submission_times(options.at, len(options.files))
+    with Outputs(options.events, options.feedback) as outputs:
+        sources = _read(options.files, outputs)
+        world = read_world(options.world)
+        if options.embedded:
+            _check(sources, world, config, outputs)
+        played = Played(sources)
+        outputs.wanted = played.concerns
+        console = Console(stderr=outputs.own_stdout, quiet=options.quiet)
+        job = Job(sources, times, played, outputs, console)
+        performing = _embedded(job, config, world) if options.embedded else _remote(job, config, options.where)
+        return run(performing, virtual_time=options.virtual_time)
+
+
+def submission_times(text: str | None, files: int) -> tuple[Seconds, ...] | None:
+    """`0,1.5` as seconds, one for each file; None: one after the other. Raises InputRefused."""
+    if text is None:
+        return None
+    try:
+        times = tuple(float(part) for part in text.split(","))
+    except ValueError as error:
+        raise InputRefused(Fault(reason=f"--at {text!r} is not a list of seconds", advice="--at 0,1.5")) from error
+    if len(times) != files:
+        raise InputRefused(
+            Fault(reason=f"--at gives {len(times)} times for {files} files", advice="one for each file")
+        )
+    if not all(0 <= time < float("inf") for time in times):
+        raise InputRefused(Fault(reason=f"--at {text!r}: a time is negative or endless", advice="seconds from now"))
+    return times
+
+
+def _read(files: tuple[Path, ...], outputs: Outputs) -> tuple[Source, ...]:
+    """All files, or InputRefused for the first bad one, with its warning among the feedback."""
+    sources = []
+    for path in files:
+        try:
+            sources.append(read_source(path))
+        except InputRefused as error:
+            _warn(outputs, path, error.fault)
+            raise
+    return tuple(sources)
+
+
+def _warn(outputs: Outputs, path: Path, fault: Fault) -> None:
+    """Bad input never reaches the realizer; its feedback says the same as the realizer's would."""
+    place = fault.where.removeprefix(str(path)).removeprefix(": ")
+    block = place.partition(":")[0] if fault.line and place else None
+    outputs(WarningFeedback(block=block, kind="PARSING_FAILURE", message=readable(fault, path)), 0.0)
+
+
+def _check(sources: Sequence[Source], world: World, config: Config, outputs: Outputs) -> None:
+    """What only a known world and body can tell, before anything moves. Raises InputRefused."""
+    from services.generation.fragment_check import check
+    from services.realizer.export import plan_block
+
+    for source in sources:
+        for thing in source.things:
+            try:
+                if isinstance(thing, TurnFragment):
+                    check(thing, world, config.robot)
+                else:
+                    plan_block(thing, world)
+            except InputRefused as error:
+                _warn(outputs, source.path, error.fault)
+                raise InputRefused(error.fault) from error
+
+
+@asynccontextmanager
+async def _private(job: Job, config: Config, world: World) -> AsyncIterator[Hub]:
+    """A system of our own: simulated body, still world; the policies only if a fragment needs them.
+
+    Without a fragment nobody but the blocks themselves moves the head.
+    """
+    from services.simulation.still import stand_still
+
+    async def table(bus: Bus, ready: Ready) -> None:
+        await stand_still(bus, ready, world)
+
+    names = ["realizer", "recognition", "control"]
+    if any(isinstance(thing, TurnFragment) for source in job.sources for thing in source.things):
+        names.append("generation")
+    services: dict[str, Service] = {name: roster.service(name, config) for name in names}
+    async with MemoryHub(config.robot) as hub, running(hub, {"simulation": table, **services}):
+        yield hub
+
+
+async def _embedded(job: Job, config: Config, world: World) -> int:
+    async with _private(job, config, world) as hub:
+        return await _perform_all(job, hub, None)
+
+
+async def _remote(job: Job, config: Config, where: Where) -> int:
+    async with await where.open(config.robot) as hub:
+        return await _perform_all(job, hub, PATIENCE)
+
+
+async def _perform_all(job: Job, hub: Hub, patience: Seconds | None) -> int:
+    """The worst exit code of all sources. patience: how long a service may take to answer at all."""
+    bus = hub.join(unique("play-log"))
+    log = Log(job.console, hub.robot, bus.now(), Telling(head=False))
+
+    def tell(message: Message, at: Seconds) -> None:
+        if job.played.concerns(message):
+            log(message, at)
+
+    sinks: tuple[Sink, ...] = (tell, job.outputs)
+    async with following(bus, sinks), connect(hub=hub) as robot:
+        if job.times is None:
+            return max([await _perform(job, source, robot, patience) for source in job.sources])
+        loop = asyncio.get_running_loop()
+        began = loop.time()
+
+        async def later(source: Source, time: Seconds) -> int:
+            await asyncio.sleep(began + time - loop.time())
+            return await _perform(job, source, robot, patience)
+
+        async with asyncio.TaskGroup() as group:
+            pairs = zip(job.sources, job.times, strict=True)
+            tasks = [group.create_task(later(source, time), name=str(source.path)) for source, time in pairs]
+        return max(task.result() for task in tasks)
+
+
+async def _perform(job: Job, source: Source, robot: Robot, patience: Seconds | None) -> int:
+    """Perform what a file holds, in order; its worst exit code. A failure is told and ends nothing else."""
+    worst = DONE
+    for thing in source.things:
+        try:
+            outcome = await _submit(thing, robot, patience)
+        except EngageError as error:
+            print(readable(error.fault, source.path), file=sys.stderr)
+            worst = max(worst, REFUSED if isinstance(error, InputRefused) else FAILED)
+            continue
+        code = job.played.exit_code(outcome)
+        if code != DONE:
+            print(f"{source.path}: {thing.id} was {outcome.status}", file=sys.stderr)
+        worst = max(worst, code)
+    return worst
+
+
+async def _submit(thing: Thing, robot: Robot, patience: Seconds | None) -> FragmentOutcome | BlockOutcome:
+    if isinstance(thing, Block):
+        return await robot.realize(thing, timeout=patience)
+    return await robot.perform(thing, timeout=patience)

@@ -1,0 +1,131 @@
+"""Keep child processes running: logs with a name before each line, restarts with growing pauses, an orderly end.
+
+A child gets SIGTERM when we are told to stop, SIGKILL if it does not listen, and sees its standard input close if
+we die without a word, so that nothing outlives its supervisor.
+"""
+
+import asyncio
+import sys
+from asyncio.subprocess import PIPE, STDOUT, Process
+from collections.abc import AsyncIterator, Callable, Mapping, Sequence
+from contextlib import asynccontextmanager, suppress
+
+from schemas.faults import Fault, RunFailed
+from schemas.units import Seconds
+
+Tell = Callable[[str, str], None]
+"""Takes a child's name and a line of its log."""
+FIRST_PAUSE: Seconds = 0.5
+LONGEST_PAUSE: Seconds = 10.0
+"""Between a crash and the restart, doubling from the first to the longest."""
+STABLE: Seconds = 20.0
+"""A child that ran for so long starts over with the first pause."""
+PATIENCE: Seconds = 5.0
+"""From SIGTERM to SIGKILL."""
+
+
+def pause_after(previous: Seconds | None, lived: Seconds) -> Seconds:
+    """How long to wait before the next start. previous: the pause before, None at the first crash."""
+    if previous is None or lived >= STABLE:
+        return FIRST_PAUSE
+    return min(2 * previous, LONGEST_PAUSE)
+
+
+def without_threads() -> None:
+    """Python 3.11 watches each child with a thread unless told to use what Linux offers."""
+    if sys.version_info < (3, 12) and sys.platform == "linux":
+        watcher = asyncio.PidfdChildWatcher()
+        asyncio.get_event_loop_policy().set_child_watcher(watcher)
+
+
+class Child:
+    """One supervised process. once: it may end by itself, with exit code 0, and is then not started again."""
+
+    def __init__(self, name: str, arguments: Sequence[str], tell: Tell, *, once: bool = False) -> None:
+        self.name = name
+        self.once = once
+        self.starts = 0
+        self.ended = asyncio.Event()
+        self.pid: int | None = None
+        self._arguments = arguments
+        self._tell = tell
+
+    async def keep(self) -> None:
+        """Run it, again after each crash, until cancelled (which stops it), or done if it runs once."""
+        loop = asyncio.get_running_loop()
+        pause: Seconds | None = None
+        while True:
+            began = loop.time()
+            code = await self._life()
+            if self.once and code == 0:
+                self.ended.set()
+                return
+            if code == 2:
+                raise ChildRefused(self.name)
+            pause = pause_after(pause, loop.time() - began)
+            self._tell(self.name, f"ended with {_ending(code)}; starting it again in {pause:g} s")
+            await asyncio.sleep(pause)
+
+    async def _life(self) -> int:
+        # Its own process group: a terminal's Ctrl-C reaches us alone, and we stop the children in order.
+        process = await asyncio.create_subprocess_exec(
+            *self._arguments, stdin=PIPE, stdout=PIPE, stderr=STDOUT, start_new_session=True
+        )
+        self.starts += 1
+        self.pid = process.pid
+        try:
+            await self._pass_on(process)
+            return await process.wait()
+        finally:
+            await self._end(process)
+            self.pid = None
+
+    async def _pass_on(self, process: Process) -> None:
+        assert process.stdout is not None
+        while line := await _line(process.stdout):
+            self._tell(self.name, line.decode(errors="replace").rstrip())
+
+    async def _end(self, process: Process) -> None:
+        if process.returncode is not None:
+            return
+        with suppress(ProcessLookupError):
+            process.terminate()
+        try:
+            async with asyncio.timeout(PATIENCE):
+                await self._pass_on(process)
+                await process.wait()
+        except TimeoutError:
+            self._tell(self.name, f"did not end within {PATIENCE:g} s; killed")
+            with suppress(ProcessLookupError):
+                process.kill()
+            await process.wait()
+
+
+class ChildRefused(RunFailed):
+    """A child ended with exit code 2: what it was given is wrong, and would be wrong again."""
+
+    def __init__(self, name: str) -> None:
+        super().__init__(Fault(reason=f"{name} could not start", advice="its log says why"))
+
+
+async def _line(stream: asyncio.StreamReader) -> bytes:
+    try:
+        return await stream.readline()
+    except ValueError:
+        return b"(a line too long to show)\n"
+
+
+def _ending(code: int) -> str:
+    return f"signal {-code}" if code < 0 else f"exit code {code}"
+
+
+@asynccontextmanager
+async def supervised(children: Mapping[str, Child]) -> AsyncIterator[None]:
+    """Keep the children running while the body of `async with` runs; at its end all have ended, last first."""
+    async with asyncio.TaskGroup() as group:
+        tasks = [group.create_task(child.keep(), name=f"child {name}") for name, child in children.items()]
+        try:
+            yield
+        finally:
+            for task in reversed(tasks):
+                task.cancel()

@@ -1,0 +1,103 @@
+"""`engage up`: the services as processes of their own on this machine, watched over until Ctrl-C."""
+
+import asyncio
+import sys
+from collections.abc import Iterable
+from pathlib import Path
+from typing import NamedTuple
+
+from rich.console import Console
+from rich.text import Text
+
+from schemas.messages import Message
+from schemas.presence import PeerAlive
+from schemas.units import Seconds
+from services.commandline.demo import DEFAULTS, Tallying, shown
+from services.commandline.outputs import Outputs
+from services.commandline.process import DONE, until_signal
+from services.commandline.roster import ROBOT
+from services.commandline.run import Where, forever, unique
+from services.commandline.supervisor import Child, supervised, without_threads
+from services.config import Config
+from services.console import tally
+from services.console.follow import following
+
+STYLES = ("cyan", "magenta", "green", "yellow", "blue", "red")
+
+
+class Options(NamedTuple):
+    """task: also run the tangram task, and end with it."""
+
+    where: Where
+    task: bool = False
+    events: Path | None = None
+    feedback: Path | None = None
+    quiet: bool = False
+
+
+def main(options: Options) -> int:
+    config = options.where.load(defaults=DEFAULTS if options.task else ())  # refused here, not by every child
+    without_threads()
+    with Outputs(options.events, options.feedback) as outputs:
+        console = Console(stderr=outputs.own_stdout, quiet=options.quiet)
+        asyncio.run(until_signal(_up(options, config, outputs, console)))
+    return DONE
+
+
+async def _up(options: Options, config: Config, outputs: Outputs, console: Console) -> None:
+    # Our own session comes first and stays: children may crash, the place where all find one another does not.
+    async with await options.where.open(config.robot) as hub:
+        bus = hub.join(unique("up"))
+        tallying = Tallying(bus.now())
+        live = options.task and console.is_terminal and not options.quiet
+        children = _children(options, config, console)
+        arrivals = Arrivals(children, console)
+        with shown(console, config.robot, bus.now(), live) as show:
+            sinks = (show, tallying, outputs, arrivals) if options.task else (outputs, arrivals)
+            async with following(bus, sinks), supervised(children):
+                if options.task:
+                    await children["collaboration"].ended.wait()
+                else:
+                    await forever()
+    if options.task:
+        console.print(tally.render(tallying.tally, config.robot))
+
+
+def _children(options: Options, config: Config, console: Console) -> dict[str, Child]:
+    names = (*ROBOT, "simulation", "collaboration") if options.task else (*ROBOT, "simulation")
+    width = max(map(len, names))
+    styles = dict(zip(names, STYLES, strict=False))
+
+    def tell(name: str, line: str) -> None:
+        console.print(Text(f"{name:>{width}} │ ", style=styles[name]) + Text(line), soft_wrap=True)
+
+    return {
+        name: Child(name, command(name, options.where, config), tell, once=name == "collaboration") for name in names
+    }
+
+
+def command(name: str, where: Where, config: Config) -> list[str]:
+    """The child's command line: `engage run NAME`, by our interpreter, on our bus, configured as we are."""
+    # What was decided here, by default or by option, is told in full, so that all children agree.
+    settings = (*where.settings, f"recognition.gaze_resolution={config.recognition.gaze_resolution}")
+    endpoints = (*where.listen, *where.connect)
+    return [
+        *(sys.executable, "-P", "-m", "services.cli", "run", name, "--attended", "--robot", config.robot),
+        *(("--config", str(where.config)) if where.config else ()),
+        *(part for setting in settings for part in ("--set", setting)),
+        *(part for endpoint in endpoints for part in ("--connect", endpoint)),
+    ]
+
+
+class Arrivals:
+    """A sink that says once that everybody is there."""
+
+    def __init__(self, names: Iterable[str], console: Console) -> None:
+        self._missing = set(names)
+        self._console = console
+
+    def __call__(self, message: Message, at: Seconds) -> None:
+        if isinstance(message, PeerAlive) and message.participant in self._missing:
+            self._missing.remove(message.participant)
+            if not self._missing:
+                self._console.print("all services are up; Ctrl-C stops them", highlight=False)

@@ -1,0 +1,88 @@
+from io import StringIO
+
+import pytest
+from rich.console import Console
+
+from schemas.feedback import WarningFeedback
+from schemas.fragments import FragmentOutcome
+from schemas.messages import Message
+from schemas.units import Seconds
+from services.console import log, tally, view
+from services.console.log import Telling
+from tests.console.scenes import SCENE, at, event, fed
+
+
+def lines(messages: tuple[tuple[Message, Seconds], ...], telling: Telling) -> list[str]:
+    told = []
+    scene = view.empty("robot", 10.0)
+    for message, time in messages:
+        before, scene = scene, view.feed(scene, message, time)
+        if (line := log.told(message, before, scene, time, telling)) is not None:
+            told.append(line.strip())
+    return told
+
+
+def test_the_log_tells_the_scene_in_order() -> None:
+    assert lines(SCENE, Telling()) == [
+        "0:00.0  human looks at the robot",
+        "0:00.1  head: fragment: rectangle",
+        "0:00.3  robot looks at rectangle",
+        "0:00.6  b:s:start at 0.60 s (planned 0.50 s)",
+        "0:01.0  * directed gaze, robot → human about rectangle (reference): waiting",
+        "0:01.9  * directed gaze, robot → human about rectangle (reference): succeeded after 0.90 s",
+        '0:02.0  robot: "a rectangle"',
+    ]
+
+
+def test_the_log_can_be_narrowed() -> None:
+    told = lines(SCENE, Telling(actions=False, points=False, head=False))
+
+    assert all(line.partition("  ")[2].startswith("*") for line in told)
+    assert len(told) == 2
+
+
+def test_a_warning_is_told_with_its_place() -> None:
+    warning = WarningFeedback(block="b", behavior="p", kind="NO_SUCH_TARGET", message="no 'cup'")
+
+    assert lines(((warning, 10.0),), Telling()) == ["0:00.0  ! NO_SUCH_TARGET b:p: no 'cup'"]
+
+
+def test_the_tally_counts_each_event_once_by_its_decision() -> None:
+    total = fed(
+        tally.feed,
+        tally.empty(10.0),
+        [
+            *SCENE,
+            event("e1", "completed", 13.0, started=at(11.0)),
+            event("e2", "failed", 14.0, delay=2.5),
+            event("e3", "failed", 15.0, optional=True),
+            event("e4", "preempted", 15.0),
+            event("e5", "started", 16.0),
+            event("e6", "succeeded", 17.0, initiator="human", responder="robot", delay=0.2),
+        ],
+    )
+
+    mine = tally.count(total, "directed_gaze", "robot", "robot")
+    theirs = tally.count(total, "directed_gaze", None, "robot")
+    assert (mine.count, mine.succeeded, mine.failed, mine.failed_optional, mine.other, mine.open) == (
+        5,
+        1,
+        1,
+        1,
+        1,
+        1,
+    )
+    assert mine.delays == (0.9,)
+    assert (theirs.count, theirs.succeeded, theirs.delays) == (1, 1, (0.2,))
+    assert total.duration == pytest.approx(7.0)
+
+
+def test_the_summary_names_kinds_outcomes_delays_and_pace() -> None:
+    total = fed(tally.feed, tally.empty(10.0))
+    total = tally.feed(total, FragmentOutcome(id="r", fragment="f", status="failed"), 12.5)
+    console = Console(width=160, record=True, file=StringIO())
+    console.print(tally.render(total, "robot"))
+    text = console.export_text()
+
+    for expected in ("directed gaze", "0.90 s", "MTBCE 4.20 s", "duration 0:02.5", "1 fragments, 1 not finished"):
+        assert expected in text

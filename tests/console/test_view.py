@@ -1,0 +1,134 @@
+from io import StringIO
+
+import msgspec
+import pytest
+from rich.console import Console
+
+from schemas.actions import ActionBegan, ActionEnded, ActorLost
+from schemas.attention import Claim
+from schemas.feedback import BlockProgress, PlannedPoint, PredictionFeedback, SyncPointProgress
+from services.console import view
+from services.console.render import render
+from tests.console.scenes import SCENE, at, event, fed
+
+
+@pytest.fixture
+def scene() -> view.Scene:
+    return fed(view.feed, view.empty("robot", 10.0))
+
+
+def drawn(scene: view.Scene, width: int = 120) -> str:
+    console = Console(width=width, record=True, file=StringIO())
+    console.print(render(scene))
+    return console.export_text()
+
+
+def test_words_come_one_by_one() -> None:
+    texts = []
+    scene = view.empty("robot", 10.0)
+    for message, time in SCENE:
+        scene = view.feed(scene, message, time)
+        if scene.said and (not texts or texts[-1] != scene.said[-1].text):
+            texts.append(scene.said[-1].text)
+
+    assert texts == ["", "a", "a rectangle"]
+
+
+def test_an_utterance_closes_when_the_voice_stops(scene: view.Scene) -> None:
+    assert [(u.actor, u.text, u.open) for u in scene.said] == [("robot", "a rectangle", False)]
+
+
+def test_a_new_look_ends_the_last_one(scene: view.Scene) -> None:
+    scene = view.feed(scene, ActionBegan(actor="human", action="look", at=at(12.0), targets=("table",)), 12.0)
+
+    assert scene.actor("human").doing == (view.Doing("look", ("table",), 12.0),)
+
+
+def test_two_arms_may_point_at_two_things() -> None:
+    scene = view.empty("robot", 0.0)
+    for target in ("red", "blue"):
+        scene = view.feed(scene, ActionBegan(actor="human", action="point", at=at(1.0), targets=(target,)), 1.0)
+    scene = view.feed(scene, ActionEnded(actor="human", action="point", at=at(2.0), targets=("red",)), 2.0)
+
+    assert [doing.targets for doing in scene.actor("human").doing] == [("blue",)]
+
+
+def test_who_is_lost_does_nothing(scene: view.Scene) -> None:
+    scene = view.feed(scene, ActorLost(actor="human", at=at(13.0)), 13.0)
+
+    assert not scene.actor("human").present
+    assert scene.actor("human").doing == ()
+
+
+def test_points_keep_plan_and_realisation(scene: view.Scene) -> None:
+    assert scene.block is not None
+    start, end = scene.block.points
+    assert (start.planned, start.realised) == (0.5, 0.6)
+    assert start.slip == pytest.approx(0.1)
+    assert (end.planned, end.realised, end.slip) == (2.0, None, None)
+
+
+def test_a_later_plan_does_not_unsay_what_was_realised(scene: view.Scene) -> None:
+    plan = PredictionFeedback(
+        block="b",
+        points=(PlannedPoint(behavior="s", sync="start", time=9.0), PlannedPoint(behavior="s", sync="end", time=2.5)),
+    )
+    scene = view.feed(scene, plan, 12.0)
+
+    assert scene.block is not None
+    assert [(p.planned, p.realised) for p in scene.block.points] == [(0.5, 0.6), (2.5, None)]
+
+
+def test_the_arbiters_own_blocks_are_not_shown(scene: view.Scene) -> None:
+    after = view.feed(scene, BlockProgress(block="maintenance-3", progress="start", at=at(12.5)), 12.5)
+    after = view.feed(
+        after, SyncPointProgress(block="maintenance-3", behavior="g", sync="start", at=at(12.5), time=0.0), 12.5
+    )
+
+    assert after == msgspec.structs.replace(scene, now=12.5)
+
+
+def test_only_the_last_ended_blocks_are_kept(scene: view.Scene) -> None:
+    for number in range(5):
+        scene = view.feed(scene, BlockProgress(block=f"n{number}", progress="start", at=at(13.0)), 13.0)
+        scene = view.feed(scene, BlockProgress(block=f"n{number}", progress="end", at=at(14.0), status="done"), 14.0)
+
+    assert [block.id for block in scene.blocks] == ["b", "n3", "n4"]
+    assert scene.block is not None
+    assert scene.block.id == "b"
+
+
+def test_a_completed_event_keeps_its_decision(scene: view.Scene) -> None:
+    scene = fed(view.feed, scene, [event("e1", "completed", 13.0, started=at(11.0), duration=1.1)])
+
+    assert [(row.event.state, row.event.delay) for row in scene.events] == [("succeeded", 0.9)]
+
+
+def test_the_view_says_who_speaks_who_looks_where_and_who_owns_the_head(scene: view.Scene) -> None:
+    text = drawn(scene)
+
+    for expected in (
+        "robot: a rectangle", "looks rectangle", "looks the robot", "fragment: rectangle", "MTBCE 4.20 s",
+        "s:start", "0.60 s", "+0.10 s", "directed gaze", "robot → human", "succeeded after 0.90 s",
+    ):  # fmt: skip
+        assert expected in text
+
+
+@pytest.mark.parametrize("width", [80, 100, 200])
+def test_the_view_fits_the_terminal(scene: view.Scene, width: int) -> None:
+    assert max(map(len, drawn(scene, width).splitlines())) <= width
+
+
+def test_an_empty_scene_can_be_drawn() -> None:
+    assert "no block yet" in drawn(view.empty("robot", 0.0))
+
+
+def test_brackets_in_ids_are_not_markup() -> None:
+    scene = view.feed(
+        view.empty("robot", 0.0), ActionBegan(actor="[red]", action="look", at=at(1.0), targets=("[/]",)), 1.0
+    )
+    scene = view.feed(scene, BlockProgress(block="[/b]", progress="start", at=at(1.0)), 1.0)
+    scene = fed(view.feed, scene, [event("e1", "started", 2.0, responder="[/x]", objects=("[/y]",))])
+    scene = msgspec.structs.replace(scene, owner=Claim(kind="face", priority=6, target="[bold]"), notes=("[/x]",))
+
+    assert "[red]" in drawn(scene)
