@@ -1,0 +1,76 @@
+"""The public JSON lines, to the letter: others parse them."""
+
+import json
+
+from schemas.feedback import BlockProgress, PlannedPoint, PredictionFeedback, SyncPointProgress, WarningFeedback
+from schemas.lines import line
+from schemas.presence import PeerGone
+from schemas.recognition import ConnectionEvent
+from schemas.units import Stamp
+
+
+def at(seconds: float) -> Stamp:
+    return Stamp("loop", seconds)
+
+
+def test_the_start_of_a_block() -> None:
+    assert line(BlockProgress(block="b", progress="start", at=at(1.23456789))) == (
+        '{"type":"block_progress","block":"b","progress":"start","status":null,"time":0.0,"global_time":1.234568}'
+    )
+
+
+def test_the_end_of_a_block_that_had_no_id() -> None:
+    message = BlockProgress(block=None, progress="end", status="failed", time=0.1 + 0.2, at=at(2))
+
+    assert line(message) == (
+        '{"type":"block_progress","block":null,"progress":"end","status":"failed","time":0.3,"global_time":2.0}'
+    )
+
+
+def test_a_sync_point() -> None:
+    message = SyncPointProgress(block="b", behavior="g", sync="stroke", at=at(5.5), time=0.5, predicted=0.4)
+
+    assert line(message) == (
+        '{"type":"sync_point_progress","block":"b","behavior":"g","sync":"stroke","time":0.5,"global_time":5.5,'
+        '"predicted":0.4,"source":"body","arrived":null,"skew":0.0}'
+    )
+
+
+def test_a_warning_about_a_behavior_and_about_the_whole_block() -> None:
+    message = WarningFeedback(block="b", behavior="g", kind="NO_SUCH_TARGET", message="no 'cup'")
+
+    assert line(message) == (
+        '{"type":"warning","block":"b","behavior":"g","kind":"NO_SUCH_TARGET","message":"no \'cup\'"}'
+    )
+    assert json.loads(line(WarningFeedback(block=None, kind="PARSING_FAILURE", message="")) or "") == {
+        "type": "warning",
+        "block": None,
+        "behavior": None,
+        "kind": "PARSING_FAILURE",
+        "message": "",
+    }
+
+
+def test_a_prediction() -> None:
+    message = PredictionFeedback(block="b", points=(PlannedPoint(behavior="g", sync="end", time=-0.0),))
+
+    assert line(message) == (
+        '{"type":"prediction","block":"b","points":[{"behavior":"g","sync":"end","time":0.0}]}'
+    )  # fmt: skip
+
+
+def test_a_connection_event_that_has_only_begun() -> None:
+    message = ConnectionEvent(
+        id="e-1", kind="directed_gaze", initiator="robot", responder="human", state="started", at=at(3), started=at(3),
+        objects=("cup",), cause="reference",
+    )  # fmt: skip
+
+    assert line(message) == (
+        '{"type":"connection_event","id":"e-1","kind":"directed_gaze","initiator":"robot","responder":"human",'
+        '"objects":["cup"],"cause":"reference","state":"started","optional":false,"delay":null,"time":3.0,'
+        '"started":3.0,"duration":null,"response":null,"block":null,"behavior":null,"turn":null}'
+    )
+
+
+def test_other_messages_have_no_line() -> None:
+    assert line(PeerGone(participant="control")) is None
