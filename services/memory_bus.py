@@ -5,6 +5,7 @@ import random
 from collections import deque
 from typing import NamedTuple
 
+import msgspec
 from msgspec import Struct
 
 from schemas import keys
@@ -24,8 +25,10 @@ class Faults(Struct, frozen=True, kw_only=True):
 
 
 class _Past(NamedTuple):
+    """A message that late subscribers still get. number: of all that were sent, so states keep their place."""
+
+    number: int
     received: Received
-    at: Seconds
 
 
 class MemoryHub(Hub):
@@ -37,15 +40,19 @@ class MemoryHub(Hub):
         self._chance = random.Random(seed)
         self._loop = asyncio.get_running_loop()
         self._buses: dict[str, MemoryBus] = {}
-        self._state: dict[str, Received] = {}
+        self._sent = 0
+        self._lives = 0
+        self._state: dict[str, _Past] = {}
         self._past: deque[_Past] = deque(maxlen=4096)
+        self._askers: list[asyncio.Future[None]] = []
         self._cut: set[str] = set()
         self._last_arrival: dict[tuple[str, str], Seconds] = {}
 
     def join(self, name: str) -> "MemoryBus":
         if name in self._buses:
             raise ValueError(f"participant {name!r} is on the bus already")
-        self._buses[name] = bus = MemoryBus(self, name)
+        self._lives += 1
+        self._buses[name] = bus = MemoryBus(self, name, run=str(self._lives))
         return bus
 
     async def close(self) -> None:
@@ -58,6 +65,7 @@ class MemoryHub(Hub):
 
     def heal(self) -> None:
         self._cut = set()
+        self.wake_askers()
 
     def kill(self, name: str) -> None:
         """End a participant as SIGKILL would: its token goes, nothing it sends or should get arrives any more."""
@@ -66,20 +74,34 @@ class MemoryHub(Hub):
 
     # -- for MemoryBus ------------------------------------------------------------------------------------------
 
-    def send(self, sender: "MemoryBus", key: str, message: Message) -> None:
-        kind = keys.key_class(key)
-        received = Received(key, decode(encode(message)), sender.name, self._loop.time())
-        if kind == "state":
-            self._state[key] = received
-        elif kind in ("cmd", "evt"):
-            self._past.append(_Past(received, received.at))
-        for bus in list(self._buses.values()):
-            self._carry(received, sender.name, bus)
+    def send(self, sender: str, key: str, message: Message) -> None:
+        self._pass_on(sender, Received(key, decode(encode(message)), sender, self._loop.time()))
 
-    def _carry(self, received: Received, sender: str, bus: "MemoryBus") -> None:
+    def inject(self, key: str, payload: bytes, encoding: str) -> None:
+        """A payload from outside, as another program would send it. A bad one is answered with a Fault."""
+        try:
+            message = decode(payload, encoding)
+        except InputRefused as error:
+            for bus in [bus for bus in self._buses.values() if bus.wants(key)]:
+                bus.publish(keys.fault(bus.name), msgspec.structs.replace(error.fault, where=key, service=bus.name))
+        else:
+            self._pass_on("", Received(key, message, "", self._loop.time()))
+
+    def _pass_on(self, sender: str, received: Received) -> None:
+        self._sent += 1
+        past = _Past(self._sent, received)
+        kind = keys.key_class(received.key)
+        if kind == "state":
+            self._state[received.key] = past
+        elif kind in ("cmd", "evt"):
+            self._past.append(past)
+        for bus in list(self._buses.values()):
+            self._carry(past, sender, bus)
+
+    def _carry(self, past: _Past, sender: str, bus: "MemoryBus") -> None:
         if bus.name == sender or self.faults == Faults():
             if not self._is_cut(sender, bus.name):
-                bus.deliver(received)
+                bus.deliver(past.received, past.number)
             return
         if self._is_cut(sender, bus.name) or self._chance.random() < self.faults.loss:
             return
@@ -88,33 +110,52 @@ class MemoryHub(Hub):
             arrival = self._loop.time() + self._chance.uniform(0.0, self.faults.delay)
             link = (sender, bus.name)
             self._last_arrival[link] = arrival = max(arrival, self._last_arrival.get(link, 0.0))
-            self._loop.call_at(arrival, bus.deliver, received)
+            self._loop.call_at(arrival, self._arrive, bus, past, arrival)
+
+    def _arrive(self, bus: "MemoryBus", past: _Past, at: Seconds) -> None:
+        bus.deliver(msgspec.structs.replace(past.received, at=at), past.number)
 
     def _is_cut(self, one: str, other: str) -> bool:
         return (one in self._cut) != (other in self._cut)
 
-    def replay(self, subscription: Subscription) -> None:
-        """What a late subscriber still gets."""
+    def replay(self, name: str, subscription: Subscription) -> int:
+        """What a late subscriber still gets: who is there, then the past in order. Returns its last number."""
         now = self._loop.time()
-        for past in self._past:
-            if now - past.at <= keys.HISTORY_MAX_AGE and subscription.wants(past.received.key):
-                subscription.offer(past.received)
-        for received in self._state.values():
-            if subscription.wants(received.key):
-                subscription.offer(received)
         for bus in self._buses.values():
             if bus.is_alive and subscription.wants(key := keys.alive(bus.name)):
-                subscription.offer(Received(key, PeerAlive(participant=bus.name), bus.name, now))
+                subscription.offer(Received(key, PeerAlive(participant=bus.name, run=bus.run), bus.name, now))
+        recent = [past for past in self._past if now - past.received.at <= keys.HISTORY_MAX_AGE]
+        for past in sorted((*recent, *self._state.values()), key=lambda past: past.number):
+            received = past.received
+            if subscription.wants(received.key) and not self._is_cut(name, received.source):
+                subscription.offer(msgspec.structs.replace(received, at=now, past=True))
+        return self._sent
 
     def announce(self, name: str, message: PeerAlive | PeerGone) -> None:
         for bus in list(self._buses.values()):
-            bus.deliver(Received(keys.alive(name), message, name, self._loop.time()))
+            bus.deliver(Received(keys.alive(name), message, name, self._loop.time()), self._sent + 1)
 
-    def answerer(self, key: str, asker: str) -> Answer | None:
-        for bus in self._buses.values():
-            if key in bus.answers and not self._is_cut(asker, bus.name):
-                return bus.answers[key]
+    async def answerer(self, key: str, asker: str, deadline: Seconds) -> Answer | None:
+        """Who serves the key, as soon as somebody does; None at the deadline."""
+        while self._loop.time() < deadline:
+            for bus in self._buses.values():
+                if key in bus.answers and not self._is_cut(asker, bus.name):
+                    return bus.answers[key]
+            change: asyncio.Future[None] = self._loop.create_future()
+            self._askers.append(change)
+            timer = self._loop.call_at(deadline, self.wake_askers)
+            try:
+                await change
+            finally:
+                timer.cancel()
         return None
+
+    def wake_askers(self) -> None:
+        """Somebody answers now, or may be heard again, or it is too late: look again."""
+        for asker in self._askers:
+            if not asker.done():
+                asker.set_result(None)
+        self._askers.clear()
 
     def forget(self, name: str) -> None:
         self._buses.pop(name, None)
@@ -123,14 +164,15 @@ class MemoryHub(Hub):
 class MemoryBus(Bus):
     clock = "loop"
 
-    def __init__(self, hub: MemoryHub, name: str) -> None:
+    def __init__(self, hub: MemoryHub, name: str, run: str) -> None:
         self.robot = hub.robot
         self.name = name
+        self.run = run
         self.is_alive = False
         self.answers: dict[str, Answer] = {}
         self._hub = hub
         self._loop = asyncio.get_running_loop()
-        self._subscriptions: list[Subscription] = []
+        self._subscriptions: dict[Subscription, int] = {}
         self._gone = False
 
     def now(self) -> Seconds:
@@ -141,28 +183,30 @@ class MemoryBus(Bus):
 
     def publish(self, key: str, message: Message) -> None:
         if not self._gone:
-            self._hub.send(self, key, message)
+            self._hub.send(self.name, key, message)
 
-    def deliver(self, received: Received) -> None:
-        for subscription in self._subscriptions:
-            if subscription.wants(received.key):
+    def wants(self, key: str) -> bool:
+        return any(subscription.wants(key) for subscription in self._subscriptions)
+
+    def deliver(self, received: Received, number: int) -> None:
+        for subscription, replayed in self._subscriptions.items():
+            # What was still on its way when the subscription came has been replayed to it.
+            if number > replayed and subscription.wants(received.key):
                 subscription.offer(received)
 
     def subscribe(self, *patterns: str, keep: Keep = Keep.EVERY, capacity: int = 4096) -> Subscription:
         subscription = Subscription(patterns, keep, capacity, self._drop)
-        self._subscriptions.append(subscription)
-        self._hub.replay(subscription)
+        if not self._gone:
+            self._subscriptions[subscription] = self._hub.replay(self.name, subscription)
         return subscription
 
     def _drop(self, subscription: Subscription) -> None:
-        if subscription in self._subscriptions:
-            self._subscriptions.remove(subscription)
+        self._subscriptions.pop(subscription, None)
 
     async def query(self, key: str, message: Message, timeout: Seconds = 1.0) -> Message:
         await asyncio.sleep(0)
-        answer = self._hub.answerer(key, self.name)
-        if answer is None or self._gone:
-            await asyncio.sleep(timeout)
+        answer = None if self._gone else await self._hub.answerer(key, self.name, self.now() + timeout)
+        if answer is None:
             raise NoReply(Fault(reason=f"no reply within {timeout} s", where=key, advice="is its server running?"))
         try:
             return decode(encode(answer(decode(encode(message)))))
@@ -171,11 +215,12 @@ class MemoryBus(Bus):
 
     def answer(self, key: str, answer: Answer) -> None:
         self.answers[key] = answer
+        self._hub.wake_askers()
 
     def declare_alive(self) -> None:
         if not self.is_alive and not self._gone:
             self.is_alive = True
-            self._hub.announce(self.name, PeerAlive(participant=self.name))
+            self._hub.announce(self.name, PeerAlive(participant=self.name, run=self.run))
 
     async def leave(self) -> None:
         for subscription in list(self._subscriptions):

@@ -3,6 +3,11 @@
 Zenoh drops silently, a server may start late, restart or die, a link may be cut. So the requester sends its
 request again until it has ended, the server answers duplicates with its last state, and the death of either
 side ends the request at the other: exactly one terminal state, whatever happens in between.
+
+A restarted server remembers nothing. What its former life had accepted fails at the requester and is not sent
+again: a robot must not say and do things twice. What had not been accepted is sent again. The gap that remains
+is an acceptance lost in the same moment as its server; its request is performed again from the start.
+A server leaves commands that it gets from history to their requester, who knows what became of them.
 """
 
 import asyncio
@@ -41,12 +46,18 @@ class Pending:
         self.request = request
         self.accepted: asyncio.Future[None] = loop.create_future()
         self.outcome: asyncio.Future[Outcome] = loop.create_future()
+        self.run = ""
+        """The life of the server that accepted."""
         self.resend_after = FIRST_RESEND
         self.resend: asyncio.TimerHandle | None = None
         self.doom: asyncio.TimerHandle | None = None
         # A caller may care for only one of the two.
         for future in (self.accepted, self.outcome):
             future.add_done_callback(_mark_seen)
+
+    @property
+    def server(self) -> str:
+        return keys.server_of(self.key)
 
 
 def _mark_seen(future: "asyncio.Future[None] | asyncio.Future[Outcome]") -> None:
@@ -59,6 +70,7 @@ class Requester:
 
     `async with Requester(bus) as requests` listens by itself. A service that wants request states in order with
     its other messages subscribes to `Requester.PATTERNS` itself and passes every message to `feed` instead.
+    A request to a server that has not come yet waits for it.
     """
 
     PATTERNS = (keys.ANY_REQUEST_STATE, keys.ANY_ALIVE)
@@ -67,33 +79,48 @@ class Requester:
         self._bus = bus
         self._loop = asyncio.get_running_loop()
         self._pending: dict[str, Pending] = {}
+        self._runs: dict[str, str] = {}
         self._listening: asyncio.Task[None] | None = None
 
     def send(self, key: str, request: Request) -> Pending:
-        """Publish the request and keep at it. A known id is an update: the newest content is what is sent again."""
+        """Publish the request and keep at it. A known id is an update: the newest content is what is sent again.
+
+        An update of a request that is being cancelled is void.
+        """
         pending = self._pending.get(request.id)
         if pending is None:
             pending = self._pending[request.id] = Pending(key, request)
-            self._arm(pending)
-        pending.request = request
-        self._bus.publish(key, _as_message(request))
+        elif isinstance(pending.request, Cancel):
+            return pending
+        else:
+            revision = pending.request.revision + 1
+            pending.key, pending.request = key, msgspec.structs.replace(request, revision=revision)
+        self._publish_anew(pending)
         return pending
 
     def cancel(self, id: str, reason: str = "") -> None:
-        """Ask the server to end request `id` as interrupted; its outcome still comes."""
-        if pending := self._pending.get(id):
-            cancel = Cancel(id=id, requester=self._bus.name, reason=reason)
-            pending.key, pending.request = keys.cancel(keys.server_of(pending.key)), cancel
-            self._bus.publish(pending.key, cancel)
+        """Ask the server to end request `id` as interrupted; its outcome still comes.
+
+        A server that has never got the request refuses it.
+        """
+        pending = self._pending.get(id)
+        if pending is not None and not isinstance(pending.request, Cancel):
+            pending.key = keys.cancel(pending.server)
+            pending.request = Cancel(id=id, requester=self._bus.name, reason=reason)
+            self._publish_anew(pending)
 
     def feed(self, received: Received) -> bool:
         """Take a message of `PATTERNS`; False if it was none of ours."""
         match received.message:
             case Accepted(id=id) if id in self._pending:
-                if not self._pending[id].accepted.done():
-                    self._pending[id].accepted.set_result(None)
+                pending = self._pending[id]
+                pending.run = self._runs.get(pending.server, "")
+                if not pending.accepted.done():
+                    pending.accepted.set_result(None)
             case Refused(id=id, fault=fault) if id in self._pending:
-                self._fail(id, RequestRefused(fault))
+                # A server that has forgotten what it accepted has failed at it.
+                known = self._pending[id].accepted.done()
+                self._fail(id, RunFailed(fault) if known else RequestRefused(fault))
             case Outcome(id=id) if id in self._pending:
                 pending = self._forget(id)
                 if not pending.accepted.done():
@@ -101,11 +128,18 @@ class Requester:
                 pending.outcome.set_result(received.message)
             case PeerGone(participant=server):
                 self._server_gone(server)
-            case PeerAlive(participant=server):
-                self._server_back(server)
+            case PeerAlive(participant=server, run=run):
+                self._server_back(server, run)
             case _:
                 return False
         return True
+
+    def _publish_anew(self, pending: Pending) -> None:
+        if pending.resend is not None:
+            pending.resend.cancel()
+        pending.resend_after = FIRST_RESEND
+        self._bus.publish(pending.key, _as_message(pending.request))
+        self._arm(pending)
 
     def _arm(self, pending: Pending) -> None:
         pending.resend = self._loop.call_later(pending.resend_after, self._send_again, pending)
@@ -117,20 +151,27 @@ class Requester:
 
     def _server_gone(self, server: str) -> None:
         for pending in self._pending.values():
-            if keys.server_of(pending.key) == server and pending.doom is None:
-                pending.doom = self._loop.call_later(GRACE, self._server_lost, pending, server)
+            if pending.server == server and pending.doom is None:
+                pending.doom = self._loop.call_later(GRACE, self._server_lost, pending, f"{server} is gone")
 
-    def _server_back(self, server: str) -> None:
-        for pending in self._pending.values():
-            if keys.server_of(pending.key) == server:
-                if pending.doom is not None:
-                    pending.doom.cancel()
-                    pending.doom = None
-                self._bus.publish(pending.key, _as_message(pending.request))
+    def _server_back(self, server: str, run: str) -> None:
+        self._runs[server] = run
+        for pending in [pending for pending in self._pending.values() if pending.server == server]:
+            if pending.doom is not None:
+                pending.doom.cancel()
+                pending.doom = None
+            if pending.run and run and pending.run != run:
+                self._server_lost(pending, f"{server} was restarted")
+            else:
+                pending.run = run if pending.accepted.done() else ""
+                self._publish_anew(pending)
 
-    def _server_lost(self, pending: Pending, server: str) -> None:
-        fault = Fault(reason=f"{server} is gone", where=pending.request.id, advice=f"start {server} again")
+    def _server_lost(self, pending: Pending, reason: str) -> None:
+        fault = Fault(reason=reason, where=pending.request.id, advice="send it again under a new id")
         self._fail(pending.request.id, RunFailed(fault))
+        # In case a new life has got it after all.
+        cancel = Cancel(id=pending.request.id, requester=self._bus.name, reason=reason)
+        self._bus.publish(keys.cancel(pending.server), cancel)
 
     def _fail(self, id: str, error: EngageError) -> None:
         pending = self._forget(id)
@@ -173,9 +214,13 @@ class Requester:
 
 
 class _Record(msgspec.Struct):
+    """run: the requester's life. ended: `state` is terminal."""
+
     request: Request
+    run: str = ""
     state: Message | None = None
     ended: bool = False
+    cancelled: bool = False
     doom: asyncio.TimerHandle | None = None
 
 
@@ -193,7 +238,7 @@ class RequestDesk:
             case Cancel(id=id): ...                     # only for live requests
             case None: ...                              # not ours, a duplicate, or already ended
 
-    on_cancel: called when a requester has been gone for longer than the grace.
+    on_cancel: called when a requester has been gone for longer than the grace, or has come back as another life.
     The service's subscription must hold `RequestDesk.patterns(server)`.
     """
 
@@ -202,35 +247,62 @@ class RequestDesk:
         self._server = server
         self._on_cancel = on_cancel
         self._loop = asyncio.get_running_loop()
-        self._records: OrderedDict[str, _Record] = OrderedDict()
+        self._live: dict[str, _Record] = {}
+        self._ended: OrderedDict[str, _Record] = OrderedDict()
+        self._runs: dict[str, str] = {}
 
     @staticmethod
     def patterns(server: str) -> tuple[str, str]:
         return (keys.commands(server), keys.ANY_ALIVE)
 
     def is_live(self, id: str) -> bool:
-        return id in self._records and not self._records[id].ended
+        return id in self._live
 
     def take(self, received: Received) -> Request | None:
-        """The request, if it is new, changed or a cancellation of a live one."""
+        """The request, if it is new, changed or a cancellation of a live one; each of these once."""
         match received.message:
-            case Cancel(id=id) as cancel:
-                return cancel if self._repeat_unless_live(id) else None
-            case Request(id=id) as request if keys.matches(keys.commands(self._server), received.key):
-                record = self._records.get(id)
-                if record is None:
-                    self._records[id] = _Record(request)
-                    return request
-                if record.ended or record.request == request:
-                    self._repeat(record)
+            case Request() as request if keys.matches(keys.commands(self._server), received.key):
+                if received.past and request.requester in self._runs:
                     return None
-                record.request = request
-                return request
+                return self._take_cancel(request) if isinstance(request, Cancel) else self._take(request)
             case PeerGone(participant=requester):
                 self._requester_gone(requester)
-            case PeerAlive(participant=requester):
-                self._requester_back(requester)
+            case PeerAlive(participant=requester, run=run):
+                self._requester_back(requester, run)
         return None
+
+    def _take(self, request: Request) -> Request | None:
+        record = self._live.get(request.id) or self._ended.get(request.id)
+        if record is None or (record.ended and not self._is_same_requester(record, request)):
+            self._ended.pop(request.id, None)
+            self._live[request.id] = _Record(request, self._runs.get(request.requester, ""))
+            return request
+        older = request.revision < record.request.revision
+        if record.ended or record.cancelled or older or request == record.request:
+            self._repeat(record)
+            return None
+        record.request = request
+        return request
+
+    def _take_cancel(self, cancel: Cancel) -> Cancel | None:
+        record = self._live.get(cancel.id)
+        if record is not None and not record.cancelled:
+            record.cancelled = True
+            return cancel
+        record = record or self._ended.get(cancel.id)
+        if record is not None:
+            self._repeat(record)
+        else:
+            # The command was lost; from here on it is too late for it, and its requester waits for an end.
+            self._live[cancel.id] = _Record(cancel, self._runs.get(cancel.requester, ""))
+            reason = f"{self._server} has never heard of it"
+            self.refuse(cancel.id, Fault(reason=reason, where=cancel.id, service=self._server))
+        return None
+
+    def _is_same_requester(self, record: _Record, request: Request) -> bool:
+        """A new life, or somebody else, who uses an id again means a new request."""
+        run = self._runs.get(request.requester, "")
+        return record.request.requester == request.requester and (not record.run or not run or record.run == run)
 
     def accept(self, id: str) -> None:
         self._answer(id, Accepted(id=id), ended=False)
@@ -239,55 +311,55 @@ class RequestDesk:
         self._answer(id, Refused(id=id, fault=fault), ended=True)
 
     def end(self, outcome: Message) -> None:
-        """Answer with a terminal state. Raises ValueError if the request has one already."""
+        """Answer with a terminal state. Raises ValueError if the request has one already, or never was."""
         assert isinstance(outcome, Outcome)
         self._answer(outcome.id, outcome, ended=True)
 
     def _answer(self, id: str, state: Message, *, ended: bool) -> None:
-        record = self._records[id]
-        if record.ended:
-            raise ValueError(f"request {id} has ended already, with {record.state}")
+        record = self._live.get(id)
+        if record is None:
+            before = f"has ended already, with {self._ended[id].state}" if id in self._ended else "was never made"
+            raise ValueError(f"request {id} {before}")
         record.state, record.ended = state, ended
         self._bus.publish(keys.request_state(self._server), state)
         if ended:
             if record.doom is not None:
                 record.doom.cancel()
-            self._records.move_to_end(id)
-            self._forget_oldest_ended()
-
-    def _forget_oldest_ended(self) -> None:
-        ended = [id for id, record in self._records.items() if record.ended]
-        for id in ended[:-ENDED_KEPT]:
-            del self._records[id]
-
-    def _repeat_unless_live(self, id: str) -> bool:
-        if self.is_live(id):
-            return True
-        if record := self._records.get(id):
-            self._repeat(record)
-        return False
+            self._ended[id] = self._live.pop(id)
+            if len(self._ended) > ENDED_KEPT:
+                self._ended.popitem(last=False)
 
     def _repeat(self, record: _Record) -> None:
         if record.state is not None:
             self._bus.publish(keys.request_state(self._server), record.state)
 
+    def _live_of(self, requester: str) -> list[_Record]:
+        return [record for record in self._live.values() if record.request.requester == requester]
+
     def _requester_gone(self, requester: str) -> None:
-        for record in self._records.values():
-            if record.request.requester == requester and not record.ended and record.doom is None:
+        self._runs.pop(requester, None)
+        for record in self._live_of(requester):
+            if record.doom is None:
                 record.doom = self._loop.call_later(GRACE, self._requester_lost, record)
 
-    def _requester_back(self, requester: str) -> None:
-        for record in self._records.values():
-            if record.request.requester == requester and record.doom is not None:
+    def _requester_back(self, requester: str, run: str) -> None:
+        self._runs[requester] = run
+        for record in self._live_of(requester):
+            if record.doom is not None:
                 record.doom.cancel()
                 record.doom = None
+            if record.run and run and record.run != run:
+                self._requester_lost(record)
+            record.run = run
 
     def _requester_lost(self, record: _Record) -> None:
-        request = record.request
-        self._on_cancel(Cancel(id=request.id, requester=request.requester, reason="requester is gone"))
+        if not record.cancelled:
+            record.cancelled = True
+            request = record.request
+            self._on_cancel(Cancel(id=request.id, requester=request.requester, reason="requester is gone"))
 
     def close(self) -> None:
-        for record in self._records.values():
+        for record in self._live.values():
             if record.doom is not None:
                 record.doom.cancel()
 

@@ -7,8 +7,6 @@ subscribers stand. A bug in a service ends its process, loudly; bad messages fro
 import asyncio
 from collections.abc import AsyncIterator, Awaitable, Callable, Mapping
 from contextlib import asynccontextmanager
-from functools import partial
-from typing import Any
 
 from services.bus import Bus, Hub
 
@@ -34,21 +32,22 @@ async def serve(hub: Hub, name: str, service: Service, ready: Ready = lambda: No
 @asynccontextmanager
 async def running(hub: Hub, services: Mapping[str, Service]) -> AsyncIterator[None]:
     """Run services in this process; the body of `async with` starts when all stand, and its end stops them."""
-    loop = asyncio.get_running_loop()
-    standing = {name: loop.create_future() for name in services}
+    standing = {name: asyncio.Event() for name in services}
     async with asyncio.TaskGroup() as group:
         tasks = [
-            group.create_task(serve(hub, name, service, partial(_resolve, standing[name])), name=f"service {name}")
+            group.create_task(_serve_for_ever(hub, name, service, standing[name]), name=f"service {name}")
             for name, service in services.items()
         ]
         try:
-            await asyncio.gather(*standing.values())
+            for stands in standing.values():
+                await stands.wait()
             yield
         finally:
             for task in reversed(tasks):
                 task.cancel()
 
 
-def _resolve(future: "asyncio.Future[Any]") -> None:
-    if not future.done():
-        future.set_result(None)
+async def _serve_for_ever(hub: Hub, name: str, service: Service, standing: asyncio.Event) -> None:
+    await serve(hub, name, service, standing.set)
+    if not standing.is_set():
+        raise RuntimeError(f"service {name} ended before it stood")

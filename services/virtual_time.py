@@ -1,8 +1,10 @@
 """An event loop whose clock jumps to the next timer: hours in seconds, exact times, and deadlocks found for free."""
 
 import asyncio
+import math
 import selectors
 from collections.abc import Coroutine
+from pathlib import Path
 from typing import Any, TypeVar
 
 T = TypeVar("T")
@@ -26,7 +28,10 @@ class _InstantSelector(selectors.SelectSelector):
 
 
 class VirtualTimeLoop(asyncio.SelectorEventLoop):
-    """Starts at second 0. `loop.time()` moves only when nothing else is left to do."""
+    """Starts at second 0. `loop.time()` moves only when nothing else is left to do.
+
+    Nothing outside the loop may wake it: no sockets, threads or processes, which take real time.
+    """
 
     def __init__(self) -> None:
         self._virtual_now = 0.0
@@ -39,12 +44,22 @@ class VirtualTimeLoop(asyncio.SelectorEventLoop):
         return self._virtual_now
 
     def jump(self, timeout: float | None) -> None:
+        """Let time pass to the next timer. Raises Deadlock if there is none."""
         if timeout is None:
-            waiting = [task.get_name() for task in asyncio.all_tasks(self) if not task.done()]
-            raise Deadlock(f"all tasks wait and no timer is pending: {', '.join(sorted(waiting))}")
+            waiting = sorted(_whereabouts(task) for task in asyncio.all_tasks(self) if not task.done())
+            raise Deadlock(f"all tasks wait and no timer is pending: {', '.join(waiting)}")
         scheduled = self._scheduled  # type: ignore[attr-defined]
         # The exact instant of the next timer: now + timeout would be off by a rounding.
         self._virtual_now = scheduled[0]._when if scheduled else self._virtual_now + timeout
+        # Timers are due before now + resolution; after months 1e-9 would vanish beside now, and time stand still.
+        self._clock_resolution = max(1e-9, math.ulp(self._virtual_now))
+
+
+def _whereabouts(task: "asyncio.Task[Any]") -> str:
+    """`service realizer (service.py:57)`."""
+    stack = task.get_stack(limit=1)
+    place = f" ({Path(stack[0].f_code.co_filename).name}:{stack[0].f_lineno})" if stack else ""
+    return f"{task.get_name()}{place}"
 
 
 def run_virtual(main: Coroutine[Any, Any, T]) -> T:
