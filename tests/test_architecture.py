@@ -1,0 +1,249 @@
+"""The rules of the house, as failing checks: who may import what, how long a file may get, what no file may hold.
+
+`violations` judges one file from its path and text alone; the tests show each rule catching a small sample, and
+then hold every tracked file to it.
+"""
+
+import ast
+import re
+import subprocess
+from collections.abc import Iterator
+from pathlib import Path, PurePosixPath
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[1]
+LONGEST = 400
+"""Lines."""
+CODE = ("schemas", "services", "examples", "benchmarks", "tests")
+
+IMPURE = {"asyncio", "zenoh", "time", "random", "logging", "datetime", "socket", "subprocess"}
+"""What values-in-values-out code has no use for: the loop, the wire, the clock, chance, talking to the console."""
+MACHINERY = {"bus", "memory_bus", "requests", "runtime", "virtual_time", "client", "cli", "commandline"}
+"""Modules of `services` that pure files don't know either; `zenoh_*` too."""
+SHELLS = {
+    "services/realizer/executor.py",  # awaits bodies
+    "services/realizer/reporting.py",  # publishes feedback
+    "services/control/body.py",  # the interface of bodies: coroutines
+    "services/control/simulated.py",  # a body that moves on the loop's clock
+    "services/control/waiting.py",
+    "services/console/follow.py",  # subscribes
+    "services/console/live.py",  # draws
+}
+"""Files beside `service.py` and `__main__.py` that are not pure. Each is a decision: keep the list short."""
+COMPOSERS = {"commandline"}
+"""Packages of `services` that are no service: they put services together and may import all of them."""
+ON_A_ROBOT = {"realizer", "generation", "recognition", "control"}
+THREADS = {"threading", "_thread", "concurrent", "multiprocessing"}
+THREAD_CALLS = {"to_thread", "run_in_executor", "Thread", "ThreadPoolExecutor"}
+
+MACHINE_PATH = re.compile(r"(?<![\w./}$-])/(?:work|home|Users|root|mnt|opt)/\w+")
+INDEX_ADDRESS = re.compile(
+    r"--(?:extra-)?index-url|--find-links|(?:https?|file)://[^\s\"'<>]+/simple\b|https?://\d+\.\d+\.\d+\.\d+[^\s]*/pypi"
+)
+
+
+def violations(path: str, text: str) -> list[str]:
+    """What file `path` (relative, with slashes) breaks, in words."""
+    found = list(_in_any_text(path, text))
+    place = PurePosixPath(path)
+    if place.suffix == ".py" and place.parts[0] in CODE:
+        tree = ast.parse(text)
+        found += _in_code(place, text, tree)
+        if place.parts[0] == "tests":
+            found += _in_tests(place, tree)
+    return [f"{path}: {violation}" for violation in found]
+
+
+def _in_any_text(path: str, text: str) -> Iterator[str]:
+    if path == "tests/test_architecture.py":
+        return  # the samples below
+    for number, line in enumerate(text.splitlines(), 1):
+        if MACHINE_PATH.search(line):
+            yield f"line {number} holds a path of somebody's machine"
+        if INDEX_ADDRESS.search(line):
+            yield f"line {number} holds the address of a package index"
+
+
+def _in_code(place: PurePosixPath, text: str, tree: ast.Module) -> Iterator[str]:
+    lines = text.count("\n")
+    if lines > LONGEST:
+        yield f"{lines} lines, at most {LONGEST}"
+    for module in _imports(place, tree):
+        yield from (f"imports {module}: {reason}" for reason in _import(place, module))
+    if place.parts[0] in ("schemas", "services"):
+        for name in _called(tree) & THREAD_CALLS:
+            yield f"calls {name}: this code starts no threads"
+    if place.parts[0] != "tests" and str(place) != "schemas/keys.py":
+        for node in ast.walk(tree):
+            if isinstance(node, ast.Constant) and isinstance(node.value, str) and "engage/v1" in node.value:
+                yield f"line {node.lineno} spells a key expression: schemas/keys.py has them all"
+
+
+def _import(place: PurePosixPath, module: str) -> Iterator[str]:
+    """Why `place` may not import `module`."""
+    top = place.parts[0]
+    package = place.parts[1] if top == "services" and len(place.parts) > 2 else ""
+    first, second = [*module.split("."), ""][:2]
+    measures = top in ("tests", "benchmarks")
+    if first == "zenoh" and not measures and not re.fullmatch(r"services/zenoh_\w+\.py", str(place)):
+        yield "only services/zenoh_*.py may"
+    if first in THREADS and not measures:
+        yield "this code starts no threads"
+    if top == "schemas" and first == "services":
+        yield "the vocabulary knows no service"
+    machinery = first == "services" and (second in MACHINERY or second.startswith("zenoh"))
+    if _is_pure(place) and (first in IMPURE or machinery):
+        yield "this file is pure"
+    elsewhere = first == "services" and second not in ("", package) and (ROOT / "services" / second).is_dir()
+    if package and package not in COMPOSERS and elsewhere:
+        yield "services do not import one another"
+    if package in ON_A_ROBOT and module.startswith("services.simulation"):
+        yield "simulation has no business on a robot"
+
+
+def _is_pure(place: PurePosixPath) -> bool:
+    if place.parts[0] == "schemas":
+        return True
+    return (
+        place.parts[0] == "services"
+        and len(place.parts) > 2
+        and place.parts[1] not in COMPOSERS
+        and place.name not in ("service.py", "__main__.py")
+        and str(place) not in SHELLS
+    )
+
+
+def _in_tests(place: PurePosixPath, tree: ast.Module) -> Iterator[str]:
+    if "time.sleep" in set(_imports(place, tree)):
+        yield "imports time.sleep: wait for something"
+    for line in _sleeps(tree, "time.sleep"):
+        yield f"line {line} sleeps on the wall clock: wait for something"
+    whole_file = any("real_time" in ast.unparse(node) for node in tree.body if isinstance(node, ast.Assign))
+    for function in ast.walk(tree):
+        if isinstance(function, ast.AsyncFunctionDef | ast.FunctionDef):
+            real = whole_file or any("real_time" in ast.unparse(mark) for mark in function.decorator_list)
+            for line in _sleeps(function, "asyncio.sleep") if real else ():
+                yield f"line {line} sleeps on the wall clock: wait for something"
+
+
+def _sleeps(tree: ast.AST, name: str) -> Iterator[int]:
+    """Lines of calls that really wait; `sleep(0)` only lets others run."""
+    for node in ast.walk(tree):
+        called = isinstance(node, ast.Call) and ast.unparse(node.func) == name
+        if called and ast.unparse(node.args[0]) not in ("0", "0.0"):
+            yield node.lineno
+
+
+def _imports(place: PurePosixPath, tree: ast.Module) -> Iterator[str]:
+    """Every module that is imported anywhere in the file, `from a import b` as both a and a.b."""
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            base = place.parent.parts[: len(place.parent.parts) - node.level + 1] if node.level else ()
+            module = ".".join([*base, *filter(None, [node.module])])
+            yield module
+            yield from (f"{module}.{alias.name}" for alias in node.names)
+
+
+def _called(tree: ast.Module) -> set[str]:
+    functions = (node.func for node in ast.walk(tree) if isinstance(node, ast.Call))
+    return {
+        function.attr if isinstance(function, ast.Attribute) else function.id
+        for function in functions
+        if isinstance(function, ast.Attribute | ast.Name)
+    }
+
+
+def tracked() -> list[str]:
+    listing = subprocess.run(["git", "ls-files", "-z"], cwd=ROOT, capture_output=True, check=False)
+    names = [name for name in listing.stdout.decode().split("\0") if name]
+    if not names:  # an archive without its history
+        names = [str(path.relative_to(ROOT)) for top in CODE for path in (ROOT / top).rglob("*.py")]
+    return [name for name in names if (ROOT / name).is_file()]
+
+
+def test_every_file_keeps_the_rules() -> None:
+    found = []
+    for name in tracked():
+        data = (ROOT / name).read_bytes()
+        if b"\0" not in data:
+            found += violations(name, data.decode(errors="replace"))
+
+    assert not found, "\n".join(found)
+
+
+def test_the_list_of_shells_holds_only_files_that_need_it() -> None:
+    for name in SHELLS:
+        path = ROOT / name
+        assert path.is_file(), f"{name} is gone: take it off the list"
+        modules = set(_imports(PurePosixPath(name), ast.parse(path.read_text())))
+        needs = {module for module in modules if module.split(".")[0] in IMPURE or module.split(".")[-1] in MACHINERY}
+        assert needs, f"{name} is pure: take it off the list"
+
+
+@pytest.mark.parametrize(
+    ("path", "text", "reason"),
+    [
+        ("schemas/x.py", "import asyncio", "pure"),
+        ("schemas/x.py", "from services import bus", "knows no service"),
+        ("schemas/x.py", "def f():\n    from time import monotonic", "pure"),
+        ("services/realizer/net.py", "import random", "pure"),
+        ("services/realizer/net.py", "import logging.handlers", "pure"),
+        ("services/realizer/net.py", "from services.bus import Bus", "pure"),
+        ("services/realizer/net.py", "from services import zenoh_bus", "pure"),
+        ("services/realizer/net.py", "from ..requests import Requester", "pure"),
+        ("services/realizer/service.py", "from services.generation.config import X", "one another"),
+        ("services/realizer/service.py", "from services import generation", "one another"),
+        ("services/collaboration/task.py", "import services.simulation.table", "one another"),
+        ("services/control/service.py", "from services.simulation import table", "no business on a robot"),
+        ("services/control/service.py", "import zenoh", "imports zenoh"),
+        ("services/cli.py", "from zenoh import Config", "imports zenoh"),
+        ("services/control/zenoh_arm.py", "import zenoh", "imports zenoh"),
+        ("services/cli.py", "import threading", "no threads"),
+        ("services/zenoh_bus.py", "from concurrent.futures import ThreadPoolExecutor", "no threads"),
+        ("services/cli.py", "async def f():\n    await asyncio.to_thread(g)", "no threads"),
+        ("services/cli.py", "loop.run_in_executor(None, f)", "no threads"),
+        ("services/cli.py", "key = 'engage/v1/cmd/realizer/block'", "spells a key"),
+        ("examples/x.py", "key = f'robot/engage/v1/{x}'", "spells a key"),
+        ("services/cli.py", "x = 1\n" * 401, "401 lines"),
+        ("tests/test_x.py", "import time\ntime.sleep(1)", "sleeps"),
+        ("tests/test_x.py", "from time import sleep", "time.sleep"),
+        ("tests/test_x.py", "@pytest.mark.real_time\nasync def test_x():\n    await asyncio.sleep(1)", "sleeps"),
+        (
+            "tests/x/test_x.py",
+            "pytestmark = pytest.mark.real_time\nasync def f():\n    await asyncio.sleep(t)",
+            "sleeps",
+        ),
+        ("README.md", "see /home/someone/engage", "somebody's machine"),
+        ("Makefile", "pip install --index-url x", "package index"),
+        ("constraints.txt", "# from https://example.org/pypi/simple/", "package index"),
+    ],
+)
+def test_a_broken_rule_is_caught(path: str, text: str, reason: str) -> None:
+    assert any(reason in violation for violation in violations(path, text))
+
+
+@pytest.mark.parametrize(
+    ("path", "text"),
+    [
+        (
+            "services/realizer/service.py",
+            "import asyncio\nfrom services.bus import Bus\nfrom services.realizer import net",
+        ),
+        ("services/realizer/net.py", "import numpy\nfrom services.realizer.config import RealizerConfig"),
+        ("services/realizer/net.py", "from services.tangram_table import TangramTable"),
+        ("services/realizer/executor.py", "import asyncio"),
+        ("services/zenoh_bus.py", "import time\nimport zenoh"),
+        ("services/commandline/demo.py", "from services.simulation import service\nimport asyncio"),
+        ("services/cli.py", "from services.realizer.service import realize"),
+        ("schemas/keys.py", "PREFIX = 'engage/v1'"),
+        ("tests/test_x.py", "async def test_x():\n    await asyncio.sleep(5)  # virtual"),
+        ("tests/test_x.py", "@pytest.mark.real_time\nasync def test_x():\n    await asyncio.sleep(0)"),
+        ("tests/test_x.py", "import threading\nimport time\ntime.monotonic()"),
+        ("README.md", "https://example.org/work/engage and ../home/x and /usr/bin/env"),
+    ],
+)
+def test_what_the_rules_allow_is_left_alone(path: str, text: str) -> None:
+    assert violations(path, text) == []
