@@ -1,0 +1,122 @@
+"""Points that are one instant, give or take fixed offsets: a weighted union-find. Thesis 4.4 had limits here.
+
+Synchronizations that share a point merge, whatever their number, direction and sign of offset.
+"""
+
+from collections import defaultdict, deque
+from collections.abc import Iterable
+
+from msgspec import Struct
+
+from schemas.faults import Fault, InputRefused
+from schemas.units import Seconds
+from services.realizer.points import Point
+from services.realizer.relations import Equal, Term
+from services.realizer.schedule import EPSILON
+
+
+class Instant(Struct, frozen=True):
+    """Points that happen together. class_id, offset: its place within its class, lowest offset 0."""
+
+    points: tuple[Point, ...]
+    class_id: int
+    offset: Seconds
+
+
+class Classes:
+    """Which points are tied together, and by how many seconds."""
+
+    def __init__(self) -> None:
+        self._parent: dict[Point, Point] = {}
+        self._offset: dict[Point, Seconds] = {}
+        """Of a point to its parent: when it happens, counted from the parent."""
+        self._links: dict[Point, list[tuple[Point, Term]]] = defaultdict(list)
+
+    def add(self, point: Point) -> None:
+        if point not in self._parent:
+            self._parent[point], self._offset[point] = point, 0.0
+
+    def find(self, point: Point) -> tuple[Point, Seconds]:
+        """The representative of the point's class, and when the point happens, counted from it."""
+        path = []
+        while self._parent[point] != point:
+            path.append(point)
+            point = self._parent[point]
+        offset = 0.0
+        for each in reversed(path):
+            offset += self._offset[each]
+            self._parent[each], self._offset[each] = point, offset
+        return point, offset
+
+    def offset_between(self, one: Point, other: Point) -> Seconds | None:
+        """Seconds from `one` to `other`; None if nothing ties them."""
+        (root, start), (other_root, end) = self.find(one), self.find(other)
+        return end - start if root == other_root else None
+
+    def tie(self, equal: Equal, block: str) -> None:
+        """Merge. Raises InputRefused if that contradicts what is known, naming points and lines."""
+        first = equal.terms[0]
+        for term in equal.terms[1:]:
+            self.add(first.point)
+            self.add(term.point)
+            apart = first.offset - term.offset  # first + first.offset = term + term.offset
+            known = self.offset_between(first.point, term.point)
+            if known is not None and abs(known - apart) > EPSILON:
+                raise self._contradiction(first, term, known, block)
+            self._links[first.point].append((term.point, term))
+            self._links[term.point].append((first.point, first))
+            if known is None:
+                (root, start), (other, end) = self.find(first.point), self.find(term.point)
+                self._parent[other], self._offset[other] = root, start + apart - end
+
+    def _contradiction(self, first: Term, second: Term, known: Seconds, block: str) -> InputRefused:
+        chain = self._chain(first.point, second.point)
+        lines = sorted({term.line for term in (first, second, *chain)} - {0})
+        via = ", ".join(dict.fromkeys(str(term.point) for term in chain))
+        reason = (
+            f"{first.text!r} and {second.text!r} cannot be one instant: {second.point} is already "
+            f"{known:+g} s from {first.point}" + (f" (through {via})" if via else "")
+        )
+        advice = f"see lines {', '.join(map(str, lines))}" if len(lines) > 1 else ""
+        return InputRefused(Fault(reason=reason, where=block, line=max(lines, default=0), advice=advice))
+
+    def _chain(self, start: Point, end: Point) -> list[Term]:
+        came: dict[Point, tuple[Point, Term] | None] = {start: None}
+        queue = deque([start])
+        while queue and end not in came:
+            here = queue.popleft()
+            for there, term in self._links[here]:
+                if there not in came:
+                    came[there] = (here, term)
+                    queue.append(there)
+        chain = []
+        while (step := came.get(end)) is not None:
+            chain.append(step[1])
+            end = step[0]
+        return chain[::-1]
+
+
+def instants(classes: Classes, points: Iterable[Point]) -> list[Instant]:
+    """`points` (in a canonical order) grouped into instants: classes by their first point, each by offset."""
+    members: dict[Point, list[tuple[Seconds, int, Point]]] = {}
+    for number, point in enumerate(points):
+        classes.add(point)
+        root, offset = classes.find(point)
+        members.setdefault(root, []).append((offset, number, point))
+    found: list[Instant] = []
+    for class_id, group in enumerate(members.values()):
+        group.sort()
+        lowest = group[0][0]
+        together: list[tuple[Seconds, int, Point]] = []
+        for member in group:
+            if together and member[0] - together[0][0] > EPSILON:
+                found.append(_instant(together, class_id, lowest))
+                together = []
+            together.append(member)
+        found.append(_instant(together, class_id, lowest))
+    return found
+
+
+def _instant(together: list[tuple[Seconds, int, Point]], class_id: int, lowest: Seconds) -> Instant:
+    points = tuple(point for _, _, point in sorted(together, key=lambda member: member[1]))
+    return Instant(points, class_id, round(together[0][0] - lowest, 9))

@@ -1,0 +1,44 @@
+"""How patient the realizer is."""
+
+from msgspec import Struct
+
+from schemas.behaviors import EventKind
+from schemas.units import Seconds
+
+
+class RealizerConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """Limits, in seconds. Where a factor stands beside one, it is multiplied with the phase's natural duration.
+
+    late, late_factor: a phase may take this much longer than natural before the realizer warns. Ours.
+    stall, stall_factor: and this much before its behavior counts as failed. Motors of 1x-4x must pass. Ours.
+    skew: a sync point that misses its instant by more is reported as LATE. Below what people notice (0.1 s).
+    estimate: how long the body may take to answer what it expects of a block.
+    abort: how long the body may take to end what was aborted before the block ends without it.
+    event_grace: an event ends as failed this much after its limit if recognition is not there to decide it.
+    event_patience: and this much if it is there, but says nothing.
+    *_limit: of an event that names no limit: recognition's own (its design page), the longer for a pair.
+    """
+
+    late: Seconds = 0.5
+    late_factor: float = 1.0
+    stall: Seconds = 3.0
+    stall_factor: float = 5.0
+    skew: Seconds = 0.1
+    estimate: Seconds = 2.0
+    abort: Seconds = 3.0
+    event_grace: Seconds = 0.5
+    event_patience: Seconds = 10.0
+    directed_gaze_limit: Seconds = 2.5
+    mutual_facial_gaze_limit: Seconds = 1.9
+    adjacency_pair_limit: Seconds = 8.0
+    backchannel_limit: Seconds = 0.8
+
+    def __post_init__(self) -> None:
+        for name in self.__struct_fields__:
+            if not 0 <= getattr(self, name) < float("inf"):
+                raise ValueError(f"{name} must be a finite number of at least 0, not {getattr(self, name)}")
+        if self.stall < self.late or self.stall_factor < self.late_factor:
+            raise ValueError("stall and stall_factor must not be below late and late_factor")
+
+    def limit_of(self, kind: EventKind) -> Seconds:
+        return float(getattr(self, f"{kind}_limit"))

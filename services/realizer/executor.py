@@ -1,0 +1,369 @@
+"""One live block on the event loop: one task per behavior, one future per sync point, one timer.
+
+Decides nothing: what was measured goes to the `Authority`, and what that says is sent to whoever performs.
+"""
+
+import asyncio
+from collections.abc import Callable, MutableMapping
+from typing import Any, Literal
+
+from msgspec import Struct
+
+from schemas import keys
+from schemas.behaviors import BlockBehavior, Event, Speech, TurnSignal, Wait
+from schemas.blocks import BlockOutcome, PerformBlock, SpokenText
+from schemas.body import (
+    AbortBehavior,
+    BehaviorOutcome,
+    GoHome,
+    PerformBehavior,
+    SyncPointArrived,
+    SyncPointReached,
+)
+from schemas.faults import EngageError, Fault, InputRefused
+from schemas.feedback import WarningKind
+from schemas.recognition import EventOutcome, RequestEvent, SignalTurn
+from schemas.requests import Outcome
+from schemas.units import Seconds
+from services.bus import Bus
+from services.realizer.authority import Authority, Begin, Effect, Extend, Late, Stalled
+from services.realizer.config import RealizerConfig
+from services.realizer.patience import event_deadline
+from services.realizer.planner import Plan, plan_block
+from services.realizer.points import Point, performer, sync_points
+from services.realizer.reporting import Reporter
+from services.requests import Pending, Requester, RequestRefused
+
+Status = Literal["done", "failed", "interrupted"]
+
+
+class Ending(Struct, frozen=True):
+    """Why a block ends."""
+
+    status: Status
+    fault: Fault | None = None
+    replaced_by: str = ""
+
+
+class Performance:
+    """A block being performed. routes: whose body requests are whose, for the service to find this by."""
+
+    def __init__(
+        self,
+        bus: Bus,
+        requests: Requester,
+        request: PerformBlock,
+        plan: Plan,
+        config: RealizerConfig,
+        is_there: Callable[[str], bool],
+        routes: MutableMapping[str, "Performance"],
+    ) -> None:
+        loop = asyncio.get_running_loop()
+        self.request = request
+        self.plan = plan
+        self._bus = bus
+        self._requests = requests
+        self._config = config
+        self._is_there = is_there
+        self._routes = routes
+        self._loop = loop
+        self._report = Reporter(bus, plan.block.id)
+        self._begun: dict[str, asyncio.Future[None]] = {id: loop.create_future() for id in plan.chains}
+        self.sync_points: dict[Point, asyncio.Future[Seconds]] = {
+            point: loop.create_future() for chain in plan.chains.values() for point in chain.points
+        }
+        self._through: dict[str, str] = {}
+        self._pending: dict[str, Pending] = {}
+        self._dropped: list[str] = list(plan.dropped)
+        self._spoken: dict[str, SpokenText] = {}
+        self._ending: asyncio.Future[Ending] = loop.create_future()
+        self._timer: asyncio.TimerHandle | None = None
+
+    # -- life ------------------------------------------------------------------------------------------------------
+
+    async def run(self) -> BlockOutcome:
+        """Perform the block to its end, whatever that is. Ends everything it began."""
+        began = self._bus.now()
+        self._authority = Authority(self.plan, began, self._config)
+        self._report.started(self.plan, began)
+        for problem in self.plan.problems:
+            self._report.warn(problem.kind, problem.message, problem.behavior)
+        try:
+            async with asyncio.TaskGroup() as tasks:
+                running = {
+                    behavior.id: tasks.create_task(
+                        self._perform(behavior), name=f"{self.plan.block.id}/{behavior.id}"
+                    )
+                    for behavior in self.plan.behaviors
+                }
+                self._advance()
+                ending = await self._ending
+                await self._end_what_moves(ending, running)
+                for task in running.values():
+                    task.cancel()
+        finally:
+            self._close()
+        self._report.ended(ending.status, began)
+        return BlockOutcome(
+            id=self.request.id,
+            block=self.plan.block.id,
+            status=ending.status,
+            spoken=tuple(self._spoken[each.id] for each in self.plan.block.behaviors if each.id in self._spoken),
+            dropped=tuple(self._dropped),
+            replaced_by=ending.replaced_by,
+            fault=ending.fault,
+        )
+
+    def stop(self, ending: Ending) -> None:
+        """End the block now. The first to end it decides how."""
+        if not self._ending.done():
+            self._ending.set_result(ending)
+
+    def feed(self, message: SyncPointArrived | SyncPointReached) -> None:
+        """A body's report about a behavior of this block."""
+        point = Point(message.behavior, message.sync)
+        match message:
+            case SyncPointArrived(at=at):
+                self._authority.arrive(point, self._bus.local(at))
+            case SyncPointReached(at=at, arrived=arrived):
+                self._reach(point, self._bus.local(at), arrived=self._bus.local(arrived), by_body=True)
+        self._advance()
+
+    async def _end_what_moves(self, ending: Ending, running: dict[str, "asyncio.Task[None]"]) -> None:
+        """Abort what still runs, and wait until it has ended, or for as long as the body is given."""
+        moving = set()
+        for behavior in self.plan.block.behaviors:
+            if (pending := self._pending.get(behavior.id)) is None or pending.outcome.done():
+                continue
+            if performer(behavior) == "body":
+                moving.add(running[behavior.id])
+                self._abort(behavior.id)
+            elif ending.status != "done":
+                self._requests.cancel(self._request_id(behavior.id), f"block {ending.status}")
+        if moving:
+            await asyncio.wait(moving, timeout=self._config.abort)
+        if ending.status == "failed":
+            self._go_home({part for id in self._pending for part in self._parts(id)})
+
+    def _close(self) -> None:
+        if self._timer is not None:
+            self._timer.cancel()
+        for behavior in self.plan.block.behaviors:
+            self._routes.pop(self._request_id(behavior.id), None)
+        futures: tuple[asyncio.Future[Any], ...] = (*self._begun.values(), *self.sync_points.values())
+        for future in futures:
+            future.cancel()
+
+    # -- decisions, as the authority makes them ----------------------------------------------------------------------
+
+    def _advance(self) -> None:
+        again = True
+        while again and not self._ending.done():
+            made_facts = [self._apply(effect) for effect in self._authority.advance(self._bus.now())]
+            again = any(made_facts)
+        if self._timer is not None:
+            self._timer.cancel()
+            self._timer = None
+        if self._authority.is_over:
+            self.stop(Ending("done"))
+        elif self._authority.deadline is not None and not self._ending.done():
+            self._timer = self._loop.call_at(self._authority.deadline, self._advance)
+
+    def _apply(self, effect: Effect) -> bool:
+        """Do what the authority says; whether that made new facts at once."""
+        match effect:
+            case Extend(behavior=id, through=through):
+                self._through[id] = through
+                return self._extend(id)
+            case Begin(behavior=id, through=through):
+                self._through[id] = through
+                self._begun[id].set_result(None)
+            case Late(behavior=id, sync=sync, overdue=overdue):
+                self._report.warn("LATE", f"{sync} is {overdue:.1f} s overdue", id)
+            case Stalled(behavior=id, sync=sync, overdue=overdue):
+                self._abort(id)
+                self._lose(id, Fault(reason=f"stalled before {sync}, {overdue:.1f} s overdue"))
+                return True
+        return False
+
+    def _extend(self, id: str) -> bool:
+        behavior = self._authority.plan.chains[id].behavior
+        end = Point(id, "end")
+        if isinstance(behavior, Wait) and end in self._authority.arrived:
+            self._reach(end, self._bus.now(), arrived=self._authority.arrived[end])
+            return True
+        if id in self._pending and performer(behavior) == "body":
+            self._send(behavior)
+        return False
+
+    def _reach(self, point: Point, at: Seconds, *, arrived: Seconds | None = None, by_body: bool = False) -> None:
+        for each in self._authority.reach(point, at):
+            came = arrived if each == point else None
+            skew = self._report.reached(self._authority.plan, self._authority, each, arrived=came, by_body=by_body)
+            if skew > self._config.skew:
+                message = f"{each.sync} came {skew:.2f} s after what it is synchronized with"
+                self._report.warn("LATE", message, each.behavior)
+            if not (future := self.sync_points[each]).done():
+                future.set_result(at)
+
+    def _lose(self, id: str, fault: Fault, kind: WarningKind = "EXECUTION_FAILURE") -> None:
+        """A behavior cannot be finished: the block fails if it is required, else goes on as if it had not been."""
+        if id in self._dropped or self._ending.done():
+            return
+        self._dropped.append(id)
+        self._report.warn(kind, str(fault), id)
+        if id in self._authority.begun:
+            self._go_home(self._parts(id), id)
+        if id in self.plan.required:
+            self.stop(Ending("failed", Fault(reason=fault.reason, where=f"{self.plan.block.id}: {id}")))
+            return
+        try:
+            plan = plan_block(self.plan.block, self.plan.estimates.values(), dropped=self._dropped)
+        except InputRefused as error:
+            self.stop(Ending("failed", error.fault))
+            return
+        self._authority.replan(plan)
+
+    # -- performers --------------------------------------------------------------------------------------------------
+
+    async def _perform(self, behavior: BlockBehavior) -> None:
+        await self._begun[behavior.id]
+        match behavior:
+            case Wait(duration=duration):
+                await self._wait(behavior.id, duration or 0.0)
+            case Event():
+                await self._event(behavior)
+            case TurnSignal():
+                self._signal(behavior)
+            case _ if performer(behavior) == "clock":
+                self._at_once(behavior.id)
+            case _:
+                await self._by_body(behavior)
+
+    async def _by_body(self, behavior: BlockBehavior) -> None:
+        self._routes[self._request_id(behavior.id)] = self
+        pending = self._send(behavior)
+        try:
+            outcome = await pending.outcome
+        except RequestRefused as error:
+            self._lose(behavior.id, error.fault, kind="CANNOT_CREATE_BEHAVIOR")
+            self._advance()
+            return
+        except EngageError as error:
+            self._pending.pop(behavior.id)
+            self.stop(Ending("failed", error.fault))
+            return
+        assert isinstance(outcome, BehaviorOutcome)
+        is_done = outcome.status == "done"
+        if isinstance(behavior, Speech):
+            text = behavior.text if is_done else outcome.spoken
+            self._spoken[behavior.id] = SpokenText(behavior=behavior.id, text=text, complete=is_done)
+        if is_done:
+            self._reach(Point(behavior.id, sync_points(behavior)[-1]), self._bus.local(outcome.at), by_body=True)
+        else:
+            self._lose(behavior.id, outcome.fault or Fault(reason=f"the body {outcome.status} it"))
+        self._advance()
+
+    def _send(self, behavior: BlockBehavior) -> Pending:
+        perform = PerformBehavior(
+            id=self._request_id(behavior.id),
+            requester=self._bus.name,
+            block=self.plan.block.id,
+            behavior=behavior,
+            through=self._through[behavior.id],
+        )
+        pending = self._pending[behavior.id] = self._requests.send(keys.BEHAVIOR, perform)
+        return pending
+
+    def _abort(self, id: str) -> None:
+        self._requests.send(keys.BEHAVIOR, AbortBehavior(id=self._request_id(id), requester=self._bus.name))
+
+    def _go_home(self, parts: set[str], name: str = "") -> None:
+        if parts:
+            id = f"{self._request_id(name)}/home" if name else f"{self.request.id}/home"
+            self._requests.send(keys.BEHAVIOR, GoHome(id=id, requester=self._bus.name, parts=tuple(sorted(parts))))
+
+    def _parts(self, id: str) -> set[str]:
+        estimate = self.plan.estimates.get(id)
+        return set(estimate.parts) if estimate else set()
+
+    async def _wait(self, id: str, duration: Seconds) -> None:
+        began = self._bus.now()
+        self._reach(Point(id, "start"), began)
+        self._advance()
+        if duration:
+            await asyncio.sleep(began + duration - self._bus.now())
+        if self._through[id] == "end":
+            self._reach(Point(id, "end"), self._bus.now())
+        else:
+            self._authority.arrive(Point(id, "end"), self._bus.now())
+        self._advance()
+
+    def _at_once(self, id: str) -> None:
+        now = self._bus.now()
+        for sync in ("start", "end"):
+            self._reach(Point(id, sync), now)
+        self._advance()
+
+    def _signal(self, signal: TurnSignal) -> None:
+        message = SignalTurn(
+            id=self._request_id(signal.id),
+            requester=self._bus.name,
+            signal=signal,
+            at=self._bus.stamp(),
+            block=self.plan.block.id,
+        )
+        if self._is_there("recognition"):
+            self._requests.send(keys.TURN, message)
+        else:
+            self._bus.publish(keys.TURN, message)
+        self._at_once(signal.id)
+
+    async def _event(self, event: Event) -> None:
+        began = self._bus.now()
+        self._reach(Point(event.id, "start"), began)
+        request = RequestEvent(
+            id=self._request_id(event.id),
+            requester=self._bus.name,
+            block=self.plan.block.id,
+            event=event,
+            at=self._bus.stamp(began),
+        )
+        outcome: asyncio.Future[Outcome] | None = None
+        if self._is_there("recognition"):
+            pending = self._pending[event.id] = self._requests.send(keys.EVENT, request)
+            outcome = pending.outcome
+        self._advance()
+        if decision := await self._decision(event, outcome):
+            end, by_body = decision
+            self._reach(Point(event.id, "end"), max(began, end), by_body=by_body)
+        self._advance()
+
+    async def _decision(self, event: Event, outcome: "asyncio.Future[Outcome] | None") -> tuple[Seconds, bool] | None:
+        """When the event was decided, and whether by recognition; None if that refused it."""
+        while True:
+            heard = outcome is not None
+            deadline = event_deadline(event, self.plan.block, self._authority.reached, self._config, is_heard=heard)
+            patience = max(0.0, deadline - self._bus.now())
+            if outcome is None:
+                await asyncio.sleep(patience)
+                if patience == 0.0:
+                    return self._bus.now(), False
+                continue  # An anchor may have been realised meanwhile, and the limit runs from there.
+            await asyncio.wait([outcome], timeout=patience)
+            if outcome.done():
+                try:
+                    decided = await outcome
+                except RequestRefused as error:
+                    self._lose(event.id, error.fault, kind="CANNOT_CREATE_BEHAVIOR")
+                    return None
+                except EngageError:
+                    outcome = None
+                    continue
+                assert isinstance(decided, EventOutcome)
+                return self._bus.local(decided.at), True
+            if patience == 0.0:
+                outcome = None
+
+    def _request_id(self, behavior: str) -> str:
+        return f"{self.request.id}/{behavior}"

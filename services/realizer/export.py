@@ -1,0 +1,97 @@
+"""A plan for people and programs: text, JSON, and a drawing of its net (DOT)."""
+
+import json
+
+from services.realizer.net import Bound, Place
+from services.realizer.planner import Plan, plan_block
+from services.realizer.points import Point
+
+__all__ = ["as_dot", "as_json", "as_text", "plan_block"]
+
+
+def as_text(plan: Plan) -> str:
+    """The schedule, instant by instant, then what ties the instants, then what was dropped."""
+    net = plan.net
+    by_time = sorted(range(len(net.transitions)), key=lambda each: (plan.schedule[each], each))
+    lines = [f"block {plan.block.id}: {len(net.transitions)} transitions, {len(net.places)} places", ""]
+    lines += [f"{plan.schedule[each]:9.3f} s  {net.transitions[each].name}" for each in by_time]
+    ties = [_tie(plan, place) for place in net.places if place.kind in ("order", "delay", "series") and place.source]
+    ties += [_tie(plan, bound) for bound in plan.bounds if bound.kind != "phase"]
+    lines += ["", *ties] if ties else []
+    lines += [f"ends when something takes its place, or with the block: {id}" for id in sorted(plan.natural)]
+    lines += [f"{problem.kind} {problem.behavior or plan.block.id}: {problem.message}" for problem in plan.problems]
+    return "\n".join(lines) + "\n"
+
+
+def _tie(plan: Plan, tie: Place | Bound) -> str:
+    names = plan.net.transitions
+    because = f"  (line {', '.join(map(str, tie.lines))})" if tie.lines else ""
+    offset = f" {tie.lag:+g} s" if tie.lag else ""
+    return f"  {names[tie.target].name}  no earlier than  {names[tie.source].name}{offset}{because}"
+
+
+def as_json(plan: Plan) -> str:
+    """Everything: transitions with their times, places with the initial marking, bounds, behaviors, problems."""
+    net = plan.net
+    document = {
+        "block": plan.block.id,
+        "transitions": [
+            {"name": transition.name, "points": list(map(str, transition.points)), "time": round(time, 6)}
+            for transition, time in zip(net.transitions, plan.schedule, strict=True)
+        ],
+        "places": [
+            {
+                "kind": place.kind,
+                "source": place.source,
+                "target": place.target,
+                "lag": place.lag,
+                "behavior": place.behavior,
+                "lines": list(place.lines),
+                "tokens": tokens,
+            }
+            for place, tokens in zip(net.places, net.initial, strict=True)
+        ],
+        "bounds": [
+            {"kind": bound.kind, "source": bound.source, "target": bound.target, "lag": bound.lag, "kept": kept}
+            for bound, kept in ((bound, number not in plan.loose) for number, bound in enumerate(net.bounds))
+        ],
+        "behaviors": {
+            id: {point.sync: round(plan.predicted(point), 6) for point in chain.points}
+            for id, chain in plan.chains.items()
+        },
+        "natural": sorted(plan.natural),
+        "dropped": list(plan.dropped),
+        "problems": [
+            {"kind": problem.kind, "behavior": problem.behavior, "message": problem.message}
+            for problem in plan.problems
+        ],
+    }
+    return json.dumps(document, indent=2, ensure_ascii=False)
+
+
+def as_dot(plan: Plan) -> str:
+    """The net for Graphviz: transitions are bars, places circles, backward arcs dashed."""
+    net = plan.net
+    lines = [f"digraph {_quoted(plan.block.id)} {{", "  rankdir=LR;", '  node [fontname="sans-serif", fontsize=10];']
+    for number, transition in enumerate(net.transitions):
+        label = _quoted(f"{transition.name}\n{plan.schedule[number]:.2f} s")
+        lines.append(f"  t{number} [shape=box, style=filled, fillcolor=gray85, label={label}];")
+    for number, place in enumerate(net.places):
+        text = "●" if net.initial[number] else f"{place.lag:g}" if place.lag else ""
+        constraint = ", constraint=false" if place.kind == "idle" else ""
+        lines.append(f"  p{number} [shape=circle, label={_quoted(text)}, tooltip={_quoted(place.kind)}];")
+        lines.append(f"  t{place.source} -> p{number}; p{number} -> t{place.target} [style=solid{constraint}];")
+    for bound in plan.bounds:
+        if bound.kind != "phase":
+            label = _quoted(f"{bound.lag:g}")
+            lines.append(f"  t{bound.source} -> t{bound.target} [style=dashed, constraint=false, label={label}];")
+    return "\n".join((*lines, "}")) + "\n"
+
+
+def _quoted(text: str) -> str:
+    return json.dumps(text, ensure_ascii=False)
+
+
+def times(plan: Plan) -> dict[Point, float]:
+    """When each point is expected, seconds from the block's start."""
+    return {point: plan.predicted(point) for chain in plan.chains.values() for point in chain.points}

@@ -1,0 +1,185 @@
+"""What a block says about its sync points, read into relations between points: which are one instant, which in order.
+
+Constraints and inline timing mean the same thing and become the same relations; so do `before` and `after`.
+"""
+
+from collections.abc import Collection, Mapping
+
+from msgspec import Struct
+
+from schemas.behaviors import After, Before, Behavior, Speech, Synchronize
+from schemas.blocks import Block
+from schemas.faults import Fault, InputRefused
+from schemas.feedback import WarningKind
+from schemas.syncref import BLOCK_ITSELF, SyncRef, canonical_sync
+from schemas.units import Seconds
+from services.realizer.points import ORIGIN, Point, sync_points, type_of
+
+
+class Term(Struct, frozen=True):
+    """A point and an offset: the instant `offset` seconds after the point. text: as its author wrote it."""
+
+    point: Point
+    offset: Seconds
+    text: str
+    line: int = 0
+
+
+class Equal(Struct, frozen=True):
+    """All terms are one instant."""
+
+    terms: tuple[Term, ...]
+
+
+class Order(Struct, frozen=True):
+    """`later` is no earlier than `earlier`."""
+
+    earlier: Term
+    later: Term
+
+
+class Problem(Struct, frozen=True):
+    """A warning about a behavior (empty: about the block)."""
+
+    kind: WarningKind
+    message: str
+    behavior: str = ""
+
+
+class Relations(Struct, frozen=True):
+    """unusable: behaviors that cannot be performed as written. required: those whose loss fails the block."""
+
+    equals: tuple[Equal, ...]
+    orders: tuple[Order, ...]
+    required: frozenset[str]
+    problems: tuple[Problem, ...] = ()
+    unusable: frozenset[str] = frozenset()
+
+    @property
+    def named(self) -> frozenset[Point]:
+        """Every point that something is said about, alone or with others."""
+        terms = [term for equal in self.equals for term in equal.terms]
+        terms += [term for order in self.orders for term in (order.earlier, order.later)]
+        return frozenset(term.point for term in terms)
+
+
+class _Reader:
+    def __init__(self, block: Block, elsewhere: Collection[Point]) -> None:
+        self.block = block
+        self.elsewhere = elsewhere
+        self.behaviors: Mapping[str, Behavior] = {behavior.id: behavior for behavior in block.behaviors}
+        self.points = {id: frozenset(sync_points(behavior)) for id, behavior in self.behaviors.items()}
+        self.equals: list[Equal] = []
+        self.orders: list[Order] = []
+        self.problems: list[Problem] = []
+        self.unusable: set[str] = set()
+        self.required = {behavior.id for behavior in block.behaviors if behavior.required}
+
+    def term(self, text: str, where: str, line: int) -> Term | Problem:
+        """The point and offset of a reference; a Problem if it names a sync point that its behavior lacks."""
+        try:
+            ref = SyncRef.parse(text)
+            if isinstance(speech := self.behaviors.get(ref.behavior), Speech):
+                ref = SyncRef.parse(text, [mark.id for mark in speech.marks])
+        except ValueError as error:
+            raise self.refusal(str(error), where, line) from error
+        here = ref.block in ("", self.block.id)
+        if not ref.behavior or ref.behavior == BLOCK_ITSELF:
+            if ref.sync == "end" and here:
+                raise self.refusal(f"{text!r}: nothing in a block can wait for its own end", where, line)
+            point = ORIGIN if here else Point(f"{ref.block}:{BLOCK_ITSELF}", ref.sync or "start")
+            return self._elsewhere(point, ref, text, where, line) if not here else Term(point, ref.offset, text, line)
+        if not here:
+            return self._elsewhere(Point(f"{ref.block}:{ref.behavior}", ref.sync), ref, text, where, line)
+        behavior = self.behaviors.get(ref.behavior)
+        if behavior is None:
+            raise self.refusal(f"unknown behavior {ref.behavior!r}", where, line, self._advice())
+        sync = canonical_sync(ref.sync, type_of(behavior), self.block.dialect)
+        if sync not in self.points[behavior.id] or ref.repetition > 1:
+            return Problem("PARSING_FAILURE", f"{where}: {type_of(behavior)} has no sync point {text!r}", behavior.id)
+        return Term(Point(behavior.id, sync), ref.offset, text, line)
+
+    def _elsewhere(self, point: Point, ref: SyncRef, text: str, where: str, line: int) -> Term:
+        if point not in self.elsewhere:
+            raise self.refusal(f"{text!r} is not a point of a live block", where, line)
+        return Term(point, ref.offset, text, line)
+
+    def refusal(self, reason: str, where: str, line: int, advice: str = "") -> InputRefused:
+        return InputRefused(Fault(reason=reason, where=f"{self.block.id}: {where}", line=line, advice=advice))
+
+    def _advice(self) -> str:
+        return f"the block has {', '.join(sorted(self.behaviors)) or 'no behaviors'}"
+
+    def read_constraints(self) -> None:
+        for number, constraint in enumerate(self.block.constraints, 1):
+            where = constraint.id or f"constraint {number}"
+            for operator in constraint.operators:
+                line = operator.line or constraint.line
+                terms = self._terms((*([operator.ref] if operator.ref else []), *operator.syncs), where, line)
+                self._relate(operator, terms)
+                if constraint.required:
+                    self.required |= {term.point.behavior for term in terms.values()} & self.behaviors.keys()
+
+    def _terms(self, texts: tuple[str, ...], where: str, line: int) -> dict[str, Term]:
+        terms = {}
+        for text in texts:
+            match self.term(text, where, line):
+                case Term() as term:
+                    terms[text] = term
+                case Problem(message=message):
+                    self.problems.append(Problem("PARSING_FAILURE", f"{message}; the line is ignored"))
+        return terms
+
+    def _relate(self, operator: Synchronize | Before | After, terms: dict[str, Term]) -> None:
+        if isinstance(operator, Synchronize):
+            if len(terms) > 1:
+                self.equals.append(Equal(tuple(terms.values())))
+            return
+        ref = terms.get(operator.ref)
+        for text in operator.syncs:
+            if ref is not None and (sync := terms.get(text)) is not None:
+                self.orders.append(Order(ref, sync) if isinstance(operator, After) else Order(sync, ref))
+
+    def read_timing(self) -> None:
+        for behavior in self.block.behaviors:
+            relations: list[Equal] = []
+            for timing in behavior.timing:
+                sync = canonical_sync(timing.sync, type_of(behavior), self.block.dialect)
+                own = f"{behavior.id}:{timing.sync}"
+                problem: Problem | None = None
+                if sync not in self.points[behavior.id]:
+                    problem = Problem("PARSING_FAILURE", f"{type_of(behavior)} has no sync point {timing.sync!r}")
+                else:
+                    other = self.term(timing.ref, behavior.id, behavior.line)
+                    if isinstance(other, Problem):
+                        problem = other
+                    else:
+                        term = Term(Point(behavior.id, sync), 0.0, own, behavior.line)
+                        relations.append(Equal((term, other)))
+                if problem is not None:
+                    self.unusable.add(behavior.id)
+                    message = f"{problem.message}; the behavior is dropped"
+                    self.problems.append(Problem("PARSING_FAILURE", message, behavior.id))
+                    break
+            else:
+                self.equals += relations
+
+    def result(self) -> Relations:
+        return Relations(
+            tuple(self.equals),
+            tuple(self.orders),
+            frozenset(self.required),
+            tuple(self.problems),
+            frozenset(self.unusable),
+        )
+
+
+def relations(block: Block, elsewhere: Collection[Point] = ()) -> Relations:
+    """Everything `block` says about its points. Raises InputRefused: a malformed or dangling reference.
+
+    elsewhere: points of other live blocks, as `Point("block:behavior", sync)`.
+    """
+    reader = _Reader(block, elsewhere)
+    reader.read_constraints()
+    reader.read_timing()
+    return reader.result()

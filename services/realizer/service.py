@@ -1,0 +1,161 @@
+"""The realizer on the bus: takes blocks, answers each exactly once, and performs any number of them at a time."""
+
+import asyncio
+
+from msgspec import Struct
+
+from schemas import keys
+from schemas.blocks import BlockOutcome, PerformBlock
+from schemas.body import (
+    Estimate,
+    EstimateBehaviors,
+    EstimateItem,
+    Estimates,
+    SyncPointArrived,
+    SyncPointReached,
+)
+from schemas.faults import EngageError, Fault, InputRefused, NoReply
+from schemas.feedback import WarningFeedback
+from schemas.presence import PeerAlive, PeerGone
+from schemas.requests import Cancel
+from services.bus import Bus
+from services.realizer.config import RealizerConfig
+from services.realizer.executor import Ending, Performance
+from services.realizer.planner import Plan, plan_block
+from services.realizer.points import performer
+from services.requests import RequestDesk, Requester
+from services.runtime import Ready
+
+
+class _Live(Struct, eq=False):
+    """A block from its request to its outcome. ended: resolved when its outcome is out."""
+
+    request: PerformBlock
+    ended: asyncio.Future[None]
+    performance: Performance | None = None
+    ending: Ending | None = None
+    """How it is to end, if that was decided before it began."""
+
+    def stop(self, ending: Ending) -> None:
+        self.ending = self.ending or ending
+        if self.performance is not None:
+            self.performance.stop(ending)
+
+
+class _Realizer:
+    def __init__(self, bus: Bus, config: RealizerConfig) -> None:
+        self.bus = bus
+        self.config = config
+        self.requests = Requester(bus)
+        self.desk = RequestDesk(bus, "realizer", self.cancel)
+        self.live: dict[str, _Live] = {}
+        self.routes: dict[str, Performance] = {}
+        self.peers: set[str] = set()
+
+    def cancel(self, cancel: Cancel) -> None:
+        if live := self.live.get(cancel.id):
+            reason = cancel.reason or "cancelled"
+            live.stop(Ending("interrupted", Fault(reason=reason, where=live.request.block.id)))
+
+    def admit(self, request: PerformBlock) -> _Live:
+        live = _Live(request, asyncio.get_running_loop().create_future())
+        self.live[request.id] = live
+        return live
+
+    async def perform(self, live: _Live) -> None:
+        """A block from request to outcome."""
+        earlier = [other for other in self.live.values() if other is not live and not other.ended.done()]
+        request = live.request
+        try:
+            plan = await self._plan(request, earlier)
+        except EngageError as error:
+            self._refuse(live, error.fault)
+            return
+        self.desk.accept(request.id)
+        await self._make_way(live, earlier)
+        if live.ending is not None:
+            self._end(live, self._never_begun(request, live.ending))
+            return
+        live.performance = Performance(
+            self.bus, self.requests, request, plan, self.config, self.peers.__contains__, self.routes
+        )
+        self._end(live, await live.performance.run())
+
+    async def _plan(self, request: PerformBlock, earlier: list[_Live]) -> Plan:
+        block = request.block
+        if any(other.request.block.id == block.id for other in earlier):
+            raise InputRefused(Fault(reason="a block of this id is still being performed", where=block.id))
+        plan_block(block)  # What is wrong with the block alone needs no body to be seen.
+        return plan_block(block, await self._estimates(request))
+
+    async def _estimates(self, request: PerformBlock) -> tuple[Estimate, ...]:
+        behaviors = [behavior for behavior in request.block.behaviors if performer(behavior) == "body"]
+        if not behaviors:
+            return ()
+        question = EstimateBehaviors(items=tuple(EstimateItem(behavior=behavior) for behavior in behaviors))
+        try:
+            answer = await self.bus.query(keys.ESTIMATE, question, timeout=self.config.estimate)
+        except NoReply as error:
+            fault = Fault(reason="there is no body to perform it", where=request.block.id, advice="start control")
+            raise InputRefused(fault) from error
+        assert isinstance(answer, Estimates)
+        return answer.items
+
+    async def _make_way(self, live: _Live, earlier: list[_Live]) -> None:
+        """What composition asks of the blocks that are already there."""
+        if live.request.block.composition == "REPLACE":
+            for other in earlier:
+                other.stop(Ending("interrupted", replaced_by=live.request.block.id))
+        if live.request.block.composition != "MERGE" and earlier:
+            await asyncio.wait([other.ended for other in earlier])
+
+    def _never_begun(self, request: PerformBlock, ending: Ending) -> BlockOutcome:
+        return BlockOutcome(
+            id=request.id,
+            block=request.block.id,
+            status=ending.status,
+            replaced_by=ending.replaced_by,
+            fault=ending.fault,
+        )
+
+    def _refuse(self, live: _Live, fault: Fault) -> None:
+        warning = WarningFeedback(block=live.request.block.id or None, kind="PARSING_FAILURE", message=str(fault))
+        self.bus.publish(keys.FEEDBACK, warning)
+        self.desk.refuse(live.request.id, fault)
+        self._forget(live)
+
+    def _end(self, live: _Live, outcome: BlockOutcome) -> None:
+        self.desk.end(outcome)
+        self._forget(live)
+
+    def _forget(self, live: _Live) -> None:
+        del self.live[live.request.id]
+        live.ended.set_result(None)
+
+
+async def realize(bus: Bus, ready: Ready, config: RealizerConfig) -> None:
+    """Serve until cancelled. A bad block is answered with a fault; it never ends the service."""
+    realizer = _Realizer(bus, config)
+    patterns = dict.fromkeys((*RequestDesk.patterns("realizer"), *Requester.PATTERNS, keys.SYNC_POINT))
+    try:
+        with bus.subscribe(*patterns) as inbox:
+            ready()
+            async with asyncio.TaskGroup() as tasks:
+                async for received in inbox:
+                    match received.message:
+                        case SyncPointArrived(id=id) | SyncPointReached(id=id) as report if id in realizer.routes:
+                            realizer.routes[id].feed(report)
+                        case PeerAlive(participant=peer):
+                            realizer.peers.add(peer)
+                        case PeerGone(participant=peer):
+                            realizer.peers.discard(peer)
+                    realizer.requests.feed(received)
+                    match realizer.desk.take(received):
+                        case PerformBlock(id=id) as request if id not in realizer.live:
+                            live = realizer.admit(request)
+                            tasks.create_task(realizer.perform(live), name=f"block {request.block.id}")
+                        case Cancel() as cancel:
+                            realizer.cancel(cancel)
+    finally:
+        realizer.desk.close()
+        realizer.requests.close()

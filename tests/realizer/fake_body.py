@@ -1,0 +1,268 @@
+"""A body at message level: the durations it is told, the authority it is given, and the faults it is told to have.
+
+It behaves on the bus as control does: it waits at hold points until its authority covers them, says so, takes over
+when a later gaze or point comes, and ends every request exactly once.
+"""
+
+import asyncio
+from collections.abc import Mapping
+from itertools import pairwise
+
+from msgspec import Struct, field
+
+from schemas import keys
+from schemas.behaviors import BlockBehavior, Speech
+from schemas.body import (
+    AbortBehavior,
+    BehaviorOutcome,
+    Estimate,
+    EstimateBehaviors,
+    Estimates,
+    GoHome,
+    HomeReached,
+    PerformBehavior,
+    Phase,
+    SyncPointArrived,
+    SyncPointReached,
+)
+from schemas.faults import Fault
+from schemas.messages import Message
+from schemas.requests import Cancel
+from schemas.units import Seconds
+from services.bus import Bus
+from services.requests import RequestDesk
+from services.runtime import Ready
+
+SEVEN = ("start", "ready", "stroke_start", "stroke", "stroke_end", "relax", "end")
+HOLDS = {
+    "gesture": ("stroke_start", "stroke_end"),
+    "pointing": ("stroke_start", "stroke_end"),
+    "head": ("stroke_start", "stroke_end"),
+    "gaze": ("relax",),
+    "face": ("relax",),
+    "faceLexeme": ("relax",),
+    "faceFacs": ("relax",),
+    "posture": ("relax",),
+}
+PART = {"gaze": "head", "gazeShift": "head", "pointing": "right_arm", "gesture": "right_arm", "speech": "voice"}
+DURATIONS: dict[str, tuple[Seconds, ...]] = {
+    "pointing": (0.5, 0.25, 0.5, 0.25, 0.25, 0.5),
+    "gesture": (0.5, 0.25, 0.5, 0.25, 0.25, 0.5),
+    "head": (0.25, 0.0, 0.25, 0.25, 0.0, 0.25),
+    "gaze": (0.0, 0.0, 0.5, 0.0, 0.0, 0.5),
+    "face": (0.0, 0.0, 0.25, 0.0, 0.0, 0.25),
+    "faceLexeme": (0.0, 0.0, 0.25, 0.0, 0.0, 0.25),
+    "faceFacs": (0.0, 0.0, 0.25, 0.0, 0.0, 0.25),
+    "posture": (0.0, 0.0, 0.5, 0.0, 0.0, 0.5),
+}
+"""Seconds per phase: binary fractions, so that times come out exact."""
+
+
+def type_of(behavior: BlockBehavior) -> str:
+    return str(behavior.__struct_config__.tag)
+
+
+def points_of(behavior: BlockBehavior) -> tuple[str, ...]:
+    if isinstance(behavior, Speech):
+        return ("start", *(mark.id for mark in sorted(behavior.marks, key=lambda mark: mark.position)), "end")
+    return SEVEN if type_of(behavior) in HOLDS else ("start", "end")
+
+
+def natural_durations(behavior: BlockBehavior) -> tuple[Seconds, ...]:
+    """Speech: a second between two points."""
+    return DURATIONS.get(type_of(behavior), (1.0,) * (len(points_of(behavior)) - 1))
+
+
+class Script(Struct):
+    """What a behavior really does. durations: of its phases, where they differ from the estimate.
+
+    slow: factor on all phases. stall: never gets to this point. fail: the body gives up on the way to it.
+    """
+
+    durations: tuple[Seconds, ...] = ()
+    slow: float = 1.0
+    stall: str = ""
+    fail: str = ""
+    refuse: bool = False
+    infeasible: str = ""
+    """Type of warning of the estimate."""
+    deaf: bool = False
+    """Does not even answer an abort."""
+
+
+class Act(Struct, eq=False):
+    perform: PerformBehavior
+    changed: asyncio.Event
+    task: asyncio.Task[None] | None = None
+    passed: list[str] = field(default_factory=list)
+    spoken: str = ""
+
+    def covers(self, sync: str) -> bool:
+        points = points_of(self.perform.behavior)
+        return points.index(sync) <= points.index(self.perform.through)
+
+
+class FakeBody:
+    """scripts: by behavior id. estimates: durations it expects, by behavior id, where not natural."""
+
+    def __init__(
+        self,
+        scripts: Mapping[str, Script] | None = None,
+        estimates: Mapping[str, tuple[Seconds, ...]] | None = None,
+    ) -> None:
+        self.scripts = dict(scripts or {})
+        self.estimates = dict(estimates or {})
+        self.stops: list[str] = []
+        """`behavior:sync` of each hold."""
+        self.commands: list[tuple[Seconds, str, str]] = []
+        """Time, behavior and authority of each command."""
+        self.homes: list[tuple[str, ...]] = []
+        self.aborted: list[str] = []
+        self.acts: dict[str, Act] = {}
+
+    async def serve(self, bus: Bus, ready: Ready) -> None:
+        self.bus = bus
+        self.desk = RequestDesk(bus, "control", self._cancelled)
+        bus.answer(keys.ESTIMATE, self._estimate)
+        try:
+            with bus.subscribe(*RequestDesk.patterns("control")) as inbox:
+                ready()
+                async with asyncio.TaskGroup() as self.tasks:
+                    async for received in inbox:
+                        match self.desk.take(received):
+                            case PerformBehavior() as perform:
+                                self._perform(perform)
+                            case AbortBehavior(id=id) | Cancel(id=id):
+                                self._abort(id)
+                            case GoHome(id=id, parts=parts):
+                                self.desk.accept(id)
+                                self.homes.append(parts)
+                                self.desk.end(HomeReached(id=id, at=bus.stamp()))
+        finally:
+            self.desk.close()
+
+    def _cancelled(self, cancel: Cancel) -> None:
+        self._abort(cancel.id)
+
+    def _script(self, behavior: BlockBehavior) -> Script:
+        return self.scripts.get(behavior.id, Script())
+
+    def estimate(self, behavior: BlockBehavior) -> Estimate:
+        """What it answers when asked."""
+        if kind := self._script(behavior).infeasible:
+            return Estimate(behavior=behavior.id, feasible=False, warning=kind, fault=Fault(reason="no way"))
+        durations = self.estimates.get(behavior.id, natural_durations(behavior))
+        holds = HOLDS.get(type_of(behavior), ())
+        phases = tuple(
+            Phase(since=since, to=to, shortest=seconds, natural=seconds, longest=seconds, hold=to in holds)
+            for (since, to), seconds in zip(pairwise(points_of(behavior)), durations, strict=True)
+        )
+        parts = (PART.get(type_of(behavior), type_of(behavior)),)
+        return Estimate(behavior=behavior.id, feasible=True, parts=parts, phases=phases)
+
+    def _estimate(self, question: Message) -> Message:
+        assert isinstance(question, EstimateBehaviors)
+        return Estimates(items=tuple(self.estimate(item.behavior) for item in question.items))
+
+    def _perform(self, perform: PerformBehavior) -> None:
+        self.commands.append((self.bus.now(), perform.behavior.id, perform.through))
+        if act := self.acts.get(perform.id):
+            act.perform = perform
+            act.changed.set()
+            return
+        if self._script(perform.behavior).refuse:
+            self.desk.refuse(perform.id, Fault(reason="conflict", where=perform.behavior.id))
+            return
+        self.desk.accept(perform.id)
+        self._take_over(perform)
+        act = self.acts[perform.id] = Act(perform, asyncio.Event())
+        act.task = self.tasks.create_task(self._run(act), name=f"fake {perform.id}")
+
+    def _take_over(self, perform: PerformBehavior) -> None:
+        type = type_of(perform.behavior)
+        for other in list(self.acts.values()):
+            same_arm = getattr(other.perform.behavior, "mode", None) == getattr(perform.behavior, "mode", None)
+            if type_of(other.perform.behavior) == type and type in HOLDS and type != "head" and same_arm:
+                assert other.task is not None
+                other.task.cancel()
+                for sync in points_of(other.perform.behavior)[len(other.passed) :]:
+                    self._reached(other, sync, self.bus.now())
+                self._end(other, "done")
+
+    async def _run(self, act: Act) -> None:
+        behavior = act.perform.behavior
+        script = self._script(behavior)
+        durations = script.durations or natural_durations(behavior)
+        points, holds = points_of(behavior), HOLDS.get(type_of(behavior), ())
+        self._reached(act, points[0], self.bus.now())
+        pending: list[str] = []
+        for seconds, sync in zip(durations, points[1:], strict=True):
+            if sync == script.stall:
+                await asyncio.get_running_loop().create_future()
+            if seconds:
+                await asyncio.sleep(seconds * script.slow)
+            if sync == script.fail:
+                self._end(act, "failed", Fault(reason="overheated"))
+                return
+            if type_of(behavior) not in ("pointing", "gesture", "head") and sync == "stroke_end":
+                pending.append(sync)
+                continue
+            arrived = self.bus.now()
+            if sync in holds and not act.covers(sync):
+                self._arrived(act, sync, arrived)
+                while not act.covers(sync):
+                    act.changed.clear()
+                    await act.changed.wait()
+            for each in (*pending, sync):
+                self._reached(act, each, arrived)
+            pending = []
+            if isinstance(behavior, Speech):
+                position = next((mark.position for mark in behavior.marks if mark.id == sync), len(behavior.text))
+                act.spoken = behavior.text[:position]
+        self._end(act, "done")
+
+    def _arrived(self, act: Act, sync: str, at: Seconds) -> None:
+        behavior = act.perform.behavior.id
+        self.stops.append(f"{behavior}:{sync}")
+        message = SyncPointArrived(
+            id=act.perform.id, block=act.perform.block, behavior=behavior, sync=sync, at=self.bus.stamp(at)
+        )
+        self.bus.publish(keys.SYNC_POINT, message)
+
+    def _reached(self, act: Act, sync: str, arrived: Seconds) -> None:
+        act.passed.append(sync)
+        message = SyncPointReached(
+            id=act.perform.id,
+            block=act.perform.block,
+            behavior=act.perform.behavior.id,
+            sync=sync,
+            at=self.bus.stamp(),
+            arrived=self.bus.stamp(arrived),
+        )
+        self.bus.publish(keys.SYNC_POINT, message)
+
+    def _abort(self, id: str) -> None:
+        if (act := self.acts.get(id)) is None:
+            self.desk.refuse(id, Fault(reason="nothing to abort"))
+            return
+        if self._script(act.perform.behavior).deaf:
+            return
+        assert act.task is not None
+        act.task.cancel()
+        self.aborted.append(act.perform.behavior.id)
+        self._end(act, "aborted")
+
+    def _end(self, act: Act, status: str, fault: Fault | None = None) -> None:
+        perform = act.perform
+        del self.acts[perform.id]
+        self.desk.end(
+            BehaviorOutcome(
+                id=perform.id,
+                block=perform.block,
+                behavior=perform.behavior.id,
+                status=status,  # type: ignore[arg-type]
+                at=self.bus.stamp(),
+                spoken=act.spoken,
+                fault=fault,
+            )
+        )

@@ -1,0 +1,140 @@
+"""A realizer, a fake body and, if wanted, a fake recognition on one memory bus; and what they were seen to do."""
+
+import asyncio
+from collections.abc import AsyncIterator, Mapping, Sequence
+from contextlib import asynccontextmanager
+from functools import partial
+
+from msgspec import Struct, field
+
+from schemas import keys
+from schemas.behaviors import After, Before, BlockBehavior, Constraint, Synchronize
+from schemas.blocks import Block, BlockOutcome, PerformBlock
+from schemas.feedback import BlockProgress, SyncPointProgress, WarningFeedback
+from schemas.recognition import EventOutcome, RequestEvent, SignalTurn, TurnOutcome
+from schemas.units import Seconds
+from services.bus import Bus
+from services.memory_bus import MemoryHub
+from services.realizer.config import RealizerConfig
+from services.realizer.service import realize
+from services.requests import Pending, RequestDesk, Requester
+from services.runtime import Ready, Service, running
+from tests.realizer.fake_body import FakeBody
+
+
+def block(
+    behaviors: Sequence[BlockBehavior], *operators: Synchronize | After | Before, id: str = "b", **rest: object
+) -> Block:
+    constraints = (Constraint(operators=operators, id="constraint-1"),) if operators else ()
+    return Block(id=id, behaviors=tuple(behaviors), constraints=constraints, **rest)  # type: ignore[arg-type]
+
+
+def together(*refs: str) -> Synchronize:
+    return Synchronize(ref=refs[0], syncs=refs[1:])
+
+
+def after(ref: str, *syncs: str) -> After:
+    return After(ref=ref, syncs=syncs)
+
+
+def before(ref: str, *syncs: str) -> Before:
+    return Before(ref=ref, syncs=syncs)
+
+
+class FakeRecognition:
+    """Decides each event as told: seconds after its start, by behavior id; None: never."""
+
+    def __init__(self, decisions: Mapping[str, Seconds | None] | None = None) -> None:
+        self.decisions = dict(decisions or {})
+        self.events: list[RequestEvent] = []
+        self.signals: list[SignalTurn] = []
+        self.cancelled: list[str] = []
+
+    async def serve(self, bus: Bus, ready: Ready) -> None:
+        desk = RequestDesk(bus, "recognition", lambda cancel: None)
+        try:
+            with bus.subscribe(*RequestDesk.patterns("recognition")) as inbox:
+                ready()
+                async with asyncio.TaskGroup() as tasks:
+                    async for received in inbox:
+                        match desk.take(received):
+                            case RequestEvent() as request:
+                                self.events.append(request)
+                                desk.accept(request.id)
+                                tasks.create_task(self._decide(bus, desk, request))
+                            case SignalTurn() as signal:
+                                self.signals.append(signal)
+                                desk.end(TurnOutcome(id=signal.id, at=bus.stamp()))
+        finally:
+            desk.close()
+
+    async def _decide(self, bus: Bus, desk: RequestDesk, request: RequestEvent) -> None:
+        delay = self.decisions.get(request.event.id)
+        if delay is not None:
+            await asyncio.sleep(delay)
+            desk.end(EventOutcome(id=request.id, event="e1", state="succeeded", at=bus.stamp()))
+
+
+class Stage(Struct):
+    """Everything seen. times: of each reported sync point, `block/behavior:sync`, from its block's start."""
+
+    hub: MemoryHub
+    body: FakeBody
+    recognition: FakeRecognition
+    requests: Requester
+    feedback: list[object] = field(default_factory=list)
+
+    def ask(self, block: Block) -> Pending:
+        return self.requests.send(keys.BLOCK, PerformBlock(id=f"r-{block.id}", requester="test", block=block))
+
+    async def perform(self, block: Block) -> BlockOutcome:
+        outcome = await self.ask(block).outcome
+        assert isinstance(outcome, BlockOutcome)
+        return outcome
+
+    def progress(self, block: str = "b") -> list[SyncPointProgress]:
+        return [each for each in self.feedback if isinstance(each, SyncPointProgress) and each.block == block]
+
+    def times(self, block: str = "b") -> dict[str, Seconds]:
+        return {f"{each.behavior}:{each.sync}": each.time for each in self.progress(block)}
+
+    def warnings(self) -> list[WarningFeedback]:
+        return [each for each in self.feedback if isinstance(each, WarningFeedback)]
+
+    def ends(self) -> list[BlockProgress]:
+        return [each for each in self.feedback if isinstance(each, BlockProgress) and each.progress == "end"]
+
+
+@asynccontextmanager
+async def stage(
+    body: FakeBody | None = None,
+    recognition: FakeRecognition | None = None,
+    config: RealizerConfig | None = None,
+    hub: MemoryHub | None = None,
+) -> AsyncIterator[Stage]:
+    body = body or FakeBody()
+    own = MemoryHub() if hub is None else hub
+    services: dict[str, Service] = {
+        "control": body.serve,
+        "realizer": partial(realize, config=config or RealizerConfig()),
+    }
+    if recognition is not None:
+        services["recognition"] = recognition.serve
+    async with running(own, services):
+        bus = own.join("test")
+        async with Requester(bus) as requests:
+            seen = Stage(own, body, recognition or FakeRecognition(), requests)
+            listening = asyncio.create_task(_listen(bus, seen), name="listen to feedback")
+            try:
+                yield seen
+            finally:
+                await asyncio.sleep(0)
+                listening.cancel()
+                await asyncio.gather(listening, return_exceptions=True)
+        await bus.leave()
+
+
+async def _listen(bus: Bus, seen: Stage) -> None:
+    with bus.subscribe(keys.FEEDBACK) as inbox:
+        async for received in inbox:
+            seen.feedback.append(received.message)
