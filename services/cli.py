@@ -98,10 +98,10 @@ def up(
     quiet: Quiet = False,
 ) -> None:
     """Run the services as separate processes on this machine; Ctrl-C stops them all."""
-    from services.commandline import demo, up
+    from services.commandline import demo, run, up
 
     chosen = (*demo.choices(seed, human, resolution), *(settings or ()))
-    where = up.Where(config, robot, tuple(connect or ()), tuple(listen or ()), chosen)
+    where = run.Where(config, robot, tuple(connect or ()), tuple(listen or ()), chosen)
     raise typer.Exit(up.main(up.Options(where, task, events, feedback, quiet)))
 
 

@@ -17,20 +17,20 @@ from schemas.messages import Message
 from schemas.recognition import ConnectionEvent
 from schemas.units import Seconds
 from schemas.world import World
-from services.bus import Bus, Hub
+from services.bus import Hub
 from services.client import Robot, connect
 from services.commandline import roster
 from services.commandline.errors import readable
 from services.commandline.outputs import Outputs
 from services.commandline.process import DONE, FAILED, REFUSED, run
 from services.commandline.run import Where, unique
-from services.commandline.sources import Source, Thing, read_source, read_world
+from services.commandline.sources import Source, Thing, read_source, read_world, still
 from services.config import Config
 from services.console.follow import Sink, following
 from services.console.live import Log
 from services.console.log import Telling
 from services.memory_bus import MemoryHub
-from services.runtime import Ready, Service, running
+from services.runtime import Service, running
 
 PATIENCE: Seconds = 5.0
 """How long a running system may take to answer at all."""
@@ -121,33 +121,38 @@ def _read(files: tuple[Path, ...], outputs: Outputs) -> tuple[Source, ...]:
         try:
             sources.append(read_source(path))
         except InputRefused as error:
-            _warn(outputs, path, error.fault)
+            _warn(outputs, _block_of(error.fault, path), error.fault)
             raise
     return tuple(sources)
 
 
-def _warn(outputs: Outputs, path: Path, fault: Fault) -> None:
-    """Bad input never reaches the realizer; its feedback says the same as the realizer's would."""
+def _block_of(fault: Fault, path: Path) -> str | None:
+    """Whose fault it is, as far as the place says: `file: block-1: gaze-1`, with a line, else unknown."""
     place = fault.where.removeprefix(str(path)).removeprefix(": ")
-    block = place.partition(":")[0] if fault.line and place else None
-    outputs(WarningFeedback(block=block, kind="PARSING_FAILURE", message=readable(fault, path)), 0.0)
+    return place.partition(": ")[0] if fault.line and place else None
+
+
+def _warn(outputs: Outputs, block: str | None, fault: Fault) -> None:
+    """Bad input never reaches the realizer; its feedback is the same all the same."""
+    outputs(WarningFeedback(block=block, kind="PARSING_FAILURE", message=readable(fault)), 0.0)
 
 
 def _check(sources: Sequence[Source], world: World, config: Config, outputs: Outputs) -> None:
-    """What only a known world and body can tell, before anything moves. Raises InputRefused."""
-    from services.generation.fragment_check import check
-    from services.realizer.export import plan_block
+    """What a known world tells, and contradictions, before anything moves. Raises InputRefused."""
+    from services.generation.fragment_check import checked
+    from services.realizer.planner import plan_block
 
     for source in sources:
         for thing in source.things:
             try:
-                if isinstance(thing, TurnFragment):
-                    check(thing, world, config.robot)
-                else:
-                    plan_block(thing, world)
+                with source.blamed():
+                    if isinstance(thing, TurnFragment):
+                        checked(thing, world, config.robot)
+                    else:
+                        plan_block(thing)
             except InputRefused as error:
-                _warn(outputs, source.path, error.fault)
-                raise InputRefused(error.fault) from error
+                _warn(outputs, thing.id, error.fault)
+                raise
 
 
 @asynccontextmanager
@@ -156,16 +161,11 @@ async def _private(job: Job, config: Config, world: World) -> AsyncIterator[Hub]
 
     Without a fragment nobody but the blocks themselves moves the head.
     """
-    from services.simulation.still import stand_still
-
-    async def table(bus: Bus, ready: Ready) -> None:
-        await stand_still(bus, ready, world)
-
     names = ["realizer", "recognition", "control"]
     if any(isinstance(thing, TurnFragment) for source in job.sources for thing in source.things):
         names.append("generation")
     services: dict[str, Service] = {name: roster.service(name, config) for name in names}
-    async with MemoryHub(config.robot) as hub, running(hub, {"simulation": table, **services}):
+    async with MemoryHub(config.robot) as hub, running(hub, {"simulation": still(world), **services}):
         yield hub
 
 

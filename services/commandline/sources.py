@@ -1,5 +1,8 @@
 """Reading the files people name: fragments, blocks, worlds. Everything is read and checked before anything moves."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 
 import msgspec
@@ -10,6 +13,7 @@ from schemas.blocks import Block
 from schemas.faults import Fault, InputRefused
 from schemas.fragments import TurnFragment
 from schemas.world import Entity, World
+from services.runtime import Service
 
 Thing = Block | TurnFragment
 
@@ -19,6 +23,18 @@ class Source(Struct, frozen=True, kw_only=True):
 
     path: Path
     things: tuple[Thing, ...]
+
+    @contextmanager
+    def blamed(self) -> Iterator[None]:
+        """A refusal inside the body of `with` names this file."""
+        try:
+            yield
+        except InputRefused as error:
+            fault = error.fault
+            if not fault.where.startswith(str(self.path)):
+                where = ": ".join(part for part in (str(self.path), fault.where) if part)
+                fault = msgspec.structs.replace(fault, where=where)
+            raise InputRefused(fault) from error
 
 
 def read_source(path: Path) -> Source:
@@ -36,9 +52,9 @@ class _World(Struct, frozen=True, forbid_unknown_fields=True):
 def read_world(path: Path | None) -> World:
     """The entities of a JSON file; the tangram table without one. Raises InputRefused with the JSON path."""
     if path is None:
-        from services.tangram_table import table, world
+        from services.simulation.still import tangram_world
 
-        return world(table())
+        return tangram_world()
     try:
         entities = msgspec.json.decode(_bytes(path), type=_World).entities
     except (msgspec.DecodeError, RecursionError) as error:
@@ -58,3 +74,10 @@ def _bytes(path: Path) -> bytes:
         return path.read_bytes()
     except OSError as error:
         raise InputRefused(Fault(reason=error.strerror or str(error), where=str(path))) from error
+
+
+def still(world: World) -> Service:
+    """Perception for a world in which nothing moves by itself."""
+    from services.simulation.still import stand_still
+
+    return partial(stand_still, world=world)

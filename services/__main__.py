@@ -1,0 +1,5 @@
+"""`python -m services` is `engage`."""
+
+from services.cli import main
+
+main()

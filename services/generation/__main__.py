@@ -1,0 +1,7 @@
+"""`python -m services.generation` is `engage run generation`."""
+
+import sys
+
+from services.cli import main
+
+main(["run", "generation", *sys.argv[1:]])

@@ -1,0 +1,7 @@
+"""`python -m services.recognition` is `engage run recognition`."""
+
+import sys
+
+from services.cli import main
+
+main(["run", "recognition", *sys.argv[1:]])

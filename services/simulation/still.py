@@ -1,0 +1,60 @@
+"""A world in which nothing happens: from a file, or the tangram table with a person who just sits there."""
+
+import asyncio
+from pathlib import Path
+
+import msgspec
+from msgspec import Struct
+
+from schemas import keys
+from schemas.actions import ActorFound
+from schemas.faults import Fault, InputRefused
+from schemas.world import Entity, World
+from services.bus import Bus
+from services.runtime import Ready
+from services.simulation.config import SimulationConfig
+from services.simulation.table import Table
+from services.tangram_table import tangram_table
+
+EXAMPLE = '{"entities": [{"id": "cup", "kind": "object", "position": [0.5, 0.1, 0.8]}]}'
+
+
+class _File(Struct, frozen=True, forbid_unknown_fields=True):
+    entities: tuple[Entity, ...]
+
+
+async def show_world(bus: Bus, ready: Ready, world: World) -> None:
+    """Be perception in a world that never changes, until cancelled. Its people are found at once."""
+    ready()
+    bus.publish(keys.WORLD, msgspec.structs.replace(world, at=bus.stamp()))
+    for person in world.people:
+        bus.publish(keys.PERCEIVED_ACTION, ActorFound(actor=person.id, at=bus.stamp()))
+    await asyncio.get_running_loop().create_future()
+
+
+def tangram_world() -> World:
+    """The tangram table as it is at the start, with the person before it."""
+    defaults = SimulationConfig()
+    table = Table(tangram_table(), hand_speed=defaults.hand_speed, shortest_movement=defaults.shortest_movement)
+    table.seated = True
+    return World(entities=table.entities(0.0))
+
+
+def load_world(path: Path) -> World:
+    """The world in a JSON file. Raises InputRefused with the file, the JSON path and the reason."""
+    try:
+        entities = msgspec.json.decode(path.read_bytes(), type=_File).entities
+    except OSError as error:
+        raise InputRefused(Fault(reason=error.strerror or str(error), where=str(path))) from error
+    except (msgspec.DecodeError, RecursionError) as error:
+        raise InputRefused(Fault(reason=str(error), where=str(path), advice=EXAMPLE)) from error
+    seen: dict[str, int] = {}
+    for index, entity in enumerate(entities):
+        where = f"{path}: $.entities[{index}].id"
+        if not entity.id:
+            raise InputRefused(Fault(reason="an entity without an id", where=where))
+        if entity.id in seen:
+            reason = f"duplicate id {entity.id!r}, of $.entities[{seen[entity.id]}] already"
+            raise InputRefused(Fault(reason=reason, where=where, advice="give each entity its own id"))
+        seen[entity.id] = index
+    return World(entities=entities)
