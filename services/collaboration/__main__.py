@@ -1,7 +1,9 @@
-"""`python -m services.collaboration` is `engage run collaboration`."""
+"""`python -m services.collaboration`: the same as `engage run collaboration`."""
 
 import sys
 
 from services.cli import main
 
-main(["run", "collaboration", *sys.argv[1:]])
+if __name__ == "__main__":
+    sys.argv[1:1] = ["run", "collaboration"]
+    main()

@@ -1,7 +1,9 @@
-"""`python -m services.simulation` is `engage run simulation`."""
+"""`python -m services.simulation`: the same as `engage run simulation`."""
 
 import sys
 
 from services.cli import main
 
-main(["run", "simulation", *sys.argv[1:]])
+if __name__ == "__main__":
+    sys.argv[1:1] = ["run", "simulation"]
+    main()

@@ -1,0 +1,73 @@
+"""Worlds from files, and a world that stands still."""
+
+from functools import partial
+from pathlib import Path
+
+import pytest
+
+from schemas import keys
+from schemas.faults import InputRefused
+from schemas.world import World
+from services.client import connect
+from services.memory_bus import MemoryHub
+from services.runtime import running
+from services.simulation.still import load_world, show_world, tangram_world
+
+CUP = '{"id": "cup", "kind": "object", "position": [0.5, 0.1, 0.8]}'
+
+
+def test_a_world_is_a_list_of_entities(tmp_path: Path) -> None:
+    file = tmp_path / "world.json"
+    file.write_text(f'{{"entities": [{CUP}, {{"id": "anna", "kind": "person", "position": [1.3, 0, 1.2]}}]}}')
+
+    world = load_world(file)
+
+    assert [entity.id for entity in world.objects] == ["cup"]
+    assert [entity.position for entity in world.people] == [(1.3, 0.0, 1.2)]
+
+
+@pytest.mark.parametrize(
+    ("text", "reason"),
+    [
+        ("", "truncated"),
+        ("{", "truncated"),
+        ('{"things": []}', r"unknown field `things`"),
+        ('{"entities": [{"id": "cup", "kind": "mug", "position": [0, 0, 0]}]}', r"\$\.entities\[0?\.*\]?.*kind"),
+        ('{"entities": [{"id": "cup", "kind": "object", "position": [0, 0]}]}', r"position"),
+        ('{"entities": [{"id": "cup", "kind": "object"}]}', r"position"),
+        (f'{{"entities": [{CUP}, {CUP}]}}', r"\$\.entities\[1\]\.id: duplicate id 'cup'"),
+        ('{"entities": [{"id": "", "kind": "object", "position": [0, 0, 0]}]}', r"without an id"),
+    ],
+)
+def test_a_bad_world_is_refused_with_file_and_place(tmp_path: Path, text: str, reason: str) -> None:
+    file = tmp_path / "world.json"
+    file.write_text(text)
+
+    with pytest.raises(InputRefused, match=reason) as refusal:
+        load_world(file)
+
+    assert refusal.value.fault.where.startswith(str(file))
+
+
+def test_a_world_that_is_not_there_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(InputRefused, match=r"nowhere\.json: No such file"):
+        load_world(tmp_path / "nowhere.json")
+
+
+def test_without_a_file_there_is_the_tangram_table_and_a_person() -> None:
+    world = tangram_world()
+
+    assert len(world.objects) == 10
+    assert [person.id for person in world.people] == ["human"]
+    assert world.entity("table") is not None
+
+
+async def test_a_still_world_is_there_for_whoever_comes_later(hub: MemoryHub) -> None:
+    async with running(hub, {"simulation": partial(show_world, world=tangram_world())}):
+        with hub.join("late").subscribe(keys.PERCEIVED_ACTION) as found:
+            async with connect(hub=hub) as robot:
+                world = await robot.world()
+            assert len(found) == 1
+
+    assert isinstance(world, World)
+    assert world.entities == tangram_world().entities
