@@ -1,0 +1,392 @@
+"""A fragment becomes a BML block: references replaced, the turn's events and gaze added. Two profiles of timing.
+
+Events are behaviors of the block, so they begin exactly when the speech or gaze they belong to does. They carry
+their timing inline: the constraints that remain, but for the hold of a point until its event has ended, are
+plain BML.
+"""
+
+from collections.abc import Mapping, Sequence
+
+import msgspec
+from msgspec import Struct
+
+from schemas.behaviors import (
+    After,
+    BlockBehavior,
+    Constraint,
+    Event,
+    Gaze,
+    Hand,
+    Head,
+    Pointing,
+    Reference,
+    Speech,
+    Synchronize,
+    Timing,
+    TurnSignal,
+)
+from schemas.blocks import Block
+from schemas.fragments import ReferenceChoice, TurnFragment
+from schemas.references import type_name
+from services.generation.config import GenerationConfig
+from services.generation.ordering import ordered
+from services.generation.permits import Permits
+from services.generation.rewriting import Operator, Replacement, Rewriting, points_named
+from services.generation.turn_policy import TurnPlan
+
+_LASTING = frozenset({"gaze", "face", "faceLexeme", "faceFacs", "posture", "event", "turn"})
+"""Types whose behaviors last as long as the rest of the block, or end when recognition says so."""
+
+
+class Emission(Struct, frozen=True):
+    """The block of a fragment; what of the input was left out, and why."""
+
+    block: Block
+    warnings: tuple[str, ...]
+
+
+def emit(
+    fragment: TurnFragment,
+    turn: TurnPlan,
+    choices: Sequence[ReferenceChoice],
+    config: GenerationConfig,
+    permits: Permits,
+    hands: Mapping[str, Hand] | None = None,
+) -> Emission:
+    """The block that performs `fragment`.
+
+    choices: one for each reference. hands: the one to point with, by reference; where it is left to the body, two
+    points count as of the same arm.
+    """
+    return _Emitter(fragment, turn, choices, config, permits, hands or {}).emit()
+
+
+class _Parts:
+    """The behaviors that replace one reference."""
+
+    def __init__(
+        self, reference: Reference, choice: ReferenceChoice, names: "_Names", turn: TurnPlan, hand: Hand | None
+    ):
+        points = choice.gesture == "directed_gaze_with_pointing"
+        looks = choice.gesture != "none"
+        required, line = reference.required, reference.line
+        self.reference = reference
+        self.gaze = self.point = self.phrase = self.event = self.glance = ""
+        self.behaviors: list[BlockBehavior] = []
+        anchors: list[str] = []
+        if looks:
+            self.gaze = names.fresh(f"{reference.id}-gaze")
+            self.behaviors.append(Gaze(id=self.gaze, target=reference.target, required=required, line=line))
+            anchors.append(f"{self.gaze}:stroke")
+        if points:
+            self.point = names.fresh(f"{reference.id}-point")
+            self.behaviors.append(
+                Pointing(id=self.point, target=reference.target, mode=hand, required=required, line=line)
+            )
+            anchors.append(f"{self.point}:stroke")
+        if choice.phrase:
+            self.phrase = names.fresh(f"{reference.id}-phrase")
+            self.behaviors.append(Speech(id=self.phrase, text=choice.phrase, required=required, line=line))
+            anchors.append(f"{self.phrase}:start")
+        if looks and choice.gesture != "gaze":
+            self.event = names.fresh(f"{reference.id}-event")
+            self.behaviors.append(
+                Event(
+                    id=self.event,
+                    kind="directed_gaze",
+                    responder=turn.addressee,
+                    objects=(reference.target,),
+                    cause="reference",
+                    anchors=tuple(anchors),
+                    turn=turn.turn,
+                    timing=(Timing("start", f"{self.gaze}:start"),),
+                )
+            )
+
+    def replacement(self, *, gaze_leads: bool) -> Replacement:
+        start = (self.gaze or self.phrase, "start")
+        if gaze_leads and self.gaze and self.phrase:
+            start = (self.phrase, "start")
+        if self.phrase:
+            end = (self.phrase, "end")
+        else:
+            end = (self.point, "stroke_end") if self.point else (self.gaze, "stroke")
+        return Replacement(start, end, loose_start=gaze_leads and bool(self.gaze and self.phrase))
+
+
+class _Names:
+    """Ids nobody in the fragment uses."""
+
+    def __init__(self, fragment: TurnFragment) -> None:
+        self._taken = {behavior.id for behavior in fragment.behaviors}
+
+    def fresh(self, wish: str) -> str:
+        name, count = wish, 2
+        while name in self._taken:
+            name, count = f"{wish}-{count}", count + 1
+        self._taken.add(name)
+        return name
+
+
+class _Emitter:
+    def __init__(
+        self,
+        fragment: TurnFragment,
+        turn: TurnPlan,
+        choices: Sequence[ReferenceChoice],
+        config: GenerationConfig,
+        permits: Permits,
+        hands: Mapping[str, Hand],
+    ) -> None:
+        self.fragment, self.turn, self.config, self.permits, self.hands = fragment, turn, config, permits, hands
+        self.names = _Names(fragment)
+        self.figure = config.profile == "figure-3.3"
+        self.dropped = [behavior for behavior in fragment.behaviors if not permits.allows(behavior)]
+        kept = [behavior for behavior in fragment.behaviors if permits.allows(behavior)]
+        self.order = ordered(kept, fragment.constraints)
+        chosen = {choice.reference: choice for choice in choices}
+        self.parts = {
+            behavior.id: _Parts(
+                behavior, chosen[behavior.id], self.names, turn, hands.get(behavior.id, permits.only_hand)
+            )
+            for behavior in self.order
+            if isinstance(behavior, Reference)
+        }
+        self.named = points_named(fragment.id, fragment.behaviors, fragment.constraints)
+        self.named_behaviors = {behavior for behavior, _ in self.named}
+        self.rewriting = Rewriting(
+            fragment=fragment.id,
+            replacements={id: parts.replacement(gaze_leads=self.figure) for id, parts in self.parts.items()},
+            dropped=frozenset(behavior.id for behavior in self.dropped),
+        )
+        self.constraints: list[Constraint] = []
+        self.speeches = self._speeches()
+        self.last_gaze = ""
+        """The one before the end-of-turn gaze, if it may be told when to relax."""
+
+    def emit(self) -> Emission:
+        for constraint in self.fragment.constraints:
+            if (rewritten := self.rewriting.constraint(constraint)) is not None:
+                self.constraints.append(rewritten)
+        self._time_speeches_and_references()
+        opening, closing = self._opening(), self._closing()
+        behaviors = (*opening, *self._in_document_order(), *closing)
+        block = Block(id=self.fragment.id, behaviors=behaviors, constraints=tuple(self.constraints))
+        return Emission(block, tuple(f"{behavior.id} is left out: inhibited" for behavior in self.dropped))
+
+    def _speeches(self) -> list[str]:
+        """Ids of plain speeches and phrases, in order."""
+        speeches = []
+        for behavior in self.order:
+            if isinstance(behavior, Speech):
+                speeches.append(behavior.id)
+            elif isinstance(behavior, Reference) and self.parts[behavior.id].phrase:
+                speeches.append(self.parts[behavior.id].phrase)
+        return speeches
+
+    def _in_document_order(self) -> list[BlockBehavior]:
+        behaviors: list[BlockBehavior] = []
+        for behavior in self.fragment.behaviors:
+            if isinstance(behavior, Reference):
+                behaviors += self.parts[behavior.id].behaviors
+            elif self.permits.allows(behavior):
+                behaviors.append(self._passed_through(behavior))
+        return behaviors
+
+    def _passed_through(self, behavior: BlockBehavior) -> BlockBehavior:
+        timing = self.rewriting.timing(behavior)
+        if isinstance(behavior, Pointing) and behavior.mode is None and self.permits.only_hand:
+            return msgspec.structs.replace(behavior, timing=timing, mode=self.permits.only_hand)
+        return msgspec.structs.replace(behavior, timing=timing) if timing != behavior.timing else behavior
+
+    # -- references and phrases -----------------------------------------------------------------------------------
+
+    def _time_speeches_and_references(self) -> None:
+        preceding = ""  # id of the speech or phrase before; "": the block start stands for it
+        glance = ""
+        points: dict[Hand | None, str] = {}  # hand -> its last point
+        gazes = 0
+        last = self._last_reference()
+        for behavior in self.order:
+            if isinstance(behavior, Reference):
+                parts = self.parts[behavior.id]
+                operators: list[Operator] = list(self.rewriting.inherited(behavior))
+                if self.figure:
+                    operators += self._as_in_the_figure(parts, preceding)
+                else:
+                    hand = self.hands.get(behavior.id)
+                    operators += self._checking_back(parts, preceding, glance, points.get(hand, ""))
+                    if parts.point:
+                        points[hand] = parts.point
+                        if behavior.id != last:
+                            operators.append(self._glance(parts))
+                            glance = parts.glance
+                if operators:
+                    id = self.names.fresh(f"{behavior.id}-timing")
+                    self.constraints.append(Constraint(id=id, operators=tuple(operators), line=behavior.line))
+                if parts.gaze:
+                    gazes += 1
+                    self.last_gaze = parts.glance or parts.gaze
+                preceding = parts.phrase or preceding
+            elif isinstance(behavior, Speech):
+                self._keep_in_line(behavior, preceding)
+                preceding = behavior.id
+            elif isinstance(behavior, Gaze):
+                gazes += 1
+                free = not {(behavior.id, "relax"), (behavior.id, "end")} & self.named
+                # An unnamed gaze follows the one before it; naming it would make it start with the block.
+                unnamed_follower = gazes > 1 and behavior.id not in self.named_behaviors
+                self.last_gaze = behavior.id if free and not unnamed_follower else ""
+
+    def _checking_back(self, parts: _Parts, preceding: str, glance: str, previous_point: str) -> list[Operator]:
+        """Profile `check-back`, its lines in the order of docs/generation.md."""
+        gaze, point, phrase, event = parts.gaze, parts.point, parts.phrase, parts.event
+        operators: list[Operator] = []
+        if phrase and preceding:
+            operators.append(_after(f"{preceding}:end", f"{phrase}:start"))
+        if gaze:
+            if preceding and (parts.reference.id, "start") not in self.named:
+                operators.append(_after(f"{preceding}:end", f"{gaze}:start"))
+            if glance:
+                operators.append(_after(f"{glance}:stroke", f"{gaze}:start"))
+            if phrase:
+                operators.append(_after(f"{phrase}:end", f"{gaze}:relax"))
+        if gaze and phrase and not point:
+            operators.append(_after(f"{gaze}:stroke", f"{phrase}:start"))
+        if point:
+            operators.append(_after(f"{gaze}:start", f"{point}:start"))
+            operators.append(_after(f"{gaze}:stroke", f"{point}:stroke_start"))
+            if phrase:
+                operators.append(_same(f"{point}:stroke_start", f"{phrase}:start"))
+                operators.append(_after(f"{phrase}:end", f"{point}:stroke_end"))
+            operators.append(_after(f"{event}:end", f"{point}:stroke_end"))
+            if previous_point:
+                operators.append(_after(f"{previous_point}:stroke_end", f"{point}:start"))
+        return operators
+
+    def _glance(self, parts: _Parts) -> Operator:
+        parts.glance = self.names.fresh(f"{parts.reference.id}-glance")
+        parts.behaviors.append(Gaze(id=parts.glance, target=self.turn.addressee))
+        return _same(f"{parts.gaze}:relax", f"{parts.glance}:start")
+
+    def _as_in_the_figure(self, parts: _Parts, preceding: str) -> list[Operator]:
+        """Profile `figure-3.3`: the gaze leads by a phrase, and the point is over when the phrase begins."""
+        gaze, point, phrase = parts.gaze, parts.point, parts.phrase
+        operators: list[Operator] = []
+        if gaze and preceding:
+            operators.append(_same(f"{preceding}:start", f"{gaze}:stroke"))
+        if point:
+            operators.append(_same(f"{gaze}:stroke+{self.config.figure_lead:g}", f"{point}:stroke_start"))
+            if phrase:
+                operators.append(_same(f"{point}:stroke_end", f"{phrase}:start"))
+        if phrase and preceding and (parts.reference.id, "start") not in self.named:
+            operators.append(_after(f"{preceding}:end", f"{phrase}:start"))
+        return operators
+
+    def _keep_in_line(self, speech: Speech, preceding: str) -> None:
+        """Speeches without timing follow one another by document order, but only while nothing names them; we do."""
+        if preceding and speech.id not in self.named_behaviors:
+            start = f"{speech.id}:start"
+            operator: Operator = (
+                _same(f"{preceding}:end", start) if self.figure else _after(f"{preceding}:end", start)
+            )
+            id = self.names.fresh(f"{speech.id}-timing")
+            self.constraints.append(Constraint(id=id, operators=(operator,), line=speech.line))
+
+    def _last_reference(self) -> str:
+        """The reference whose gaze lasts until the end-of-turn gaze, if there is one."""
+        if not self._ends_with_gaze or not self.parts:
+            return ""
+        return next(behavior.id for behavior in reversed(self.order) if isinstance(behavior, Reference))
+
+    # -- the turn -------------------------------------------------------------------------------------------------
+
+    @property
+    def _ends_with_gaze(self) -> bool:
+        return self.turn.closes and self.permits.looks
+
+    def _opening(self) -> list[BlockBehavior]:
+        """What begins with the first speech, or with the block if there is none."""
+        turn = self.turn
+        timing = (Timing("start", f"{self.speeches[0]}:start"),) if self.speeches else ()
+        if turn.announces_pair:
+            return [
+                Event(
+                    id=self.names.fresh("turn-pair"),
+                    kind="adjacency_pair",
+                    responder=turn.addressee,
+                    cause="turn",
+                    accept=turn.accept,
+                    turn=turn.turn,
+                    timing=timing,
+                )
+            ]
+        if turn.reply:
+            id = self.names.fresh(f"turn-{turn.reply}")
+            return [TurnSignal(id=id, turn=turn.turn, signal=turn.reply, actor=turn.addressee, timing=timing)]
+        if turn.backchannel:
+            nod = next((behavior.id for behavior in self.order if isinstance(behavior, Head)), "")
+            if not timing and nod and not self.permits.speech_only:
+                timing = (Timing("start", f"{nod}:start"),)
+            id = self.names.fresh("backchannel")
+            return [
+                Event(
+                    id=id, kind="backchannel", responder=turn.addressee, cause="turn", turn=turn.turn, timing=timing
+                )
+            ]
+        return []
+
+    def _closing(self) -> list[BlockBehavior]:
+        """End of the turn: facial gaze with an optional mutual facial gaze, and the clock of the pair."""
+        turn = self.turn
+        if not turn.closes:
+            return []
+        ended = self.names.fresh("turn-ended")
+        signal = TurnSignal(id=ended, turn=turn.turn, signal="ended", actor=turn.addressee)
+        operators: list[Operator] = []
+        closing: list[BlockBehavior] = []
+        if self._ends_with_gaze:
+            gaze = self.names.fresh("turn-gaze")
+            closing.append(Gaze(id=gaze, target=turn.addressee))
+            closing.append(
+                Event(
+                    id=self.names.fresh("turn-gaze-event"),
+                    kind="mutual_facial_gaze",
+                    responder=turn.addressee,
+                    cause="turn",
+                    optional=True,
+                    turn=turn.turn,
+                    timing=(Timing("start", f"{gaze}:start"),),
+                )
+            )
+            if self.speeches:
+                operators.append(_same(f"{self.speeches[-1]}:end", f"{gaze}:start"))
+            else:
+                operators += [_after(f"{id}:end", f"{gaze}:start") for id in self._with_an_end_of_their_own()]
+            if self.last_gaze:
+                operators.append(_same(f"{self.last_gaze}:relax", f"{gaze}:start"))
+            signal = msgspec.structs.replace(signal, timing=(Timing("start", f"{gaze}:start"),))
+        if self.speeches:
+            signal = msgspec.structs.replace(signal, timing=(Timing("start", f"{self.speeches[-1]}:end"),))
+        elif not self._ends_with_gaze:
+            operators += [_after(f"{id}:end", f"{ended}:start") for id in self._with_an_end_of_their_own()]
+        closing.append(signal)
+        if operators:
+            self.constraints.append(Constraint(id=self.names.fresh("turn-timing"), operators=tuple(operators)))
+        return closing
+
+    def _with_an_end_of_their_own(self) -> list[str]:
+        """Behaviors that end by themselves; a gaze or a face lasts until all of these have."""
+        return [behavior.id for behavior in self._in_document_order() if _ends_by_itself(behavior)]
+
+
+def _ends_by_itself(behavior: BlockBehavior) -> bool:
+    return type_name(behavior) not in _LASTING
+
+
+def _after(reference: str, sync: str) -> After:
+    return After(ref=reference, syncs=(sync,))
+
+
+def _same(reference: str, sync: str) -> Synchronize:
+    return Synchronize(ref=reference, syncs=(sync,))

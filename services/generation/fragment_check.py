@@ -1,0 +1,94 @@
+"""Is a fragment sound, and does it speak of what the world knows? Refused whole, with its place, before all else."""
+
+from collections.abc import Iterator, Mapping
+from difflib import get_close_matches
+
+from msgspec.structs import replace
+
+from schemas.behaviors import Gaze, GazeShift, HeadDirectionShift, Pointing, Reference
+from schemas.check import check as check_form
+from schemas.faults import Fault, InputRefused
+from schemas.fragments import TurnFragment
+from schemas.references import disambiguated
+from schemas.syncref import SyncRef
+from schemas.world import Entity, World
+
+
+def checked(fragment: TurnFragment, world: World, robot: str) -> TurnFragment:
+    """The fragment with its addressee filled in and marks that look like offsets made explicit.
+
+    robot: its actor id, which may be a target too. Raises InputRefused with JSON path and XML line of the first
+    thing that is wrong, by itself or with regard to the world.
+    """
+    fragment = disambiguated(fragment)
+    check_form(fragment)
+    known = {entity.id: entity for entity in world.entities}
+    for path, target, line in _targets(fragment):
+        if target not in known and target != robot:
+            raise _refused(fragment, path, f"the world does not know {target!r}", line, _nearest(target, known))
+    for index, behavior in enumerate(fragment.behaviors):
+        if isinstance(behavior, Reference):
+            _check_objects(fragment, index, behavior, known)
+            _check_timing(fragment, index, behavior)
+    return replace(fragment, addressee=addressee(fragment, world))
+
+
+def addressee(fragment: TurnFragment, world: World) -> str:
+    """Who is spoken to: the one named, else the only person there is. Raises InputRefused."""
+    people = [person.id for person in world.people]
+    if fragment.addressee:
+        if fragment.addressee not in people:
+            advice = f"people: {', '.join(people)}" if people else "the world knows nobody"
+            reason = f"the world does not know the person {fragment.addressee!r}"
+            raise _refused(fragment, "$.addressee", reason, 0, advice)
+        return fragment.addressee
+    if len(people) != 1:
+        reason = f"no addressee, and the world knows {len(people) or 'no'} people"
+        advice = f"name one of {', '.join(people)}" if people else "the world needs a person to speak to"
+        raise _refused(fragment, "$.addressee", reason, 0, advice)
+    return people[0]
+
+
+def _check_objects(fragment: TurnFragment, index: int, reference: Reference, known: Mapping[str, Entity]) -> None:
+    objects = {id: entity for id, entity in known.items() if entity.kind == "object"}
+    if reference.target not in objects:
+        reason = f"the world does not know the object {reference.target!r}"
+        path = f"$.behaviors[{index}].target"
+        raise _refused(fragment, path, reason, reference.line, _nearest(reference.target, objects))
+    for number, option in enumerate(reference.options):
+        for place, distractor in enumerate(option.distractors):
+            if distractor not in objects:
+                path = f"$.behaviors[{index}].options[{number}].distractors[{place}]"
+                reason = f"the world does not know the object {distractor!r}"
+                line = option.line or reference.line
+                raise _refused(fragment, path, reason, line, _nearest(distractor, objects))
+
+
+def _check_timing(fragment: TurnFragment, index: int, reference: Reference) -> None:
+    for place, timing in enumerate(reference.timing):
+        if timing.sync not in ("start", "end"):
+            reason = f"a reference has no sync point {timing.sync!r}"
+            path = f"$.behaviors[{index}].timing[{place}].sync"
+            raise _refused(fragment, path, reason, reference.line, "it has 'start' and 'end'")
+        if SyncRef.parse(timing.ref).behavior == reference.id:
+            path = f"$.behaviors[{index}].timing[{place}].ref"
+            raise _refused(fragment, path, "a reference cannot be timed by itself", reference.line, "")
+
+
+def _targets(fragment: TurnFragment) -> Iterator[tuple[str, str, int]]:
+    for index, behavior in enumerate(fragment.behaviors):
+        if isinstance(behavior, Gaze | GazeShift | Pointing | HeadDirectionShift):
+            yield f"$.behaviors[{index}].target", behavior.target, behavior.line
+    if fragment.delay_target:
+        yield "$.delay_target", fragment.delay_target, 0
+
+
+def _nearest(name: str, known: Mapping[str, Entity]) -> str:
+    if not known:
+        return "the world is empty"
+    near = get_close_matches(name, sorted(known), n=1)
+    return f"did you mean {near[0]!r}?" if near else f"known: {', '.join(sorted(known)[:12])}"
+
+
+def _refused(fragment: TurnFragment, path: str, reason: str, line: int, advice: str) -> InputRefused:
+    return InputRefused(Fault(reason=reason, where=f"{fragment.id}: {path}", line=line, advice=advice))

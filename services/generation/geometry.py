@@ -1,0 +1,87 @@
+"""Which objects a gaze or a point may also seem to mean: distractors from rays and places. Thesis 3.3.2."""
+
+import math
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from schemas.body import NoPointZone, Ray
+from schemas.units import Meters, Radians, Vector
+from schemas.world import Entity
+
+TOLERANCE = 1e-9
+"""On an angle or distance: an object exactly on the edge is inside, whatever the rounding."""
+
+
+def in_gaze_cone(gaze: Ray, half_angle: Radians, objects: Sequence[Entity]) -> frozenset[str]:
+    """Ids of the objects whose centre or any footprint corner lies in the cone around the gaze axis.
+
+    The angle between axis and eye-to-point decides: the same set as the ellipse the cone cuts from the table
+    (decision B4).
+    """
+    if not objects:
+        return frozenset()
+    places, owner = _places(objects)
+    reach = places - np.asarray(gaze.origin)
+    along = reach @ _unit(gaze.axis)
+    distance = np.linalg.norm(reach, axis=1)
+    angle_rad = np.arccos(np.clip(along / np.maximum(distance, TOLERANCE), -1.0, 1.0))
+    inside = (angle_rad <= half_angle + TOLERANCE) | (distance <= TOLERANCE)
+    return frozenset(objects[int(index)].id for index in np.unique(owner[inside]))
+
+
+def in_pointing_cylinder(forearm: Ray, radius: Meters, objects: Sequence[Entity]) -> frozenset[str]:
+    """Ids of the objects in the half-cylinder ahead of the hand, around the axis from elbow to hand (decision B5).
+
+    An object of radius r counts when its centre is within `radius` + r of the axis.
+    """
+    if not objects:
+        return frozenset()
+    centres = np.array([entity.position for entity in objects])
+    radii = np.array([radius + extent(entity) for entity in objects])
+    reach = centres - np.asarray(forearm.tip if forearm.tip is not None else forearm.origin)
+    axis = _unit(forearm.axis)
+    along = reach @ axis
+    off_axis = np.linalg.norm(reach - np.outer(along, axis), axis=1)
+    inside = (along >= -TOLERANCE) & (off_axis <= radii + TOLERANCE)
+    return frozenset(objects[int(index)].id for index in np.flatnonzero(inside))
+
+
+def extent(entity: Entity) -> Meters:
+    """Radius of an object: what it says, else that of its footprint."""
+    if entity.radius or not entity.footprint:
+        return entity.radius
+    return max(math.hypot(x, y) for x, y in entity.footprint)
+
+
+def in_zone(place: Vector, zones: Iterable[NoPointZone]) -> bool:
+    """Is `place` where the robot must not point?"""
+    return any(math.dist(place, zone.center) <= zone.radius for zone in zones)
+
+
+def angle_off_axis(gaze: Ray, place: Vector) -> Radians:
+    """Between the gaze axis and the direction from the eye to `place`."""
+    reach = np.asarray(place) - np.asarray(gaze.origin)
+    distance = float(np.linalg.norm(reach))
+    if distance <= TOLERANCE:
+        return 0.0
+    return math.acos(max(-1.0, min(1.0, float(reach @ _unit(gaze.axis)) / distance)))
+
+
+def _places(objects: Sequence[Entity]) -> tuple[NDArray[np.float64], NDArray[np.intp]]:
+    """Centres and footprint corners of all objects, (n, 3), and the index of the object each belongs to."""
+    places: list[Vector] = []
+    owner: list[int] = []
+    for index, entity in enumerate(objects):
+        x, y, z = entity.position
+        cos, sin = math.cos(entity.yaw), math.sin(entity.yaw)
+        places.append(entity.position)
+        places.extend((x + cos * u - sin * v, y + sin * u + cos * v, z) for u, v in entity.footprint)
+        owner.extend([index] * (1 + len(entity.footprint)))
+    return np.array(places), np.array(owner)
+
+
+def _unit(axis: Vector) -> NDArray[np.float64]:
+    vector = np.asarray(axis, dtype=np.float64)
+    return vector / np.linalg.norm(vector)

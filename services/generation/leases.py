@@ -1,0 +1,65 @@
+"""Inhibition of gaze and of pointing: leases that end by themselves when their owner dies or lets them lapse."""
+
+from msgspec import Struct
+
+from schemas.attention import Claim, Inhibit
+from schemas.behaviors import Hand
+from schemas.units import Seconds
+from services.generation.config import GenerationConfig
+from services.generation.permits import HANDS, Permits
+
+_HAND_OF: dict[str, Hand] = {"point-left": "LEFT_HAND", "point-right": "RIGHT_HAND"}
+
+
+class _Lease(Struct):
+    request: Inhibit
+    ends: Seconds
+
+
+class Leases:
+    """The leases in force, newest last. `deadline`: when the next one lapses if nobody renews it."""
+
+    def __init__(self, config: GenerationConfig) -> None:
+        self._config = config
+        self._leases: dict[str, _Lease] = {}
+
+    def take(self, request: Inhibit, now: Seconds) -> None:
+        """A new lease, a renewed one, or one whose owner has changed its mind."""
+        self._leases[request.id] = _Lease(request, now + request.ttl)
+
+    def release(self, id: str) -> bool:
+        """End a lease early. False if there is none of this id."""
+        return self._leases.pop(id, None) is not None
+
+    @property
+    def deadline(self) -> Seconds | None:
+        return min((lease.ends for lease in self._leases.values()), default=None)
+
+    def lapse(self, now: Seconds) -> tuple[str, ...]:
+        """End what nobody has renewed; their ids."""
+        lapsed = tuple(id for id, lease in self._leases.items() if now >= lease.ends)
+        for id in lapsed:
+            del self._leases[id]
+        return lapsed
+
+    def claim(self) -> Claim | None:
+        """Of the newest lease on gaze."""
+        if self._config.speech_only:
+            return Claim(kind="inhibition", priority=1, reason="speech only: head up")
+        for lease in reversed(self._leases.values()):
+            request = lease.request
+            if request.part == "gaze":
+                target = request.target if request.mode == "target" else ""
+                return Claim(
+                    kind="inhibition", priority=1, target=target, reason=f"{request.requester}: {request.mode}"
+                )
+        return None
+
+    def permits(self) -> Permits:
+        """What fragments may do now."""
+        inhibited = {lease.request.part for lease in self._leases.values()}
+        return Permits(
+            gaze="gaze" not in inhibited,
+            hands=tuple(hand for hand in HANDS if hand not in {_HAND_OF.get(part) for part in inhibited}),
+            speech_only=self._config.speech_only,
+        )

@@ -1,0 +1,54 @@
+"""What the robot may do just now, as far as inhibitions and the study's condition say."""
+
+from msgspec import Struct
+
+from schemas.behaviors import (
+    Behavior,
+    Emit,
+    Event,
+    Gaze,
+    GazeShift,
+    Hand,
+    HeadDirectionShift,
+    Pointing,
+    Reference,
+    Speech,
+    TurnSignal,
+    Wait,
+)
+
+HANDS: tuple[Hand, ...] = ("LEFT_HAND", "RIGHT_HAND")
+
+
+class Permits(Struct, frozen=True, kw_only=True):
+    """hands: those it may point with. speech_only: words, and nothing else."""
+
+    gaze: bool = True
+    hands: tuple[Hand, ...] = HANDS
+    speech_only: bool = False
+
+    def allows(self, behavior: Behavior) -> bool:
+        if isinstance(behavior, Gaze | GazeShift | HeadDirectionShift):
+            return self.looks
+        if isinstance(behavior, Pointing):
+            wanted = HANDS if behavior.mode == "BOTH_HANDS" else (behavior.mode,) if behavior.mode else ()
+            return bool(self.hands) and set(wanted) <= set(self.hands) and not self.speech_only
+        return not self.speech_only or isinstance(behavior, Speech | Reference | Event | TurnSignal | Emit | Wait)
+
+    @property
+    def looks(self) -> bool:
+        return self.gaze and not self.speech_only
+
+    @property
+    def only_hand(self) -> Hand | None:
+        """The hand to name when there is no choice."""
+        return self.hands[0] if len(self.hands) == 1 else None
+
+    @property
+    def no_gaze(self) -> str:
+        """Why references are made without gaze; empty when they need not."""
+        return "speech only" if self.speech_only else "" if self.gaze else "gaze is inhibited"
+
+    @property
+    def no_point(self) -> str:
+        return "speech only" if self.speech_only else "" if self.hands else "pointing is inhibited"

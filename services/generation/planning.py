@@ -1,0 +1,67 @@
+"""From a fragment to its block, in one pure step: references chosen, then everything emitted."""
+
+from collections.abc import Sequence
+
+from msgspec import Struct
+
+from schemas.behaviors import Reference
+from schemas.blocks import Block
+from schemas.body import Capabilities
+from schemas.fragments import ReferenceChoice, TurnFragment
+from schemas.world import World
+from services.generation.config import GenerationConfig
+from services.generation.emission import emit
+from services.generation.motions import Motions
+from services.generation.ordering import ordered
+from services.generation.permits import Permits
+from services.generation.reference_policy import Choices, Scene, choose
+from services.generation.turn_policy import TurnPlan
+
+
+class Plan(Struct, frozen=True, kw_only=True):
+    block: Block
+    choices: tuple[ReferenceChoice, ...] = ()
+    warnings: tuple[str, ...] = ()
+
+
+def references(fragment: TurnFragment) -> tuple[Reference, ...]:
+    """In the order in which they are made (decision B12)."""
+    order = ordered(fragment.behaviors, fragment.constraints)
+    return tuple(behavior for behavior in order if isinstance(behavior, Reference))
+
+
+def targets(fragment: TurnFragment) -> Sequence[str]:
+    """Of its references, in order: what the body is asked about."""
+    return [reference.target for reference in references(fragment)]
+
+
+def plan(
+    fragment: TurnFragment,
+    turn: TurnPlan,
+    world: World,
+    body: Capabilities | None,
+    motions: Motions,
+    permits: Permits,
+    config: GenerationConfig,
+) -> Plan:
+    """The block of a checked fragment. body, motions: needed for references only.
+
+    Raises RunFailed where a reference cannot be made at all.
+    """
+    chosen = Choices()
+    if made := references(fragment):
+        chosen = choose(made, _scene(world, body, permits, config), motions, config)
+    emission = emit(fragment, turn, chosen.choices, config, permits, chosen.hands)
+    return Plan(block=emission.block, choices=chosen.choices, warnings=chosen.warnings + emission.warnings)
+
+
+def _scene(world: World, body: Capabilities | None, permits: Permits, config: GenerationConfig) -> Scene:
+    said = body or Capabilities(body="unknown", types=(), parts=())
+    return Scene(
+        world=world,
+        half_angle=config.gaze_half_angle or said.gaze_half_angle,
+        pointing_radius=config.pointing_radius or said.pointing_radius,
+        zones=said.no_point_zones,
+        no_gaze=permits.no_gaze,
+        no_point=permits.no_point,
+    )

@@ -1,0 +1,310 @@
+"""Which gesture and which phrase make each object reference: the cheapest pairs that are understood. Thesis 3.3.2.
+
+Cost depends on where the head and the arms are, and every gesture moves them, so a sequence of references is
+chosen as a whole: a dynamic program over what head and arms point at. Reliability does not depend on posture,
+so pairs that are not understood go first, and per gesture only the best phrase can win.
+"""
+
+from collections.abc import Sequence
+from typing import get_args
+
+from msgspec import Struct
+
+from schemas.behaviors import Hand, Reference, SpeechOption
+from schemas.body import NoPointZone
+from schemas.faults import Fault, RunFailed
+from schemas.fragments import GestureChoice, PairConsidered, ReferenceChoice
+from schemas.units import Meters, Probability, Radians, Seconds
+from schemas.world import World
+from services.generation.config import GenerationConfig
+from services.generation.geometry import in_gaze_cone, in_pointing_cylinder, in_zone
+from services.generation.motions import HERE, Motions, arm_of, hand_of
+from services.generation.reliability import channel_reliability, reliability
+
+GESTURES: tuple[GestureChoice, ...] = get_args(GestureChoice)
+"""J, from fewer gestures to more."""
+ROUNDING = 9
+"""Decimals of costs and reliabilities that count: sums in another order are still ties."""
+
+
+class Scene(Struct, frozen=True, kw_only=True):
+    """Where references are made. no_gaze, no_point: why the robot may not look or point; empty when it may."""
+
+    world: World
+    half_angle: Radians
+    pointing_radius: Meters
+    zones: tuple[NoPointZone, ...] = ()
+    no_gaze: str = ""
+    no_point: str = ""
+
+
+class Pair(Struct, frozen=True, kw_only=True):
+    """A gesture with a phrase, as far as posture does not matter. ruled_out: why it cannot be performed, or empty."""
+
+    gesture: GestureChoice
+    order: int
+    """Of the phrase among the reference's options."""
+    option: SpeechOption
+    distractors: frozenset[str]
+    channel: Probability
+    reliability: Probability
+    ruled_out: str = ""
+
+    @property
+    def preference(self) -> tuple[bool, float, int, int]:
+        """Among equal costs the least wins (decision B13)."""
+        points = self.gesture == "directed_gaze_with_pointing"
+        return (
+            not (points and self.option.deictic), -round(self.reliability, ROUNDING),
+            GESTURES.index(self.gesture), self.order,
+        )  # fmt: skip
+
+
+class Posture(Struct, frozen=True):
+    """What the head looks at and each arm points at: a reference's target, or HERE."""
+
+    head: str = HERE
+    arms: tuple[tuple[str, str], ...] = ()
+    """(arm, target) of the arms that have moved, by arm."""
+
+    def arm(self, arm: str) -> str:
+        return dict(self.arms).get(arm, HERE)
+
+    def after(self, gesture: GestureChoice, target: str, motions: Motions) -> "Posture":
+        if gesture == "none":
+            return self
+        if gesture != "directed_gaze_with_pointing":
+            return Posture(target, self.arms)
+        arms = {**dict(self.arms), arm_of(motions.point(HERE, target)): target}
+        return Posture(target, tuple(sorted(arms.items())))
+
+
+class Choices(Struct, frozen=True):
+    """hands: the one that points, by reference id, where the body says which."""
+
+    choices: tuple[ReferenceChoice, ...] = ()
+    warnings: tuple[str, ...] = ()
+    hands: dict[str, Hand] = {}
+
+
+class _Way(Struct, frozen=True):
+    """The best way to reach a posture: its cost, then its preferences, decide."""
+
+    cost: Seconds
+    preferences: tuple[tuple[bool, float, int, int], ...]
+    pairs: tuple[Pair, ...]
+    postures: tuple[Posture, ...]
+    """Before each pair."""
+
+    @property
+    def rank(self) -> tuple[float, tuple[tuple[bool, float, int, int], ...]]:
+        return round(self.cost, ROUNDING), self.preferences
+
+
+def choose(references: Sequence[Reference], scene: Scene, motions: Motions, config: GenerationConfig) -> Choices:
+    """The pairs of least total cost for `references` in this order, each with the table it was chosen from.
+
+    A reference none of whose pairs reaches its minimum gets one of its most reliable, with a warning (decision B10).
+    Raises RunFailed where a reference cannot be made at all.
+    """
+    warnings: list[str] = []
+    tables = [considered(reference, scene, motions, config) for reference in references]
+    candidates = []
+    for reference, table in zip(references, tables, strict=True):
+        candidates.append(_candidates(reference, table))
+        warnings += _doubts(reference, scene)
+    best = _cheapest_way(references, candidates, motions, config)
+    choices: list[ReferenceChoice] = []
+    hands: dict[str, Hand] = {}
+    for reference, table, pair, posture in zip(references, tables, best.pairs, best.postures, strict=True):
+        choice = _explain(reference, table, pair, posture, motions, config)
+        if _below(pair.reliability, reference.minimum_reliability):
+            warnings.append(
+                f"{reference.id}: nothing reaches the minimum reliability {reference.minimum_reliability:g}; chose "
+                f"{_name(pair)} with R {pair.reliability:.4g}"
+            )
+        choices.append(choice)
+        if choice.gesture == "directed_gaze_with_pointing" and (hand := hand_of(motions.point(HERE, choice.target))):
+            hands[choice.reference] = hand
+    return Choices(tuple(choices), tuple(warnings), hands)
+
+
+def considered(reference: Reference, scene: Scene, motions: Motions, config: GenerationConfig) -> tuple[Pair, ...]:
+    """Every pair of J x S with its distractors and reliability."""
+    target = reference.target
+    universe = frozenset(entity.id for entity in scene.world.objects) - {target}
+    gaze, point = motions.gaze(HERE, target), motions.point(HERE, target)
+    gazed, pointed = universe, universe
+    if gaze.ray is not None:
+        gazed = in_gaze_cone(gaze.ray, scene.half_angle, scene.world.objects) - {target}
+    if point.ray is not None:
+        pointed = in_pointing_cylinder(point.ray, scene.pointing_radius, scene.world.objects) - {target}
+    no_gaze, no_point = _obstacles(target, scene, motions)
+    pairs = []
+    for gesture in GESTURES:
+        points = gesture == "directed_gaze_with_pointing"
+        obstacle = "" if gesture == "none" else no_gaze or (no_point if points else "")
+        shown = universe if gesture == "none" else gazed & pointed if points else gazed
+        for order, option in enumerate(reference.options):
+            said = frozenset(option.distractors) & universe if option.text and not option.deictic else universe
+            channel = channel_reliability(gesture, option.text, config)
+            distractors = shown & said
+            ruled_out = obstacle
+            if option.deictic and not points:
+                ruled_out = "a deictic phrase needs a point"
+            elif channel == 0:
+                ruled_out = "neither gesture nor phrase"
+            pairs.append(
+                Pair(
+                    gesture=gesture,
+                    order=order,
+                    option=option,
+                    distractors=distractors,
+                    channel=channel,
+                    reliability=reliability(len(distractors), channel),
+                    ruled_out=ruled_out,
+                )
+            )
+    return tuple(pairs)
+
+
+def cost(pair: Pair, target: str, posture: Posture, motions: Motions, config: GenerationConfig) -> Seconds:
+    """C(j, s) in seconds, from `posture`: head, wait for shared gaze (decision B7), arm, words."""
+    seconds = config.seconds_per_word * pair.option.cost if pair.option.text else 0.0
+    if pair.gesture != "none":
+        seconds += config.head_cost(motions.gaze(posture.head, target).head_degrees)
+    if pair.gesture in ("directed_gaze", "directed_gaze_with_pointing"):
+        seconds += config.wait_weight * config.expected_delay
+    if pair.gesture == "directed_gaze_with_pointing":
+        arm = arm_of(motions.point(HERE, target))
+        seconds += config.arm_cost(motions.point(posture.arm(arm), target).arm_degrees)
+    return seconds
+
+
+def _obstacles(target: str, scene: Scene, motions: Motions) -> tuple[str, str]:
+    """Why the robot cannot look, or point, at `target` (decision B9)."""
+    gaze, point = motions.gaze(HERE, target), motions.point(HERE, target)
+    no_gaze, no_point = scene.no_gaze, scene.no_point
+    if not no_gaze and not gaze.feasible:
+        no_gaze = f"cannot look: {gaze.fault.reason if gaze.fault else 'the body refuses'}"
+    if not no_point and not point.feasible:
+        no_point = f"cannot point: {point.fault.reason if point.fault else 'the body refuses'}"
+    entity = scene.world.entity(target)
+    if not no_point and entity is not None and in_zone(entity.position, scene.zones):
+        no_point = "cannot point: in a no-point zone"
+    return no_gaze, no_point
+
+
+def _candidates(reference: Reference, table: tuple[Pair, ...]) -> tuple[Pair, ...]:
+    """The pairs that may win whatever the posture: per gesture the best phrase."""
+    possible = [pair for pair in table if not pair.ruled_out]
+    if not possible:
+        reasons = "; ".join(dict.fromkeys(f"{_name(pair)}: {pair.ruled_out}" for pair in table))
+        raise RunFailed(Fault(reason=f"no way to refer to {reference.target}: {reasons}", where=reference.id))
+    feasible = [pair for pair in possible if not _below(pair.reliability, reference.minimum_reliability)]
+    if not feasible:
+        most = max(round(pair.reliability, ROUNDING) for pair in possible)
+        feasible = [pair for pair in possible if round(pair.reliability, ROUNDING) == most]
+
+    def rank(pair: Pair) -> tuple[float, tuple[bool, float, int, int]]:
+        return (round(pair.option.cost if pair.option.text else 0.0, ROUNDING), pair.preference)
+
+    best = [
+        min((pair for pair in feasible if pair.gesture == gesture), key=rank, default=None) for gesture in GESTURES
+    ]
+    return tuple(pair for pair in best if pair is not None)
+
+
+def _cheapest_way(
+    references: Sequence[Reference],
+    candidates: Sequence[tuple[Pair, ...]],
+    motions: Motions,
+    config: GenerationConfig,
+) -> _Way:
+    """argmin of the summed cost over all sequences of candidates, the posture carried along (decision B11)."""
+    ways: dict[Posture, _Way] = {Posture(): _Way(0.0, (), (), ())}
+    for reference, pairs in zip(references, candidates, strict=True):
+        onward: dict[Posture, _Way] = {}
+        for posture, way in ways.items():
+            for pair in pairs:
+                reached = posture.after(pair.gesture, reference.target, motions)
+                longer = _Way(
+                    way.cost + cost(pair, reference.target, posture, motions, config),
+                    (*way.preferences, pair.preference),
+                    (*way.pairs, pair),
+                    (*way.postures, posture),
+                )
+                if reached not in onward or longer.rank < onward[reached].rank:
+                    onward[reached] = longer
+        ways = onward
+    return min(ways.values(), key=lambda way: way.rank)
+
+
+def _explain(
+    reference: Reference,
+    table: tuple[Pair, ...],
+    chosen: Pair,
+    posture: Posture,
+    motions: Motions,
+    config: GenerationConfig,
+) -> ReferenceChoice:
+    least = cost(chosen, reference.target, posture, motions, config)
+    fallback = _below(chosen.reliability, reference.minimum_reliability)
+    rows = []
+    for pair in table:
+        seconds = cost(pair, reference.target, posture, motions, config)
+        short = _below(pair.reliability, reference.minimum_reliability)
+        if pair is chosen:
+            reason = "most reliable: nothing reaches the minimum" if fallback else "least cost"
+        elif pair.ruled_out:
+            reason = pair.ruled_out
+        elif short:
+            reason = f"R {pair.reliability:.4g} below {reference.minimum_reliability:g}"
+        elif round(seconds - least, ROUNDING) == 0:
+            reason = "same cost, less preferred"
+        elif seconds > least:
+            reason = f"dearer by {seconds - least:.3g} s"
+        else:
+            reason = "cheaper here, but dearer over the sequence"
+        rows.append(
+            PairConsidered(
+                gesture=pair.gesture,
+                phrase=pair.option.text,
+                distractors=tuple(sorted(pair.distractors)),
+                channel=pair.channel,
+                reliability=pair.reliability,
+                minimum=reference.minimum_reliability,
+                cost=seconds,
+                feasible=not pair.ruled_out and not short,
+                chosen=pair is chosen,
+                reason=reason,
+            )
+        )
+    return ReferenceChoice(
+        reference=reference.id,
+        target=reference.target,
+        gesture=chosen.gesture,
+        phrase=chosen.option.text,
+        reliability=chosen.reliability,
+        cost=least,
+        pairs=tuple(rows),
+    )
+
+
+def _doubts(reference: Reference, scene: Scene) -> list[str]:
+    """Warn of deictic phrases whose listed distractors are not everything else (decision B8)."""
+    universe = {entity.id for entity in scene.world.objects} - {reference.target}
+    return [
+        f"{reference.id}: the distractors of the deictic {option.text!r} are everything else, not those listed"
+        for option in reference.options
+        if option.deictic and option.distractors and set(option.distractors) - {reference.target} != universe
+    ]
+
+
+def _below(value: Probability, minimum: Probability) -> bool:
+    return round(value - minimum, ROUNDING) < 0
+
+
+def _name(pair: Pair) -> str:
+    phrase = repr(pair.option.text) if pair.option.text else "no phrase"
+    return f"{pair.gesture.replace('_', ' ')} with {phrase}"

@@ -1,0 +1,226 @@
+"""What the maintenance policy keeps an eye on: moving hands, the face, and how long nothing has connected."""
+
+import math
+
+from msgspec import Struct
+
+from schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost
+from schemas.attention import Claim
+from schemas.recognition import ConnectionEvent, Statistics
+from schemas.units import Seconds
+from schemas.world import Entity, World
+from services.generation.config import GenerationConfig
+
+
+class _Hand(Struct):
+    owner: str
+    moving_since: Seconds | None = None
+    still_since: Seconds | None = None
+    active: bool = False
+
+
+class HandWatch:
+    """Claim 5: a hand that moves, or with which its owner manipulates something, until it has been still."""
+
+    def __init__(self, config: GenerationConfig) -> None:
+        self._config = config
+        self._hands: dict[str, _Hand] = {}
+        self._places: dict[str, Entity] = {}
+        self._acts: dict[str, str] = {}
+        """Manipulations under way: actor -> the hand, or the object if no hand of theirs is known."""
+        self._watched = ""
+
+    def feed(self, message: World | ActionBegan | ActionEnded | ActorLost, now: Seconds) -> None:
+        match message:
+            case World():
+                self._places = {entity.id: entity for entity in message.entities}
+                self._see(message, now)
+            case ActionBegan(action="act", actor=actor, targets=targets):
+                self._acts[actor] = self._hand_at(actor, targets)
+                hand = self._hands.setdefault(self._acts[actor], _Hand(actor))
+                hand.active = True
+            case ActionEnded(action="act", actor=actor) | ActorLost(actor=actor):
+                if (id := self._acts.pop(actor, None)) is not None:
+                    hand = self._hands[id]
+                    if hand.moving_since is None:
+                        hand.still_since = now
+
+    def _see(self, world: World, now: Seconds) -> None:
+        fast = {
+            entity.id: entity
+            for entity in world.entities
+            if entity.kind == "hand" and math.hypot(*entity.velocity) > self._config.hand_speed
+        }
+        for entity in fast.values():
+            hand = self._hands.setdefault(entity.id, _Hand(entity.owner))
+            if hand.moving_since is None:
+                hand.moving_since = now
+            hand.still_since = None
+        for id, hand in self._hands.items():
+            if id not in fast and (hand.moving_since is not None or hand.still_since is None):
+                hand.moving_since = None
+                hand.still_since = now
+
+    def _hand_at(self, actor: str, targets: tuple[str, ...]) -> str:
+        """The hand of `actor` that moves, else the one nearest to what it manipulates, else that thing itself."""
+        hands = [entity for entity in self._places.values() if entity.kind == "hand" and entity.owner == actor]
+        moving = [hand.id for hand in hands if self._hands.get(hand.id, _Hand(actor)).moving_since is not None]
+        if moving:
+            return moving[0]
+        thing = self._places.get(targets[0]) if targets else None
+        if hands and thing is not None:
+            return min(hands, key=lambda hand: (math.dist(hand.position, thing.position), hand.id)).id
+        return hands[0].id if hands else targets[0] if targets else actor
+
+    def _acting(self, id: str) -> bool:
+        return id in self._acts.values()
+
+    @property
+    def deadline(self) -> Seconds | None:
+        due = []
+        for id, hand in self._hands.items():
+            if hand.moving_since is not None and not hand.active:
+                due.append(hand.moving_since + self._config.hand_onset)
+            elif hand.still_since is not None and hand.active and not self._acting(id):
+                due.append(hand.still_since + self._config.hand_stillness)
+        return min(due, default=None)
+
+    def claim(self, now: Seconds) -> Claim | None:
+        for id, hand in self._hands.items():
+            if hand.moving_since is not None and now >= hand.moving_since + self._config.hand_onset:
+                hand.active = True
+            elif (
+                hand.still_since is not None
+                and not self._acting(id)
+                and now >= hand.still_since + self._config.hand_stillness
+            ):
+                hand.active = False
+        active = [id for id, hand in self._hands.items() if hand.active]
+        if not active:
+            self._watched = ""
+            return None
+        if self._watched not in active:  # stay with a hand while it moves, however many others do
+            self._watched = active[0]
+        reason = "manipulates" if self._acting(self._watched) else "moves"
+        return Claim(kind="hands", priority=5, target=self._watched, reason=reason)
+
+
+class FaceWatch:
+    """Claim 6: the face of the person spoken to last, else of whoever is nearest; lost for long, its direction."""
+
+    def __init__(self, config: GenerationConfig) -> None:
+        self._config = config
+        self._people: dict[str, Entity] = {}
+        self._lost: dict[str, Seconds] = {}
+        self._known: list[str] = []
+        self._seen: Seconds = float("-inf")
+        self.partner = ""
+        """Who was spoken to last."""
+
+    def feed(self, message: World | ActorFound | ActorLost, now: Seconds) -> None:
+        match message:
+            case World():
+                seen = {person.id: person for person in message.people}
+                for id in self._people.keys() - seen.keys():
+                    self._lost.setdefault(id, now)
+                for id in seen.keys() - self._people.keys():
+                    self._lost.pop(id, None)
+                self._people = seen
+                self._known += [id for id in seen if id not in self._known]
+            case ActorLost(actor=actor):
+                self._lost.setdefault(actor, now)
+            case ActorFound(actor=actor):
+                self._lost.pop(actor, None)
+
+    def present(self, now: Seconds) -> list[str]:
+        """People whose face is seen, or was a moment ago; the nearest first."""
+
+        def distance(id: str) -> tuple[float, str]:
+            person = self._people.get(id)
+            return (math.hypot(person.position[0], person.position[1]) if person else math.inf, id)
+
+        here = [id for id in self._known if id not in self._lost or now < self._lost[id] + self._config.face_lost]
+        return sorted(here, key=distance)
+
+    @property
+    def deadline(self) -> Seconds | None:
+        due = [lost + self._config.face_lost for lost in self._lost.values()]
+        return min((each for each in due if each > self._seen), default=None)
+
+    def claim(self, now: Seconds) -> Claim | None:
+        self._seen = now
+        present = self.present(now)
+        if not present:
+            return Claim(kind="face", priority=6, reason="lost: hold the direction") if self._known else None
+        return Claim(kind="face", priority=6, target=self.partner if self.partner in present else present[0])
+
+    def is_face(self, target: str) -> bool:
+        return target in self._known
+
+
+class GlanceWatch:
+    """Claim 3: a quick look at the face when nothing has connected for longer than usual.
+
+    The quiet is counted from the last start of a connection event or from when the head last was on a face,
+    whichever is later: who has just looked need not check.
+    """
+
+    def __init__(self, config: GenerationConfig) -> None:
+        self._config = config
+        self._statistics: dict[str, Statistics] = {}
+        self._quiet_since: Seconds | None = None
+        self._on_face = False
+        self._until: Seconds | None = None
+        self._seen: Seconds = float("-inf")
+        self.face = ""
+        """Where a glance would go."""
+
+    def feed(self, message: Statistics | ConnectionEvent, now: Seconds) -> None:
+        match message:
+            case Statistics(actor=actor):
+                self._statistics[actor] = message
+            case ConnectionEvent(state="started"):
+                self._quiet_since = now
+
+    def head_is_on_face(self, on_face: bool, now: Seconds) -> None:
+        if self._on_face != on_face or self._quiet_since is None:
+            self._quiet_since = now
+        self._on_face = on_face
+
+    def began(self, now: Seconds) -> None:
+        """The arbiter gives the head to the glance."""
+        self._until = now + self._config.glance_duration
+
+    def ended(self, now: Seconds) -> None:
+        """It has taken it away."""
+        self._until = None
+        self._quiet_since = now
+
+    @property
+    def pace(self) -> Seconds:
+        """Mean time between connection events, without our own glances, within its limits."""
+        seen = self._statistics.get(self.face) or self._statistics.get("")
+        if seen is None or seen.session.events < self._config.mtbce_events:
+            return self._config.mtbce_prior
+        recent = seen.recent.mtbce_without_maintenance
+        if recent is None:
+            return self._config.mtbce_high  # nothing in the window: slower than it can show
+        return min(max(recent, self._config.mtbce_low), self._config.mtbce_high)
+
+    @property
+    def _due(self) -> Seconds | None:
+        if self._on_face or not self.face or self._quiet_since is None:
+            return None
+        return self._quiet_since + self._config.glance_factor * self.pace
+
+    @property
+    def deadline(self) -> Seconds | None:
+        due = self._until if self._until is not None else self._due
+        return due if due is not None and due > self._seen else None
+
+    def claim(self, now: Seconds) -> Claim | None:
+        self._seen = now
+        wanted = now < self._until if self._until is not None else self._due is not None and now >= self._due
+        if not wanted or not self.face:
+            return None
+        return Claim(kind="glance", priority=3, target=self.face, reason=f"quiet for longer than {self.pace:.1f} s")
