@@ -172,13 +172,14 @@ class ZenohBus(Bus):
         deadline = self._loop.time() + timeout
         payload, encoding = encode(message), encoding_of(message)
         while (left := deadline - self._loop.time()) > 0:
+            known = self._hub.peers.changes
             reply = await self._ask(key, payload, encoding, left)
             if reply is not None and reply.ok is not None:
                 return decode(reply.ok.payload.to_bytes(), str(reply.ok.encoding))
             if reply is not None and reply.err is not None:
                 raise InputRefused(_fault(reply.err.payload.to_bytes()))
             # Nobody serves it, or its server died over it: there is hope only if somebody comes.
-            if not await self._hub.peers.change(deadline):
+            if not await self._hub.peers.change(deadline, since=known):
                 break
         raise NoReply(Fault(reason=f"no reply within {timeout} s", where=key, advice="is its server running?"))
 
@@ -197,7 +198,7 @@ class ZenohBus(Bus):
             try:
                 question = decode(query.payload.to_bytes() if query.payload else b"", str(query.encoding))
                 message = answer(question)
-                query.reply(key, encode(message), encoding=encoding_of(message), **QOS)
+                query.reply(key, encode(message), encoding=encoding_of(message))
             except EngageError as error:
                 query.reply_err(encode(error.fault), encoding=encoding_of(error.fault))
             finally:

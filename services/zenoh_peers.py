@@ -41,6 +41,7 @@ class Peers:
     ) -> None:
         self.processes: set[str] = set()
         self.names: dict[str, set[str]] = {}
+        self.changes = 0
         self.clocks = clocks
         self._loop = asyncio.get_running_loop()
         self._session = session
@@ -100,8 +101,10 @@ class Peers:
         if not runs:
             del self.names[name]
 
-    async def change(self, deadline: Seconds) -> bool:
-        """Wait until somebody comes or goes; False at the deadline."""
+    async def change(self, deadline: Seconds, since: int | None = None) -> bool:
+        """Wait until somebody comes or goes; False at the deadline. since: true at once if `changes` is past it."""
+        if since is not None and self.changes > since:
+            return True
         watcher: asyncio.Future[None] = self._loop.create_future()
         self._watchers.append(watcher)
         timer = self._loop.call_at(deadline, _resolve, watcher)
@@ -114,6 +117,7 @@ class Peers:
                 self._watchers.remove(watcher)
 
     def _wake_watchers(self) -> None:
+        self.changes += 1
         for watcher in self._watchers:
             _resolve(watcher)
         self._watchers.clear()

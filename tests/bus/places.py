@@ -1,0 +1,109 @@
+"""Where the contract is tested: on the memory bus and on Zenoh with real sockets, each as several processes."""
+
+import asyncio
+import os
+import socket
+from typing import Any
+
+import zenoh
+
+from schemas.messages import Message
+from services.bus import Bus, Hub, Received, Subscription
+from services.memory_bus import MemoryHub
+from services.zenoh_bus import ZenohHub, open_hub
+
+PATIENCE = 5.0
+"""Seconds until something that must come counts as lost. A limit of failure, never waited for."""
+
+
+def free_endpoint() -> str:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return f"tcp/127.0.0.1:{probe.getsockname()[1]}"
+
+
+class MemoryPlace:
+    """All processes of a robot share the hub; participants are apart anyway."""
+
+    is_real = False
+
+    def __init__(self) -> None:
+        self._hubs: dict[str, MemoryHub] = {}
+
+    async def process(self, robot: str = "robot") -> Hub:
+        return self._hubs.setdefault(robot, MemoryHub(robot))
+
+    async def inject(self, key: str, payload: bytes, encoding: str) -> None:
+        self._hubs["robot"].inject(key, payload, encoding)
+
+    async def close(self) -> None:
+        for hub in self._hubs.values():
+            await hub.close()
+
+
+class ZenohPlace:
+    """Each process is a session of its own, over TCP, though in this one process."""
+
+    is_real = True
+
+    def __init__(self) -> None:
+        self._rendezvous = free_endpoint()
+        self._hubs: list[ZenohHub] = []
+        self._robot = f"contract-{os.getpid()}-"
+
+    async def process(self, robot: str = "robot") -> Hub:
+        hub = await open_hub(self._robot + robot, rendezvous=self._rendezvous)
+        self._hubs.append(hub)
+        await acquainted(*(known for known in self._hubs if known.robot == hub.robot))
+        return hub
+
+    async def inject(self, key: str, payload: bytes, encoding: str) -> None:
+        """As a program that knows only Zenoh."""
+        session: Any = self._hubs[-1].session
+        loop, matched = asyncio.get_running_loop(), asyncio.Event()
+        publisher = session.declare_publisher(key, congestion_control=zenoh.CongestionControl.BLOCK)
+
+        def changed(status: zenoh.MatchingStatus) -> None:
+            loop.call_soon_threadsafe(matched.set)
+
+        publisher.declare_matching_listener(zenoh.handlers.Callback(changed, indirect=False))
+        if not publisher.matching_status.matching:
+            await asyncio.wait_for(matched.wait(), PATIENCE)
+        publisher.put(payload, encoding=encoding)
+        publisher.undeclare()
+
+    async def close(self) -> None:
+        for hub in self._hubs:
+            await hub.close()
+
+
+async def acquainted(*hubs: ZenohHub) -> None:
+    """Wait until all know one another."""
+    loop = asyncio.get_running_loop()
+    deadline = loop.time() + PATIENCE
+    for hub in hubs:
+        while not {other.run for other in hubs if other is not hub} <= hub.peers.processes:
+            assert await hub.peers.change(deadline), f"{hub.run} never met all of {[other.run for other in hubs]}"
+
+
+async def take(subscription: Subscription, count: int = 1) -> list[Received]:
+    """The next `count` messages. Fails when they do not come."""
+    taken = []
+    for _ in range(count):
+        received = await subscription.next(asyncio.get_running_loop().time() + PATIENCE)
+        assert received is not None, f"{len(taken)} of {count} messages came: {taken}"
+        taken.append(received)
+    return taken
+
+
+async def messages(subscription: Subscription, count: int = 1) -> list[Any]:
+    return [received.message for received in await take(subscription, count)]
+
+
+async def heard(bus: Bus, key: str, message: Message, inbox: Subscription) -> Any:
+    """Publish on a stream until it is heard: what goes before the subscription is known is lost, as it may be."""
+    while True:
+        bus.publish(key, message)
+        received = await inbox.next(bus.now() + 0.02)
+        if received is not None:
+            return received.message

@@ -1,0 +1,404 @@
+"""What every bus promises, tested on both: the memory bus on virtual time, Zenoh on real sockets."""
+
+import asyncio
+import threading
+from collections.abc import AsyncIterator
+
+import pytest
+import pytest_asyncio
+
+from schemas import keys
+from schemas.attention import Claim, HeadOwner
+from schemas.faults import Fault, InputRefused, NoReply
+from schemas.messages import Message, encode, encode_json, encoding_of
+from schemas.presence import PeerAlive, PeerGone
+from schemas.requests import Accepted, Cancel
+from schemas.units import Stamp
+from services.bus import Keep
+from services.virtual_time import VirtualTimeLoop
+from tests.bus.places import MemoryPlace, ZenohPlace, heard, messages, take
+
+Place = MemoryPlace | ZenohPlace
+
+
+pytestmark = pytest.mark.each_bus
+
+
+@pytest_asyncio.fixture
+async def place() -> AsyncIterator[Place]:
+    virtual = isinstance(asyncio.get_running_loop(), VirtualTimeLoop)
+    place: Place = MemoryPlace() if virtual else ZenohPlace()
+    yield place
+    await place.close()
+
+
+def state(number: int) -> Accepted:
+    return Accepted(id=str(number))
+
+
+def numbers(received: list[Accepted]) -> list[int]:
+    return [int(message.id) for message in received]
+
+
+async def test_messages_of_one_publisher_keep_their_order_across_keys(place: Place):
+    there, here = (await place.process()).join("there"), (await place.process()).join("here")
+    ways = [keys.request_state("there"), keys.BLOCK, keys.WORLD, keys.fault("there"), keys.cancel("realizer")]
+    inbox = here.subscribe(keys.ANY_REQUEST_STATE, keys.commands("realizer"), keys.WORLD, keys.ANY_FAULT)
+
+    for number in range(300):
+        there.publish(ways[number % len(ways)], state(number))
+
+    assert numbers(await messages(inbox, 300)) == list(range(300))
+
+
+async def test_a_message_comes_once_however_many_patterns_include_it(place: Place):
+    there, here = (await place.process()).join("there"), (await place.process()).join("here")
+    inbox = here.subscribe(keys.EVERYTHING, keys.ANY_FAULT, "engage/v1/evt/**", keys.fault("there"))
+
+    for number in range(3):
+        there.publish(keys.fault("there"), state(number))
+    there.publish(keys.HEAD_OWNER, state(3))
+
+    assert numbers(await messages(inbox, 4)) == [0, 1, 2, 3]
+
+
+async def test_a_wildcard_takes_one_chunk_and_a_double_one_any_number(place: Place):
+    there, here = (await place.process()).join("there"), (await place.process()).join("here")
+    single, double = here.subscribe("engage/v1/evt/*/fault"), here.subscribe("engage/v1/state/**")
+
+    there.publish(keys.fault("a"), state(0))
+    there.publish(keys.statistics("all"), state(1))
+    there.publish(keys.FEEDBACK, state(2))
+    there.publish(keys.fault("b"), state(3))
+    there.publish(keys.WORLD, state(4))
+
+    assert numbers(await messages(single, 2)) == [0, 3]
+    assert numbers(await messages(double, 2)) == [1, 4]
+
+
+async def test_the_source_and_the_own_time_of_arrival_come_with_a_message(place: Place):
+    there, here = (await place.process()).join("there"), (await place.process()).join("here")
+    inbox = here.subscribe(keys.FEEDBACK)
+    before = here.now()
+
+    there.publish(keys.FEEDBACK, state(1))
+
+    [received] = await take(inbox)
+    assert (received.key, received.source) == (keys.FEEDBACK, "there")
+    assert before <= received.at <= here.now()
+
+
+@pytest.mark.parametrize("apart", [True, False])
+async def test_a_late_subscriber_gets_the_last_state_once(place: Place, apart: bool):
+    process = await place.process()
+    there = process.join("there")
+    here = (await place.process() if apart else process).join("here")
+    for number in range(5):
+        there.publish(keys.WORLD, state(number))
+
+    inbox = here.subscribe(keys.WORLD)
+    [last] = await take(inbox)
+    there.publish(keys.WORLD, state(5))
+
+    assert (numbers([last.message]), last.past) == ([4], True)
+    assert numbers(await messages(inbox)) == [5]
+
+
+@pytest.mark.parametrize("apart", [True, False])
+async def test_a_late_subscriber_gets_commands_and_events_of_the_last_two_seconds_in_order(place: Place, apart: bool):
+    process = await place.process()
+    there = process.join("there")
+    here = (await place.process() if apart else process).join("here")
+    ways = [keys.BLOCK, keys.FEEDBACK, keys.cancel("realizer")]
+    there.publish(keys.BLOCK, state(1000))
+    with there.subscribe(keys.INHIBIT) as never:
+        assert await never.next(there.now() + keys.HISTORY_MAX_AGE + 0.1) is None
+    for number in range(30):
+        there.publish(ways[number % 3], state(number))
+
+    inbox = here.subscribe(keys.commands("realizer"), keys.FEEDBACK)
+    past = await take(inbox, 30)
+    there.publish(keys.FEEDBACK, state(30))
+
+    assert numbers([received.message for received in past]) == list(range(30))
+    assert all(received.past for received in past)
+    assert numbers(await messages(inbox)) == [30]
+
+
+async def test_what_is_published_while_somebody_joins_comes_once_and_in_order(place: Place):
+    there, hub = (await place.process()).join("there"), await place.process()
+    ways = [keys.BLOCK, keys.FEEDBACK]
+    inboxes = []
+
+    for number in range(200):
+        there.publish(ways[number % 2], state(number))
+        if number % 20 == 10:
+            inboxes.append(hub.join(f"here-{number}").subscribe(keys.BLOCK, keys.FEEDBACK))
+            await asyncio.sleep(0)
+
+    for inbox in inboxes:
+        assert numbers(await messages(inbox, 200)) == list(range(200))
+
+
+async def test_latest_keeps_only_the_newest_of_each_key(place: Place):
+    there, here = (await place.process()).join("there"), (await place.process()).join("here")
+    latest = here.subscribe("engage/v1/state/**", keep=Keep.LATEST)
+    every = here.subscribe("engage/v1/state/**")
+
+    for number in range(10):
+        there.publish(keys.WORLD if number % 2 else keys.HEAD_OWNER, state(number))
+    await take(every, 10)
+
+    assert numbers(await messages(latest, 2)) == [8, 9]
+    assert len(latest) == 0
+
+
+async def test_a_full_queue_drops_the_oldest_and_counts(place: Place):
+    there, here = (await place.process()).join("there"), (await place.process()).join("here")
+    small, large = here.subscribe(keys.FEEDBACK, capacity=3), here.subscribe(keys.FEEDBACK)
+
+    for number in range(10):
+        there.publish(keys.FEEDBACK, state(number))
+    await take(large, 10)
+
+    assert numbers(await messages(small, 3)) == [7, 8, 9]
+    assert (small.overflowed, large.overflowed) == (7, 0)
+
+
+async def test_a_stream_reaches_those_who_listen_and_nobody_later(place: Place):
+    there, here = (await place.process()).join("there"), (await place.process()).join("here")
+    inbox = here.subscribe(keys.ROBOT_STATE, keep=Keep.LATEST)
+    await heard(there, keys.ROBOT_STATE, state(0), inbox)
+    for number in range(20):
+        there.publish(keys.ROBOT_STATE, state(number))
+    last = -1
+    while last < 19:
+        [last] = numbers(await messages(inbox))
+
+    late = here.subscribe(keys.ROBOT_STATE, keys.FEEDBACK)
+    there.publish(keys.FEEDBACK, state(20))
+
+    assert numbers(await messages(late)) == [20]
+
+
+async def test_everybody_of_a_process_hears_a_message_once_its_publisher_too(place: Place):
+    hub = await place.process()
+    one, other = hub.join("one"), hub.join("other")
+    inboxes = [one.subscribe(keys.FEEDBACK), other.subscribe(keys.FEEDBACK), other.subscribe("engage/v1/evt/**")]
+
+    for number in range(3):
+        one.publish(keys.FEEDBACK, state(number))
+
+    for inbox in inboxes:
+        assert numbers(await messages(inbox, 3)) == [0, 1, 2]
+        assert len(inbox) == 0
+
+
+async def test_a_name_is_taken_once(place: Place):
+    hub = await place.process()
+    hub.join("one")
+
+    with pytest.raises(ValueError, match="one"):
+        hub.join("one")
+
+
+@pytest.mark.parametrize("apart", [True, False])
+async def test_liveliness_tells_who_is_there_who_comes_and_who_goes(place: Place, apart: bool):
+    process = await place.process()
+    here, early = process.join("here"), process.join("early")
+    late = (await place.process() if apart else process).join("late")
+    early.declare_alive()
+
+    inbox = here.subscribe(keys.ANY_ALIVE)
+    first = await messages(inbox)
+    late.declare_alive()
+    late.declare_alive()
+    second = await messages(inbox)
+    await late.leave()
+    await late.leave()
+    third = await messages(inbox)
+
+    assert [message.participant for message in first + second] == ["early", "late"]
+    assert isinstance(first[0], PeerAlive)
+    assert isinstance(second[0], PeerAlive)
+    assert third == [PeerGone(participant="late")]
+
+
+async def test_another_life_of_a_name_has_another_run(place: Place):
+    here = (await place.process()).join("here")
+    inbox = here.subscribe(keys.ANY_ALIVE)
+    lives = []
+    for _ in range(2):
+        hub = await place.process()
+        bus = hub.join("service")
+        bus.declare_alive()
+        lives += await messages(inbox)
+        await bus.leave()
+        assert await messages(inbox) == [PeerGone(participant="service")]
+
+    assert lives[0].run
+    assert lives[0].run != lives[1].run
+
+
+def echo(question: Message) -> Message:
+    assert isinstance(question, Accepted)
+    if question.id == "bad":
+        raise InputRefused(Fault(reason="bad indeed", where="here"))
+    return Accepted(id=question.id + "!")
+
+
+@pytest.mark.parametrize("apart", [True, False])
+async def test_a_question_is_answered_or_refused_with_the_servers_fault(place: Place, apart: bool):
+    process = await place.process()
+    server = process.join("server")
+    client = (await place.process() if apart else process).join("client")
+    server.answer(keys.DESCRIBE, echo)
+
+    assert await client.query(keys.DESCRIBE, Accepted(id="a")) == Accepted(id="a!")
+    with pytest.raises(InputRefused) as refused:
+        await client.query(keys.DESCRIBE, Accepted(id="bad"))
+    assert refused.value.fault == Fault(reason="bad indeed", where="here")
+
+
+async def test_a_question_nobody_answers_fails_at_its_timeout(place: Place):
+    client = (await place.process()).join("client")
+    await place.process()
+    asked = client.now()
+
+    with pytest.raises(NoReply, match="describe"):
+        await client.query(keys.DESCRIBE, Accepted(id="a"), timeout=0.2)
+
+    assert client.now() - asked == pytest.approx(0.2, abs=0.1 if place.is_real else 1e-9)
+
+
+async def test_a_question_asked_too_early_is_answered_once_the_server_stands(place: Place):
+    client, server = (await place.process()).join("client"), (await place.process()).join("server")
+
+    asking = asyncio.create_task(client.query(keys.DESCRIBE, Accepted(id="a"), timeout=5.0), name="asking")
+    await asyncio.sleep(0)
+    server.answer(keys.DESCRIBE, echo)
+
+    assert await asking == Accepted(id="a!")
+
+
+async def test_a_server_that_has_left_answers_no_more(place: Place):
+    client, server = (await place.process()).join("client"), (await place.process()).join("server")
+    server.answer(keys.DESCRIBE, echo)
+    assert await client.query(keys.DESCRIBE, Accepted(id="a")) == Accepted(id="a!")
+
+    await server.leave()
+
+    with pytest.raises(NoReply):
+        await client.query(keys.DESCRIBE, Accepted(id="a"), timeout=0.2)
+
+
+async def test_two_robots_do_not_hear_each_other(place: Place):
+    mine, other = (await place.process("left")).join("me"), (await place.process("right")).join("me")
+    inbox = mine.subscribe(keys.EVERYTHING)
+    other_inbox = other.subscribe(keys.EVERYTHING)
+    other.answer(keys.DESCRIBE, echo)
+    other.declare_alive()
+
+    other.publish(keys.FEEDBACK, state(1))
+    await take(other_inbox, 2)
+
+    with pytest.raises(NoReply):
+        await mine.query(keys.DESCRIBE, Accepted(id="a"), timeout=0.3)
+    assert len(inbox) == 0
+
+
+@pytest.mark.parametrize(
+    ("payload", "encoding"),
+    [
+        (b"\xc1garbage", "application/msgpack"),
+        (b"{", "application/json"),
+        (b'{"type":"accepted"}', "application/json"),
+        (b'{"type":"no such thing"}', "application/json"),
+        (encode(Accepted(id="x")), "application/msgpack;engage.Accepted/2"),
+        (encode(Accepted(id="x")), "image/png"),
+        (b"", "zenoh/bytes"),
+    ],
+)
+async def test_a_bad_payload_is_answered_with_a_fault_and_harms_nobody(place: Place, payload: bytes, encoding: str):
+    here = (await place.process()).join("here")
+    await place.process()
+    inbox, faults = here.subscribe(keys.BLOCK), here.subscribe(keys.ANY_FAULT)
+
+    await place.inject(keys.BLOCK, payload, encoding)
+    [fault] = await messages(faults)
+    await place.inject(keys.BLOCK, encode(state(1)), encoding_of(state(1)))
+
+    assert numbers(await messages(inbox)) == [1]
+    assert isinstance(fault, Fault)
+    assert fault.service == "here"
+    assert keys.BLOCK in fault.where
+
+
+async def test_other_programs_may_speak_json_without_saying_who_they_are(place: Place):
+    here = (await place.process()).join("here")
+    await place.process()
+    inbox = here.subscribe(keys.commands("realizer"))
+
+    await place.inject(keys.cancel("realizer"), encode_json(Cancel(id="a", requester="me")), "application/json")
+
+    [received] = await take(inbox)
+    assert received.message == Cancel(id="a", requester="me")
+    assert received.source == ""
+
+
+async def test_stamps_of_another_process_read_as_local_time(place: Place):
+    there, here = (await place.process()).join("there"), (await place.process()).join("here")
+    inbox = here.subscribe(keys.HEAD_OWNER)
+
+    there.publish(keys.HEAD_OWNER, HeadOwner(owner=Claim(kind="none", priority=0), since=there.stamp()))
+
+    [received] = await take(inbox)
+    assert here.local(received.message.since) == received.message.since.seconds
+    assert here.local(Stamp(here.clock, 5.0)) == 5.0
+
+
+async def test_a_closed_subscription_ends_its_reader_and_others_go_on(place: Place):
+    there, here = (await place.process()).join("there"), (await place.process()).join("here")
+    closing, staying = here.subscribe(keys.FEEDBACK), here.subscribe(keys.FEEDBACK)
+    reading = asyncio.create_task(closing.next(), name="reading")
+    await asyncio.sleep(0)
+
+    closing.close()
+    there.publish(keys.FEEDBACK, state(1))
+
+    assert await reading is None
+    assert numbers(await messages(staying)) == [1]
+    assert len(closing) == 0
+
+
+async def test_leaving_ends_readers_and_publishes_no_more(place: Place):
+    there, here = (await place.process()).join("there"), (await place.process()).join("here")
+    inbox = there.subscribe(keys.FEEDBACK)
+    other = here.subscribe(keys.FEEDBACK)
+
+    await there.leave()
+    there.publish(keys.FEEDBACK, state(1))
+    here.publish(keys.FEEDBACK, state(2))
+
+    assert await inbox.next() is None
+    assert numbers(await messages(other)) == [2]
+
+
+async def test_closing_leaves_no_task_and_no_thread(place: Place):
+    hub, other = await place.process(), await place.process()
+    bus = hub.join("one")
+    bus.declare_alive()
+    bus.answer(keys.DESCRIBE, echo)
+    inbox = bus.subscribe(keys.EVERYTHING)
+    there = other.join("there")
+    there.publish(keys.FEEDBACK, state(1))
+    await there.query(keys.DESCRIBE, Accepted(id="a"))
+    bus.publish(keys.FEEDBACK, state(2))
+
+    await hub.close()
+    await hub.close()
+
+    assert asyncio.all_tasks() == {asyncio.current_task()}
+    assert threading.active_count() == 1
+    while await inbox.next() is not None:
+        pass
