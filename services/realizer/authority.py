@@ -197,7 +197,7 @@ class Authority:
         furthest = known
         for number in range(known + 1, len(points)):
             transition = self.plan.at[points[number]]
-            member = next(each for each in self.plan.members[transition] if each.behavior == behavior)
+            member = self._member(behavior, transition)
             if member.kind == "hold" and points[number] not in self.reached and (transition, behavior) not in granted:
                 break
             furthest = number
@@ -220,21 +220,31 @@ class Authority:
                 times[transition] = measured
                 facts.append(transition)
         lags = []
-        for number, place in enumerate(net.places):
-            if place.kind == "idle":
-                continue
+        for place in net.places:
             if place.kind == "phase":
-                member = next(each for each in self.plan.members[place.source] if each.behavior == place.behavior)
-                if (since := self.reached.get(member.point)) is not None:
+                if self._has_come(place.behavior, place.target):
+                    continue
+                if (since := self._passed(place.behavior, place.source)) is not None:
                     times[place.target] = max(times[place.target], since + place.lag)
                     continue
-            lags.append(Lag(place.source, place.target, place.lag, number))
+            if place.kind != "idle":
+                lags.append(Lag(place.source, place.target, place.lag, 0))
         for bound in self.plan.bounds:
-            lags.append(Lag(bound.source, bound.target, bound.lag, -1))
+            if bound.kind != "phase" or self._passed(bound.behavior, bound.target) is None:
+                lags.append(Lag(bound.source, bound.target, bound.lag, -1))
         try:
             return earliest(times, facts, lags)
         except PositiveCycle:
             return earliest(times, facts, [lag for lag in lags if lag.reason >= 0])
+
+    def _member(self, behavior: str, transition: int) -> Member:
+        return next(member for member in self.plan.members[transition] if member.behavior == behavior)
+
+    def _passed(self, behavior: str, transition: int) -> Seconds | None:
+        return self.reached.get(self._member(behavior, transition).point)
+
+    def _has_come(self, behavior: str, transition: int) -> bool:
+        return self._is_there(self._member(behavior, transition))
 
     # -- patience ------------------------------------------------------------------------------------------------
 

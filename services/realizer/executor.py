@@ -130,14 +130,16 @@ class Performance:
         self._advance()
 
     async def _end_what_moves(self, ending: Ending, running: dict[str, "asyncio.Task[None]"]) -> None:
-        """Abort what still runs, and wait until it has ended, or for as long as the body is given."""
+        """Abort what still runs, and wait until all has ended, or for as long as the body is given."""
         moving = set()
         for behavior in self.plan.block.behaviors:
-            if (pending := self._pending.get(behavior.id)) is None or pending.outcome.done():
+            pending = self._pending.get(behavior.id)
+            if pending is None or running[behavior.id].done():
                 continue
             if performer(behavior) == "body":
                 moving.add(running[behavior.id])
-                self._abort(behavior.id)
+                if ending.status != "done" and not pending.outcome.done():
+                    self._abort(behavior.id)
             elif ending.status != "done":
                 self._requests.cancel(self._request_id(behavior.id), f"block {ending.status}")
         if moving:
