@@ -256,11 +256,13 @@ class Authority:
                 continue
             points = chain.points
             number = next(number for number, point in enumerate(points) if point not in self.reached)
-            if points[number] in self.arrived and self._through[behavior] < number:
+            # A gaze holds at `relax`, where its `stroke_end` is reported too: what counts is the instant.
+            holds_at = self._member(behavior, self.plan.at[points[number]]).point
+            if holds_at in self.arrived and self._through[behavior] < points.index(holds_at):
                 continue
             since = self.reached[points[number - 1]] if number else began
             natural = chain.segments[number - 1].natural if number else 0.0
-            expected = max(since + natural, self._granted_at[behavior] if points[number] in self.arrived else 0.0)
+            expected = max(since + natural, self._granted_at[behavior] if holds_at in self.arrived else 0.0)
             late = expected + self.config.late + self.config.late_factor * natural
             stalled = expected + self.config.stall + self.config.stall_factor * natural
             if now >= stalled - EPSILON:

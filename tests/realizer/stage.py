@@ -10,6 +10,7 @@ from msgspec import Struct, field
 from schemas import keys
 from schemas.behaviors import After, Before, BlockBehavior, Constraint, Synchronize
 from schemas.blocks import Block, BlockOutcome, PerformBlock
+from schemas.faults import Fault
 from schemas.feedback import BlockProgress, SyncPointProgress, WarningFeedback
 from schemas.recognition import EventOutcome, RequestEvent, SignalTurn, TurnOutcome
 from schemas.units import Seconds
@@ -44,8 +45,9 @@ def before(ref: str, *syncs: str) -> Before:
 class FakeRecognition:
     """Decides each event as told: seconds after its start, by behavior id; None: never."""
 
-    def __init__(self, decisions: Mapping[str, Seconds | None] | None = None) -> None:
+    def __init__(self, decisions: Mapping[str, Seconds | None] | None = None, refuse: Sequence[str] = ()) -> None:
         self.decisions = dict(decisions or {})
+        self.refuse = refuse
         self.events: list[RequestEvent] = []
         self.signals: list[SignalTurn] = []
         self.cancelled: list[str] = []
@@ -60,6 +62,9 @@ class FakeRecognition:
                         match desk.take(received):
                             case RequestEvent() as request:
                                 self.events.append(request)
+                                if request.event.id in self.refuse:
+                                    desk.refuse(request.id, Fault(reason="unknown actor"))
+                                    continue
                                 desk.accept(request.id)
                                 tasks.create_task(self._decide(bus, desk, request))
                             case SignalTurn() as signal:
@@ -83,6 +88,7 @@ class Stage(Struct):
     recognition: FakeRecognition
     requests: Requester
     feedback: list[object] = field(default_factory=list)
+    news: asyncio.Event = field(default_factory=asyncio.Event)
 
     def ask(self, block: Block) -> Pending:
         return self.requests.send(keys.BLOCK, PerformBlock(id=f"r-{block.id}", requester="test", block=block))
@@ -91,6 +97,16 @@ class Stage(Struct):
         outcome = await self.ask(block).outcome
         assert isinstance(outcome, BlockOutcome)
         return outcome
+
+    async def some_feedback(self) -> None:
+        """Wait until the realizer has said something more."""
+        self.news.clear()
+        await self.news.wait()
+
+    async def seen(self, point: str, block: str = "b") -> None:
+        """Wait for a sync point."""
+        while point not in self.times(block):
+            await self.some_feedback()
 
     def progress(self, block: str = "b") -> list[SyncPointProgress]:
         return [each for each in self.feedback if isinstance(each, SyncPointProgress) and each.block == block]
@@ -138,3 +154,4 @@ async def _listen(bus: Bus, seen: Stage) -> None:
     with bus.subscribe(keys.FEEDBACK) as inbox:
         async for received in inbox:
             seen.feedback.append(received.message)
+            seen.news.set()
