@@ -10,7 +10,7 @@ EntityKind = Literal["object", "person", "hand", "surface"]
 
 
 class Entity(Struct, frozen=True, kw_only=True, omit_defaults=True):
-    """A thing or a person. position of a person: the face; of an object: its centre.
+    """A thing or a person. position: of a person the face, of an object its centre.
 
     footprint: corners in the entity's own frame, metres (x, y), before turning by `yaw` about z.
     Only `object` entities can be distractors.

@@ -61,8 +61,8 @@ def test_a_prediction() -> None:
 
 def test_a_connection_event_that_has_only_begun() -> None:
     message = ConnectionEvent(
-        id="e-1", kind="directed_gaze", initiator="robot", responder="human", state="started", at=at(3), started=at(3),
-        objects=("cup",), cause="reference",
+        id="e-1", kind="directed_gaze", initiator="robot", responder="human", state="started", objects=("cup",),
+        at=at(3), started=at(3), cause="reference",
     )  # fmt: skip
 
     assert line(message) == (

@@ -1,0 +1,289 @@
+"""Write docs/protocol.md from schemas/: `python docs/protocol.py`. tests/schemas/test_protocol.py checks it.
+
+The prose and the table of keys stand here; messages and fields are read from the code, with their strings.
+"""
+
+import ast
+import inspect
+import re
+import sys
+from pathlib import Path
+from textwrap import dedent
+from types import ModuleType
+
+import msgspec
+
+from schemas import (
+    actions,
+    attention,
+    behaviors,
+    blocks,
+    body,
+    faults,
+    feedback,
+    fragments,
+    keys,
+    presence,
+    recognition,
+    requests,
+    units,
+    world,
+)
+
+PAGE = Path(__file__).parent / "protocol.md"
+
+KEYS: tuple[tuple[str, str, str], ...] = (
+    (keys.FRAGMENT, "manager → generation", "`PerformFragment`"),
+    (keys.INHIBIT, "anyone → generation", "`Inhibit`"),
+    (keys.BLOCK, "manager, generation → realizer", "`PerformBlock`"),
+    (keys.EVENT, "realizer → recognition", "`RequestEvent`"),
+    (keys.TURN, "realizer, generation → recognition", "`SignalTurn`"),
+    (keys.BEHAVIOR, "realizer → control", "`PerformBehavior`, `AbortBehavior`, `GoHome`"),
+    (keys.cancel("<server>"), "requester → the request's server", "`Cancel`"),
+    (
+        keys.request_state("<server>"),
+        "server → requester",
+        "`Accepted`, `Refused`; from generation `FragmentOutcome`, `InhibitionEnded`; from the realizer"
+        " `BlockOutcome`; from control `BehaviorOutcome`, `HomeReached`; from recognition `EventOutcome`,"
+        " `TurnOutcome`",
+    ),
+    (
+        keys.FEEDBACK,
+        "realizer → all",
+        "`BlockProgress`, `SyncPointProgress`, `PredictionFeedback`, `WarningFeedback`",
+    ),
+    (keys.SYNC_POINT, "control → realizer", "`SyncPointArrived`, `SyncPointReached`, `WordSpoken`"),
+    (keys.ROBOT_ACTION, "control → recognition", "`ActionBegan`, `ActionEnded`"),
+    (
+        keys.PERCEIVED_ACTION,
+        "perception → recognition",
+        "`ActionBegan`, `ActionEnded`, `ActorFound`, `ActorLost`",
+    ),
+    (keys.CONNECTION_EVENT, "recognition → all", "`ConnectionEvent`"),
+    (keys.fault("<service>"), "any service → all", "`Fault`: a bad message, or what went wrong at the edge"),
+    (keys.WORLD, "perception → all", "`World`"),
+    (keys.HEAD_OWNER, "generation → all", "`HeadOwner`"),
+    (keys.statistics("<actor>"), "recognition → all", "`Statistics`, one per person, and `all`"),
+    (keys.ROBOT_STATE, "control → all", "`RobotState`"),
+    (keys.ESTIMATE, "generation, realizer ask control", "`EstimateBehaviors`, answered with `Estimates`"),
+    (keys.DESCRIBE, "anyone asks control", "`DescribeBody`, answered with `Capabilities`"),
+    (keys.alive("<participant>"), "the bus itself", "`PeerAlive`, `PeerGone`: made from liveliness, never sent"),
+)
+
+MODULES: tuple[ModuleType, ...] = (
+    fragments, blocks, behaviors, feedback, recognition, attention, actions, world, body, requests, faults, presence,
+    units,
+)  # fmt: skip
+
+HEAD = f"""\
+# Protocol
+
+Everything that services say to one another, and what any other program needs to take part. The structs are in
+`schemas/`; as JSON Schemas in `schemas/exported/`, one file per message. This page is made from the code:
+`python docs/protocol.py`.
+
+## Keys
+
+`<robot>/{keys.PREFIX}/<class>/<producer or server>/<subject>`, where `<robot>` is the deployment's namespace (default
+`robot`) and the number is the major version of the protocol. The class says how a key travels:
+
+| class | for | how |
+|---|---|---|
+| `cmd` | requests to a server | each, in order; a late subscriber gets the last {keys.HISTORY_MAX_AGE:g} s; idempotent by id |
+| `evt` | request states, feedback, sync points, actions, connection events, faults | as `cmd` |
+| `state` | world, statistics, owner of the head | the last value, also for a late subscriber |
+| `stream` | the robot's posture | the newest only; may be dropped |
+| `rpc` | short questions | a Zenoh query; no reply within its timeout is a failure |
+| `alive` | who is there | liveliness tokens |
+
+KEYS
+Chunks that begin with `@` under the prefix are the bus' own bookkeeping (order, history, clocks); no wildcard
+includes them.
+
+## Payloads
+
+MessagePack by default, JSON on request. The encoding of a sample names form, message and major version:
+`application/msgpack;engage.SyncPointReached/1`, `application/json;engage.PerformFragment/1`; the part after `;` may be
+missing. Another major version is refused by name. A payload is one struct; its field `type` says which. Fields at
+their default are left out. Unknown fields are ignored on the bus (a newer peer may send them).
+
+- Instants are `[clock, seconds]` (`Stamp`): seconds on a named monotonic clock. Instants of different clocks compare
+  only through an estimated offset; durations are plain seconds.
+- Lengths are metres, x ahead of the robot, y to its left, z up, origin on the floor below the robot. Angles are
+  radians unless the type says `Degrees`.
+- An actor's id as a target stands for its face.
+
+## Requests
+
+A request has an `id` of its requester's making and ends exactly once: `Accepted` or `Refused`, then one outcome with
+the same id. Send it again (after 0.3 s, doubling to 2 s) until it has ended; the server repeats its last state. Same
+id, same request: nothing is done twice. `Cancel` with that id ends it as interrupted. When the requester's liveliness
+token stays away for 2 s, the server ends its requests; a requester that never had a token is left alone.
+
+## Speaking it from elsewhere
+
+Any language with Zenoh can play a fragment. In Python, without a line of Engage:
+
+```python
+import json, zenoh
+
+config = zenoh.Config()
+config.insert_json5("mode", '"client"')
+config.insert_json5("connect/endpoints", '["tcp/127.0.0.1:7447"]')
+with zenoh.open(config) as session:
+    states = session.declare_subscriber("robot/{keys.request_state("generation")}")
+    session.put(
+        "robot/{keys.FRAGMENT}",
+        json.dumps({{
+            "type": "perform_fragment",
+            "id": "greeting-1",
+            "requester": "my-manager",
+            "fragment": {{
+                "type": "fragment",
+                "id": "greeting-1",
+                "turn_status": "full",
+                "behaviors": [{{"type": "speech", "id": "speech-1", "text": "Hello there."}}],
+            }},
+        }}),
+        encoding="application/json;engage.PerformFragment/1",
+    )
+    for sample in states:
+        print(sample.encoding, sample.payload.to_bytes())
+```
+
+Answers come as MessagePack. `mode` `client` suits a visitor: Zenoh forwards it everything through the one it connects
+to.
+
+## Blocks and fragments in files
+
+`engage play` and `schemas.json_codec.read` take XML or JSON; a JSON file may hold an array of several. In JSON the
+form is that of `TurnFragment` and `Block` below; `type` may be left out where the content makes it plain, and an
+unknown key is refused. In XML:
+
+- a block is `<bml>` in the namespace `org.mindmakers.bml` (the thesis' draft), in none, or in that of BML 1.0;
+- a turn fragment is `<ebml:ebml xmlns:ebml="edu.wpi.ebml">` around the same elements, with the attributes `turnIndex`,
+  `turnStatus`, `addressee`, `delay`, `delayTarget`, `accept` (separated by spaces), and with
+  `<ebml:reference target minReliability>` of `<speechOption text cost deictic>` of `<distractor object>`;
+- connection events inside a block are `<ebml:event kind responder cause optional accept limit turn>` with
+  `<ebml:object id>` and `<ebml:anchor ref>`; what becomes of a turn is `<ebml:turn turn signal actor>`;
+- marks of a speech are `<sync id>`, `<sync ref>`, `<tm id>` or `<mark name>`; other elements inside its text are
+  prosodic markup for the voice;
+- attributes and elements of other namespaces are ignored; there are no entities and no DTD; at most 4 MiB, 64 levels.
+
+Sync references: `[block:]behavior:sync[:n][±seconds]`, `[block:]seconds`, `bml:start`; details in `schemas/syncref.py`.
+Whatever is wrong is refused whole, before anything moves, with file, line (XML) or path (JSON), reason and advice.
+
+## JSON lines
+
+`--feedback FILE` and `--events FILE` (of `engage demo`, `play`, ...) write one JSON object per line. These are public: keys may
+be added, but none is renamed or removed. Every key is always there; what is not known is `null`. Times are seconds,
+rounded to microseconds; `time` of feedback counts from the start of the block, `global_time` and `time` of events are
+instants of the bus clock.
+
+| stream | `type` | keys |
+|---|---|---|
+| feedback | `block_progress` | `block`, `progress` (`start` or `end`), `status` (at the end: `done`, `failed`, `interrupted`), `time`, `global_time` |
+| feedback | `sync_point_progress` | `block`, `behavior`, `sync`, `time`, `global_time`, `predicted`, `source` (`body` or `clock`), `arrived`, `skew` |
+| feedback | `warning` | `block`, `behavior` (`null`: the whole block), `kind`, `message` |
+| feedback | `prediction` | `block`, `points` (each `behavior`, `sync`, `time`) |
+| events | `connection_event` | `id`, `kind`, `initiator`, `responder`, `objects`, `cause`, `state`, `optional`, `delay`, `time`, `started`, `duration`, `response`, `block`, `behavior`, `turn` |
+
+## Messages
+
+"""  # noqa: E501
+
+
+def page() -> str:
+    return HEAD.replace("KEYS\n", _key_table(), 1) + "\n".join(_module(module) for module in MODULES)
+
+
+def _key_table() -> str:
+    rows = [f"| `{key}` | {way} | {messages} |" for key, way, messages in KEYS]
+    return "\n".join(["| key | from → to | messages |", "|---|---|---|", *rows, "", ""])
+
+
+def _module(module: ModuleType) -> str:
+    tree = ast.parse(inspect.getsource(module))
+    title = module.__name__.rpartition(".")[2]
+    parts = [f"### {title}", "", inspect.cleandoc(module.__doc__ or ""), ""]
+    parts += [part for node in tree.body if isinstance(node, ast.ClassDef) for part in _struct(module, node)]
+    if aliases := [
+        _alias(node, following) for node, following in zip(tree.body, [*tree.body[1:], None], strict=True)
+    ]:
+        parts += [line for line in aliases if line]
+    return "\n".join(parts).rstrip() + "\n"
+
+
+def _struct(module: ModuleType, node: ast.ClassDef) -> list[str]:
+    kind = getattr(module, node.name)
+    if not (isinstance(kind, type) and issubclass(kind, msgspec.Struct)):
+        return []
+    tag = kind.__struct_config__.tag
+    parts = [f"#### {node.name}" + (f" · `{tag}`" if tag else ""), ""]
+    prose, meanings = _meanings(ast.get_docstring(node) or "", kind.__struct_fields__)
+    if prose:
+        parts += [prose, ""]
+    if rows := _rows(kind, meanings):
+        parts += ["| field | type | default | |", "|---|---|---|---|", *rows, ""]
+    bases = [base.__name__ for base in kind.__bases__ if base is not msgspec.Struct and base.__struct_fields__]
+    if bases:
+        parts += [f"And the fields of `{bases[0]}`.", ""]
+    return parts
+
+
+def _meanings(text: str, fields: tuple[str, ...]) -> tuple[str, dict[str, str]]:
+    """A docstring apart: prose, and what it says about fields (`name: meaning`, beginning a line or sentence)."""
+    if not fields:
+        return text, {}
+    names = "|".join(fields)
+    heading = re.compile(rf"(?:^|(?<=\. ))((?:{names})(?:, (?:{names}))*): ", re.MULTILINE)
+    pieces = heading.split(text)
+    found: dict[str, str] = {}
+    prose = pieces[0]
+    for heads, meaning in zip(pieces[1::2], pieces[2::2], strict=True):
+        said, _, after = meaning.partition("\n\n")
+        found |= {name: " ".join(said.split()) for name in heads.split(", ")}
+        prose += after and f"\n{after}"
+    return prose.strip(), found
+
+
+def _rows(owner: type, meanings: dict[str, str]) -> list[str]:
+    (node,) = ast.parse(dedent(inspect.getsource(owner))).body
+    assert isinstance(node, ast.ClassDef)
+    rows = []
+    for field, following in zip(node.body, [*node.body[1:], None], strict=True):
+        if not (isinstance(field, ast.AnnAssign) and isinstance(field.target, ast.Name)):
+            continue
+        kind = ast.unparse(field.annotation).replace("|", "\\|")
+        default = "" if field.value is None else f"`{ast.unparse(field.value)}`"
+        name = field.target.id
+        meaning = " ".join(filter(None, [meanings.get(name), _said(following)])).replace("|", "\\|")
+        rows.append(f"| `{name}` | `{kind}` | {default} | {meaning} |")
+    return rows
+
+
+def _said(node: ast.stmt | None) -> str:
+    """The string that stands below a field."""
+    if isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant) and isinstance(node.value.value, str):
+        return " ".join(node.value.value.split())
+    return ""
+
+
+def _alias(node: ast.stmt, following: ast.stmt | None) -> str:
+    """A named type of the module: `Hand = Literal[...]`."""
+    if not (isinstance(node, ast.Assign) and isinstance(node.targets[0], ast.Name)):
+        return ""
+    said = _said(following)
+    return f"- `{node.targets[0].id}` = `{' '.join(ast.unparse(node.value).split())}`" + (f": {said}" if said else "")
+
+
+def main() -> int:
+    fresh = page()
+    if "--check" in sys.argv[1:]:
+        return 0 if PAGE.read_text(encoding="utf-8") == fresh else 1
+    PAGE.write_text(fresh, encoding="utf-8")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
