@@ -1,0 +1,66 @@
+"""What the robot is seen to do, from the sync points its body reports and from what its eyes rest on. Pure."""
+
+from schemas.actions import ActionBegan, ActionEnded
+from schemas.behaviors import Action, BlockBehavior, Head, Pointing, Speech
+from schemas.units import Seconds, Stamp
+from services.control.body import Reached
+
+ActionMessage = ActionBegan | ActionEnded
+
+
+class Deeds:
+    """Turns progress into actions of `actor`. Every action that began ends once."""
+
+    def __init__(self, actor: str, clock: str) -> None:
+        self._actor = actor
+        self._clock = clock
+        self._look: ActionBegan | None = None
+        self._open: dict[str, ActionBegan] = {}
+
+    def reached(self, id: str, label: str, behavior: BlockBehavior, reached: Reached) -> list[ActionMessage]:
+        """After request `id`, known to people as `label`, has passed a sync point."""
+        action: Action
+        targets: tuple[str, ...]
+        match behavior:
+            case Pointing(target=target):
+                action, targets, first, last = "point", (target,), "stroke_start", "stroke_end"
+            case Head(lexeme=lexeme):
+                action = "nod" if lexeme.upper() == "NOD" else "shake"
+                targets, first, last = (), "start", "end"
+            case Speech():
+                action, targets, first, last = "speak", (), "start", "end"
+            case _:
+                return []
+        if reached.sync == first:
+            return [self._begin(id, action, targets, label, reached.at)]
+        return self.ended(id, reached.at) if reached.sync == last else []
+
+    def ended(self, id: str, at: Seconds) -> list[ActionMessage]:
+        """Request `id` is over, however it ended."""
+        return [self._end(began, at)] if (began := self._open.pop(id, None)) else []
+
+    def looks_at(self, entity: str, label: str, at: Seconds) -> list[ActionMessage]:
+        """The eyes rest on `entity`, or on nothing. label: the behavior that brought them there, if known."""
+        if entity == (self._look.targets[0] if self._look else ""):
+            return []
+        messages: list[ActionMessage] = [self._end(self._look, at)] if self._look else []
+        self._look = None
+        if entity:
+            self._look = ActionBegan(
+                actor=self._actor, action="look", at=Stamp(self._clock, at), targets=(entity,), behavior=label
+            )
+            messages.append(self._look)
+        return messages
+
+    def _begin(self, id: str, action: Action, targets: tuple[str, ...], label: str, at: Seconds) -> ActionBegan:
+        began = ActionBegan(
+            actor=self._actor, action=action, at=Stamp(self._clock, at), targets=targets, behavior=label
+        )
+        self._open[id] = began
+        return began
+
+    def _end(self, began: ActionBegan, at: Seconds) -> ActionEnded:
+        return ActionEnded(
+            actor=began.actor, action=began.action, at=Stamp(self._clock, at), targets=began.targets,
+            behavior=began.behavior,
+        )  # fmt: skip

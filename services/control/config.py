@@ -1,0 +1,88 @@
+"""Configuration of control: the body, its world of forbidden zones, and what goes wrong with it on purpose."""
+
+from typing import Literal
+
+from msgspec import Struct
+
+from schemas.body import NoPointZone
+from schemas.units import Degrees, Probability, Seconds
+
+
+class Displaced(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """A joint that is elsewhere than the body believes, until it first moves (Fig. 4.7: an arm near already)."""
+
+    joint: str
+    angle: Degrees
+
+
+class Stall(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """A part stops half-way to a sync point.
+
+    part: head, left_arm, right_arm, torso or face. before: the sync point it is late for.
+    seconds: how long it stands still; None: for ever. behavior: id of the only behavior meant; empty: each.
+    """
+
+    part: str
+    before: str
+    seconds: Seconds | None = None
+    behavior: str = ""
+
+
+class Slow(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """Everything `part` does takes `factor` times as long. Thesis 4.2.2. Less than 1: faster, within the limits."""
+
+    part: str
+    factor: float
+
+
+class Variability(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """How the simulated body deviates from its own estimates, drawn from `seed`; the default is perfect.
+
+    seed: same seed, same deviations, whatever the order in which behaviors come.
+    noise: standard deviation of the logarithm of each behavior's duration; 0.1 is about 10 %.
+    slow, stall, displaced: see their types.
+    overheated: parts whose motor fails half-way through every motion (thesis 4.5.3).
+    mute: `silent`: the voice moves its lips without a sound and reports its words all the same (thesis 5.4.3);
+        `refuse`: it knows, and refuses to speak.
+    lost: share of the sync point messages that never reach the bus.
+    """
+
+    seed: int = 0
+    noise: float = 0.0
+    slow: tuple[Slow, ...] = ()
+    stall: tuple[Stall, ...] = ()
+    displaced: tuple[Displaced, ...] = ()
+    overheated: tuple[str, ...] = ()
+    mute: Literal["", "silent", "refuse"] = ""
+    lost: Probability = 0.0
+
+    def __post_init__(self) -> None:
+        if self.noise < 0.0:
+            raise ValueError(f"noise is {self.noise}: expected >= 0")
+        for slow in self.slow:
+            if slow.factor <= 0.0:
+                raise ValueError(f"slow.factor of {slow.part!r} is {slow.factor}: expected > 0")
+        if not 0.0 <= self.lost <= 1.0:
+            raise ValueError(f"lost is {self.lost}: expected 0..1")
+
+
+class ControlConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """The section `control`.
+
+    state_rate: `RobotState` messages per second while anything moves; once a second else.
+    dead_man: seconds without a word from the requester of a live behavior (it repeats its request at least every
+        2 s) before the body goes home by itself. Longer than two repetitions.
+    no_point_zones: spheres that are never pointed into.
+    variability: of the simulated body.
+    """
+
+    state_rate: float = 20.0
+    dead_man: Seconds = 5.0
+    no_point_zones: tuple[NoPointZone, ...] = ()
+    variability: Variability = Variability()
+
+    def __post_init__(self) -> None:
+        if not 1.0 <= self.state_rate <= 200.0:
+            raise ValueError(f"state_rate is {self.state_rate}: expected 1..200 per second")
+        if self.dead_man < 4.5:
+            raise ValueError(f"dead_man is {self.dead_man} s: expected >= 4.5, requests are repeated every 2 s")

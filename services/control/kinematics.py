@@ -1,0 +1,241 @@
+"""The simulated torso: where its joints put its eyes and hands, and which angles look or point at a position.
+
+A torso behind a table: hip, neck with yaw and pitch, two arms with shoulder yaw, shoulder pitch and elbow. Metres and
+radians; x ahead, y left, z up, origin on the floor below the robot. Shoulder pitch is measured from hanging down,
+forward positive; the elbow flexes the forearm forward, so that an arm stays in one vertical plane.
+"""
+
+import math
+from collections.abc import Iterable, Mapping
+from math import atan2, cos, hypot, radians, sin
+from typing import Literal
+
+from msgspec import Struct
+
+from schemas.body import BodyPose, JointAngle, JointLimit, Ray
+from schemas.units import Meters, Radians, Vector
+
+Side = Literal["left", "right"]
+Pose = Mapping[str, float]
+"""Angle of each joint; radians, of the face 0..1."""
+
+HIP: Vector = (0.0, 0.0, 0.60)
+NECK: Vector = (0.0, 0.0, 1.10)
+EYES_AHEAD: Meters = 0.05
+EYES_ABOVE: Meters = 0.07
+SHOULDER: Mapping[Side, Vector] = {"left": (0.0, 0.20, 0.95), "right": (0.0, -0.20, 0.95)}
+UPPER_ARM: Meters = 0.20
+FOREARM: Meters = 0.25
+"""Elbow to the tip of the pointing hand."""
+TABLE_TOP: Meters = 0.72
+TABLE_EDGE: Meters = 0.20
+"""x of the edge at the robot's side."""
+CLEARANCE: Meters = 0.01
+REACH: Meters = 1.5
+"""How far from the shoulder something may be that is pointed at: farther, people can't tell."""
+HAND_TO_TARGET: Meters = 0.06
+"""Pointing is not touching."""
+SLIDE: Radians = radians(2.0)
+"""Shoulder pitch from stroke to stroke_end, the axis staying on target: what keeps the arm in motion."""
+
+
+def _joint(
+    name: str, part: str, low: float, high: float, speed: float, acceleration: float, home: float = 0.0
+) -> tuple[JointLimit, float]:
+    limit = JointLimit(
+        joint=name, part=part, low=radians(low), high=radians(high), speed=radians(speed),
+        acceleration=radians(acceleration),
+    )  # fmt: skip
+    return limit, radians(home)
+
+
+def _face(name: str, low: float) -> tuple[JointLimit, float]:
+    return JointLimit(joint=name, part="face", low=low, high=1.0, speed=8.0, acceleration=120.0), 0.0
+
+
+def _arm(side: Side, inward: int) -> list[tuple[JointLimit, float]]:
+    """inward: sign of a yaw towards the middle."""
+    low, high = sorted((-45.0 * inward, 80.0 * inward))
+    return [
+        _joint(f"{side}_shoulder_yaw", f"{side}_arm", low, high, 200, 2000),
+        _joint(f"{side}_shoulder_pitch", f"{side}_arm", -35, 110, 200, 2000, home=-15),
+        _joint(f"{side}_elbow", f"{side}_arm", 5, 145, 200, 2000, home=115),
+    ]
+
+
+_TABLE = [
+    _joint("torso_turn", "torso", -30, 30, 60, 300),
+    _joint("torso_lean", "torso", -15, 25, 60, 300),
+    _joint("neck_yaw", "head", -85, 85, 400, 6000),
+    _joint("neck_pitch", "head", -80, 40, 400, 6000),
+    *_arm("left", inward=-1),
+    *_arm("right", inward=1),
+    _face("brows", -1.0),
+    _face("lids", 0.0),
+    _face("mouth_corners", -1.0),
+    _face("mouth", 0.0),
+]
+JOINTS: tuple[JointLimit, ...] = tuple(limit for limit, _ in _TABLE)
+HOME: Mapping[str, float] = {limit.joint: home for limit, home in _TABLE}
+LIMIT: Mapping[str, JointLimit] = {limit.joint: limit for limit in JOINTS}
+PARTS: tuple[str, ...] = ("head", "torso", "left_arm", "right_arm", "face")
+
+
+class Unreachable(ValueError):
+    """No joint angles do it; the message says why."""
+
+
+class Aim(Struct, frozen=True):
+    """Arm angles (shoulder yaw, shoulder pitch, elbow) whose forearm axis runs through a target."""
+
+    stroke: tuple[float, float, float]
+    held: tuple[float, float, float]
+    """A little later, still on target."""
+
+
+def joints_of(part: str) -> tuple[str, ...]:
+    return tuple(limit.joint for limit in JOINTS if limit.part == part)
+
+
+def pose_message(pose: Pose) -> BodyPose:
+    return BodyPose(joints=tuple(JointAngle(name, angle) for name, angle in pose.items()))
+
+
+def gaze(pose: Pose) -> Ray:
+    """Gaze axis from between the eyes."""
+    yaw, pitch = pose["neck_yaw"], pose["neck_pitch"]
+    ahead = (cos(pitch) * cos(yaw), cos(pitch) * sin(yaw), sin(pitch))
+    up = (-sin(pitch) * cos(yaw), -sin(pitch) * sin(yaw), cos(pitch))
+    eyes = _add(NECK, _add(_scale(ahead, EYES_AHEAD), _scale(up, EYES_ABOVE)))
+    return Ray(origin=_to_world(eyes, pose), axis=_turned(ahead, pose))
+
+
+def arm(pose: Pose, side: Side) -> Ray:
+    """Forearm: from the elbow, tip at the hand."""
+    yaw, pitch = pose[f"{side}_shoulder_yaw"], pose[f"{side}_shoulder_pitch"]
+    elbow = _add(SHOULDER[side], _scale(_hanging(yaw, pitch), UPPER_ARM))
+    axis = _hanging(yaw, pitch + pose[f"{side}_elbow"])
+    hand = _add(elbow, _scale(axis, FOREARM))
+    return Ray(origin=_to_world(elbow, pose), axis=_turned(axis, pose), tip=_to_world(hand, pose))
+
+
+def look_at(target: Vector, pose: Pose, reserve: Radians = 0.0) -> tuple[float, float]:
+    """Neck yaw and pitch whose gaze axis runs through `target`, the torso as in `pose`.
+
+    reserve: kept free before the joints' limits, for a nod. Raises Unreachable.
+    """
+    x, y, z = _subtract(_to_torso(target, pose), NECK)
+    distance, above = hypot(x, y), z
+    if hypot(distance, above) <= EYES_ABOVE:
+        raise Unreachable("it is inside the head")
+    # The axis passes EYES_ABOVE the neck's pivot, so the pitch is a little less than the direction from the pivot.
+    angles = (atan2(y, x), atan2(above, distance) - math.asin(EYES_ABOVE / hypot(distance, above)))
+    for joint, angle in zip(("neck_yaw", "neck_pitch"), angles, strict=True):
+        if not LIMIT[joint].low + reserve <= angle <= LIMIT[joint].high - reserve:
+            raise Unreachable(f"{joint} cannot turn to {math.degrees(angle):.0f} degrees")
+    return angles
+
+
+def point_at(side: Side, target: Vector, radius: Meters, pose: Pose) -> Aim:
+    """Angles of the `side` arm that point at `target` without touching it, as extended as the table allows.
+
+    radius: of what is pointed at. Raises Unreachable.
+    """
+    x, y, z = _subtract(_to_torso(target, pose), SHOULDER[side])
+    distance = hypot(x, y, z)
+    if distance > REACH:
+        raise Unreachable(f"it is {distance:.2f} m from the {side} shoulder, farther than {REACH} m")
+    reason = ""
+    for degrees in range(20, -32, -2):
+        pitch = radians(degrees)
+        stroke, held = (_pointing(x, y, z, angle) for angle in (pitch, pitch - SLIDE))
+        reason = _objection(side, stroke, target, radius, pose) or _objection(side, held, target, radius, pose)
+        if not reason:
+            return Aim(stroke, held)
+    raise Unreachable(f"the {side} arm finds no way to point at it: {reason}")
+
+
+def touches_table(pose: Pose) -> str:
+    """Name of an arm of which elbow or hand is in the table or closer than the clearance, or nothing."""
+    for side in SHOULDER:
+        forearm = arm(pose, side)
+        assert forearm.tip is not None
+        if _in_table(forearm.origin) or _in_table(forearm.tip) or _in_table(_edge_crossing(forearm)):
+            return f"{side}_arm"
+    return ""
+
+
+def degrees_between(one: Iterable[float], other: Iterable[float]) -> float:
+    """Sum over joints of the rotation from one to the other, in degrees."""
+    return math.degrees(sum(abs(b - a) for a, b in zip(one, other, strict=True)))
+
+
+def _pointing(x: float, y: float, z: float, pitch: Radians) -> tuple[float, float, float]:
+    """For a target relative to the shoulder: the arm's plane holds it, and the forearm runs through it."""
+    ahead = hypot(x, y) - UPPER_ARM * sin(pitch)
+    above = z + UPPER_ARM * cos(pitch)
+    return atan2(y, x), pitch, atan2(ahead, -above) - pitch
+
+
+def _objection(side: Side, angles: tuple[float, float, float], target: Vector, radius: Meters, pose: Pose) -> str:
+    names = joints_of(f"{side}_arm")
+    for name, angle in zip(names, angles, strict=True):
+        if not LIMIT[name].low <= angle <= LIMIT[name].high:
+            return f"{name} cannot turn to {math.degrees(angle):.0f} degrees"
+    there = {**pose, **dict(zip(names, angles, strict=True))}
+    if touches_table(there) == f"{side}_arm":
+        return "the table is in the way"
+    hand = arm(there, side).tip
+    assert hand is not None
+    if math.dist(hand, target) < radius + HAND_TO_TARGET or math.dist(arm(there, side).origin, target) < FOREARM:
+        return "it is too near"
+    return ""
+
+
+def _in_table(point: Vector) -> bool:
+    return point[0] > TABLE_EDGE - CLEARANCE and point[2] < TABLE_TOP + CLEARANCE
+
+
+def _edge_crossing(forearm: Ray) -> Vector:
+    """Where the forearm passes the table's edge; its hand if it does not."""
+    assert forearm.tip is not None
+    (x0, y0, z0), (x1, y1, z1) = forearm.origin, forearm.tip
+    if not x0 < TABLE_EDGE < x1:
+        return forearm.tip
+    part = (TABLE_EDGE - x0) / (x1 - x0)
+    return (TABLE_EDGE, y0 + part * (y1 - y0), z0 + part * (z1 - z0))
+
+
+def _hanging(yaw: Radians, angle: Radians) -> Vector:
+    """Unit vector at `angle` from straight down, forward in the vertical plane at `yaw`."""
+    return (sin(angle) * cos(yaw), sin(angle) * sin(yaw), -cos(angle))
+
+
+def _turned(vector: Vector, pose: Pose) -> Vector:
+    """Torso frame to world, direction only: lean about y, then turn about z."""
+    (x, y, z), lean, turn = vector, pose["torso_lean"], pose["torso_turn"]
+    x, z = x * cos(lean) + z * sin(lean), z * cos(lean) - x * sin(lean)
+    return (x * cos(turn) - y * sin(turn), x * sin(turn) + y * cos(turn), z)
+
+
+def _to_world(point: Vector, pose: Pose) -> Vector:
+    return _add(HIP, _turned(_subtract(point, HIP), pose))
+
+
+def _to_torso(point: Vector, pose: Pose) -> Vector:
+    (x, y, z), lean, turn = _subtract(point, HIP), pose["torso_lean"], pose["torso_turn"]
+    x, y = x * cos(turn) + y * sin(turn), y * cos(turn) - x * sin(turn)
+    x, z = x * cos(lean) - z * sin(lean), z * cos(lean) + x * sin(lean)
+    return _add(HIP, (x, y, z))
+
+
+def _add(one: Vector, other: Vector) -> Vector:
+    return (one[0] + other[0], one[1] + other[1], one[2] + other[2])
+
+
+def _subtract(one: Vector, other: Vector) -> Vector:
+    return (one[0] - other[0], one[1] - other[1], one[2] - other[2])
+
+
+def _scale(vector: Vector, factor: float) -> Vector:
+    return (vector[0] * factor, vector[1] * factor, vector[2] * factor)

@@ -1,0 +1,360 @@
+"""Fluid motion in closed form: a path through joint space, and its play in time under a movement authority.
+
+A `Path` is a twice differentiable curve q(s), where s is the time in seconds at natural speed; each sync point lies
+at some s. A `Motion` plays it: s(t) is made of few parabolas, so that the instant at which a sync point is crossed
+is a formula and nobody has to step through the trajectory. It runs at a steady rate, brakes to a stop exactly at
+the authority's limit, and goes on without having stopped if the limit is moved in time.
+
+Speed and acceleration limits: q'' alone stays within `SHARE` of the acceleration, which leaves the rest to changes of
+the rate: |q''| rate^2 + |q'| |rate'| <= limit.
+"""
+
+import math
+from collections.abc import Sequence
+from math import inf, sqrt
+from typing import Any
+
+import numpy as np
+from msgspec import Struct
+from numpy.typing import NDArray
+
+from schemas.body import JointLimit
+from schemas.units import Seconds
+
+Array = NDArray[np.float64]
+
+SHARE = 0.6
+MARGIN = 0.97
+"""Peaks are found by sampling; what lies between two samples gets this much room."""
+AT_REST = 1e-9
+SAMPLES = np.linspace(0.0, 1.0, 33)
+_STRETCHES = tuple(1.1**step for step in range(40)) + tuple(0.9**step for step in range(1, 12))
+
+
+class State(Struct, frozen=True):
+    """Position, velocity and acceleration of some joints, in the order of their limits."""
+
+    q: Array
+    v: Array
+    a: Array
+
+    @property
+    def at_rest(self) -> bool:
+        return bool(np.all(np.abs(self.v) < AT_REST) and np.all(np.abs(self.a) < AT_REST))
+
+
+def resting(q: Sequence[float] | Array) -> State:
+    position = np.asarray(q, dtype=np.float64)
+    return State(position, np.zeros_like(position), np.zeros_like(position))
+
+
+class Leg(Struct, frozen=True, kw_only=True):
+    """A stretch of a path. Its end is passed with `velocity` (empty: rest) and without acceleration.
+
+    seconds: natural duration; longer if the limits ask for it.
+    marks: sync points, with the fraction of the leg's duration at which they lie.
+    """
+
+    goal: tuple[float, ...]
+    seconds: Seconds
+    velocity: tuple[float, ...] = ()
+    marks: tuple[tuple[str, float], ...] = ()
+
+
+class _Segment(Struct, frozen=True):
+    start: Seconds
+    seconds: Seconds
+    coefficients: Array
+    """6 x joints, of ascending powers of the time since `start`."""
+    leg: int
+
+
+class Path:
+    """Legs joined into one curve, from a state that may be in motion.
+
+    marks: sync point -> s. length: seconds at natural speed.
+    """
+
+    def __init__(self, start: State, legs: Sequence[Leg], limits: Sequence[JointLimit]) -> None:
+        self.legs = tuple(legs)
+        self.start = start
+        self.marks: dict[str, Seconds] = {}
+        self._limits = _Limits(limits)
+        self._segments: list[_Segment] = []
+        self._leg_starts: list[Seconds] = []
+        self.length = 0.0
+        state = self._limits.soften(start)
+        for index, leg in enumerate(self.legs):
+            state = self._append(index, leg, state)
+        self._peaks = [self._limits.peaks(segment.coefficients, segment.seconds) for segment in self._segments]
+
+    def _append(self, index: int, leg: Leg, state: State) -> State:
+        goal = np.asarray(leg.goal, dtype=np.float64)
+        velocity = np.asarray(leg.velocity or np.zeros_like(goal), dtype=np.float64)
+        end = State(goal, velocity, np.zeros_like(goal))
+        self._leg_starts.append(self.length)
+        still = np.allclose(state.q, goal, rtol=0.0, atol=1e-7) and state.at_rest and not velocity.any()
+        seconds = 0.0
+        if not (still and leg.seconds <= 0.0):
+            coefficients, seconds = self._limits.connect(state, end, max(leg.seconds, 0.02))
+            self._segments.append(_Segment(self.length, seconds, coefficients, index))
+        for sync, fraction in leg.marks:
+            self.marks[sync] = self.length + fraction * seconds
+        self.length += seconds
+        return end
+
+    def at(self, s: Seconds) -> State:
+        """q, q' and q'' at s."""
+        if not self._segments:
+            return resting(self.legs[-1].goal if self.legs else self.start.q)
+        segment = self._segment(s)
+        return _evaluate(segment.coefficients, min(max(s - segment.start, 0.0), segment.seconds))
+
+    def after(self, s: Seconds) -> tuple[Leg, ...]:
+        """What is left at s, as legs, with the sync points that lie beyond s."""
+        index = max((i for i, start in enumerate(self._leg_starts) if start <= s + 1e-12), default=0)
+        ends = [*self._leg_starts[1:], self.length]
+        legs = []
+        for leg, start, end in list(zip(self.legs, self._leg_starts, ends, strict=True))[index:]:
+            since = max(start, s)
+            left = end - since
+            if left <= 1e-12 and end - start > 0.0:
+                continue
+            marks = tuple(
+                (sync, (self.marks[sync] - since) / left if left > 0.0 else 1.0)
+                for sync, _ in leg.marks
+                if self.marks[sync] > s + 1e-12
+            )
+            legs.append(Leg(goal=leg.goal, velocity=leg.velocity, seconds=left, marks=marks))
+        return tuple(legs)
+
+    @property
+    def fastest(self) -> float:
+        """The highest steady rate that the limits permit; at least 1."""
+        speed = max((speed for speed, _ in self._peaks), default=0.0)
+        acceleration = max((acceleration for _, acceleration in self._peaks), default=0.0)
+        return max(1.0, min(4.0, MARGIN / max(speed, 0.01), sqrt(MARGIN * SHARE / max(acceleration, 0.01))))
+
+    def steepest_brake(self, s: Seconds, rate: float = 1.0) -> float:
+        """How quickly the rate may fall to 0 at s, in 1/s: quickly where the path is slow anyway."""
+        brake = 40.0
+        while brake > 0.5:
+            window = np.linspace(max(0.0, s - rate * rate / (2 * brake)), s, 9)
+            if all(self._limits.permits_brake(self.at(float(point)), brake) for point in window):
+                break
+            brake *= 0.8
+        return brake
+
+    @property
+    def gentlest_brake(self) -> float:
+        """A change of the rate that the limits permit anywhere on this path, in 1/s."""
+        return self._limits.brake_anywhere
+
+    def _segment(self, s: Seconds) -> _Segment:
+        for segment in self._segments:
+            if s < segment.start + segment.seconds:
+                return segment
+        return self._segments[-1]
+
+
+class _Limits:
+    def __init__(self, limits: Sequence[JointLimit]) -> None:
+        self.low = np.array([limit.low for limit in limits])
+        self.high = np.array([limit.high for limit in limits])
+        self.speed = np.array([limit.speed for limit in limits])
+        self.acceleration = np.array([limit.acceleration for limit in limits])
+        self.brake_anywhere = float(np.min((1 - SHARE) * self.acceleration / self.speed)) if len(limits) else 1.0
+
+    def soften(self, state: State) -> State:
+        """The state with an acceleration that a path may have."""
+        bound = MARGIN * SHARE * self.acceleration
+        return State(state.q, state.v, np.clip(state.a, -bound, bound))
+
+    def connect(self, start: State, end: State, seconds: Seconds) -> tuple[Array, Seconds]:
+        """The quintic between two states that takes `seconds`, or as near to it as keeps the limits."""
+        best: tuple[float, Array, Seconds] | None = None
+        for stretch in _STRETCHES:
+            duration = seconds * stretch
+            coefficients = _quintic(start, end, duration)
+            excess = self._excess(coefficients, duration)
+            if excess <= 0.0:
+                return coefficients, duration
+            if best is None or excess < best[0]:
+                best = (excess, coefficients, duration)
+        assert best is not None
+        return best[1], best[2]
+
+    def peaks(self, coefficients: Array, seconds: Seconds) -> tuple[float, float]:
+        """Largest speed and acceleration, as fractions of the joints' limits."""
+        _, speed, acceleration = _sampled(coefficients, seconds)
+        return (
+            float(np.max(np.abs(speed) / self.speed)),
+            float(np.max(np.abs(acceleration) / self.acceleration)),
+        )
+
+    def permits_brake(self, state: State, brake: float) -> bool:
+        return bool(np.all(np.abs(state.v) * brake <= (1 - SHARE) * self.acceleration))
+
+    def _excess(self, coefficients: Array, seconds: Seconds) -> float:
+        """By how much the worst limit is exceeded, as a fraction of it; <= 0 if none is."""
+        position, _, _ = _sampled(coefficients, seconds)
+        speed, acceleration = self.peaks(coefficients, seconds)
+        outside = float(np.max(np.maximum(self.low - position, position - self.high) / (self.high - self.low)))
+        return max(speed / MARGIN - 1.0, acceleration / (MARGIN * SHARE) - 1.0, outside - 1e-9)
+
+
+class _Piece(Struct, frozen=True):
+    t: Seconds
+    s: Seconds
+    rate: float
+    slope: float
+
+    def s_at(self, t: Seconds) -> Seconds:
+        since = t - self.t
+        return self.s + self.rate * since + self.slope * since * since / 2
+
+    def rate_at(self, t: Seconds) -> float:
+        return max(0.0, self.rate + self.slope * (t - self.t))
+
+
+class Motion:
+    """A path being played from `start` on. Pure: ask it about any instant from the last change on.
+
+    cruise: the steady rate, 1 = natural. limit: the s where it has to stop, until `extend` moves it.
+    """
+
+    def __init__(self, path: Path, start: Seconds, *, cruise: float = 1.0, limit: Seconds = inf) -> None:
+        self.path = path
+        self.cruise = min(cruise, path.fastest)
+        self.limit = limit
+        # From rest the rate may jump: nothing moves yet. A path that starts in motion was built for rate 1.
+        self._replan(start, 0.0, self.cruise if path.start.at_rest else 1.0)
+
+    def extend(self, limit: Seconds, now: Seconds) -> None:
+        """Move the limit further along. A motion that still brakes for the old one picks up speed again."""
+        if limit > self.limit:
+            s, rate = self.s(now), self.rate(now)
+            self.limit = limit
+            self._replan(now, s, rate)
+
+    def brake(self, now: Seconds) -> None:
+        """Stop as soon as the limits permit."""
+        s, rate = self.s(now), self.rate(now)
+        self.limit = min(self.limit, s + rate * rate / (2 * self.path.gentlest_brake))
+        self._replan(now, s, rate)
+
+    def s(self, t: Seconds) -> Seconds:
+        if t >= self.end:
+            return self._stop
+        return min(self._piece(t).s_at(t), self._stop)
+
+    def rate(self, t: Seconds) -> float:
+        return 0.0 if t >= self.end else self._piece(t).rate_at(t)
+
+    def at(self, t: Seconds) -> State:
+        """Where the joints are, and how they move."""
+        if t >= self.end:
+            return resting(self.path.at(self._stop).q)
+        piece = self._piece(t)
+        rate, state = piece.rate_at(t), self.path.at(min(piece.s_at(t), self._stop))
+        return State(state.q, state.v * rate, state.a * rate * rate + state.v * piece.slope)
+
+    def crossing(self, s: Seconds) -> Seconds | None:
+        """When s is reached; None if it lies beyond the limit."""
+        if s > self._stop + 1e-12:
+            return None
+        if s >= self._stop - 1e-12:
+            return self.end
+        piece = next((piece for piece in reversed(self._pieces) if piece.s <= s), self._pieces[0])
+        root = sqrt(max(0.0, piece.rate * piece.rate + 2 * piece.slope * (s - piece.s)))
+        return piece.t + 2 * (s - piece.s) / (piece.rate + root) if s > piece.s else piece.t
+
+    def _piece(self, t: Seconds) -> _Piece:
+        return next((piece for piece in reversed(self._pieces) if piece.t <= t), self._pieces[0])
+
+    def _replan(self, now: Seconds, s: Seconds, rate: float) -> None:
+        self._stop = max(s, min(self.limit, self.path.length))
+        self._pieces: list[_Piece] = []
+        left = self._stop - s
+        if left <= 0.0:
+            self.end = now
+            self._pieces.append(_Piece(now, s, 0.0, 0.0))
+            return
+        if rate == 0.0 and self.path.at(s).at_rest:
+            rate = self.cruise
+        brake = (
+            inf if self.path.at(self._stop).at_rest else self.path.steepest_brake(self._stop, max(rate, self.cruise))
+        )
+        change = self.path.gentlest_brake
+        top, braking = _top_rate(rate, self.cruise, left, change, brake)
+        now, s, rate = self._ramp(now, s, rate, top, change, self._stop)
+        steady = self._stop - s - braking
+        if rate > 0.0 and steady > 0.0:
+            self._pieces.append(_Piece(now, s, rate, 0.0))
+            now, s = now + steady / rate, s + steady
+        if braking > 0.0:
+            self._pieces.append(_Piece(now, s, rate, -rate * rate / (2 * (self._stop - s))))
+            now += 2 * (self._stop - s) / rate
+        if not self._pieces:
+            self._pieces.append(_Piece(now, s, 0.0, 0.0))
+        self.end = now
+
+    def _ramp(
+        self, now: Seconds, s: Seconds, rate: float, to: float, change: float, stop: Seconds
+    ) -> tuple[Seconds, Seconds, float]:
+        if math.isclose(rate, to, rel_tol=1e-12, abs_tol=1e-12):
+            return now, s, to
+        slope = math.copysign(change, to - rate)
+        seconds = (to - rate) / slope
+        piece = _Piece(now, s, rate, slope)
+        self._pieces.append(piece)
+        if piece.s_at(now + seconds) >= stop:
+            root = sqrt(max(0.0, rate * rate + 2 * slope * (stop - s)))
+            return now + 2 * (stop - s) / (rate + root), stop, root
+        return now + seconds, piece.s_at(now + seconds), to
+
+
+def _top_rate(rate: float, cruise: float, left: Seconds, change: float, brake: float) -> tuple[float, Seconds]:
+    """The highest rate from which one can still stop after `left`, and how much of `left` the braking takes."""
+    if brake == inf:
+        return cruise, 0.0
+    ramp = abs(cruise * cruise - rate * rate) / (2 * change)
+    if ramp + cruise * cruise / (2 * brake) <= left:
+        return cruise, cruise * cruise / (2 * brake)
+    if rate * rate / (2 * brake) >= left:
+        return rate, left
+    top = sqrt((left + rate * rate / (2 * change)) / (1 / (2 * change) + 1 / (2 * brake)))
+    top = max(rate, min(top, max(rate, cruise)))
+    return top, top * top / (2 * brake)
+
+
+def _quintic(start: State, end: State, seconds: Seconds) -> Array:
+    """Coefficients of the polynomial of degree five that joins two states in `seconds`."""
+    t, h = seconds, end.q - start.q
+    return np.array(
+        [
+            start.q,
+            start.v,
+            start.a / 2,
+            (20 * h - (8 * end.v + 12 * start.v) * t - (3 * start.a - end.a) * t**2) / (2 * t**3),
+            (-30 * h + (14 * end.v + 16 * start.v) * t + (3 * start.a - 2 * end.a) * t**2) / (2 * t**4),
+            (12 * h - 6 * (end.v + start.v) * t + (end.a - start.a) * t**2) / (2 * t**5),
+        ]
+    )
+
+
+_POWERS = np.arange(6)
+_FIRST = np.arange(1, 6)
+_SECOND = np.arange(2, 6) * np.arange(1, 5)
+
+
+def _evaluate(c: Array, t: Seconds) -> State:
+    powers = t**_POWERS
+    first = powers[:5] * _FIRST
+    second = powers[:4] * _SECOND
+    return State(powers @ c, first @ c[1:], second @ c[2:])
+
+
+def _sampled(c: Array, seconds: Seconds) -> tuple[Any, Any, Any]:
+    powers = (SAMPLES * seconds)[:, None] ** _POWERS
+    return powers @ c, (powers[:, :5] * _FIRST) @ c[1:], (powers[:, :4] * _SECOND) @ c[2:]

@@ -1,0 +1,93 @@
+"""A behavior in motion: how far it may go, which sync points are still to come, and the faults it is due."""
+
+from math import inf
+
+from schemas.behaviors import BlockBehavior
+from schemas.units import Seconds
+from services.control import variability
+from services.control.body import Authority
+from services.control.choreography import Course, Point
+from services.control.config import Stall, Variability
+from services.control.motion import Leg, Motion, Path
+from services.control.waiting import Bell
+
+STALL, OVERHEAT = "(stall)", "(overheat)"
+"""Points of a path that only the simulation knows."""
+
+
+class Run:
+    """`course` under `authority`. Its bell rings when the authority changes or another behavior takes over.
+
+    cut_at: when a later behavior took its parts. holding: it stands at a hold point.
+    """
+
+    def __init__(
+        self, behavior: BlockBehavior, course: Course, authority: Authority, deviations: Variability, occasion: int
+    ) -> None:
+        self.behavior = behavior
+        self.course = course
+        self.authority = authority
+        self.bell = Bell()
+        self.pending: list[Point] = list(course.points)
+        self.holding = False
+        self.cut_at: Seconds | None = None
+        self.motion: Motion
+        real = ("head",) if course.parts == ("nod",) else course.parts
+        self.cruise = variability.rate(deviations, real, behavior.id, occasion)
+        self.stall: Stall | None = variability.stall(deviations, real, behavior)
+        if self.stall is not None:
+            self._expect(STALL, self.stall.before)
+        if variability.overheats(deviations, real):
+            self._expect(OVERHEAT, "stroke" if self.awaits("stroke") else "end")
+
+    def awaits(self, sync: str) -> bool:
+        return any(point.sync == sync for point in self.pending)
+
+    @property
+    def left(self) -> list[str]:
+        """Sync points still to be reported."""
+        return [point.sync for point in self.pending if point.sync not in (STALL, OVERHEAT)]
+
+    @property
+    def is_over(self) -> bool:
+        return self.cut_at is not None or self.authority.revoked is not None
+
+    def play(self, motion: Motion) -> None:
+        self.motion = motion
+
+    def limit(self, path: Path) -> Seconds:
+        """How far along `path` it may go now."""
+        for point in self.pending:
+            if point.sync in (STALL, OVERHEAT) or (point.held_with and not self.authority.covers(point.held_with)):
+                return path.marks.get(point.sync, inf)
+        return inf
+
+    def cut(self, now: Seconds) -> None:
+        """A later behavior has taken over."""
+        self.cut_at = now
+        self.bell.ring()
+
+    def _expect(self, fault: str, before: str) -> None:
+        """Put `fault` half-way to sync point `before`, on the leg that has it."""
+        index = next((i for i, point in enumerate(self.pending) if point.sync == before), None)
+        if index is None:
+            return
+        legs = tuple(_marked(leg, fault, before) for leg in self.course.legs)
+        self.course = _with_legs(self.course, legs)
+        self.pending.insert(index, Point(fault))
+
+
+def _marked(leg: Leg, fault: str, before: str) -> Leg:
+    fractions = dict(leg.marks)
+    if before not in fractions:
+        return leg
+    earlier = max((fraction for fraction in fractions.values() if fraction < fractions[before]), default=0.0)
+    marks = (*leg.marks, (fault, (earlier + fractions[before]) / 2))
+    return Leg(goal=leg.goal, velocity=leg.velocity, seconds=leg.seconds, marks=marks)
+
+
+def _with_legs(course: Course, legs: tuple[Leg, ...]) -> Course:
+    return Course(
+        parts=course.parts, joints=course.joints, legs=legs, points=course.points, on_target=course.on_target,
+        degrees=course.degrees, ray=course.ray,
+    )  # fmt: skip

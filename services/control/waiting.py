@@ -1,0 +1,29 @@
+"""Waiting for an instant or for news, whichever comes first."""
+
+import asyncio
+from math import inf
+
+from schemas.units import Seconds
+
+
+class Bell:
+    """One task waits with `heard`; anybody may `ring`, before or while it waits."""
+
+    def __init__(self) -> None:
+        self._loop = asyncio.get_running_loop()
+        self._rung = asyncio.Event()
+
+    def ring(self) -> None:
+        self._rung.set()
+
+    async def heard(self, until: Seconds) -> None:
+        """Return once the bell has been rung since the last time, or at loop time `until` (inf: never)."""
+        if self._loop.time() >= until:
+            return
+        timer = None if until == inf else self._loop.call_at(until, self._rung.set)
+        try:
+            await self._rung.wait()
+            self._rung.clear()
+        finally:
+            if timer is not None:
+                timer.cancel()
