@@ -1,0 +1,67 @@
+import json
+from pathlib import Path
+
+import pytest
+
+from tests.cli.command import FRAGMENT, GOOD_BLOCK, Engage
+
+
+@pytest.fixture
+def block(tmp_path: Path) -> Path:
+    path = tmp_path / "hello.xml"
+    path.write_text(GOOD_BLOCK)
+    return path
+
+
+def test_the_text_shows_the_schedule(engage: Engage, block: Path) -> None:
+    result = engage("plan", block)
+
+    assert result.code == 0
+    assert result.out.startswith("block hello: ")
+    assert "look:stroke = words:start" in result.out
+
+
+def test_the_json_has_every_point_with_its_time(engage: Engage, block: Path) -> None:
+    document = json.loads(engage("plan", "--format", "json", block).out)
+
+    behaviors = document["behaviors"]
+    assert behaviors["look"]["stroke"] == behaviors["words"]["start"] > 0
+
+
+def test_the_dot_is_a_graph(engage: Engage, block: Path) -> None:
+    assert engage("plan", "--format", "dot", block).out.startswith('digraph "hello" {')
+
+
+def test_durations_are_those_of_the_simulated_body_in_the_given_world(
+    engage: Engage, block: Path, tmp_path: Path
+) -> None:
+    strokes = []
+    for name, y in (("ahead", 0.0), ("aside", 0.6)):
+        world = tmp_path / f"{name}.json"
+        world.write_text(f'{{"entities": [{{"id": "rectangle", "kind": "object", "position": [0.6, {y}, 1.2]}}]}}')
+        document = json.loads(engage("plan", "--format", "json", "--world", world, block).out)
+        strokes.append(document["behaviors"]["look"]["stroke"])
+
+    assert strokes[0] < strokes[1]
+
+
+def test_a_target_the_world_does_not_know_is_dropped_with_a_problem(
+    engage: Engage, block: Path, tmp_path: Path
+) -> None:
+    world = tmp_path / "empty.json"
+    world.write_text('{"entities": []}')
+
+    document = json.loads(engage("plan", "--format", "json", "--world", world, block).out)
+
+    assert document["dropped"] == ["look"]
+    assert [problem["kind"] for problem in document["problems"]] == ["NO_SUCH_TARGET"]
+
+
+def test_a_fragment_is_planned_as_the_block_it_becomes(engage: Engage, tmp_path: Path) -> None:
+    path = tmp_path / "ask.xml"
+    path.write_text(FRAGMENT)
+
+    document = json.loads(engage("plan", "--format", "json", path).out)
+
+    assert document["block"] == "ask"
+    assert any("stroke_start" in points for points in document["behaviors"].values())

@@ -1,0 +1,141 @@
+"""`engage play --embedded --virtual-time`: the whole way from a file to what the body did, in no time."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from tests.cli.command import FRAGMENT, GOOD_BLOCK, Engage
+
+PLAY = ("play", "--embedded", "--virtual-time")
+LONG = '<bml id="long"><speech id="s"><text>One two three four five six seven eight nine ten.</text></speech></bml>'
+REPLACE = '<bml id="new" composition="REPLACE"><gaze id="g" target="trapezoid"/></bml>'
+
+
+@pytest.fixture
+def files(tmp_path: Path) -> dict[str, Path]:
+    texts = {"hello": GOOD_BLOCK, "ask": FRAGMENT, "long": LONG, "new": REPLACE}
+    for name, text in texts.items():
+        (tmp_path / f"{name}.xml").write_text(text)
+    return {name: tmp_path / f"{name}.xml" for name in texts}
+
+
+def lines(text: str, **fields: object) -> list[dict[str, Any]]:
+    """The JSON lines that have these fields."""
+    return [line for line in map(json.loads, text.splitlines()) if fields.items() <= line.items()]
+
+
+def points(text: str, behavior: str) -> dict[str, float]:
+    return {line["sync"]: line["time"] for line in lines(text, type="sync_point_progress", behavior=behavior)}
+
+
+def test_a_block_is_performed_and_its_feedback_is_json_lines(engage: Engage, files: dict[str, Path]) -> None:
+    result = engage(*PLAY, "--feedback", "-", files["hello"])
+
+    assert result.code == 0, result.err
+    assert [line["status"] for line in lines(result.out, type="block_progress", progress="end")] == ["done"]
+    assert points(result.out, "words")["start"] == pytest.approx(points(result.out, "look")["stroke"], abs=1e-3)
+    assert list(points(result.out, "look")) == [
+        "start",
+        "ready",
+        "stroke_start",
+        "stroke",
+        "stroke_end",
+        "relax",
+        "end",
+    ]
+
+
+def test_only_the_played_block_is_written(engage: Engage, files: dict[str, Path]) -> None:
+    result = engage(*PLAY, "--feedback", "-", files["ask"])
+
+    assert {line["block"] for line in map(json.loads, result.out.splitlines())} == {"ask"}
+
+
+def test_no_policy_moves_the_head_beside_a_plain_block(
+    engage: Engage, files: dict[str, Path], tmp_path: Path
+) -> None:
+    events = tmp_path / "events.jsonl"
+
+    result = engage(*PLAY, "--events", events, files["hello"])
+
+    assert result.code == 0, result.err
+    assert events.read_text() == ""
+
+
+def test_a_fragment_starts_its_connection_events(engage: Engage, files: dict[str, Path]) -> None:
+    result = engage(*PLAY, "--events", "-", files["ask"])
+
+    assert result.code == 0, result.err
+    kinds = [line["kind"] for line in lines(result.out, state="started", initiator="robot")]
+    assert kinds == ["adjacency_pair", "directed_gaze", "mutual_facial_gaze"]
+
+
+def test_files_come_one_after_the_other(engage: Engage, files: dict[str, Path]) -> None:
+    result = engage(*PLAY, "--feedback", "-", files["long"], files["hello"])
+
+    (end,) = lines(result.out, block="long", progress="end")
+    (start,) = lines(result.out, block="hello", progress="start")
+    assert result.code == 0, result.err
+    assert start["global_time"] >= end["global_time"]
+
+
+def test_at_gives_each_file_its_time(engage: Engage, files: dict[str, Path]) -> None:
+    result = engage(*PLAY, "--at", "0.5,0", "--feedback", "-", files["hello"], files["long"])
+
+    (first,) = lines(result.out, block="long", progress="start")
+    (second,) = lines(result.out, block="hello", progress="start")
+    assert result.code == 0, result.err
+    assert second["global_time"] - first["global_time"] == pytest.approx(0.5)
+
+
+def test_a_block_that_another_file_replaces_counts_as_done(engage: Engage, files: dict[str, Path]) -> None:
+    result = engage(*PLAY, "--at", "0,1", "--feedback", "-", files["long"], files["new"])
+
+    assert [line["status"] for line in lines(result.out, block="long", progress="end")] == ["interrupted"]
+    assert result.code == 0, result.err
+
+
+def test_failing_at_run_time_is_exit_code_3(engage: Engage, files: dict[str, Path], tmp_path: Path) -> None:
+    path = tmp_path / "must.xml"
+    path.write_text('<bml id="must"><pointing id="p" target="rectangle" required="true"/></bml>')
+
+    result = engage(*PLAY, "--set", "control.variability.overheated=['left_arm','right_arm']", path, files["hello"])
+
+    assert result.code == 3
+    assert result.err.startswith(f"{path}")
+    assert result.err.count("\n") == 1
+
+
+def test_the_log_says_what_happens(engage: Engage, files: dict[str, Path]) -> None:
+    result = engage(*PLAY, files["hello"])
+
+    assert 'robot: "A rectangle."' in result.out
+    assert "robot looks at rectangle" in result.out
+    assert "block hello: done" in result.out
+
+
+def test_quiet_prints_nothing(engage: Engage, files: dict[str, Path]) -> None:
+    assert engage(*PLAY, "--quiet", files["hello"]) == (0, "", "")
+
+
+def test_json_is_as_good_as_xml(engage: Engage, tmp_path: Path) -> None:
+    path = tmp_path / "look.json"
+    path.write_text('{"type": "block", "id": "j", "behaviors": [{"type": "gaze", "id": "g", "target": "rectangle"}]}')
+
+    result = engage(*PLAY, "--feedback", "-", path)
+
+    assert result.code == 0, result.err
+    assert "stroke" in points(result.out, "g")
+
+
+def test_a_world_of_ones_own(engage: Engage, tmp_path: Path) -> None:
+    world, block = tmp_path / "world.json", tmp_path / "cup.xml"
+    world.write_text('{"entities": [{"id": "cup", "kind": "object", "position": [0.5, 0.1, 0.8]}]}')
+    block.write_text('<bml id="b"><gaze id="g" target="cup"/></bml>')
+
+    result = engage(*PLAY, "--world", world, "--feedback", "-", block)
+
+    assert result.code == 0, result.err
+    assert "stroke" in points(result.out, "g")

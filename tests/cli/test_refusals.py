@@ -1,0 +1,184 @@
+"""Bad input: one line on standard error, `file:line: reason (advice)`, exit code 2, and nothing has moved."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from tests.cli.command import FRAGMENT, GOOD_BLOCK, Engage
+
+BAD = {
+    "cut.xml": ('<bml id="b">\n  <gaze id="g" target="rectangle"', "2", "malformed XML"),
+    "crossed.xml": ('<bml id="b">\n  <gaze id="g" target="x">\n</bml>', "3", "malformed XML"),
+    "foreign.xml": ("<html/>", "1", "neither BML nor EBML"),
+    "typo.xml": ('<bml id="b">\n  <gaze id="g" target="x"/>\n  <face id="h" start="k:end"/>\n</bml>', "3", "unknown"),
+    "twice.xml": ('<bml id="b">\n  <gaze id="g" target="x"/>\n  <gaze id="g" target="y"/>\n</bml>', "3", "duplicate"),
+    "nameless.xml": ('<bml>\n  <gaze id="g" target="x"/>\n</bml>', "", "id"),
+    "bomb.xml": ('<!DOCTYPE a [<!ENTITY b "c">]>\n<bml id="b"/>', "", "<!DOCTYPE>"),
+    "empty.xml": ("", "", "empty"),
+    "text.txt": ("hello", "", "neither XML nor JSON"),
+    "cut.json": ('{"id": "b",\n "behaviors": [', "", "JSON"),
+    "wrong.json": ('{"type": "block", "id": "b", "behaviors": [{"type": "gaze", "id": "g", "target": 3}]}', "",
+                   "behaviors[0].target"),
+    "unknown.json": ('{"type": "block", "id": "b", "behaviours": []}', "", "behaviours"),
+    "reliability.xml": (FRAGMENT.replace("0.95", "1.5"), "3", "1.5"),
+    "optionless.xml": (FRAGMENT.replace('<ebml:speechOption text="the blue piece" cost="3"/>', ""), "3", "phrase"),
+}  # fmt: skip
+
+
+@pytest.fixture(params=BAD)
+def bad(request: pytest.FixtureRequest, tmp_path: Path) -> tuple[Path, str, str]:
+    text, line, reason = BAD[request.param]
+    path = tmp_path / request.param
+    path.write_text(text)
+    return path, line, reason
+
+
+@pytest.mark.parametrize("command", [("plan",), ("play", "--embedded", "--virtual-time")], ids=["plan", "play"])
+def test_a_bad_file_is_refused_with_place_and_reason(
+    engage: Engage, bad: tuple[Path, str, str], command: tuple[str, ...]
+) -> None:
+    path, line, reason = bad
+
+    result = engage(*command, path)
+
+    assert result.code == 2
+    assert result.out == ""
+    assert result.err.startswith(f"{path}:{line}: " if line else f"{path}:")
+    assert reason in result.err
+    assert result.err.count("\n") == 1
+
+
+@pytest.mark.parametrize(
+    ("text", "reason"),
+    [
+        (FRAGMENT.replace("blue-square", "blue-squere"), "the world does not know the object 'blue-squere'"),
+        (FRAGMENT.replace('id="ask"', 'id="ask" addressee="nobody"'), "the world does not know the person 'nobody'"),
+    ],
+)
+def test_a_fragment_about_unknown_things_is_refused(engage: Engage, tmp_path: Path, text: str, reason: str) -> None:
+    path = tmp_path / "ask.xml"
+    path.write_text(text)
+
+    result = engage("play", "--embedded", "--virtual-time", path)
+
+    assert result.code == 2
+    assert result.err.startswith(f"{path}:")
+    assert reason in result.err
+
+
+def test_contradictory_constraints_are_refused_by_line(engage: Engage, tmp_path: Path) -> None:
+    path = tmp_path / "circle.xml"
+    path.write_text(
+        """<bml id="b">
+  <gaze id="a" target="rectangle"/>
+  <gaze id="b1" target="trapezoid"/>
+  <constraint>
+    <after ref="a:end"><sync ref="b1:start"/></after>
+    <after ref="b1:end"><sync ref="a:start"/></after>
+  </constraint>
+</bml>"""
+    )
+
+    result = engage("plan", path)
+
+    assert result.code == 2
+    assert result.err.startswith(f"{path}:")
+    assert "5" in result.err
+    assert "6" in result.err
+
+
+def test_nothing_of_a_good_file_moves_when_another_is_bad(engage: Engage, tmp_path: Path) -> None:
+    good, bad, feedback = tmp_path / "good.xml", tmp_path / "bad.xml", tmp_path / "feedback.jsonl"
+    good.write_text(GOOD_BLOCK)
+    bad.write_text(BAD["typo.xml"][0])
+
+    result = engage("play", "--embedded", "--virtual-time", "--feedback", feedback, good, bad)
+
+    assert result.code == 2
+    (line,) = map(json.loads, feedback.read_text().splitlines())
+    assert (line["type"], line["block"], line["kind"]) == ("warning", "b", "PARSING_FAILURE")
+
+
+def test_malformed_xml_warns_about_no_block(engage: Engage, tmp_path: Path) -> None:
+    bad, feedback = tmp_path / "bad.xml", tmp_path / "feedback.jsonl"
+    bad.write_text(BAD["cut.xml"][0])
+
+    engage("play", "--embedded", "--virtual-time", "--feedback", feedback, bad)
+
+    (line,) = map(json.loads, feedback.read_text().splitlines())
+    assert (line["type"], line["block"]) == ("warning", None)
+
+
+@pytest.mark.parametrize(
+    ("world", "reason"),
+    [
+        ("{", "truncated"),
+        ('{"entities": 3}', "array"),
+        ('{"things": []}', "things"),
+        ('{"entities": [{"id": "cup", "kind": "mug", "position": [0, 0, 0]}]}', "mug"),
+        ('{"entities": [{"id": "cup", "kind": "object", "position": [0, 0]}]}', "position"),
+        ('{"entities": [{"id": "", "kind": "object", "position": [1, 0, 0]}]}', "without an id"),
+    ],
+)  # fmt: skip
+def test_a_bad_world_is_refused(engage: Engage, tmp_path: Path, world: str, reason: str) -> None:
+    block, path = tmp_path / "b.xml", tmp_path / "world.json"
+    block.write_text(GOOD_BLOCK)
+    path.write_text(world)
+
+    for command in (("plan",), ("play", "--embedded", "--virtual-time")):
+        result = engage(*command, block, "--world", path)
+        assert result.code == 2
+        assert result.err.startswith(f"{path}: ")
+        assert reason in result.err
+
+
+@pytest.mark.parametrize(
+    ("toml", "reason"),
+    [
+        ("[recognition", "not TOML"),
+        ("robbot = 'x'", "robbot"),
+        ("[recognition]\ngaze_resolution = 'room'", "recognition.gaze_resolution"),
+        ("[recognition]\nspeed = 3", "`speed`"),
+        ("[generation]\nglance_factor = -1", "glance_factor must be positive"),
+        ("robot = 'a/b'", "a/b"),
+        ("generation = 3", "generation"),
+    ],
+)
+def test_a_bad_configuration_is_refused_with_file_and_key(
+    engage: Engage, tmp_path: Path, toml: str, reason: str
+) -> None:
+    path = tmp_path / "engage.toml"
+    path.write_text(toml)
+
+    for command in (["demo"], ["run", "realizer"], ["up"], ["watch"]):
+        result = engage(*command, "--config", path)
+        assert result.code == 2
+        assert result.err.startswith(f"{path}: ")
+        assert reason in result.err
+
+
+@pytest.mark.parametrize(
+    ("arguments", "reason"),
+    [
+        (["fly"], "No such command 'fly'"),
+        (["run", "nobody"], "'nobody' is not one of"),
+        (["plan"], "Missing argument 'FILE'"),
+        (["demo", "--events", "no/such/folder/x"], "no/such/folder/x: cannot write"),
+        (["demo", "--config", "missing.toml"], "missing.toml: No such file"),
+        (["play", "missing.xml"], "missing.xml: No such file"),
+        (["play", "--virtual-time", "x.xml"], "add --embedded"),
+        (["play", "--embedded", "--at", "1,2", "x.xml"], "2 times for 1 files"),
+        (["play", "--embedded", "--at", "soon", "x.xml"], "not a list of seconds"),
+        (["play", "--embedded", "--at=-1", "x.xml"], "negative"),
+        (["play", "--embedded", "--at", "nan", "x.xml"], "negative or endless"),
+        (["demo", "--set", "recognition"], "section.key=value"),
+        (["demo", "--set", "recognition.speed=1"], "speed"),
+    ],
+)
+def test_a_misused_command_is_one_line(engage: Engage, arguments: list[str], reason: str) -> None:
+    result = engage(*arguments)
+
+    assert result.code == 2
+    assert reason in result.err
+    assert result.err.count("\n") == 1
