@@ -102,10 +102,13 @@ includes them.
 
 ## Payloads
 
-MessagePack by default, JSON on request. The encoding of a sample names form, message and major version:
+Engage sends MessagePack and understands JSON as well. The encoding of a sample names form, message and major version:
 `application/msgpack;engage.SyncPointReached/1`, `application/json;engage.PerformFragment/1`; the part after `;` may be
 missing. Another major version is refused by name. A payload is one struct; its field `type` says which. Fields at
 their default are left out. Unknown fields are ignored on the bus (a newer peer may send them).
+
+Where blocks and fragments go, `application/xml` may stand for BML or EBML; the id of the request is then that of the
+block or fragment.
 
 - Instants are `[clock, seconds]` (`Stamp`): seconds on a named monotonic clock. Instants of different clocks compare
   only through an estimated offset; durations are plain seconds.
@@ -175,8 +178,8 @@ Whatever is wrong is refused whole, before anything moves, with file, line (XML)
 
 ## JSON lines
 
-`--feedback FILE` and `--events FILE` (of `engage demo`, `play`, ...) write one JSON object per line. These are public: keys may
-be added, but none is renamed or removed. Every key is always there; what is not known is `null`. Times are seconds,
+`--feedback FILE` and `--events FILE` (of `engage demo`, `up` and `play`) write one JSON object per line; `engage watch
+--json` prints both kinds, and every other message as it is. These are public: keys may be added, but none is renamed or removed. Every key is always there; what is not known is `null`. Times are seconds,
 rounded to microseconds; `time` of feedback counts from the start of the block, `global_time` and `time` of events are
 instants of the bus clock.
 
@@ -185,7 +188,7 @@ instants of the bus clock.
 | feedback | `block_progress` | `block`, `progress` (`start` or `end`), `status` (at the end: `done`, `failed`, `interrupted`), `time`, `global_time` |
 | feedback | `sync_point_progress` | `block`, `behavior`, `sync`, `time`, `global_time`, `predicted`, `source` (`body` or `clock`), `arrived`, `skew` |
 | feedback | `warning` | `block`, `behavior` (`null`: the whole block), `kind`, `message` |
-| feedback | `prediction` | `block`, `points` (each `behavior`, `sync`, `time`) |
+| `engage watch --json` only | `prediction` | `block`, `points` (each `behavior`, `sync`, `time`) |
 | events | `connection_event` | `id`, `kind`, `initiator`, `responder`, `objects`, `cause`, `state`, `optional`, `delay`, `time`, `started`, `duration`, `response`, `block`, `behavior`, `turn` |
 
 ## Messages

@@ -61,7 +61,7 @@ def test_every_key_is_in_the_table(protocol: ModuleType) -> None:
 def test_every_key_of_the_json_lines_is_described(name: str) -> None:
     source = Path(lines.__file__).read_text(encoding="utf-8")
     function = source.partition(f"def {name}(")[2].partition("\n\n\n")[0]
-    (row,) = re.findall(rf"^\| \w+ \| `{name}` \| (.*) \|$", PAGE, re.MULTILINE)
+    (row,) = re.findall(rf"^\| [^|]+ \| `{name}` \| (.*) \|$", PAGE, re.MULTILINE)
 
     written = set(re.findall(r'"(\w+)":', function)) - {"type"}
 
