@@ -8,10 +8,10 @@ from collections.abc import Iterable
 
 from msgspec import Struct
 
-from schemas.faults import Fault, InputRefused
+from schemas.faults import Fault
 from schemas.units import Seconds
 from services.realizer.points import Point
-from services.realizer.relations import Equal, Term
+from services.realizer.relations import BlockRefused, Equal, Term
 from services.realizer.schedule import EPSILON
 
 
@@ -54,7 +54,7 @@ class Classes:
         return end - start if root == other_root else None
 
     def tie(self, equal: Equal, block: str) -> None:
-        """Merge. Raises InputRefused if that contradicts what is known, naming points and lines."""
+        """Merge. Raises BlockRefused if that contradicts what is known, naming points and lines."""
         first = equal.terms[0]
         for term in equal.terms[1:]:
             self.add(first.point)
@@ -69,7 +69,7 @@ class Classes:
                 (root, start), (other, end) = self.find(first.point), self.find(term.point)
                 self._parent[other], self._offset[other] = root, start + apart - end
 
-    def _contradiction(self, first: Term, second: Term, known: Seconds, block: str) -> InputRefused:
+    def _contradiction(self, first: Term, second: Term, known: Seconds, block: str) -> BlockRefused:
         chain = self._chain(first.point, second.point)
         lines = sorted({term.line for term in (first, second, *chain)} - {0})
         via = ", ".join(dict.fromkeys(str(term.point) for term in chain))
@@ -78,7 +78,8 @@ class Classes:
             f"{known:+g} s from {first.point}" + (f" (through {via})" if via else "")
         )
         advice = f"see lines {', '.join(map(str, lines))}" if len(lines) > 1 else ""
-        return InputRefused(Fault(reason=reason, where=block, line=max(lines, default=0), advice=advice))
+        fault = Fault(reason=reason, where=block, line=max(lines, default=0), advice=advice)
+        return BlockRefused(fault, "IMPOSSIBLE_TO_SCHEDULE")
 
     def _chain(self, start: Point, end: Point) -> list[Term]:
         came: dict[Point, tuple[Point, Term] | None] = {start: None}

@@ -25,7 +25,7 @@ class RealizerConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
     stall_factor: float = 5.0
     skew: Seconds = 0.1
     estimate: Seconds = 2.0
-    abort: Seconds = 3.0
+    abort: Seconds = 5.0
     event_grace: Seconds = 0.5
     event_patience: Seconds = 10.0
     directed_gaze_limit: Seconds = 2.5

@@ -13,14 +13,14 @@ from msgspec import Struct
 from schemas.behaviors import BlockBehavior, Event
 from schemas.blocks import Block
 from schemas.body import Estimate, Estimates
-from schemas.faults import Fault, InputRefused
+from schemas.faults import Fault
 from schemas.feedback import WarningKind
 from schemas.units import Seconds
 from services.realizer.assembly import Assembler, Assembly, Chain, Member, equal_by_order, same_part
 from services.realizer.classes import Classes
 from services.realizer.net import Bound, PetriNet, Place
 from services.realizer.points import Point, segments, sync_points
-from services.realizer.relations import Equal, Problem, Relations, Term, relations
+from services.realizer.relations import BlockRefused, Equal, Problem, Relations, Term, relations
 from services.realizer.schedule import EPSILON, Lag, PositiveCycle, earliest
 
 
@@ -72,7 +72,7 @@ def plan_block(
     dropped: Iterable[str] = (),
     elsewhere: Iterable[Point] = (),
 ) -> Plan:
-    """Plan `block`; durations that no estimate gives are nominal. Raises InputRefused, with place and line.
+    """Plan `block`; durations that no estimate gives are nominal. Raises BlockRefused, with place and line.
 
     dropped: behaviors to leave out as if never written. elsewhere: points of other live blocks.
     """
@@ -94,29 +94,31 @@ class _Planner:
             if behavior.id in self.dropped:
                 continue
             if behavior.id in self.relations.unusable:
-                self._refuse_if_required(behavior.id, "its timing names a sync point it does not have")
+                self._refuse_if_required(
+                    behavior.id, "its timing names a sync point it does not have", "PARSING_FAILURE"
+                )
                 self.dropped.append(behavior.id)
             elif (estimate := estimates.get(behavior.id)) and not estimate.feasible:
                 self._drop(behavior.id, _kind(estimate.warning), str(estimate.fault or "the body cannot do it"))
 
     def _check_ids(self) -> None:
         if not self.block.id:
-            raise InputRefused(Fault(reason="a block needs an id", where="block"))
+            raise BlockRefused(Fault(reason="a block needs an id", where="block"))
         seen: set[str] = set()
         for behavior in self.block.behaviors:
             if not behavior.id or behavior.id == "bml" or ":" in behavior.id or behavior.id in seen:
                 why = "is used twice" if behavior.id in seen else "is not a usable id"
-                raise InputRefused(Fault(reason=f"{behavior.id!r} {why}", where=self.block.id, line=behavior.line))
+                raise BlockRefused(Fault(reason=f"{behavior.id!r} {why}", where=self.block.id, line=behavior.line))
             seen.add(behavior.id)
 
-    def _refuse_if_required(self, id: str, reason: str) -> None:
+    def _refuse_if_required(self, id: str, reason: str, kind: WarningKind) -> None:
         if id in self.relations.required:
             line = next(behavior.line for behavior in self.block.behaviors if behavior.id == id)
             advice = "it is required; without `required` it would be dropped"
-            raise InputRefused(Fault(reason=reason, where=f"{self.block.id}: {id}", line=line, advice=advice))
+            raise BlockRefused(Fault(reason=reason, where=f"{self.block.id}: {id}", line=line, advice=advice), kind)
 
     def _drop(self, id: str, kind: WarningKind, reason: str) -> None:
-        self._refuse_if_required(id, reason)
+        self._refuse_if_required(id, reason, kind)
         self.dropped.append(id)
         self.problems.append(Problem(kind, reason, id))
 
@@ -186,7 +188,7 @@ class _Planner:
     def _check(self, assembly: Assembly, chains: Mapping[str, Chain]) -> frozenset[int]:
         """Is there a schedule at all, with every phase as short or long as can be? The bounds to give up if so.
 
-        Raises _Unreachable for a behavior that misses an absolute time, InputRefused for a deadlock.
+        Raises _Unreachable for a behavior that misses an absolute time, BlockRefused for a deadlock.
         """
         net = assembly.net
         loose: set[int] = {number for number, bound in enumerate(net.bounds) if bound.stretch is None}
@@ -224,14 +226,13 @@ class _Planner:
                 return number
         lines = sorted({line for lag in cycle.lags for line in _reason(net, lag).lines})
         advice = f"see lines {', '.join(map(str, lines))}" if len(lines) > 1 else ""
-        raise InputRefused(
-            Fault(
-                reason=f"these points wait for each other in a circle: {names}",
-                where=self.block.id,
-                line=lines[0] if lines else 0,
-                advice=advice,
-            )
+        fault = Fault(
+            reason=f"these points wait for each other in a circle: {names}",
+            where=self.block.id,
+            line=lines[0] if lines else 0,
+            advice=advice,
         )
+        raise BlockRefused(fault, "IMPOSSIBLE_TO_SCHEDULE")
 
 
 def _kind(warning: str) -> WarningKind:

@@ -16,6 +16,14 @@ from schemas.units import Seconds
 from services.realizer.points import ORIGIN, Point, sync_points, type_of
 
 
+class BlockRefused(InputRefused):
+    """The whole block is refused. kind: of the warning that says so."""
+
+    def __init__(self, fault: Fault, kind: WarningKind = "PARSING_FAILURE") -> None:
+        super().__init__(fault)
+        self.kind = kind
+
+
 class Term(Struct, frozen=True):
     """A point and an offset: the instant `offset` seconds after the point. text: as its author wrote it."""
 
@@ -104,8 +112,8 @@ class _Reader:
             raise self.refusal(f"{text!r} is not a point of a live block", where, line)
         return Term(point, ref.offset, text, line)
 
-    def refusal(self, reason: str, where: str, line: int, advice: str = "") -> InputRefused:
-        return InputRefused(Fault(reason=reason, where=f"{self.block.id}: {where}", line=line, advice=advice))
+    def refusal(self, reason: str, where: str, line: int, advice: str = "") -> BlockRefused:
+        return BlockRefused(Fault(reason=reason, where=f"{self.block.id}: {where}", line=line, advice=advice))
 
     def _advice(self) -> str:
         return f"the block has {', '.join(sorted(self.behaviors)) or 'no behaviors'}"

@@ -14,7 +14,7 @@ from schemas.body import (
     SyncPointArrived,
     SyncPointReached,
 )
-from schemas.faults import EngageError, Fault, InputRefused, NoReply
+from schemas.faults import EngageError, Fault, NoReply
 from schemas.feedback import WarningFeedback
 from schemas.presence import PeerAlive, PeerGone
 from schemas.requests import Cancel
@@ -23,6 +23,7 @@ from services.realizer.config import RealizerConfig
 from services.realizer.executor import Ending, Performance
 from services.realizer.planner import Plan, plan_block
 from services.realizer.points import performer
+from services.realizer.relations import BlockRefused
 from services.requests import RequestDesk, Requester
 from services.runtime import Ready
 
@@ -69,7 +70,7 @@ class _Realizer:
         try:
             plan = await self._plan(request, earlier)
         except EngageError as error:
-            self._refuse(live, error.fault)
+            self._refuse(live, error)
             return
         self.desk.accept(request.id)
         await self._make_way(live, earlier)
@@ -84,7 +85,7 @@ class _Realizer:
     async def _plan(self, request: PerformBlock, earlier: list[_Live]) -> Plan:
         block = request.block
         if any(other.request.block.id == block.id for other in earlier):
-            raise InputRefused(Fault(reason="a block of this id is still being performed", where=block.id))
+            raise BlockRefused(Fault(reason="a block of this id is still being performed", where=block.id))
         plan_block(block)  # What is wrong with the block alone needs no body to be seen.
         return plan_block(block, await self._estimates(request))
 
@@ -97,7 +98,7 @@ class _Realizer:
             answer = await self.bus.query(keys.ESTIMATE, question, timeout=self.config.estimate)
         except NoReply as error:
             fault = Fault(reason="there is no body to perform it", where=request.block.id, advice="start control")
-            raise InputRefused(fault) from error
+            raise BlockRefused(fault, "CANNOT_CREATE_BEHAVIOR") from error
         assert isinstance(answer, Estimates)
         return answer.items
 
@@ -118,8 +119,10 @@ class _Realizer:
             fault=ending.fault,
         )
 
-    def _refuse(self, live: _Live, fault: Fault) -> None:
-        warning = WarningFeedback(block=live.request.block.id or None, kind="PARSING_FAILURE", message=str(fault))
+    def _refuse(self, live: _Live, error: EngageError) -> None:
+        fault = error.fault
+        kind = error.kind if isinstance(error, BlockRefused) else "PARSING_FAILURE"
+        warning = WarningFeedback(block=live.request.block.id or None, kind=kind, message=str(fault))
         self.bus.publish(keys.FEEDBACK, warning)
         self.desk.refuse(live.request.id, fault)
         self._forget(live)

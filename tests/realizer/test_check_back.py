@@ -11,7 +11,7 @@ HUMAN = "human"
 
 
 def pointed_reference_and_end_of_turn() -> Block:
-    """ "Please move" [DG with pointing] "the blue piece" [glance] "so that it touches the top of" [DG] "the rectangle"."""
+    """Step 5 of the scenario: a pointed reference with its glance, a gazed-at one, the end of the turn."""
     behaviors: tuple[BlockBehavior, ...] = (
         Gaze(id="gaze-0", target=HUMAN),
         Speech(id="speech-1", text="Please move"),
