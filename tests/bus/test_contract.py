@@ -44,6 +44,8 @@ async def test_messages_of_one_publisher_keep_their_order_across_keys(place: Pla
     there, here = (await place.process()).join("there"), (await place.process()).join("here")
     ways = [keys.request_state("there"), keys.BLOCK, keys.WORLD, keys.fault("there"), keys.cancel("realizer")]
     inbox = here.subscribe(keys.ANY_REQUEST_STATE, keys.commands("realizer"), keys.WORLD, keys.ANY_FAULT)
+    there.publish(keys.WORLD, state(-1))
+    await take(inbox)  # of states published while somebody joins, only the last must reach him
 
     for number in range(300):
         there.publish(ways[number % len(ways)], state(number))

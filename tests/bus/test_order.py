@@ -1,0 +1,155 @@
+"""The numbering behind the Zenoh bus, without Zenoh: whatever the wire loses, repeats or reorders."""
+
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from schemas import keys
+from services.zenoh_order import Follower, Ledger, Missing, Pulse, Written
+
+KEYS = (keys.BLOCK, keys.FEEDBACK, keys.SYNC_POINT, keys.INHIBIT)
+HEARD = (keys.BLOCK, "engage/v1/evt/**")
+
+
+def write(ledger: Ledger, key: str, now: float = 0.0) -> Written:
+    return ledger.write(key, "application/msgpack", b"", "there", "clock", now)
+
+
+def numbers(written: list[Written]) -> list[int]:
+    return [one.envelope.number for one in written]
+
+
+class Wire:
+    """From a ledger to a follower, with the follower's questions answered when told to."""
+
+    def __init__(self) -> None:
+        self.ledger = Ledger("run")
+        self.follower = Follower(HEARD)
+        self.delivered: list[Written] = []
+        self.expected: list[Written] = []
+
+    def send(self, key: str, copies: int = 1) -> None:
+        written = write(self.ledger, key)
+        if key == keys.INHIBIT:
+            return
+        self.expected.append(written)
+        for _ in range(copies):
+            self.delivered += self.follower.take(written)
+
+    def pulse(self) -> None:
+        self.follower.pulse(Pulse(self.ledger.recent(0.0)))
+
+    def ask(self) -> None:
+        if self.follower.behind:
+            past = self.ledger.past(self.follower.missing(), 0.0)
+            self.delivered += [one for one, _ in self.follower.catch_up(past)]
+
+
+@given(st.lists(st.tuples(st.sampled_from(KEYS), st.sampled_from([0, 1, 1, 2]), st.booleans(), st.booleans())))
+@settings(max_examples=100)
+def test_every_message_is_delivered_once_and_in_the_order_of_its_key_whatever_gets_lost(
+    steps: list[tuple[str, int, bool, bool]],
+):
+    wire = Wire()
+
+    for key, copies, pulse, ask in steps:
+        wire.send(key, copies)
+        if pulse:
+            wire.pulse()
+        if ask:
+            wire.ask()
+    wire.pulse()
+    wire.ask()
+
+    assert sorted(wire.delivered, key=lambda one: one.envelope.number) == wire.expected
+    assert wire.follower.lost == 0
+    for key in KEYS:
+        assert [one for one in wire.delivered if one.key == key] == [one for one in wire.expected if one.key == key]
+
+
+@given(st.lists(st.tuples(st.sampled_from(KEYS), st.booleans(), st.booleans())), st.integers(0, 10))
+@settings(max_examples=100)
+def test_what_a_cut_link_lost_comes_in_order_across_keys(steps: list[tuple[str, bool, bool]], joins_at: int):
+    """A lost message closes the link, and a link that is back makes the follower ask before it delivers."""
+    wire, was_cut = Wire(), False
+
+    for step, (key, cut, ask) in enumerate(steps):
+        if was_cut and not cut:
+            wire.follower.behind = True
+        was_cut = cut
+        wire.send(key, copies=0 if cut or step < joins_at else 1)
+        if ask and not cut:
+            wire.ask()
+    wire.follower.behind = True
+    wire.ask()
+
+    assert wire.delivered == wire.expected
+    assert wire.follower.lost == 0
+
+
+def test_the_first_question_gets_two_seconds_of_events_and_the_last_state():
+    ledger = Ledger("run")
+    write(ledger, keys.WORLD, now=0.0)
+    write(ledger, keys.FEEDBACK, now=0.9)
+    write(ledger, keys.WORLD, now=0.95)
+    write(ledger, keys.FEEDBACK, now=1.0)
+    write(ledger, keys.BLOCK, now=2.0)
+
+    past = ledger.past(Missing((keys.FEEDBACK, keys.WORLD), {}), now=3.0)
+
+    assert numbers(list(past.written)) == [3, 4]
+    assert past.counts == {keys.WORLD: 2, keys.FEEDBACK: 2}
+
+
+def test_after_a_cut_everything_kept_is_handed_out_however_old():
+    ledger, follower = Ledger("run"), Follower([keys.FEEDBACK, keys.BLOCK])
+    follower.catch_up(ledger.past(follower.missing(), now=0.0))
+    cut = [write(ledger, key, now=0.0) for key in (keys.FEEDBACK, keys.BLOCK, keys.FEEDBACK)]
+
+    follower.behind = True
+    caught_up = follower.catch_up(ledger.past(follower.missing(), now=100.0))
+
+    assert caught_up == [(one, False) for one in cut]
+
+
+def test_what_is_no_longer_kept_counts_as_lost():
+    ledger, follower = Ledger("run", kept=2), Follower([keys.FEEDBACK])
+    follower.catch_up(ledger.past(follower.missing(), now=0.0))
+    for _ in range(5):
+        write(ledger, keys.FEEDBACK)
+    last = write(ledger, keys.FEEDBACK)
+
+    assert follower.take(last) == []
+    assert numbers([one for one, _ in follower.catch_up(ledger.past(follower.missing(), 0.0))]) == [5, 6]
+    assert follower.lost == 4
+
+
+def test_a_state_that_was_skipped_is_not_missed():
+    ledger, follower = Ledger("run"), Follower([keys.WORLD])
+    follower.catch_up(ledger.past(follower.missing(), now=0.0))
+    write(ledger, keys.WORLD)
+    second = write(ledger, keys.WORLD)
+
+    assert follower.take(second) == [second]
+    assert not follower.behind
+
+
+def test_a_process_that_does_not_answer_holds_nothing_up():
+    ledger, follower = Ledger("run"), Follower([keys.FEEDBACK])
+    for _ in range(5):
+        write(ledger, keys.FEEDBACK)
+    held = [write(ledger, keys.FEEDBACK), write(ledger, keys.FEEDBACK)]
+    for one in reversed(held):
+        assert follower.take(one) == []
+
+    assert follower.catch_up(None) == [(one, False) for one in held]
+    assert follower.lost == 0
+
+
+def test_the_pulse_tells_of_the_keys_written_lately():
+    ledger = Ledger("run")
+    write(ledger, keys.FEEDBACK, now=0.0)
+    write(ledger, keys.BLOCK, now=2.0)
+
+    assert ledger.recent(2.5) == {keys.FEEDBACK: 1, keys.BLOCK: 1}
+    assert ledger.recent(4.0) == {keys.BLOCK: 1}
+    assert ledger.recent(6.0) == {}
