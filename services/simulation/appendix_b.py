@@ -30,6 +30,10 @@ GLANCE = 0.2
 """From a word to the gaze it causes."""
 FOLLOW = 0.3
 """From seeing where the robot points to looking there."""
+MOVE = 2.1
+"""From the end of a request to the hand's next motion. The robot holds its eyes on the person's until its facial gaze
+is answered or has failed, 1.9 s after it began; a hand that moved earlier would draw them away.
+"""
 
 
 def rules() -> tuple[Rule, ...]:
@@ -80,7 +84,7 @@ def moves(step: str, piece: str, side: Side, landmark: str, name: str) -> tuple[
         Rule(step, Word("so"), (Grab(piece),), GLANCE),
         Rule(step, Event("directed_gaze", "started", landmark), (LookAt(landmark),), 0.6),
         Rule(step, Word(name), (LookAt(landmark),), GLANCE),
-        Rule(step, Ended(), (Lay(piece, side, landmark), Withdraw(), Pause(0.2), LookAt(FACE)), 0.6),
+        Rule(step, Ended(), (Lay(piece, side, landmark), Withdraw(), Pause(0.2), LookAt(FACE)), MOVE),
     )
 
 
@@ -124,7 +128,7 @@ LAST_PIECES = (
         "step-18",
         Ended(),
         (Grab("purple-triangle"), Lay("purple-triangle", "top right", "trapezoid"), Withdraw()),
-        0.5,
+        MOVE,
     ),
     Rule("step-20-a", Begun(), (LookAt(TABLE),), 0.1),
     Rule("step-20-a", Word("ummmm"), (LookAt(FACE),), GLANCE),
@@ -140,7 +144,7 @@ LAST_PIECES = (
             LookAt("green-square"), Pause(0.3), Grab("green-square"),
             Lay("green-square", "left", "blue-square"), Withdraw(), Pause(0.2), LookAt(FACE),
         ),
-        0.4,
+        MOVE,
     ),
     Rule("step-23-a", Begun(), (LookAt(FACE),), 0.1),
     Rule("step-23-a", Word("ummmm"), (LookAt(TABLE),), GLANCE),
@@ -179,7 +183,7 @@ FIXES = tuple(
         f"{step}-{again}",
         Ended(),
         (LookAt(piece), Pause(0.3), Grab(piece), Lay(piece, side, landmark), Withdraw(), Pause(0.2), LookAt(FACE)),
-        0.5,
+        MOVE,
     )
     for step, piece, side, landmark in PLACES
     for again in ("fix", "again")

@@ -1,0 +1,83 @@
+"""Play the whole system in virtual time and keep what happened."""
+
+import asyncio
+from functools import partial
+from typing import Any
+
+from schemas import keys
+from schemas.fragments import FragmentOutcome
+from schemas.recognition import ConnectionEvent
+from services.bus import Bus, Received
+from services.collaboration.config import CollaborationConfig
+from services.collaboration.service import collaborate
+from services.control.config import ControlConfig
+from services.control.service import embody
+from services.generation.config import GenerationConfig
+from services.generation.service import generate
+from services.memory_bus import MemoryHub
+from services.realizer.config import RealizerConfig
+from services.realizer.service import realize
+from services.recognition.config import RecognitionConfig
+from services.recognition.service import recognize
+from services.runtime import Ready, Service, running
+from services.simulation.config import SimulationConfig
+from services.simulation.service import simulate
+
+LIMIT = 900.0
+"""Seconds of virtual time: nothing in the scenario takes so long."""
+
+
+class Record:
+    """Everything that was on the bus, in order."""
+
+    def __init__(self, received: list[Received]) -> None:
+        self.received = received
+
+    def messages(self, kind: type) -> list[Any]:
+        return [it.message for it in self.received if isinstance(it.message, kind)]
+
+    @property
+    def events(self) -> dict[str, list[ConnectionEvent]]:
+        """The life of every connection event, by id, in the order of their starts."""
+        lives: dict[str, list[ConnectionEvent]] = {}
+        for event in self.messages(ConnectionEvent):
+            lives.setdefault(event.id, []).append(event)
+        return dict(sorted(lives.items(), key=lambda it: it[1][0].started.seconds))
+
+    def robot_initiated(self) -> list[ConnectionEvent]:
+        """For each event that the robot's turns and references caused, by start, the change that decided it."""
+        lives = [life for life in self.events.values() if life[0].initiator == "robot"]
+        return [life[min(1, len(life) - 1)] for life in lives if life[0].cause in ("turn", "reference")]
+
+    @property
+    def outcomes(self) -> dict[str, FragmentOutcome]:
+        return {it.fragment: it for it in self.messages(FragmentOutcome)}
+
+
+async def play(human: str = "scripted", resolution: str = "table", seed: int = 0, mode: str = "scripted") -> Record:
+    """Until the manager has said goodbye."""
+    received: list[Received] = []
+    finished = asyncio.Event()
+
+    async def collaboration(bus: Bus, ready: Ready) -> None:
+        await collaborate(bus, ready, CollaborationConfig(mode=mode))  # type: ignore[arg-type]
+        finished.set()
+
+    services: dict[str, Service] = {
+        "control": partial(embody, config=ControlConfig()),
+        "realizer": partial(realize, config=RealizerConfig()),
+        "recognition": partial(recognize, config=RecognitionConfig(gaze_resolution=resolution)),  # type: ignore[arg-type]
+        "generation": partial(generate, config=GenerationConfig()),
+        "simulation": partial(simulate, config=SimulationConfig(human=human, seed=seed)),  # type: ignore[arg-type]
+        "collaboration": collaboration,
+    }
+    async with MemoryHub() as hub:
+        with hub.join("record").subscribe(
+            f"{keys.PREFIX}/cmd/**", f"{keys.PREFIX}/evt/**", f"{keys.PREFIX}/state/**", capacity=10**6
+        ) as inbox:
+            async with running(hub, services):
+                async with asyncio.timeout(LIMIT):
+                    await finished.wait()
+            while len(inbox) and (it := await inbox.next()):
+                received.append(it)
+    return Record(received)

@@ -1,0 +1,239 @@
+"""The acceptance test: Appendix B through all real services, in virtual time. Expectations: the scenario page.
+
+`AP DG MFG` with `S` succeeded, `F` failed, `*` not asserted. Steps 7-17 are ours and not counted.
+"""
+
+from collections import Counter
+from functools import cache
+
+import pytest
+
+from schemas.actions import ActionBegan, ActionEnded, ActorLost
+from schemas.attention import HeadOwner
+from schemas.body import WordSpoken
+from schemas.faults import Fault
+from schemas.feedback import BlockProgress, SyncPointProgress, WarningFeedback
+from schemas.recognition import ConnectionEvent
+from schemas.world import World
+from services.collaboration.relations import Relation, relation
+from services.virtual_time import run_virtual
+from tests.scenario.playing import Record, play
+
+SHORT = {"adjacency_pair": "AP", "directed_gaze": "DG", "mutual_facial_gaze": "MFG", "backchannel": "BC"}
+COUNTED = ("step-2", "step-3", "step-4", "step-5", "step-18", "step-20", "step-21", "step-23", "step-24", "step-25")
+DEGREE = {"succeeded": "S", "completed": "S", "failed": "F"}
+
+EXPECTED: dict[str, dict[str, list[str]]] = {
+    "table": {
+        "step-2": ["AP *", "MFG S"],
+        "step-3": ["AP *", "DG rectangle S", "DG trapezoid S", "MFG S"],
+        "step-4": ["AP *", "MFG F"],
+        "step-5": ["AP S", "DG blue-square S", "DG rectangle S", "MFG F"],
+        "step-18": ["AP S", "DG purple-triangle F", "DG pink-square S", "MFG F"],
+        "step-20": ["AP *", "MFG S"],
+        "step-21": ["AP S", "DG green-square S", "DG blue-square S", "MFG F"],
+        "step-23": ["AP *", "MFG S"],
+        "step-24": ["AP *", "MFG *"],
+        "step-25": ["AP *", "MFG S"],
+    }
+}
+EXPECTED["object"] = EXPECTED["table"] | {
+    "step-18": ["AP S", "DG purple-triangle F", "DG pink-square F", "MFG F"],
+    "step-21": ["AP S", "DG green-square S", "DG blue-square F", "MFG F"],
+}
+
+
+@cache
+def played(human: str = "scripted", resolution: str = "table", seed: int = 0, mode: str = "scripted") -> Record:
+    return run_virtual(play(human, resolution, seed, mode))
+
+
+def step_of(block: str) -> str:
+    """step-20-a and step-20-b are step-20."""
+    return "-".join(block.split("-")[:2])
+
+
+def counted(record: Record) -> list[ConnectionEvent]:
+    return [event for event in record.robot_initiated() if step_of(event.block) in COUNTED]
+
+
+def described(event: ConnectionEvent, expected: str) -> str:
+    parts = [
+        SHORT[event.kind],
+        *event.objects,
+        "*" if expected.endswith("*") else DEGREE.get(event.state, event.state),
+    ]
+    return " ".join(parts)
+
+
+def by_step(record: Record, resolution: str = "table") -> dict[str, list[str]]:
+    steps: dict[str, list[str]] = {}
+    for event in counted(record):
+        described_so_far = steps.setdefault(step_of(event.block), [])
+        expected = EXPECTED[resolution].get(step_of(event.block), [])
+        like = expected[len(described_so_far)] if len(described_so_far) < len(expected) else ""
+        described_so_far.append(described(event, like))
+    return steps
+
+
+def words(record: Record, block: str) -> str:
+    spoken = [it.word for it in record.messages(WordSpoken) if it.block == block]
+    return " ".join(spoken)
+
+
+@pytest.mark.parametrize("resolution", ["table", "object"])
+def test_robot_initiated_events_come_in_the_order_and_with_the_outcomes_of_the_transcript(resolution: str) -> None:
+    assert by_step(played(resolution=resolution), resolution) == EXPECTED[resolution]
+
+
+@pytest.mark.parametrize(("resolution", "gazes"), [("table", {"S": 7, "F": 1}), ("object", {"S": 5, "F": 3})])
+def test_totals_of_causes_turn_and_reference(resolution: str, gazes: dict[str, int]) -> None:
+    events = counted(played(resolution=resolution))
+
+    assert Counter(SHORT[event.kind] for event in events) == {"AP": 10, "DG": 8, "MFG": 10}
+    assert Counter(DEGREE[event.state] for event in events if event.kind == "directed_gaze") == gazes
+
+
+def test_four_of_the_references_are_made_with_pointing() -> None:
+    outcomes = played().outcomes
+    pointed = [
+        choice.target
+        for step in ("step-3", "step-5", "step-18", "step-21")
+        for choice in outcomes[step].choices
+        if choice.gesture == "directed_gaze_with_pointing"
+    ]
+
+    assert pointed == ["trapezoid", "blue-square", "purple-triangle", "green-square"]
+
+
+def test_the_arm_really_points_at_what_it_is_said_to_point_at() -> None:
+    points = [
+        it.targets[0]
+        for it in played().messages(ActionBegan)
+        if it.actor == "robot" and it.action == "point" and it.behavior.split(":")[0] in COUNTED
+    ]
+
+    assert points == ["trapezoid", "blue-square", "purple-triangle", "green-square"]
+
+
+@pytest.mark.parametrize(
+    ("block", "said"),
+    [
+        ("step-2", "Hello, let's make a tangram."),
+        ("step-18", "Please move that so that it is touching the top right of the pink square"),
+        ("step-20-a", "Ummmm,"),
+        ("step-21", "Please move this so that it is touching the left side of the blue piece"),
+        ("step-25", "Thanks for playing. That was fun, goodbye."),
+    ],
+)
+def test_the_voice_says_the_words_of_the_transcript(block: str, said: str) -> None:
+    assert words(played(), block) == said
+
+
+def test_the_optional_facial_gazes_at_the_ends_of_turns_cost_no_time() -> None:
+    facial = [event for event in counted(played()) if event.kind == "mutual_facial_gaze"]
+
+    assert all(event.optional for event in facial)
+    assert next(event for event in facial if event.block == "step-2").delay == 0.0
+
+
+@pytest.mark.parametrize("step", ["step-5", "step-18", "step-21"])
+def test_a_request_to_move_a_piece_is_answered_by_moving_it(step: str) -> None:
+    (pair,) = [it for it in counted(played()) if it.block == step and it.kind == "adjacency_pair"]
+
+    assert (pair.state, pair.response) == ("succeeded", "act")
+
+
+@pytest.mark.parametrize("step", ["step-2", "step-4", "step-5", "step-18", "step-20-a", "step-21", "step-23-a"])
+def test_the_first_word_follows_the_look_at_the_person(step: str) -> None:
+    points = {(it.behavior, it.sync): it.time for it in played().messages(SyncPointProgress) if it.block == step}
+
+    assert points["speech-1", "start"] >= points["look", "stroke"]
+
+
+def test_step_1_has_no_robot_initiated_event_and_the_robot_is_on_the_face() -> None:
+    record = played()
+    first = min(event.started.seconds for event in record.robot_initiated())
+    owners = [it for it in record.messages(HeadOwner) if it.since.seconds < first - 1.0]
+
+    robots = [life[0] for life in record.events.values() if life[0].initiator == "robot"]
+
+    assert robots[0].block == "step-2"
+    assert (owners[-1].owner.kind, owners[-1].owner.target) == ("face", "human")
+
+
+def test_step_6_the_robot_follows_the_hand_and_then_meets_the_persons_eyes() -> None:
+    record = played()
+    end = next(
+        it.at.seconds for it in record.messages(BlockProgress) if it.block == "step-5" and it.progress == "end"
+    )
+    start = next(it.at.seconds for it in record.messages(BlockProgress) if it.block == "step-7-a")
+    owners = [it.owner for it in record.messages(HeadOwner) if end <= it.since.seconds <= start]
+    (gaze,) = [
+        life
+        for life in record.events.values()
+        if life[0].initiator == "human" and life[0].kind == "mutual_facial_gaze" and end < life[0].at.seconds < start
+    ]
+
+    assert ("hands", 5) in [(owner.kind, owner.priority) for owner in owners]
+    assert ("response", 4) in [(owner.kind, owner.priority) for owner in owners]
+    assert gaze[1].state == "succeeded"
+
+
+def test_step_19_is_accepted_as_the_source_has_it() -> None:
+    record = played()
+    final = record.messages(World)[-1]
+    triangle, trapezoid = final.entity("purple-triangle"), final.entity("trapezoid")
+
+    assert relation(triangle, trapezoid) == Relation("purple-triangle", "top right", "trapezoid")
+    assert not [id for id in record.outcomes if id.endswith(("fix", "again"))]
+
+
+def test_every_fragment_is_done_and_nothing_is_warned_of() -> None:
+    record = played()
+
+    assert {outcome.status for outcome in record.outcomes.values()} == {"done"}
+    assert record.messages(Fault) == []
+    assert record.messages(WarningFeedback) == []
+
+
+def test_the_person_leaves_and_no_event_stays_open() -> None:
+    record = played()
+    lost = record.messages(ActorLost)[-1].at.seconds
+
+    assert all(life[-1].state != "started" for life in record.events.values())
+    assert all(life[-1].at.seconds <= lost + 1e-6 for life in record.events.values())
+
+
+def test_every_action_that_began_has_ended_or_was_followed_by_another() -> None:
+    record = played()
+    human = [it for it in record.messages(ActionBegan) + record.messages(ActionEnded) if it.actor == "human"]
+
+    acts = Counter(type(it).__name__ for it in human if it.action == "act")
+    assert acts["ActionBegan"] == acts["ActionEnded"] == 9
+
+
+def test_the_same_seed_gives_the_same_run_and_another_seed_the_same_events() -> None:
+    again = run_virtual(play())
+    other = played(seed=7)
+
+    assert [event.at for event in again.robot_initiated()] == [event.at for event in played().robot_initiated()]
+    assert by_step(other) == EXPECTED["table"]
+    assert [event.at for event in other.robot_initiated()] != [event.at for event in played().robot_initiated()]
+
+
+def test_a_misplaced_piece_is_asked_to_be_fixed_and_then_is_right() -> None:
+    record = played(human="misplacing")
+    final = record.messages(World)[-1]
+    pink, yellow = final.entity("pink-square"), final.entity("yellow-triangle")
+
+    assert words(record, "step-14-fix").startswith("Please fix the pink square so that it is touching")
+    assert relation(pink, yellow) == Relation("pink-square", "bottom right", "yellow-triangle")
+    assert by_step(record) == EXPECTED["table"]
+
+
+def test_the_task_finishes_the_figure_with_a_person_who_listens() -> None:
+    record = played(human="listening", mode="task")
+
+    assert words(record, "finished") == "Look, we made an anchor."
+    assert not [id for id in record.outcomes if "fix" in id or "again" in id]
