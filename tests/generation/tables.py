@@ -1,0 +1,75 @@
+"""Worlds and bodies as tables of numbers: distractors and degrees are what a test says they are."""
+
+from collections.abc import Callable, Mapping, Sequence
+
+from schemas.behaviors import Reference, SpeechOption
+from schemas.body import Estimate, Ray
+from schemas.faults import Fault
+from schemas.units import Vector
+from schemas.world import Entity, World
+from services.generation.motions import HERE, Motions
+from services.generation.reference_policy import Scene
+
+TANGRAMS = (
+    "pink-triangle", "purple-triangle", "yellow-triangle", "red-square", "blue-square", "pink-square",
+    "green-square", "purple-square", "rectangle", "trapezoid",
+)  # fmt: skip
+HEIGHT = 1000.0
+"""Of eyes and hands above the table, each right above what it is on: rays are parallel, cones are circles."""
+
+
+def flat_world(places: Mapping[str, tuple[float, float]]) -> World:
+    objects = [Entity(id=id, kind="object", position=(x, y, 0.0)) for id, (x, y) in places.items()]
+    return World(entities=(*objects, Entity(id="human", kind="person", position=(99.0, 0.0, 0.0))))
+
+
+def apart(ids: Sequence[str] = TANGRAMS) -> World:
+    """Objects a metre from one another: no gesture can mean two of them."""
+    return flat_world({id: (float(index), 0.0) for index, id in enumerate(ids)})
+
+
+def scene(world: World, **fields: object) -> Scene:
+    """Gaze means what is within 0.2 m of where it goes, pointing what is within 0.1 m."""
+    return Scene(world=world, half_angle=0.2 / HEIGHT, pointing_radius=0.1, **fields)  # type: ignore[arg-type]
+
+
+def body(
+    world: World,
+    sequence: Sequence[str],
+    head: Callable[[str, str], float] = lambda since, target: 20.0,
+    arm: Callable[[str, str], float] = lambda since, target: 60.0,
+    arm_for: Callable[[str], str] = lambda target: "right_arm",
+    out_of_reach: Sequence[str] = (),
+) -> Motions:
+    """Degrees by (since, target)."""
+    gazes: dict[tuple[str, str], Estimate] = {}
+    points: dict[tuple[str, str], Estimate] = {}
+    for target in sequence:
+        entity = world.entity(target)
+        assert entity is not None
+        x, y, _ = entity.position
+        above: Vector = (x, y, HEIGHT)
+        for since in (HERE, *sequence):
+            ray = Ray(origin=above, axis=(0.0, 0.0, -1.0), tip=above)
+            gazes[since, target] = Estimate(behavior="g", feasible=True, head_degrees=head(since, target), ray=ray)
+            reached = target not in out_of_reach
+            points[since, target] = Estimate(
+                behavior="p",
+                feasible=reached,
+                fault=None if reached else Fault(reason="out of reach"),
+                arm_degrees=arm(since, target) if reached else 0.0,
+                parts=(arm_for(target),) if reached else (),
+                ray=ray if reached else None,
+            )
+    return Motions(gazes, points)
+
+
+def option(
+    text: str, cost: float | None = None, distractors: Sequence[str] = (), deictic: bool = False
+) -> SpeechOption:
+    words = len(text.split()) if cost is None else cost
+    return SpeechOption(text=text, cost=words, distractors=tuple(distractors), deictic=deictic)
+
+
+def refer(id: str, target: str, minimum: float, *options: SpeechOption) -> Reference:
+    return Reference(id=id, target=target, minimum_reliability=minimum, options=options)

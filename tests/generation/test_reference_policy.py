@@ -1,0 +1,383 @@
+"""Choices of the thesis and of Appendix B, decision by decision; the sequence optimum against brute force."""
+
+from itertools import product
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from schemas.behaviors import Reference, SpeechOption
+from schemas.body import NoPointZone
+from schemas.faults import RunFailed
+from schemas.fragments import ReferenceChoice
+from services.generation.config import GenerationConfig
+from services.generation.motions import HERE, Motions
+from services.generation.reference_policy import Pair, Posture, Scene, choose, considered, cost
+from tests.generation.tables import TANGRAMS, apart, body, flat_world, option, refer, scene
+
+CONFIG = GenerationConfig()
+
+
+def made(choice: ReferenceChoice) -> tuple[str, str]:
+    return choice.gesture, choice.phrase
+
+
+def choice_of(reference: Reference, **fields: object) -> ReferenceChoice:
+    world = apart()
+    chosen = choose([reference], scene(world, **fields), body(world, [reference.target]), CONFIG)
+    return chosen.choices[0]
+
+
+# -- Appendix B -------------------------------------------------------------------------------------------------
+
+POINT, LOOK = "directed_gaze_with_pointing", "directed_gaze"
+THIS = option("this", 1, [], deictic=True)
+THAT = option("that", 1, [], deictic=True)
+
+
+@pytest.mark.parametrize(
+    ("references", "expected"),
+    [
+        (
+            [
+                refer("3a", "rectangle", 0.85, option("a rectangle")),
+                refer("3b", "trapezoid", 0.95, option("a trapezoid")),
+            ],
+            [(LOOK, "a rectangle"), (POINT, "a trapezoid")],
+        ),
+        (
+            [
+                refer("5a", "blue-square", 0.95, option("the blue piece")),
+                refer("5b", "rectangle", 0.85, option("the rectangle")),
+            ],
+            [(POINT, "the blue piece"), (LOOK, "the rectangle")],
+        ),
+        (
+            [
+                refer("18a", "purple-triangle", 0.95, THAT, option("the purple triangle")),
+                refer("18b", "pink-square", 0.85, option("the pink square")),
+            ],
+            [(POINT, "that"), (LOOK, "the pink square")],
+        ),
+        (
+            [
+                refer("21a", "green-square", 0.95, option("the green square"), THIS),
+                refer("21b", "blue-square", 0.85, option("the blue piece")),
+            ],
+            [(POINT, "this"), (LOOK, "the blue piece")],
+        ),
+    ],
+    ids=["step 3", "step 5", "step 18", "step 21"],
+)
+def test_the_eight_choices_of_appendix_b(references: list[Reference], expected: list[tuple[str, str]]) -> None:
+    world = apart()
+    motions = body(world, [reference.target for reference in references])
+
+    chosen = choose(references, scene(world), motions, CONFIG)
+
+    assert [made(choice) for choice in chosen.choices] == expected
+    assert chosen.warnings == ()
+
+
+# -- Fig. 3.2 ---------------------------------------------------------------------------------------------------
+
+FIGURE = GenerationConfig(
+    phrase_reliability=0.85, gaze_reliability=0.05, directed_gaze_reliability=0.08, pointing_reliability=0.10
+)
+TRIANGLES = ("pink-triangle", "purple-triangle")
+SQUARES = ("red-square", "blue-square", "pink-square", "green-square")
+IT = option("it")
+
+
+def figure_3_2(*more: SpeechOption) -> list[Reference]:
+    """Its two references; `more` options for the first."""
+
+    def all_but(target: str) -> list[str]:
+        return [id for id in TANGRAMS if id != target]
+
+    yellow = refer(
+        "ref-1",
+        "yellow-triangle",
+        0.85,
+        option("the triangle", distractors=TRIANGLES),
+        option("the yellow triangle"),
+        *more,
+        option("this piece", distractors=all_but("yellow-triangle"), deictic=True),
+    )
+    purple = refer(
+        "ref-2",
+        "purple-square",
+        0.85,
+        option("the square", distractors=SQUARES),
+        option("the purple square"),
+        option("this piece", distractors=all_but("purple-square"), deictic=True),
+    )
+    return [yellow, purple]
+
+
+def choose_as_in_the_figure(references: list[Reference]) -> list[tuple[str, str]]:
+    """A triangle in the gaze cone at the yellow one, a square in that at the purple one; the body near the yellow."""
+    places = {id: (float(index), 0.0) for index, id in enumerate(TANGRAMS)}
+    places |= {"pink-triangle": (2.15, 0.0), "purple-square": (7.0, 0.0), "red-square": (7.15, 0.0)}
+    world = flat_world(places)
+    near = {"yellow-triangle": 1.0, "purple-square": 30.0}
+    motions = body(
+        world,
+        ["yellow-triangle", "purple-square"],
+        head=lambda since, target: near[target],
+        arm=lambda since, target: near[target],
+    )
+    chosen = choose(references, scene(world), motions, FIGURE)
+    assert not chosen.warnings
+    return [made(choice) for choice in chosen.choices]
+
+
+def test_fig_3_2_becomes_fig_3_3_without_the_option_it() -> None:
+    assert choose_as_in_the_figure(figure_3_2()) == [(POINT, "this piece"), ("none", "the purple square")]
+
+
+def test_with_the_option_it_fig_3_2_needs_no_gesture() -> None:
+    assert choose_as_in_the_figure(figure_3_2(IT)) == [("none", "it"), ("none", "the purple square")]
+
+
+# -- decisions --------------------------------------------------------------------------------------------------
+
+
+def test_nothing_at_all_is_never_chosen() -> None:  # B2
+    choice = choice_of(refer("r", "rectangle", 0.01, option("", 0), option("the rectangle")))
+
+    assert choice.gesture != "none" or choice.phrase
+    none = next(pair for pair in choice.pairs if pair.gesture == "none" and not pair.phrase)
+    assert (none.reliability, none.feasible) == (0.0, False)
+
+
+def test_the_empty_phrase_is_considered_only_if_offered() -> None:  # B3
+    without = choice_of(refer("r", "rectangle", 0.05, option("the rectangle")))
+    offered = choice_of(refer("r", "rectangle", 0.05, option("", 0), option("the rectangle")))
+
+    assert {pair.phrase for pair in without.pairs} == {"the rectangle"}
+    assert made(offered) == ("gaze", "")
+
+
+def test_a_look_is_cheaper_than_a_directed_gaze_by_the_wait() -> None:  # B7
+    choice = choice_of(refer("r", "rectangle", 0.75, option("the rectangle")))
+
+    costs = {pair.gesture: pair.cost for pair in choice.pairs}
+    assert made(choice) == ("gaze", "the rectangle")
+    assert costs["gaze"] == pytest.approx(0.2 + 0.7)
+    assert costs["directed_gaze"] - costs["gaze"] == pytest.approx(0.3)
+    assert costs[POINT] - costs["directed_gaze"] == pytest.approx(1.0)
+
+
+def test_a_deictic_phrase_is_never_without_a_point_and_rules_out_nothing_itself() -> None:  # B8
+    world = apart()
+    reference = refer("r", "rectangle", 0.5, option("this", 1, ["trapezoid"], deictic=True))
+
+    chosen = choose([reference], scene(world), body(world, ["rectangle"]), CONFIG)
+
+    rows = {pair.gesture: pair for pair in chosen.choices[0].pairs}
+    assert chosen.choices[0].gesture == POINT
+    assert "needs a point" in rows["directed_gaze"].reason
+    assert len(rows["none"].distractors) == 9
+    assert any("'this'" in warning for warning in chosen.warnings)
+
+
+@pytest.mark.parametrize(
+    ("fields", "reach", "reason"),
+    [
+        ({}, False, "out of reach"),
+        ({"no_point": "pointing is inhibited"}, True, "inhibited"),
+        ({"zones": (NoPointZone(center=(8.0, 0.0, 0.0), radius=0.5),)}, True, "no-point zone"),
+    ],
+)
+def test_without_a_point_no_deictic_phrase(fields: dict[str, object], reach: bool, reason: str) -> None:  # B9
+    world = apart()
+    reference = refer("r", "rectangle", 0.9, option("this", 1, deictic=True), option("the rectangle"))
+    motions = body(world, ["rectangle"], out_of_reach=[] if reach else ["rectangle"])
+
+    choice = choose([reference], scene(world, **fields), motions, CONFIG).choices[0]
+
+    assert made(choice) == (LOOK, "the rectangle")
+    assert all(reason in pair.reason for pair in choice.pairs if pair.gesture == POINT)
+
+
+def test_inhibited_gaze_leaves_words_only() -> None:
+    choice = choice_of(refer("r", "rectangle", 0.5, option("the rectangle"), option("it")), no_gaze="inhibited")
+
+    assert made(choice) == ("none", "it")
+
+
+def test_what_is_not_understood_well_enough_is_made_as_well_as_possible_and_reported() -> None:  # B10
+    world = apart()
+    reference = refer("r", "rectangle", 0.99, option("the rectangle"), option("it"))
+
+    chosen = choose([reference], scene(world), body(world, ["rectangle"]), CONFIG)
+
+    assert made(chosen.choices[0]) == (POINT, "it")  # both phrases have R .98: the cheaper one
+    (warning,) = chosen.warnings
+    assert "0.99" in warning
+    assert "0.98" in warning
+    assert "'it'" in warning
+
+
+def test_a_reference_that_cannot_be_made_says_why() -> None:
+    with pytest.raises(RunFailed, match="deictic phrase needs a point"):
+        choice_of(refer("r", "rectangle", 0.5, THIS), no_point="pointing is inhibited")
+
+
+def test_distractors_are_those_that_every_channel_leaves() -> None:
+    world = flat_world({"a": (0.0, 0.0), "near": (0.08, 0.0), "seen": (0.15, 0.0), "far": (1.0, 0.0)})
+    reference = refer("r", "a", 0.5, option("it", distractors=["near", "far"]))
+
+    choice = choose([reference], scene(world), body(world, ["a"]), CONFIG).choices[0]
+
+    distractors = {pair.gesture: pair.distractors for pair in choice.pairs}
+    assert distractors == {"none": ("far", "near"), "gaze": ("near",), "directed_gaze": ("near",), POINT: ("near",)}
+
+
+@pytest.mark.parametrize(
+    ("options", "expected"),
+    [
+        # same cost: a deictic phrase with a point goes first
+        ([option("the piece"), option("this piece", deictic=True)], (POINT, "this piece")),
+        # then higher R
+        ([option("a b", distractors=["trapezoid"]), option("c d")], (POINT, "c d")),
+        # then the order of the options
+        ([option("first one"), option("other one")], (POINT, "first one")),
+    ],
+)
+def test_ties_are_broken_as_decided(options: list[SpeechOption], expected: tuple[str, str]) -> None:
+    world = flat_world({"rectangle": (0.0, 0.0), "trapezoid": (0.05, 0.0), "far": (5.0, 0.0)})
+    reference = refer("r", "rectangle", 0.3, *options)
+    free = GenerationConfig(seconds_per_head_degree=0, seconds_per_arm_degree=0, expected_delay=0)
+
+    choice = choose([reference], scene(world), body(world, ["rectangle"]), free).choices[0]
+
+    assert made(choice) == expected
+
+
+def test_of_equal_cost_and_reliability_the_fewer_gestures_win() -> None:
+    """Two gestures cannot have one reliability by the formula, so compare the preference itself."""
+    one, other = (
+        Pair(gesture=gesture, order=0, option=option("it"), distractors=frozenset(), channel=0.7, reliability=0.7)
+        for gesture in ("gaze", "directed_gaze")
+    )
+
+    assert one.preference < other.preference
+
+
+def test_every_pair_is_in_the_table_with_its_reason() -> None:
+    choice = choice_of(refer("r", "rectangle", 0.85, option("the rectangle"), option("it")))
+
+    assert len(choice.pairs) == 8
+    assert [pair.chosen for pair in choice.pairs].count(True) == 1
+    reasons = {(pair.gesture, pair.phrase): pair.reason for pair in choice.pairs}
+    assert reasons[LOOK, "it"] == "least cost"
+    assert reasons["none", "it"] == "R 0.7 below 0.85"
+    assert reasons[POINT, "it"] == "dearer by 1 s"
+
+
+# -- sequences --------------------------------------------------------------------------------------------------
+
+
+def test_an_arm_that_is_near_already_changes_the_next_choice() -> None:
+    """Alone each is said; together the first point pays for the second."""
+    world = apart()
+    long = "the long name of this thing here"
+    references = [refer(str(i), id, 0.65, option(long, 3), THIS) for i, id in enumerate(["rectangle", "trapezoid"])]
+
+    def arm(since: str, target: str) -> float:
+        return 40.0 if since == HERE else 0.0
+
+    motions = body(world, ["rectangle", "trapezoid"], head=lambda since, target: 5.0, arm=arm)
+
+    alone = [choose([each], scene(world), motions, CONFIG).choices[0] for each in references]
+    together = choose(references, scene(world), motions, CONFIG).choices
+
+    assert [made(choice)[0] for choice in alone] == ["none", "none"]
+    assert [made(choice)[0] for choice in together] == [POINT, POINT]
+    assert sum(choice.cost for choice in together) < sum(choice.cost for choice in alone)
+    assert "dearer over the sequence" not in {pair.reason for pair in together[1].pairs}
+
+
+def brute_force(
+    references: list[Reference], where: Scene, motions: Motions, config: GenerationConfig
+) -> tuple[float, tuple[object, ...]]:
+    """Least summed cost, then least preferences, over every combination."""
+    allowed = []
+    for reference in references:
+        table = [pair for pair in considered(reference, where, motions, config) if not pair.ruled_out]
+        good = [pair for pair in table if round(pair.reliability - reference.minimum_reliability, 9) >= 0]
+        most = max(round(pair.reliability, 9) for pair in table)
+        allowed.append(good or [pair for pair in table if round(pair.reliability, 9) == most])
+    best = None
+    for combination in product(*allowed):
+        posture, total = Posture(), 0.0
+        for pair, reference in zip(combination, references, strict=True):
+            total += cost(pair, reference.target, posture, motions, config)
+            posture = posture.after(pair.gesture, reference.target, motions)
+        rank = (round(total, 9), tuple(pair.preference for pair in combination))
+        best = rank if best is None or rank < best else best
+    assert best is not None
+    return best
+
+
+NAMES = ("a", "b", "c", "d")
+degrees = st.integers(0, 8).map(lambda steps: steps * 15.0)
+
+
+@st.composite
+def problems(draw: st.DrawFn) -> tuple[list[Reference], Scene, Motions]:
+    spots = st.integers(0, 12).map(lambda steps: steps * 0.06)
+    world = flat_world({name: (draw(spots), draw(spots)) for name in NAMES})
+    sequence = draw(st.lists(st.sampled_from(NAMES), min_size=1, max_size=3))
+    references = []
+    for number, target in enumerate(sequence):
+        others = [name for name in NAMES if name != target]
+        options = [option("some words", draw(st.integers(0, 4)), draw(st.sets(st.sampled_from(others))))]
+        for _ in range(draw(st.integers(0, 2))):
+            text = draw(st.sampled_from(["", "this", "it"]))
+            distractors = draw(st.sets(st.sampled_from(others)))
+            options.append(option(text, draw(st.integers(0, 4)), sorted(distractors), deictic=text == "this"))
+        minimum = draw(st.sampled_from([0.05, 0.3, 0.45, 0.7, 0.85, 0.95, 0.99]))
+        references.append(refer(f"ref-{number}", target, minimum, *options))
+    table = {(since, target): draw(degrees) for since in (HERE, *NAMES) for target in NAMES}
+    reach = {(since, target): draw(degrees) for since in (HERE, *NAMES) for target in NAMES}
+    motions = body(
+        world,
+        sequence,
+        head=lambda since, target: table[since, target],
+        arm=lambda since, target: reach[since, target],
+        arm_for=lambda target: "left_arm" if target in "ab" else "right_arm",
+        out_of_reach=sorted(draw(st.sets(st.sampled_from(NAMES), max_size=1))),
+    )
+    no_gaze = draw(st.sampled_from(["", "", "", "inhibited"]))
+    return references, scene(world, no_gaze=no_gaze), motions
+
+
+@settings(max_examples=100, deadline=None)
+@given(problems())
+def test_the_choice_is_the_optimum_over_the_sequence(problem: tuple[list[Reference], Scene, Motions]) -> None:
+    references, where, motions = problem
+
+    chosen = choose(references, where, motions, CONFIG)
+    least, _ = brute_force(references, where, motions, CONFIG)
+
+    assert sum(choice.cost for choice in chosen.choices) == pytest.approx(least, abs=1e-6)
+
+
+@settings(max_examples=100, deadline=None)
+@given(problems())
+def test_what_holds_for_every_choice(problem: tuple[list[Reference], Scene, Motions]) -> None:
+    references, where, motions = problem
+
+    chosen = choose(references, where, motions, CONFIG)
+
+    for reference, choice in zip(references, chosen.choices, strict=True):
+        deictic = {option.text for option in reference.options if option.deictic}
+        row = next(pair for pair in choice.pairs if pair.chosen)
+        warned = any(f"{reference.id}: nothing reaches" in warning for warning in chosen.warnings)
+        assert choice.phrase not in deictic or choice.gesture == POINT
+        assert warned == (not row.feasible)
+        assert row.reliability > 0
+        assert not where.no_gaze or choice.gesture == "none"

@@ -1,0 +1,200 @@
+"""Table 3.1, every row and index; turns over streamed fragments; what is illegal; what ends a turn early."""
+
+import pytest
+
+from schemas.actions import ActionBegan, ActionEnded
+from schemas.faults import InputRefused
+from schemas.fragments import TurnFragment, TurnStatus
+from schemas.units import Stamp
+from services.generation.config import GenerationConfig
+from services.generation.turn_policy import Aborted, TurnPlan, TurnPolicy, plan_turn
+
+AT = Stamp("test", 0.0)
+
+
+def fragment(id: str, status: TurnStatus, index: int = 1, **fields: object) -> TurnFragment:
+    return TurnFragment(id=id, turn_index=index, turn_status=status, **fields)  # type: ignore[arg-type]
+
+
+def policy() -> TurnPolicy:
+    return TurnPolicy("robot", GenerationConfig())
+
+
+def says(actor: str, ends: bool = False) -> ActionBegan | ActionEnded:
+    return (ActionEnded if ends else ActionBegan)(actor=actor, action="speak", at=AT)
+
+
+@pytest.mark.parametrize(
+    ("status", "index", "pair", "reply", "closes", "backchannel"),
+    [
+        ("beginning", 1, True, "", False, False),
+        ("beginning", 2, False, "answered", False, False),
+        ("beginning", 3, False, "repaired", False, False),
+        ("middle", 1, False, "", False, False),
+        ("middle", 2, False, "", False, False),
+        ("middle", 3, False, "", False, False),
+        ("end", 1, False, "", True, False),
+        ("end", 2, False, "", True, False),
+        ("end", 3, False, "", True, False),
+        ("full", 1, True, "", True, False),
+        ("full", 2, False, "answered", True, False),
+        ("full", 3, False, "repaired", True, False),
+        ("backchannel", 1, False, "", False, True),
+        ("backchannel", 2, False, "", False, True),
+        ("backchannel", 3, False, "", False, True),
+    ],
+)
+def test_table_3_1(status: TurnStatus, index: int, pair: bool, reply: str, closes: bool, backchannel: bool) -> None:
+    plan = plan_turn(fragment("f", status, index), "t", "human")
+
+    assert plan == TurnPlan(
+        turn="t",
+        addressee="human",
+        announces_pair=pair,
+        reply=reply,  # type: ignore[arg-type]
+        closes=closes,
+        backchannel=backchannel,
+    )
+
+
+def test_streamed_fragments_are_one_turn_named_after_the_first() -> None:
+    turns = policy()
+
+    plans = [
+        turns.accept(fragment(id, status), "human")  # type: ignore[arg-type]
+        for id, status in [("a", "beginning"), ("b", "middle"), ("c", "end"), ("d", "full")]
+    ]
+
+    assert [plan.turn for plan in plans] == ["a", "a", "a", "d"]
+
+
+@pytest.mark.parametrize(
+    ("before", "illegal", "reason"),
+    [
+        ([], ("x", "middle"), "no turn open"),
+        ([], ("x", "end"), "no turn open"),
+        ([("a", "full")], ("x", "middle"), "no turn open"),
+        ([("a", "beginning")], ("x", "beginning"), "turn a is open"),
+        ([("a", "beginning")], ("x", "full"), "turn a is open"),
+        ([("a", "beginning")], ("x", "backchannel"), "holds the turn"),
+        ([("a", "full")], ("x", "backchannel"), "holds the turn"),
+        ([("a", "beginning")], ("a", "middle"), "id"),
+    ],
+)
+def test_an_illegal_sequence_is_refused_and_changes_nothing(
+    before: list[tuple[str, TurnStatus]], illegal: tuple[str, TurnStatus], reason: str
+) -> None:
+    turns = policy()
+    for id, status in before:
+        turns.accept(fragment(id, status), "human")
+    was_open = turns.open_turn
+
+    with pytest.raises(InputRefused, match=reason):
+        turns.accept(fragment(*illegal), "human")
+
+    assert turns.open_turn == was_open
+
+
+def test_a_turn_cannot_change_whom_it_speaks_to() -> None:
+    turns = policy()
+    turns.accept(fragment("a", "beginning"), "alice")
+
+    with pytest.raises(InputRefused, match="speaks to alice, not to bob"):
+        turns.accept(fragment("b", "end"), "bob")
+
+
+def test_a_backchannel_is_fine_once_the_turn_is_over() -> None:
+    turns = policy()
+    turns.accept(fragment("a", "full"), "human")
+    turns.fragment_ended("a", complete=True, now=1.0)
+
+    assert turns.accept(fragment("b", "backchannel"), "human").backchannel
+
+
+def test_silence_closes_an_open_turn_after_ten_seconds() -> None:
+    turns = policy()
+    turns.accept(fragment("a", "beginning"), "human")
+    assert turns.deadline is None  # as long as it is performed
+    turns.fragment_ended("a", complete=True, now=3.0)
+    assert turns.deadline == 13.0
+
+    assert turns.tick(12.9) is None
+    assert turns.tick(13.0) == Aborted("a", "human", (), "silence for 10 s")
+    assert turns.deadline is None
+    assert turns.accept(fragment("b", "beginning"), "human").turn == "b"
+
+
+def test_the_next_fragment_ends_the_silence() -> None:
+    turns = policy()
+    turns.accept(fragment("a", "beginning"), "human")
+    turns.fragment_ended("a", complete=True, now=3.0)
+    turns.accept(fragment("b", "middle"), "human")
+
+    assert turns.deadline is None
+    assert turns.tick(20.0) is None
+
+
+def test_a_failed_fragment_aborts_its_turn_and_what_is_in_line() -> None:
+    turns = policy()
+    for id, status in [("a", "beginning"), ("b", "middle"), ("c", "end"), ("d", "full")]:
+        turns.accept(fragment(id, status), "human")  # type: ignore[arg-type]
+
+    aborted = turns.fragment_ended("a", complete=False, now=1.0, reason="a failed")
+
+    assert aborted == Aborted("a", "human", ("b", "c"), "a failed")
+    assert turns.fragment_ended("b", complete=False, now=1.0) is None  # ended already
+    assert turns.holds_the_turn  # with d
+
+
+def test_after_a_fault_the_turn_cannot_go_on() -> None:
+    turns = policy()
+    turns.accept(fragment("a", "beginning"), "human")
+    turns.fragment_ended("a", complete=False, now=1.0)
+
+    with pytest.raises(InputRefused, match="no turn open"):
+        turns.accept(fragment("b", "end"), "human")
+
+
+def test_talking_into_the_robots_speech_takes_the_floor() -> None:
+    turns = policy()
+    turns.accept(fragment("a", "full"), "human")
+    turns.feed(says("robot"), 1.0)
+    turns.feed(says("human"), 2.0)
+
+    assert turns.deadline == 2.8
+    assert turns.tick(2.79) is None
+    assert turns.tick(2.8) == Aborted("a", "human", ("a",), "human took the floor")
+
+
+@pytest.mark.parametrize("ends", ["human", "robot"])
+def test_a_short_word_or_an_early_answer_is_no_barge_in(ends: str) -> None:
+    turns = policy()
+    turns.accept(fragment("a", "full"), "human")
+    turns.feed(says("robot"), 1.0)
+    turns.feed(says("human"), 2.0)
+    turns.feed(says(ends, ends=True), 2.5)
+
+    assert turns.deadline is None
+    assert turns.tick(5.0) is None
+
+
+def test_somebody_else_talking_does_not_end_the_turn() -> None:
+    turns = policy()
+    turns.accept(fragment("a", "full"), "human")
+    turns.feed(says("robot"), 1.0)
+    turns.feed(says("passer-by"), 2.0)
+
+    assert turns.tick(2.8) is None
+    assert turns.holds_the_turn
+
+
+def test_the_robot_thinks_only_within_an_open_turn_with_nothing_in_line() -> None:
+    turns = policy()
+    hold = fragment("a", "beginning", delay=True, delay_target="table")
+    turns.accept(hold, "human")
+    turns.fragment_ended("a", complete=True, now=1.0)
+    assert turns.thinks_after(hold)
+
+    turns.accept(fragment("b", "end"), "human")
+    assert not turns.thinks_after(hold)
+    assert not turns.thinks_after(fragment("b", "end", delay=True, delay_target="table"))
