@@ -29,9 +29,13 @@ from services.runtime import Ready
 
 
 class _Live(Struct, eq=False):
-    """A block from its request to its outcome. ended: resolved when its outcome is out."""
+    """A block from its request to its outcome.
+
+    earlier: those that were there when it came. ended: resolved when its outcome is out.
+    """
 
     request: PerformBlock
+    earlier: list["_Live"]
     ended: asyncio.Future[None]
     performance: Performance | None = None
     ending: Ending | None = None
@@ -59,21 +63,20 @@ class _Realizer:
             live.stop(Ending("interrupted", Fault(reason=reason, where=live.request.block.id)))
 
     def admit(self, request: PerformBlock) -> _Live:
-        live = _Live(request, asyncio.get_running_loop().create_future())
+        live = _Live(request, list(self.live.values()), asyncio.get_running_loop().create_future())
         self.live[request.id] = live
         return live
 
     async def perform(self, live: _Live) -> None:
         """A block from request to outcome."""
-        earlier = [other for other in self.live.values() if other is not live and not other.ended.done()]
         request = live.request
         try:
-            plan = await self._plan(request, earlier)
+            plan = await self._plan(live)
         except EngageError as error:
             self._refuse(live, error)
             return
         self.desk.accept(request.id)
-        await self._make_way(live, earlier)
+        await self._make_way(live)
         if live.ending is not None:
             self._end(live, self._never_begun(request, live.ending))
             return
@@ -82,12 +85,12 @@ class _Realizer:
         )
         self._end(live, await live.performance.run())
 
-    async def _plan(self, request: PerformBlock, earlier: list[_Live]) -> Plan:
-        block = request.block
-        if any(other.request.block.id == block.id for other in earlier):
+    async def _plan(self, live: _Live) -> Plan:
+        block = live.request.block
+        if any(other.request.block.id == block.id and not other.ended.done() for other in live.earlier):
             raise BlockRefused(Fault(reason="a block of this id is still being performed", where=block.id))
         plan_block(block)  # What is wrong with the block alone needs no body to be seen.
-        return plan_block(block, await self._estimates(request))
+        return plan_block(block, await self._estimates(live.request))
 
     async def _estimates(self, request: PerformBlock) -> tuple[Estimate, ...]:
         behaviors = [behavior for behavior in request.block.behaviors if performer(behavior) == "body"]
@@ -102,13 +105,14 @@ class _Realizer:
         assert isinstance(answer, Estimates)
         return answer.items
 
-    async def _make_way(self, live: _Live, earlier: list[_Live]) -> None:
+    async def _make_way(self, live: _Live) -> None:
         """What composition asks of the blocks that are already there."""
         if live.request.block.composition == "REPLACE":
-            for other in earlier:
+            for other in live.earlier:
                 other.stop(Ending("interrupted", replaced_by=live.request.block.id))
-        if live.request.block.composition != "MERGE" and earlier:
-            await asyncio.wait([other.ended for other in earlier])
+        if live.request.block.composition != "MERGE" and live.earlier:
+            await asyncio.wait([other.ended for other in live.earlier])
+        live.earlier.clear()
 
     def _never_begun(self, request: PerformBlock, ending: Ending) -> BlockOutcome:
         return BlockOutcome(

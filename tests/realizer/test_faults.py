@@ -1,4 +1,4 @@
-"""What can go wrong while a block runs: it always ends, exactly once, the rest runs, and nothing is left in the air."""
+"""What can go wrong while a block runs: it ends, exactly once, the rest runs, nothing hangs in the air."""
 
 import asyncio
 
