@@ -1,17 +1,25 @@
 """An event loop whose clock jumps to the next timer: hours in seconds, exact times, and deadlocks found for free."""
 
 import asyncio
+import heapq
+import itertools
 import math
 import selectors
-from collections.abc import Coroutine
+from collections.abc import Callable, Coroutine
+from contextvars import Context
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, TypeVar, TypeVarTuple, Unpack
 
 T = TypeVar("T")
+Ts = TypeVarTuple("Ts")
 
 
 class Deadlock(RuntimeError):
     """Every task waits and no timer is pending: in real time this would hang for ever."""
+
+
+class TimeRanOut(RuntimeError):
+    """Virtual time has passed the loop's limit: something waits for what never comes, and timers go on."""
 
 
 class _InstantSelector(selectors.SelectSelector):
@@ -27,13 +35,30 @@ class _InstantSelector(selectors.SelectSelector):
         return []
 
 
+class _Timer(asyncio.TimerHandle):
+    """Of timers due together the one set first fires first; asyncio's heap leaves it to chance."""
+
+    __slots__ = ("_number",)
+
+    def __init__(self, number: int, when: float, *rest: Any) -> None:
+        super().__init__(when, *rest)
+        self._number = number
+
+    def __lt__(self, other: object) -> bool:
+        assert isinstance(other, _Timer)
+        return (self.when(), self._number) < (other.when(), other._number)
+
+
 class VirtualTimeLoop(asyncio.SelectorEventLoop):
     """Starts at second 0. `loop.time()` moves only when nothing else is left to do.
 
     Nothing outside the loop may wake it: no sockets, threads or processes, which take real time.
+    limit: the second at which TimeRanOut is raised; with a timer that repeats there is never a Deadlock.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, limit: float = math.inf) -> None:
+        self._limit = limit
+        self._timers = itertools.count()
         self._virtual_now = 0.0
         selector = _InstantSelector()
         selector.loop = self
@@ -43,11 +68,23 @@ class VirtualTimeLoop(asyncio.SelectorEventLoop):
     def time(self) -> float:
         return self._virtual_now
 
+    def call_at(
+        self, when: float, callback: Callable[[Unpack[Ts]], object], *args: Unpack[Ts], context: Context | None = None
+    ) -> asyncio.TimerHandle:
+        self._check_closed()  # type: ignore[attr-defined]
+        timer = _Timer(next(self._timers), when, callback, args, self, context)
+        heapq.heappush(self._scheduled, timer)  # type: ignore[attr-defined]
+        timer._scheduled = True  # type: ignore[attr-defined]
+        return timer
+
     def jump(self, timeout: float | None) -> None:
         """Let time pass to the next timer. Raises Deadlock if there is none."""
         if timeout is None:
             waiting = sorted(_whereabouts(task) for task in asyncio.all_tasks(self) if not task.done())
             raise Deadlock(f"all tasks wait and no timer is pending: {', '.join(waiting)}")
+        if self._virtual_now > self._limit:
+            self._limit = math.inf  # the loop still has to end its tasks
+            raise TimeRanOut(f"{self._virtual_now:.0f} s have passed")
         scheduled = self._scheduled  # type: ignore[attr-defined]
         # The exact instant of the next timer: now + timeout would be off by a rounding.
         self._virtual_now = scheduled[0]._when if scheduled else self._virtual_now + timeout

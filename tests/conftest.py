@@ -9,6 +9,13 @@ import pytest_asyncio
 from services.memory_bus import MemoryHub
 from services.virtual_time import VirtualTimeLoop
 
+LONGEST_TEST = 24 * 3600.0
+"""Virtual seconds; then a test waits for something that never comes."""
+
+
+def virtual_loop() -> asyncio.AbstractEventLoop:
+    return VirtualTimeLoop(limit=LONGEST_TEST)
+
 
 def pytest_configure(config: pytest.Config) -> None:
     config.addinivalue_line("markers", "real_time: runs on the wall clock (real sockets and processes)")
@@ -19,10 +26,10 @@ def pytest_asyncio_loop_factories(
     config: pytest.Config, item: pytest.Item
 ) -> Mapping[str, Callable[[], asyncio.AbstractEventLoop]]:
     if item.get_closest_marker("each_bus"):
-        return {"memory": VirtualTimeLoop, "zenoh": asyncio.SelectorEventLoop}
+        return {"memory": virtual_loop, "zenoh": asyncio.SelectorEventLoop}
     if item.get_closest_marker("real_time"):
         return {"real": asyncio.SelectorEventLoop}
-    return {"virtual": VirtualTimeLoop}
+    return {"virtual": virtual_loop}
 
 
 @pytest.fixture(autouse=True)

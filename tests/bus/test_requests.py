@@ -1,0 +1,430 @@
+"""Both ends of a long request, over a memory bus that loses, repeats, delays, is cut, and whose ends die."""
+
+import asyncio
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from schemas import keys
+from schemas.behaviors import Wait
+from schemas.blocks import Block, BlockOutcome, PerformBlock
+from schemas.body import PerformBehavior
+from schemas.faults import EngageError, Fault, RunFailed
+from schemas.presence import PeerAlive, PeerGone
+from schemas.requests import Accepted, Cancel, Outcome, Request
+from services.bus import Received
+from services.memory_bus import Faults, MemoryBus, MemoryHub
+from services.requests import ENDED_KEPT, GRACE, RequestDesk, Requester, RequestRefused
+from services.virtual_time import run_virtual
+
+
+def block(id: str = "b", requester: str = "client") -> PerformBlock:
+    return PerformBlock(id=id, requester=requester, block=Block(id=id))
+
+
+def extent(through: str, id: str = "b") -> PerformBehavior:
+    return PerformBehavior(id=id, requester="client", block="b", behavior=Wait(id="w"), through=through)
+
+
+class Server:
+    """Accepts every block, performs it for `seconds`, and keeps a diary."""
+
+    def __init__(self, hub: MemoryHub, seconds: float = 0.5, name: str = "realizer") -> None:
+        self.bus = hub.join(name)
+        self.desk = RequestDesk(self.bus, name, self.cancel)
+        self.seconds = seconds
+        self.taken: list[Request] = []
+        self.ended: list[str] = []
+        self.timers: dict[str, asyncio.TimerHandle] = {}
+        self.task = asyncio.create_task(self.serve(), name=name)
+
+    async def serve(self) -> None:
+        with self.bus.subscribe(*RequestDesk.patterns(self.bus.name)) as inbox:
+            self.bus.declare_alive()
+            async for received in inbox:
+                match self.desk.take(received):
+                    case Cancel() as cancel:
+                        self.taken.append(cancel)
+                        self.cancel(cancel)
+                    case Request(id=id) as request:
+                        self.taken.append(request)
+                        if id not in self.timers:
+                            self.desk.accept(id)
+                            loop = asyncio.get_running_loop()
+                            self.timers[id] = loop.call_later(self.seconds, self.end, id, "done")
+
+    def cancel(self, cancel: Cancel) -> None:
+        self.timers[cancel.id].cancel()
+        self.end(cancel.id, "interrupted")
+
+    def end(self, id: str, status: Any) -> None:
+        self.ended.append(f"{id} {status}")
+        self.desk.end(BlockOutcome(id=id, block=id, status=status))
+
+    async def die(self, hub: MemoryHub) -> None:
+        hub.kill(self.bus.name)
+        for timer in self.timers.values():
+            timer.cancel()
+        self.desk.close()
+        self.task.cancel()
+        await asyncio.gather(self.task, return_exceptions=True)
+
+
+@contextmanager
+def requester_of(bus: MemoryBus) -> Iterator[Requester]:
+    """A requester that is fed at the instant of arrival, without a task."""
+    requester = Requester(bus)
+    inbox = bus.subscribe(*Requester.PATTERNS)
+    offer = inbox.offer
+    inbox.offer = lambda received: (offer(received), requester.feed(received))[0]  # type: ignore[method-assign]
+    yield requester
+    requester.close()
+
+
+async def test_a_request_is_accepted_and_ends(hub: MemoryHub):
+    server = Server(hub)
+    async with Requester(hub.join("client")) as requests:
+        pending = requests.send(keys.BLOCK, block())
+        await pending.accepted
+
+        outcome = await pending.outcome
+
+    assert outcome == BlockOutcome(id="b", block="b", status="done")
+    assert asyncio.get_running_loop().time() == 0.5
+    await server.die(hub)
+
+
+async def test_a_server_that_comes_late_gets_the_request_at_once_and_once(hub: MemoryHub):
+    client = hub.join("client")
+    client.declare_alive()
+    async with Requester(client) as requests:
+        pending = requests.send(keys.BLOCK, block())
+        await asyncio.sleep(60.0)
+        server = Server(hub)
+
+        await pending.outcome
+
+    assert asyncio.get_running_loop().time() == 60.5
+    assert server.taken == [block()]
+    await server.die(hub)
+
+
+async def test_a_refusal_ends_both_futures_with_the_servers_fault(hub: MemoryHub):
+    server = hub.join("realizer")
+    desk = RequestDesk(server, "realizer", lambda cancel: None)
+    inbox = server.subscribe(*RequestDesk.patterns("realizer"))
+    async with Requester(hub.join("client")) as requests:
+        pending = requests.send(keys.BLOCK, block())
+        received = await inbox.next()
+        assert received is not None
+        assert desk.take(received) == block()
+        desk.refuse("b", Fault(reason="no such target"))
+
+        for future in (pending.accepted, pending.outcome):
+            with pytest.raises(RequestRefused, match="no such target"):
+                await future
+
+
+async def test_a_cancelled_request_ends_as_interrupted(hub: MemoryHub):
+    server = Server(hub)
+    async with Requester(hub.join("client")) as requests:
+        pending = requests.send(keys.BLOCK, block())
+        await pending.accepted
+        requests.cancel("b", "changed my mind")
+        requests.cancel("b", "really")
+
+        outcome = await pending.outcome
+
+    assert outcome == BlockOutcome(id="b", block="b", status="interrupted")
+    assert server.taken == [block(), Cancel(id="b", requester="client", reason="changed my mind")]
+    await server.die(hub)
+
+
+async def test_cancelling_what_the_server_never_got_ends_as_refused_and_it_is_never_performed(hub: MemoryHub):
+    server = Server(hub)
+    client = hub.join("client")
+    async with Requester(client) as requests:
+        hub.partition("client")
+        pending = requests.send(keys.BLOCK, block())
+        hub.heal()
+        requests.cancel("b")
+
+        with pytest.raises(RequestRefused, match="never heard"):
+            await pending.outcome
+
+    client.publish(keys.BLOCK, block())
+    await asyncio.sleep(1.0)
+    assert server.taken == []
+    await server.die(hub)
+
+
+async def test_a_killed_server_fails_the_request_after_the_grace(hub: MemoryHub):
+    server = Server(hub, seconds=100.0)
+    async with Requester(hub.join("client")) as requests:
+        pending = requests.send(keys.BLOCK, block())
+        await pending.accepted
+        await asyncio.sleep(1.0)
+        await server.die(hub)
+
+        with pytest.raises(RunFailed, match="realizer is gone"):
+            await pending.outcome
+
+    assert asyncio.get_running_loop().time() == 1.0 + GRACE
+
+
+async def test_a_restarted_server_does_not_perform_again_what_it_had_accepted(hub: MemoryHub):
+    server = Server(hub, seconds=100.0)
+    client = hub.join("client")
+    client.declare_alive()
+    async with Requester(client) as requests:
+        pending = requests.send(keys.BLOCK, block())
+        await pending.accepted
+        await server.die(hub)
+        again = Server(hub)
+
+        with pytest.raises(RunFailed, match="restarted"):
+            await pending.outcome
+        await asyncio.sleep(10.0)
+
+    assert again.taken == []
+    await again.die(hub)
+
+
+async def test_a_request_that_died_with_its_server_unaccepted_is_performed_by_the_next(hub: MemoryHub):
+    server = Server(hub)
+    async with Requester(hub.join("client")) as requests:
+        hub.partition("client")
+        pending = requests.send(keys.BLOCK, block())
+        await server.die(hub)
+        hub.heal()
+        again = Server(hub)
+
+        assert (await pending.outcome).id == "b"
+
+    assert (server.taken, again.taken) == ([], [block()])
+    await again.die(hub)
+
+
+async def test_a_short_absence_of_the_server_is_harmless(hub: MemoryHub):
+    server = Server(hub, seconds=5.0)
+    async with Requester(hub.join("client")) as requests:
+        pending = requests.send(keys.BLOCK, block())
+        await pending.accepted
+        hub.announce("realizer", PeerGone(participant="realizer"))
+        await asyncio.sleep(GRACE - 0.1)
+        hub.announce("realizer", PeerAlive(participant="realizer", run=server.bus.run))
+
+        assert (await pending.outcome).id == "b"
+
+    assert asyncio.get_running_loop().time() == 5.0
+    await server.die(hub)
+
+
+async def test_a_dead_requester_ends_its_requests_after_the_grace(hub: MemoryHub):
+    server = Server(hub, seconds=100.0)
+    await asyncio.sleep(0)
+    client, other = hub.join("client"), hub.join("other")
+    for bus in (client, other):
+        bus.declare_alive()
+    client.publish(keys.BLOCK, block("mine"))
+    other.publish(keys.BLOCK, block("others", "other"))
+    await asyncio.sleep(1.0)
+
+    hub.kill("client")
+    await asyncio.sleep(GRACE + 0.001)
+
+    assert server.ended == ["mine interrupted"]
+    assert server.desk.is_live("others")
+    await server.die(hub)
+
+
+async def test_a_requester_that_is_back_within_the_grace_keeps_its_requests(hub: MemoryHub):
+    server = Server(hub, seconds=100.0)
+    await asyncio.sleep(0)
+    client = hub.join("client")
+    client.declare_alive()
+    client.publish(keys.BLOCK, block())
+    hub.announce("client", PeerGone(participant="client"))
+    await asyncio.sleep(GRACE - 0.001)
+    hub.announce("client", PeerAlive(participant="client", run=client.run))
+
+    await asyncio.sleep(2 * GRACE)
+
+    assert server.ended == []
+    await server.die(hub)
+
+
+async def test_a_restarted_requester_has_forgotten_its_requests_so_they_end_at_once(hub: MemoryHub):
+    server = Server(hub, seconds=100.0)
+    await asyncio.sleep(0)
+    client = hub.join("client")
+    client.declare_alive()
+    client.publish(keys.BLOCK, block())
+    await asyncio.sleep(1.0)
+    hub.kill("client")
+    hub.join("client").declare_alive()
+    await asyncio.sleep(0)
+
+    assert server.ended == ["b interrupted"]
+    await server.die(hub)
+
+
+async def test_a_duplicate_is_answered_with_the_last_state(hub: MemoryHub):
+    server = Server(hub)
+    client = hub.join("client")
+    states = client.subscribe(keys.ANY_REQUEST_STATE)
+    for _ in range(2):
+        client.publish(keys.BLOCK, block())
+    await asyncio.sleep(1.0)
+    client.publish(keys.BLOCK, block())
+    await asyncio.sleep(0)
+
+    outcome = BlockOutcome(id="b", block="b", status="done")
+    assert [(await states.next()).message for _ in range(4)] == [  # type: ignore[union-attr]
+        Accepted(id="b"), Accepted(id="b"), outcome, outcome,
+    ]  # fmt: skip
+    assert server.taken == [block()]
+    await server.die(hub)
+
+
+async def test_an_older_content_never_replaces_a_newer(hub: MemoryHub):
+    server = Server(hub, name="control")
+    client = hub.join("client")
+    with requester_of(client) as requests:
+        requests.send(keys.BEHAVIOR, first := extent("start"))
+        requests.send(keys.BEHAVIOR, extent("stroke_start"))
+        newest = requests.send(keys.BEHAVIOR, extent("stroke_end")).request
+        client.publish(keys.BEHAVIOR, first)
+        await asyncio.sleep(0.4)
+
+        assert [request.through for request in server.taken] == ["start", "stroke_start", "stroke_end"]  # type: ignore[attr-defined]
+        assert newest.revision == 2
+    await server.die(hub)
+
+
+async def test_an_update_after_the_cancellation_is_void(hub: MemoryHub):
+    bus = hub.join("control")
+    desk = RequestDesk(bus, "control", lambda cancel: None)
+
+    def take(message: Any) -> Request | None:
+        return desk.take(Received(keys.BEHAVIOR, message, "client", 0.0))
+
+    assert take(extent("start")) is not None
+    assert take(Cancel(id="b", requester="client")) is not None
+    assert take(extent("end")) is None
+    assert take(Cancel(id="b", requester="client")) is None
+
+
+async def test_an_id_used_again_by_somebody_else_is_a_new_request(hub: MemoryHub):
+    server = Server(hub)
+    client = hub.join("client")
+    client.publish(keys.BLOCK, block("b", "client"))
+    await asyncio.sleep(1.0)
+
+    client.publish(keys.BLOCK, block("b", "another"))
+    await asyncio.sleep(0)
+
+    assert server.taken == [block("b", "client"), block("b", "another")]
+    await server.die(hub)
+
+
+async def test_a_server_that_ends_a_request_twice_has_a_bug(hub: MemoryHub):
+    server = Server(hub)
+    hub.join("client").publish(keys.BLOCK, block())
+    await asyncio.sleep(1.0)
+
+    with pytest.raises(ValueError, match="b has ended already"):
+        server.desk.end(BlockOutcome(id="b", block="b", status="done"))
+    with pytest.raises(ValueError, match="x was never made"):
+        server.desk.accept("x")
+    await server.die(hub)
+
+
+async def test_a_desk_forgets_the_oldest_ended_requests_and_no_live_one(hub: MemoryHub):
+    bus = hub.join("realizer")
+    desk = RequestDesk(bus, "realizer", lambda cancel: None)
+    inbox = bus.subscribe(*RequestDesk.patterns("realizer"))
+    states = bus.subscribe(keys.ANY_REQUEST_STATE)
+    for number in range(ENDED_KEPT + 2):
+        bus.publish(keys.BLOCK, block(str(number)))
+        received = await inbox.next()
+        assert received is not None
+        assert desk.take(received) is not None
+        if number:
+            desk.refuse(str(number), Fault(reason="no"))
+
+    def is_forgotten(id: str) -> bool:
+        return desk.take(Received(keys.BLOCK, block(id), "client", 0.0)) is not None
+
+    assert desk.is_live("0")
+    assert is_forgotten("1")
+    assert not is_forgotten("2")
+    assert len(states) == ENDED_KEPT + 2
+
+
+@given(
+    loss=st.floats(0.0, 0.6),
+    duplicate=st.floats(0.0, 0.5),
+    delay=st.floats(0.0, 0.5),
+    seed=st.integers(0, 1 << 16),
+    script=st.lists(
+        st.tuples(
+            st.sampled_from(["ask", "ask", "update", "cancel", "cut", "heal", "kill server", "start server"]),
+            st.floats(0.0, 2.5),
+        ),
+        max_size=15,
+    ),
+)
+@settings(max_examples=60, deadline=None)
+def test_every_request_ends_exactly_once_at_both_ends(
+    loss: float, duplicate: float, delay: float, seed: int, script: list[tuple[str, float]]
+):
+    async def main() -> None:
+        hub = MemoryHub(faults=Faults(loss=loss, duplicate=duplicate, delay=delay), seed=seed)
+        client = hub.join("client")
+        client.declare_alive()
+        lives: list[Server] = []
+        pendings = []
+        async with Requester(client) as requests:
+            for number, (what, pause) in enumerate(script):
+                match what:
+                    case "ask":
+                        pendings.append(requests.send(keys.BLOCK, block(str(number))))
+                    case "update" if pendings and not pendings[-1].outcome.done():
+                        content = Block(id=pendings[-1].request.id, composition="APPEND")
+                        requests.send(keys.BLOCK, PerformBlock(id=content.id, requester="client", block=content))
+                    case "cancel" if pendings:
+                        requests.cancel(pendings[-1].request.id)
+                    case "cut":
+                        hub.partition("client")
+                    case "heal":
+                        hub.heal()
+                    case "kill server" if lives and not lives[-1].task.done():
+                        await lives[-1].die(hub)
+                    case "start server" if not lives or lives[-1].task.done():
+                        lives.append(Server(hub))
+                await asyncio.sleep(pause)
+            hub.heal()
+            if not lives or lives[-1].task.done():
+                lives.append(Server(hub))
+            ends = await asyncio.wait_for(
+                asyncio.gather(*(pending.outcome for pending in pendings), return_exceptions=True), 600.0
+            )
+            await asyncio.sleep(10.0)
+
+        assert all(isinstance(end, (Outcome, EngageError)) for end in ends)
+        assert all(pending.accepted.done() for pending in pendings)
+        for life in lives:
+            ids = [request.id for request in life.taken if request.id in life.timers]
+            performed = {id for id in ids if f"{id} done" in life.ended or f"{id} interrupted" in life.ended}
+            assert len(life.ended) == len(performed)
+            assert life.task.done() or not any(life.desk.is_live(id) for id in ids)
+        for life in lives:
+            await life.die(hub)
+        await hub.close()
+
+    run_virtual(main())
