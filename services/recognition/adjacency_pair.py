@@ -187,7 +187,7 @@ class AdjacencyPair(Machine):
             self.step("responder_interrupts", at)
         else:
             self.event.delay = at - self._turn_end
-            self.step(given, at)
+            self.step(given, max(at, self._turn_end))
 
     def ends(self, action: Action, at: Seconds, *, by_robot: bool) -> None:
         """Somebody's action has ended: the person's turn, or the response."""

@@ -3,32 +3,29 @@
 from collections import OrderedDict
 from collections.abc import Iterable
 
+from schemas.syncref import BLOCK_ITSELF, SyncRef, canonical_sync
 from schemas.units import Seconds
 
 BLOCKS_KEPT = 64
 """Blocks whose realised points are remembered, for a request that arrives after them."""
 
 
-def anchor(reference: str) -> str:
-    """`block-1:gaze-1:strokeStart+0.5` -> `gaze-1:strokestart`: one spelling for both dialects, no offset."""
-    *_, behavior, sync = ["", *reference.split(":")]
-    return f"{behavior}:{_plain(sync)}"
+def anchor(reference: str) -> tuple[str, Seconds] | None:
+    """The point a sync reference means, and the offset: `g:strokeStart+0.5` -> `g:stroke_start`, 0.5.
 
-
-def offset(reference: str) -> Seconds:
-    """The offset in seconds of a sync reference, 0 if it has none or a strange one."""
-    sync = reference.rpartition(":")[2]
-    plain = next((index for index, letter in enumerate(sync) if letter in "+-"), len(sync))
+    None for what is no point of a behavior: a bad reference, a number of seconds, the block itself.
+    """
     try:
-        return float(sync[plain:].replace(" ", "") or 0.0)
+        point = SyncRef.parse(reference)
     except ValueError:
-        return 0.0
+        return None
+    if point.behavior in ("", BLOCK_ITSELF):
+        return None
+    return _name(point.behavior, point.sync), point.offset
 
 
-def _plain(sync: str) -> str:
-    for sign in "+-":
-        sync = sync.partition(sign)[0]
-    return sync.strip().replace("_", "").lower()
+def _name(behavior: str, sync: str) -> str:
+    return f"{behavior}:{canonical_sync(sync)}"
 
 
 class Blocks:
@@ -40,7 +37,7 @@ class Blocks:
 
     def realised(self, block: str, behavior: str, sync: str, at: Seconds) -> str:
         """Remember a point; its anchor."""
-        name = f"{behavior}:{_plain(sync)}"
+        name = _name(behavior, sync)
         self._points.setdefault(block, {})[name] = at
         if len(self._points) > BLOCKS_KEPT:
             self._points.popitem(last=False)
@@ -65,7 +62,7 @@ class LimitClock:
         self.limit = limit
         self._from = start
         self._not_before = start
-        self._waiting = {anchor(reference): offset(reference) for reference in anchors}
+        self._waiting = dict(filter(None, map(anchor, anchors)))
 
     @property
     def waiting(self) -> tuple[str, ...]:

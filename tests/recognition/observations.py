@@ -104,7 +104,7 @@ class Log:
     def requests_event(self, kind: EventKind, at: float, *objects: str, **event: Any) -> str:
         """The id of the request."""
         self.requests += 1
-        request = request_event(kind, at, *objects, id=f"request-{self.requests}", **event)
+        request = request_event(kind, at, *objects, request=f"request-{self.requests}", **event)
         self.feed(request, at)
         return request.id
 
@@ -130,11 +130,11 @@ class Log:
 
 
 def request_event(
-    kind: EventKind, at: float, *objects: str, id: str = "request-1", block: str = "block-1", **event: Any
+    kind: EventKind, at: float, *objects: str, request: str = "request-1", block: str = "block-1", **event: Any
 ) -> RequestEvent:
     event = {"id": "event-1", "responder": HUMAN, **event}
     return RequestEvent(
-        id=id, requester="realizer", block=block, at=stamp(at), event=Event(kind=kind, objects=objects, **event)
+        id=request, requester="realizer", block=block, at=stamp(at), event=Event(kind=kind, objects=objects, **event)
     )
 
 

@@ -1,0 +1,469 @@
+"""Adjacency pairs and backchannels: every row of the two tables, both initiators, exact times."""
+
+import pytest
+
+from tests.recognition.observations import HUMAN, ROBOT, Log
+
+
+def asked(*accept: str, turn: str = "turn-1", end: float | None = 2.0) -> Log:
+    """The robot has asked at 1.0 and fallen silent at `end`."""
+    log = Log()
+    log.begins(ROBOT, "speak", 1.0, behavior="block-1:speech-1")
+    log.requests_event("adjacency_pair", 1.0, turn=turn, accept=accept)
+    if end is not None:
+        log.ends(ROBOT, "speak", end, behavior="block-1:speech-1")
+        log.signals("ended", end)
+    return log
+
+
+def backchannel(start: float, end: float) -> list[tuple[str, str, float]]:
+    return [("bc-1", "started", start), ("bc-1", "succeeded", start), ("bc-1", "completed", end)]
+
+
+# -- the robot's pairs ------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("action", ["speak", "nod", "shake", "point"])
+def test_person_answers_within_the_limit(action):
+    log = asked()
+    log.begins(HUMAN, action, 2.4)
+    log.ends(HUMAN, action, 3.4)
+
+    assert log.told("adjacency_pair") == [
+        ("ap-1", "started", 1.0), ("ap-1", "succeeded", 2.4), ("ap-1", "completed", 3.4),
+    ]  # fmt: skip
+    assert log.succeeded("ap-1").delay == pytest.approx(0.4)
+    assert (log.succeeded("ap-1").response, log.outcomes[0].response) == (action, action)
+    assert log.last("ap-1").duration == pytest.approx(1.0)
+    assert log.told("backchannel") == []
+
+
+def test_no_answer_fails_at_the_limit_after_the_turns_end():
+    log = asked()
+    log.until(9.0)
+
+    assert log.told() == [("ap-1", "started", 1.0), ("ap-1", "failed", 3.5)]
+    assert (log.last("ap-1").delay, log.last("ap-1").response) == (2.5, None)
+
+
+def test_manipulation_has_longer_when_it_is_accepted():
+    log = asked("act")
+    log.begins(HUMAN, "act", 9.5, "blue-square")
+    log.ends(HUMAN, "act", 11.0, "blue-square")
+
+    assert log.told() == [("ap-1", "started", 1.0), ("ap-1", "succeeded", 9.5), ("ap-1", "completed", 11.0)]
+    assert (log.succeeded("ap-1").delay, log.succeeded("ap-1").response) == (7.5, "act")
+
+
+def test_what_is_not_accepted_answers_nothing():
+    log = asked("nod")
+    log.begins(HUMAN, "speak", 2.2)
+    log.begins(HUMAN, "act", 2.3)
+    log.until(3.5)
+
+    assert log.states("ap-1") == ["started", "failed"]
+
+
+def test_an_interruption_is_decided_at_the_turns_end_with_a_negative_delay():
+    log = asked(end=None)
+    log.begins(HUMAN, "speak", 1.5)
+    log.until(2.5)
+    assert log.states("ap-1") == ["started"]
+    log.signals("ended", 3.0)
+    log.ends(HUMAN, "speak", 3.4)
+
+    assert log.told() == [("ap-1", "started", 1.0), ("ap-1", "succeeded", 3.0), ("ap-1", "completed", 3.4)]
+    assert log.succeeded("ap-1").delay == pytest.approx(-1.5)
+
+
+def test_an_interruption_that_is_over_before_the_turn_completes_with_it():
+    log = asked(end=None)
+    log.begins(HUMAN, "speak", 1.2)
+    log.ends(HUMAN, "speak", 2.2)
+    log.signals("ended", 3.0)
+
+    assert log.told()[1:] == [("ap-1", "succeeded", 3.0), ("ap-1", "completed", 3.0)]
+    assert log.last("ap-1").duration == pytest.approx(1.0)
+
+
+def test_short_speech_that_outlasts_the_turn_is_the_answer():
+    log = asked(end=None)
+    log.begins(HUMAN, "speak", 1.8)
+    log.ends(ROBOT, "speak", 2.0, behavior="block-1:speech-1")
+    log.signals("ended", 2.0)
+    log.ends(HUMAN, "speak", 2.2)
+
+    assert log.told() == [("ap-1", "started", 1.0), ("ap-1", "succeeded", 2.0), ("ap-1", "completed", 2.2)]
+    assert log.succeeded("ap-1").delay == pytest.approx(-0.2)
+
+
+def test_pauses_between_the_robots_words_belong_to_its_turn():
+    log = asked(end=None)
+    log.ends(ROBOT, "speak", 1.5, behavior="block-1:speech-1")
+    log.begins(HUMAN, "nod", 1.7)
+    log.ends(HUMAN, "nod", 1.9)
+
+    assert log.told("backchannel") == [
+        ("bc-1", "started", 1.7),
+        ("bc-1", "succeeded", 1.7),
+        ("bc-1", "completed", 1.9),
+    ]
+    assert log.states("ap-1") == ["started"]
+
+
+def test_manipulation_during_the_turn_answers_early():
+    log = asked("act", end=None)
+    log.begins(HUMAN, "act", 1.5, "blue-square")
+    log.signals("ended", 2.0)
+
+    assert log.succeeded("ap-1").delay == pytest.approx(-0.5)
+
+
+def test_the_end_of_another_turn_starts_no_clock():
+    log = asked(end=None)
+    log.signals("ended", 2.0, turn="turn-9")
+    log.until(5.0)
+
+    assert log.states("ap-1") == ["started"]
+
+
+def test_a_pair_announced_after_its_turns_end_has_its_clock():
+    log = Log()
+    log.signals("ended", 2.0)
+    log.requests_event("adjacency_pair", 1.0, turn="turn-1")
+    log.until(3.5)
+
+    assert log.told()[-1] == ("ap-1", "failed", 3.5)
+
+
+def test_without_a_turn_the_block_is_the_turn():
+    log = asked(turn="", end=None)
+    log.block_ends(2.0)
+    log.until(3.5)
+
+    assert log.told()[-1] == ("ap-1", "failed", 3.5)
+
+
+@pytest.mark.parametrize("how", ["signal", "cancel"])
+def test_an_aborted_turn_withdraws_the_question(how):
+    log = asked(end=None)
+    if how == "signal":
+        log.signals("aborted", 1.5)
+    else:
+        log.cancels("request-1", 1.5)
+
+    assert log.told() == [("ap-1", "started", 1.0), ("ap-1", "withdrawn", 1.5)]
+
+
+def test_who_interrupted_an_aborted_turn_has_answered():
+    log = asked(end=None)
+    log.begins(HUMAN, "speak", 1.5)
+    log.until(2.4)
+    log.signals("aborted", 2.5)
+
+    assert log.states("ap-1") == ["started", "succeeded"]
+    assert log.succeeded("ap-1").delay == pytest.approx(-1.0)
+
+
+def test_a_new_question_supersedes_the_pending_one():
+    log = asked()
+    log.requests_event("adjacency_pair", 3.0, turn="turn-2")
+
+    assert log.told()[1:] == [("ap-1", "superseded", 3.0), ("ap-2", "started", 3.0)]
+    assert log.outcomes[0].state == "superseded"
+
+
+def test_a_new_question_completes_the_answer_to_the_last():
+    log = asked("act")
+    log.begins(HUMAN, "act", 3.0, "blue-square")
+    log.requests_event("adjacency_pair", 4.0, turn="turn-2")
+
+    assert log.told()[1:] == [("ap-1", "succeeded", 3.0), ("ap-1", "completed", 4.0), ("ap-2", "started", 4.0)]
+
+
+def test_a_turn_that_nobody_ends_is_given_up():
+    log = asked(end=None)
+    log.until(20.0)
+    assert log.states("ap-1") == ["started"]
+    log.ends(ROBOT, "speak", 20.0, behavior="block-1:speech-1")
+    log.until(32.0)
+
+    assert log.told()[-1] == ("ap-1", "withdrawn", 32.0)
+
+
+@pytest.mark.parametrize("answered", [True, False])
+def test_the_third_turn_closes_the_pair(answered):
+    log = asked()
+    if answered:
+        log.begins(HUMAN, "speak", 2.5)
+    log.signals("repaired", 3.0)
+
+    assert log.states("ap-1") == ["started", "succeeded", "completed"]
+
+
+# -- the person's pairs -----------------------------------------------------------------------------------------
+
+
+def test_robot_answers_a_persons_turn():
+    log = Log()
+    log.begins(HUMAN, "speak", 1.0)
+    log.ends(HUMAN, "speak", 2.0)
+    log.begins(ROBOT, "speak", 2.6)
+    log.ends(ROBOT, "speak", 3.6)
+
+    assert log.told() == [("ap-1", "started", 1.0), ("ap-1", "succeeded", 2.6), ("ap-1", "completed", 3.6)]
+    assert (log.events[0].initiator, log.succeeded("ap-1").response) == (HUMAN, "speak")
+    assert log.succeeded("ap-1").delay == pytest.approx(0.6)
+
+
+@pytest.mark.parametrize("action", ["nod", "shake", "point"])
+def test_robot_answers_with_a_gesture(action):
+    log = Log()
+    log.begins(HUMAN, "speak", 1.0)
+    log.ends(HUMAN, "speak", 2.0)
+    log.begins(ROBOT, action, 2.6)
+    log.ends(ROBOT, action, 3.0)
+
+    assert log.states("ap-1") == ["started", "succeeded", "completed"]
+
+
+def test_an_answering_fragment_is_the_answer():
+    log = Log()
+    log.begins(HUMAN, "speak", 1.0)
+    log.ends(HUMAN, "speak", 2.0)
+    log.signals("answered", 2.3, block="block-1")
+    log.block_ends(2.9)
+
+    assert log.told() == [("ap-1", "started", 1.0), ("ap-1", "succeeded", 2.3), ("ap-1", "completed", 2.9)]
+
+
+def test_no_answer_to_a_person_fails():
+    log = Log()
+    log.begins(HUMAN, "speak", 1.0)
+    log.ends(HUMAN, "speak", 2.0)
+    log.until(3.5)
+
+    assert log.told()[-1] == ("ap-1", "failed", 3.5)
+
+
+def test_manipulation_asks_for_an_answer_from_its_end_on():
+    log = Log()
+    log.begins(HUMAN, "act", 1.0, "blue-square")
+    log.ends(HUMAN, "act", 4.0, "blue-square")
+    log.begins(ROBOT, "speak", 5.0)
+
+    assert log.told() == [("ap-1", "started", 1.0), ("ap-1", "succeeded", 5.0)]
+    assert log.succeeded("ap-1").delay == pytest.approx(1.0)
+
+
+def test_a_person_who_goes_on_speaking_has_not_ended_the_turn():
+    log = Log()
+    log.begins(HUMAN, "speak", 1.0)
+    log.ends(HUMAN, "speak", 2.0)
+    log.begins(HUMAN, "speak", 3.0)
+    log.until(6.0)
+    assert log.states("ap-1") == ["started"]
+    log.ends(HUMAN, "speak", 6.0)
+    log.until(7.5)
+
+    assert log.told()[-1] == ("ap-1", "failed", 7.5)
+
+
+def test_the_robots_question_is_the_answer_to_a_person_who_has_finished():
+    log = Log()
+    log.begins(HUMAN, "speak", 1.0)
+    log.ends(HUMAN, "speak", 2.0)
+    log.requests_event("adjacency_pair", 2.5, turn="turn-1")
+
+    assert log.told()[1:] == [("ap-1", "succeeded", 2.5), ("ap-1", "completed", 2.5), ("ap-2", "started", 2.5)]
+
+
+def test_the_robots_question_supersedes_a_turn_that_goes_on():
+    log = Log()
+    log.begins(HUMAN, "speak", 1.0)
+    log.begins(ROBOT, "speak", 1.5)
+    log.requests_event("adjacency_pair", 1.5, turn="turn-1")
+
+    assert log.told()[1:] == [("ap-1", "superseded", 1.5), ("ap-2", "started", 1.5)]
+
+
+def test_robot_that_interrupts_has_answered_when_the_person_has_finished():
+    log = Log()
+    log.begins(HUMAN, "speak", 1.0)
+    log.begins(ROBOT, "speak", 1.5)
+    log.ends(HUMAN, "speak", 3.0)
+    log.ends(ROBOT, "speak", 3.5)
+
+    assert log.told() == [("ap-1", "started", 1.0), ("ap-1", "succeeded", 3.0), ("ap-1", "completed", 3.5)]
+    assert log.succeeded("ap-1").delay == pytest.approx(-1.5)
+
+
+@pytest.mark.parametrize(("at", "pairs"), [(4.9, {"ap-1"}), (5.2, {"ap-1", "ap-2"})])
+def test_the_initiator_speaking_again_at_once_is_the_third_turn(at, pairs):
+    log = Log()
+    log.begins(HUMAN, "speak", 1.0)
+    log.ends(HUMAN, "speak", 2.0)
+    log.begins(ROBOT, "speak", 2.6)
+    log.ends(ROBOT, "speak", 3.6)
+    log.begins(HUMAN, "speak", at)
+
+    assert {event.id for event in log.events} == pairs
+
+
+def test_a_person_who_leaves_while_speaking_withdraws():
+    log = Log()
+    log.begins(HUMAN, "speak", 1.0)
+    log.lost(HUMAN, 2.0)
+    log.until(2.5)
+
+    assert log.told()[-1] == ("ap-1", "withdrawn", 2.5)
+
+
+def test_a_person_who_leaves_while_answering_has_answered():
+    log = asked()
+    log.begins(HUMAN, "speak", 2.5)
+    log.lost(HUMAN, 3.0)
+    log.until(3.5)
+
+    assert log.told()[-1] == ("ap-1", "completed", 3.5)
+    assert log.last("ap-1").duration == pytest.approx(0.5)
+
+
+# -- backchannels -----------------------------------------------------------------------------------------------
+
+
+def test_short_speech_while_the_robot_speaks_is_a_backchannel_known_at_its_end():
+    log = asked(end=None)
+    log.begins(HUMAN, "speak", 1.5)
+    assert log.told("backchannel") == []
+    log.ends(HUMAN, "speak", 2.3)
+
+    assert log.told("backchannel") == [
+        ("bc-1", "started", 1.5),
+        ("bc-1", "succeeded", 1.5),
+        ("bc-1", "completed", 2.3),
+    ] or (log.states("bc-1") == ["started", "succeeded", "completed"] and log.last("bc-1").started.seconds == 1.5)
+    assert (log.last("bc-1").initiator, log.last("bc-1").responder) == (ROBOT, HUMAN)
+    assert (log.last("bc-1").delay, log.last("bc-1").duration) == (None, pytest.approx(0.8))
+
+
+def test_longer_speech_while_the_robot_speaks_is_a_change_of_floor():
+    log = Log()
+    log.begins(ROBOT, "speak", 1.0)
+    log.begins(HUMAN, "speak", 1.5)
+    log.until(2.3)
+
+    assert log.told() == [("ap-1", "started", 1.5)]
+
+
+@pytest.mark.parametrize("action", ["nod", "shake"])
+def test_gestures_while_the_robot_speaks_are_backchannels(action):
+    log = Log()
+    log.begins(ROBOT, "speak", 1.0)
+    log.begins(HUMAN, action, 1.5)
+    log.begins(HUMAN, action, 2.5)
+    log.ends(HUMAN, action, 3.0)
+
+    assert log.told() == [
+        ("bc-1", "started", 1.5), ("bc-1", "succeeded", 1.5), ("bc-1", "completed", 2.5),
+        ("bc-2", "started", 2.5), ("bc-2", "succeeded", 2.5), ("bc-2", "completed", 3.0),
+    ]  # fmt: skip
+
+
+def test_a_nod_into_silence_is_nothing():
+    log = Log()
+    log.begins(HUMAN, "nod", 1.0)
+    log.ends(HUMAN, "nod", 1.5)
+
+    assert log.events == []
+
+
+def test_robots_nod_while_a_person_speaks_is_a_backchannel():
+    log = Log()
+    log.begins(HUMAN, "speak", 1.0)
+    log.begins(ROBOT, "nod", 1.5)
+    log.ends(ROBOT, "nod", 2.0)
+
+    assert log.told("backchannel") == [
+        ("bc-1", "started", 1.5),
+        ("bc-1", "succeeded", 1.5),
+        ("bc-1", "completed", 2.0),
+    ]
+    assert (log.last("bc-1").initiator, log.last("bc-1").responder) == (HUMAN, ROBOT)
+
+
+def test_robots_short_speech_while_a_person_speaks_is_a_backchannel():
+    log = Log()
+    log.begins(HUMAN, "speak", 1.0)
+    log.begins(ROBOT, "speak", 1.5)
+    log.ends(ROBOT, "speak", 1.9)
+
+    assert log.states("bc-1") == ["started", "succeeded", "completed"]
+    assert log.states("ap-1") == ["started"]
+
+
+@pytest.mark.parametrize("announced_first", [True, False])
+def test_an_announced_backchannel_is_one_event_however_it_is_noticed(announced_first):
+    log = Log()
+    log.begins(HUMAN, "speak", 1.0)
+    if announced_first:
+        log.requests_event("backchannel", 1.5)
+        log.begins(ROBOT, "nod", 1.5)
+    else:
+        log.begins(ROBOT, "nod", 1.5)
+        log.requests_event("backchannel", 1.5)
+    log.ends(ROBOT, "nod", 2.0)
+
+    assert log.told("backchannel") == [
+        ("bc-1", "started", 1.5),
+        ("bc-1", "succeeded", 1.5),
+        ("bc-1", "completed", 2.0),
+    ]
+    assert [(outcome.event, outcome.state) for outcome in log.outcomes] == [("bc-1", "succeeded")]
+
+
+@pytest.mark.parametrize("announced_first", [True, False])
+def test_an_announced_spoken_backchannel_is_one_event(announced_first):
+    log = Log()
+    log.begins(HUMAN, "speak", 1.0)
+    if announced_first:
+        log.requests_event("backchannel", 1.5)
+        log.begins(ROBOT, "speak", 1.5)
+    else:
+        log.begins(ROBOT, "speak", 1.5)
+        log.requests_event("backchannel", 1.5)
+    log.ends(ROBOT, "speak", 1.9)
+
+    assert log.told("backchannel") == [
+        ("bc-1", "started", 1.5),
+        ("bc-1", "succeeded", 1.5),
+        ("bc-1", "completed", 1.9),
+    ]
+
+
+def test_an_announced_backchannel_ends_with_its_block():
+    log = Log()
+    log.requests_event("backchannel", 1.5)
+    log.block_ends(1.9)
+
+    assert log.told()[-1] == ("bc-1", "completed", 1.9)
+
+
+def test_a_gesture_whose_person_vanishes_is_completed():
+    log = Log()
+    log.begins(ROBOT, "speak", 1.0)
+    log.begins(HUMAN, "nod", 1.5)
+    log.lost(HUMAN, 1.6)
+    log.until(2.1)
+
+    assert log.told()[-1] == ("bc-1", "completed", 2.1)
+
+
+def test_late_and_repeated_speech_does_not_speak_for_ever():
+    log = Log()
+    log.begins(HUMAN, "speak", 1.0)
+    log.ends(HUMAN, "speak", 2.0)
+    log.begins(HUMAN, "speak", 1.0)
+    log.until(3.5)
+
+    assert log.states("ap-1") == ["started", "failed"]

@@ -1,0 +1,201 @@
+"""Whatever comes in, in whatever order: no exception, every event ends exactly once, statistics add up."""
+
+import itertools
+import random
+from collections import Counter
+from collections.abc import Callable, Sequence
+from typing import Any
+
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost
+from schemas.attention import Claim, HeadOwner
+from schemas.behaviors import TurnSignal
+from schemas.feedback import BlockProgress, SyncPointProgress
+from schemas.recognition import ConnectionEvent, EventOutcome, SignalTurn, TurnOutcome
+from schemas.requests import Accepted, Cancel, Refused
+from services.recognition.config import RecognitionConfig
+from services.recognition.machine import DECISIONS, ENDINGS
+from services.recognition.session import Observation, Session
+from services.recognition.standings import Standings
+from services.recognition.statistics import KINDS
+from tests.recognition.observations import ROBOT, request_event, stamp, world
+
+ACTORS = ("ann", "bob")
+LATENESS = (0.0, 0.0, 0.0, 0.0, 0.3, 1.0)
+
+
+class Chance:
+    """Draws observations; shared by hypothesis (few, shrinking) and plain seeds (long, dense)."""
+
+    def __init__(self, pick: Callable[[Sequence[Any]], Any]) -> None:
+        self.pick = pick
+
+    def id(self, prefix: str) -> str:
+        return f"{prefix}-{self.pick(range(400))}"
+
+    def observation(self, at: float) -> Observation:
+        return self.pick((self.look, self.look, self.look, self.act, self.act, self.request, self.rare))(at)
+
+    def look(self, at: float) -> Observation:
+        actor = self.pick((ROBOT, "ann", "ann", "bob"))
+        faces = ("ann", "ann", "bob") if actor == ROBOT else (ROBOT, ROBOT)
+        place = self.pick((*faces, "blue-square", "blue-square", "rectangle", "table", "nowhere", ""))
+        kind = self.pick((ActionBegan, ActionBegan, ActionEnded))
+        return kind(actor=actor, action="look", at=stamp(at), targets=(place,) if place else ())
+
+    def act(self, at: float) -> Observation:
+        kind, actor = self.pick((ActionBegan, ActionEnded)), self.pick((ROBOT, "ann", "ann", "bob"))
+        action = self.pick(("speak", "speak", "speak", "nod", "shake", "point", "act"))
+        place = self.pick(("blue-square", "table", ""))
+        return kind(actor=actor, action=action, at=stamp(at), targets=(place,) if place else ())
+
+    def request(self, at: float) -> Observation:
+        kind = self.pick(KINDS)
+        objects = self.pick(((), ("blue-square",), ("blue-square",), ("blue-square", "rectangle")))
+        responder = self.pick(("ann", "ann", "ann", "bob", "stranger"))
+        return request_event(
+            kind, at, *objects, request=self.id("request"), responder=responder,
+            optional=self.pick((False, True)), block=self.pick(("block-1", "block-2", "")),
+            turn=self.pick(("", "turn-1", "turn-2")), accept=self.pick(((), ("act",), ("speak", "nod"))),
+            anchors=self.pick(((), (), ("gaze-1:stroke",), ("gaze-1:stroke", "phrase-1:start+0.5", "?"))),
+            cause=self.pick(("turn", "reference", "maintenance")),
+        )  # fmt: skip
+
+    def rare(self, at: float) -> Observation:
+        block = self.pick(("block-1", "block-2"))
+        match self.pick(("presence", "signal", "signal", "signal", "owner", "owner", "point", "end", "cancel")):
+            case "presence":
+                return self.pick((ActorFound, ActorFound, ActorLost))(actor=self.pick(ACTORS), at=stamp(at))
+            case "signal":
+                signal = TurnSignal(
+                    id="t", turn=self.pick(("", "turn-1", "turn-2")), actor=self.pick((*ACTORS, "")),
+                    signal=self.pick(("ended", "ended", "answered", "repaired", "aborted")),
+                )  # fmt: skip
+                return SignalTurn(
+                    id=self.id("signal"), requester="realizer", signal=signal, at=stamp(at), block=block
+                )
+            case "owner":
+                kind = self.pick(("fragment", "face", "face"))
+                target = self.pick(("ann", "blue-square", ""))
+                return HeadOwner(owner=Claim(kind=kind, priority=2, target=target), since=stamp(at))
+            case "point":
+                behavior, sync = self.pick((("gaze-1", "stroke"), ("phrase-1", "start")))
+                return SyncPointProgress(block=block, behavior=behavior, sync=sync, at=stamp(at), time=at)
+            case "cancel":
+                return Cancel(id=self.id("request"), requester="realizer")
+        status = self.pick(("done", "interrupted", "failed"))
+        return BlockProgress(block=block, progress="end", at=stamp(at), status=status)
+
+    def stream(self, length: int) -> list[tuple[float, Observation]]:
+        """(time, observation) as they arrive, mostly in order: some come late, some twice."""
+        arrivals: list[tuple[float, float, Observation]] = []
+        at = 0.0
+        for _ in range(length):
+            at += self.pick((0.0, 0.1, 0.1, 0.2, 0.3, 0.4, 0.7, 2.0))
+            observation, late = self.observation(at), self.pick(LATENESS)
+            arrivals += [(at + late, at, observation)] * self.pick((1, 1, 1, 1, 2))
+        return [(at, observation) for _, at, observation in sorted(arrivals, key=lambda arrival: arrival[0])]
+
+
+@st.composite
+def drawn_streams(draw):
+    return Chance(lambda choices: draw(st.sampled_from(choices))).stream(draw(st.integers(1, 15)))
+
+
+seeded_streams = st.integers(0, 10**6).map(lambda seed: Chance(random.Random(seed).choice).stream(250))
+streams = st.one_of(drawn_streams(), seeded_streams)
+
+
+def run(stream, resolution="object"):
+    """All effects, with everybody leaving at the end."""
+    session = Session(ROBOT, RecognitionConfig(gaze_resolution=resolution))
+    session.feed(world(*ACTORS), 0.0)
+    effects, asked, signaled = [], [], []
+    seen = set()
+    for at, observation in stream:
+        if hasattr(observation, "event"):
+            if observation.id in seen:
+                continue
+            seen.add(observation.id)
+            asked.append(observation.id)
+        elif isinstance(observation, SignalTurn):
+            if observation.id in seen:
+                continue
+            seen.add(observation.id)
+            signaled.append(observation.id)
+        effects += session.feed(observation, at)
+    end = max(at for at, _ in stream) + 100.0
+    for name in ACTORS:
+        effects += session.feed(ActorLost(actor=name, at=stamp(end)), end)
+    effects += session.advance(end + 1.0)
+    return session, effects, asked, signaled
+
+
+@settings(max_examples=150, deadline=None)
+@given(streams, st.sampled_from(("object", "table")))
+def test_every_event_ends_exactly_once_and_every_request_is_answered(stream, resolution):
+    session, effects, asked, signaled = run(stream, resolution)
+
+    events = [effect for effect in effects if isinstance(effect, ConnectionEvent)]
+    lives: dict[str, list[str]] = {}
+    for event in events:
+        lives.setdefault(event.id, []).append(event.state)
+    for id, states in lives.items():
+        assert states[0] == "started", (id, states)
+        assert sum(state in DECISIONS for state in states) == 1, (id, states)
+        assert [state in ENDINGS for state in states] == [False] * (len(states) - 1) + [True], (id, states)
+    accepted = [effect.id for effect in effects if isinstance(effect, Accepted)]
+    refused = [effect.id for effect in effects if isinstance(effect, Refused)]
+    outcomes = [effect.id for effect in effects if isinstance(effect, EventOutcome)]
+    assert sorted(accepted + refused) == sorted(asked)
+    assert sorted(outcomes) == sorted(accepted)
+    assert [effect.id for effect in effects if isinstance(effect, TurnOutcome)] == signaled
+    assert session.deadline is None
+
+
+@settings(max_examples=100, deadline=None)
+@given(streams)
+def test_times_of_an_event_never_run_backwards(stream):
+    _, effects, _, _ = run(stream)
+
+    times: dict[str, float] = {}
+    for event in effects:
+        if isinstance(event, ConnectionEvent):
+            assert event.at.seconds >= times.get(event.id, event.started.seconds)
+            times[event.id] = event.at.seconds
+            assert event.duration is None or event.duration >= 0
+            assert event.delay is None or event.delay >= 0 or event.kind == "adjacency_pair"
+
+
+@settings(max_examples=100, deadline=None)
+@given(streams)
+def test_statistics_equal_a_slow_recomputation_from_the_log(stream):
+    _, effects, _, _ = run(stream)
+    log = [effect for effect in effects if isinstance(effect, ConnectionEvent)]
+    standings = Standings(ROBOT, RecognitionConfig())
+    published = {}
+    for event in log:
+        for statistics in standings.feed([event], set(), event.at.seconds):
+            published[statistics.actor] = statistics
+
+    for actor in ("", *ACTORS):
+        own = [event for event in log if actor in ("", event.initiator, event.responder)]
+        if not own:
+            continue
+        starts = sorted(event.started.seconds for event in own if event.state == "started")
+        gaps = [later - earlier for earlier, later in itertools.pairwise(starts)]
+        session = published[actor].session
+        assert session.events == len(starts)
+        assert session.max_gap == (max(gaps) if gaps else None)
+        assert (session.mtbce is None) == (not gaps)
+        assert session.mtbce is None or abs(session.mtbce - sum(gaps) / len(gaps)) < 1e-9
+        states = Counter((event.kind, event.state) for event in own if event.state == "succeeded")
+        states += Counter((event.kind, "failed") for event in own if event.state == "failed" and not event.optional)
+        for kind in session.kinds:
+            delays = [e.delay for e in own if (e.kind, e.state) == (kind.kind, "succeeded") and e.delay is not None]
+            assert (kind.succeeded, kind.failed) == (states[kind.kind, "succeeded"], states[kind.kind, "failed"])
+            assert kind.delay_min == min(delays, default=None)
+            assert kind.delay_max == max(delays, default=None)
+            assert kind.delay_mean is None or abs(kind.delay_mean - sum(delays) / len(delays)) < 1e-9

@@ -1,0 +1,130 @@
+"""The transition tables as data: complete, closed, drawable; and what an undefined transition does."""
+
+from pathlib import Path
+
+import pytest
+
+from schemas.behaviors import EventKind
+from services.recognition import adjacency_pair, backchannel, directed_gaze, mutual_facial_gaze
+from services.recognition.config import RecognitionConfig
+from services.recognition.machine import (
+    DECISIONS,
+    ENDINGS,
+    IDLE,
+    Ledger,
+    Row,
+    UndefinedTransition,
+    UnderWay,
+    diagram,
+    table,
+)
+
+TABLES = {
+    "directed gaze": directed_gaze.TABLE, "mutual facial gaze": mutual_facial_gaze.TABLE,
+    "adjacency pair": adjacency_pair.TABLE, "backchannel": backchannel.TABLE,
+}  # fmt: skip
+PAGE = Path(__file__).parents[2] / "docs" / "recognition.md"
+every_table = pytest.mark.parametrize("rows", TABLES.values(), ids=TABLES)
+
+
+@every_table
+def test_every_state_can_be_reached_and_left(rows):
+    reachable, frontier = {IDLE}, [IDLE]
+    while frontier:
+        state = frontier.pop()
+        for row in rows.values():
+            if row.state == state and row.next not in reachable:
+                reachable.add(row.next)
+                frontier.append(row.next)
+
+    assert {row.state for row in rows.values()} == reachable
+    assert all(any(row.state == state and row.next != state for row in rows.values()) for state in reachable)
+
+
+@every_table
+def test_every_way_back_to_idle_ends_the_event_and_no_other_does(rows):
+    """An event that was never told of (undecided speech) may vanish; told ones end with their row."""
+    told = {IDLE: False}
+    for _ in rows:
+        for row in rows.values():
+            if row.state in told and row.next != IDLE:
+                told[row.next] = told.get(row.next, False) or told[row.state] or "started" in row.publishes
+    for row in rows.values():
+        begins_now = told[row.state] or "started" in row.publishes
+        ends = [state for state in row.publishes if state in ENDINGS]
+        assert len(ends) == (1 if row.next == IDLE and begins_now else 0), row
+
+
+@every_table
+def test_every_state_says_what_happens_when_the_person_has_gone(rows):
+    for state in {row.state for row in rows.values()} - {IDLE, adjacency_pair.INTERRUPTED}:
+        assert (state, "person_gone") in rows
+
+
+@every_table
+def test_no_row_decides_twice(rows):
+    assert all(sum(state in DECISIONS for state in row.publishes) <= 1 for row in rows.values())
+
+
+@every_table
+def test_the_diagram_shows_every_row(rows):
+    drawn = diagram(rows.values())
+
+    for row in rows.values():
+        assert f"    {row.state} --> {row.next} : {row.given}" in drawn
+
+
+@every_table
+def test_the_documentation_shows_the_tables_as_they_are(rows):
+    assert diagram(rows.values()) in PAGE.read_text()
+
+
+def test_two_rows_for_one_input_are_a_mistake():
+    with pytest.raises(ValueError, match="two rows"):
+        table(Row(IDLE, "speaks", "a"), Row(IDLE, "speaks", "b"))
+
+
+def gaze(strict: bool) -> mutual_facial_gaze.MutualFacialGaze:
+    machine = mutual_facial_gaze.MutualFacialGaze(Ledger("loop"), strict=strict)
+    machine.event = UnderWay(kind="mutual_facial_gaze", initiator="robot", responder="human", started=1.0)
+    machine.step("robot_looks", 1.0)
+    return machine
+
+
+def test_an_undefined_transition_raises_and_changes_nothing():
+    machine = gaze(strict=True)
+
+    with pytest.raises(UndefinedTransition, match="MutualFacialGaze: no 'robot_answers' in state 'robot_waiting'"):
+        machine.step("robot_answers", 2.0)
+    assert (machine.state, len(machine._ledger.effects)) == ("robot_waiting", 1)
+
+
+def test_an_undefined_transition_is_ignored_when_not_strict():
+    machine = gaze(strict=False)
+
+    assert machine.step("robot_answers", 2.0) is False
+    assert (machine.state, len(machine._ledger.effects)) == ("robot_waiting", 1)
+
+
+def test_ids_count_by_kind_and_carry_the_session():
+    ledger = Ledger("loop", "3f2-")
+    kinds: tuple[EventKind, ...] = ("directed_gaze", "backchannel", "directed_gaze")
+    for kind in kinds:
+        ledger.publish(UnderWay(kind=kind, initiator="robot", responder="human", started=0.0), "started", 0.0)
+
+    assert [event.id for event in ledger.take()] == ["3f2-dg-1", "3f2-bc-1", "3f2-dg-2"]  # type: ignore[union-attr]
+
+
+@pytest.mark.parametrize(
+    ("setting", "value", "reason"),
+    [
+        ("directed_gaze_limit", 0.0, "directed_gaze_limit must be greater than 0 s"),
+        ("lost_face_grace", -0.1, "lost_face_grace must not be negative"),
+        ("engaged_from", 0.2, "thresholds overlap"),
+        ("enough_events", 1, "at least 2"),
+        ("accept", (), "at least one action"),
+    ],
+)
+def test_bad_configuration_is_refused(setting, value, reason):
+    with pytest.raises(ValueError, match=reason):
+        RecognitionConfig(**{setting: value})
