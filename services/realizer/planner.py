@@ -12,7 +12,7 @@ from msgspec import Struct
 
 from schemas.behaviors import BlockBehavior, Event
 from schemas.blocks import Block
-from schemas.body import Estimate, Estimates
+from schemas.body import BodyPose, Estimate, Estimates
 from schemas.faults import Fault
 from schemas.feedback import WarningKind
 from schemas.units import Seconds
@@ -321,3 +321,24 @@ def _handovers(
         elif abs(start(successor)[0] - relax) <= EPSILON:
             cut.add(id)
     return successors, frozenset(cut)
+
+
+def poses_before(plan: Plan) -> dict[str, BodyPose]:
+    """Where the body will be when a behavior takes another's place, by the id of the later: on the earlier's target.
+
+    How long a look takes depends on what was looked at before it, not on where the head is as the block comes in.
+    """
+    poses = {}
+    for id, chain in plan.chains.items():
+        start = plan.predicted(Point(id, "start"))
+        before = [
+            (began, number, estimate.pose_after)
+            for number, (other, earlier) in enumerate(plan.chains.items())
+            if same_part(chain.behavior, earlier.behavior)
+            and "relax" in sync_points(earlier.behavior)
+            and (began := plan.predicted(Point(other, "start"))) < start
+            and (estimate := plan.estimates.get(other)) is not None
+        ]
+        if before and (pose := max(before, key=lambda it: it[:2])[2]) is not None:
+            poses[id] = pose
+    return poses

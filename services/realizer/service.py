@@ -1,12 +1,14 @@
 """The realizer on the bus: takes blocks, answers each exactly once, and performs any number of them at a time."""
 
 import asyncio
+from collections.abc import Mapping
 
 from msgspec import Struct
 
 from schemas import keys
 from schemas.blocks import BlockOutcome, PerformBlock
 from schemas.body import (
+    BodyPose,
     Estimate,
     EstimateBehaviors,
     EstimateItem,
@@ -21,7 +23,7 @@ from schemas.requests import Cancel
 from services.bus import Bus
 from services.realizer.config import RealizerConfig
 from services.realizer.executor import Ending, Performance
-from services.realizer.planner import Plan, plan_block
+from services.realizer.planner import Plan, plan_block, poses_before
 from services.realizer.points import performer
 from services.realizer.relations import BlockRefused
 from services.requests import RequestDesk, Requester
@@ -90,13 +92,18 @@ class _Realizer:
         if any(other.request.block.id == block.id and not other.ended.done() for other in live.earlier):
             raise BlockRefused(Fault(reason="a block of this id is still being performed", where=block.id))
         plan_block(block)  # What is wrong with the block alone needs no body to be seen.
-        return plan_block(block, await self._estimates(live.request))
+        plan = plan_block(block, await self._estimates(live.request, {}))
+        if before := poses_before(plan):
+            plan = plan_block(block, await self._estimates(live.request, before))
+        return plan
 
-    async def _estimates(self, request: PerformBlock) -> tuple[Estimate, ...]:
+    async def _estimates(self, request: PerformBlock, before: Mapping[str, BodyPose]) -> tuple[Estimate, ...]:
+        """before: where the body will be when a behavior starts; the others are asked for from where it is now."""
         behaviors = [behavior for behavior in request.block.behaviors if performer(behavior) == "body"]
         if not behaviors:
             return ()
-        question = EstimateBehaviors(items=tuple(EstimateItem(behavior=behavior) for behavior in behaviors))
+        items = (EstimateItem(behavior=behavior, pose=before.get(behavior.id)) for behavior in behaviors)
+        question = EstimateBehaviors(items=tuple(items))
         try:
             answer = await self.bus.query(keys.ESTIMATE, question, timeout=self.config.estimate)
         except NoReply as error:

@@ -1,0 +1,52 @@
+"""How long a look takes depends on what was looked at before it."""
+
+from schemas.behaviors import After, Constraint, Gaze, Pointing, Speech
+from schemas.blocks import Block
+from schemas.body import BodyPose, Estimate, JointAngle, Phase
+from services.realizer.planner import plan_block, poses_before
+
+
+def estimate(behavior: str, *points: str, pan: float = 0.0) -> Estimate:
+    phases = tuple(
+        Phase(since=a, to=b, shortest=0.5, natural=0.5, hold=b in ("relax", "stroke_start", "stroke_end"))
+        for a, b in zip(points, points[1:], strict=False)
+    )
+    pose = BodyPose(joints=(JointAngle("pan", pan),))
+    return Estimate(behavior=behavior, feasible=True, phases=phases, pose_after=pose)
+
+
+ALL = ("start", "ready", "stroke_start", "stroke", "stroke_end", "relax", "end")
+
+
+def test_each_gaze_but_the_first_starts_from_the_one_before_it() -> None:
+    block = Block(
+        id="b",
+        behaviors=(
+            Gaze(id="third", target="c"),
+            Gaze(id="first", target="a"),
+            Gaze(id="second", target="b"),
+            Pointing(id="point", target="a"),
+            Speech(id="speech", text="this"),
+        ),
+        constraints=(
+            Constraint(operators=(After(ref="first:stroke", syncs=("second:start",)),)),
+            Constraint(operators=(After(ref="second:stroke", syncs=("third:start",)),)),
+        ),
+    )
+    estimates = (
+        estimate("third", *ALL, pan=3.0),
+        estimate("first", *ALL, pan=1.0),
+        estimate("second", *ALL, pan=2.0),
+        estimate("point", *ALL, pan=9.0),
+        estimate("speech", "start", "end"),
+    )
+
+    before = poses_before(plan_block(block, estimates))
+
+    assert {id: pose.joints[0].angle for id, pose in before.items()} == {"second": 1.0, "third": 2.0}
+
+
+def test_a_single_gaze_starts_from_where_the_body_is() -> None:
+    block = Block(id="b", behaviors=(Gaze(id="look", target="a"),))
+
+    assert poses_before(plan_block(block, (estimate("look", *ALL),))) == {}
