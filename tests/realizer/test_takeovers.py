@@ -1,5 +1,7 @@
 """How long a look takes depends on what was looked at before it."""
 
+from itertools import pairwise
+
 from schemas.behaviors import After, Constraint, Gaze, Pointing, Speech
 from schemas.blocks import Block
 from schemas.body import BodyPose, Estimate, JointAngle, Phase
@@ -9,7 +11,7 @@ from services.realizer.planner import plan_block, poses_before
 def estimate(behavior: str, *points: str, pan: float = 0.0) -> Estimate:
     phases = tuple(
         Phase(since=a, to=b, shortest=0.5, natural=0.5, hold=b in ("relax", "stroke_start", "stroke_end"))
-        for a, b in zip(points, points[1:], strict=False)
+        for a, b in pairwise(points)
     )
     pose = BodyPose(joints=(JointAngle("pan", pan),))
     return Estimate(behavior=behavior, feasible=True, phases=phases, pose_after=pose)
