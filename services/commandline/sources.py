@@ -12,7 +12,7 @@ from schemas import json_codec
 from schemas.blocks import Block
 from schemas.faults import Fault, InputRefused
 from schemas.fragments import TurnFragment
-from schemas.world import Entity, World
+from schemas.world import World
 from services.runtime import Service
 
 Thing = Block | TurnFragment
@@ -45,28 +45,18 @@ def read_source(path: Path) -> Source:
     return Source(path=path, things=things)
 
 
-class _World(Struct, frozen=True, forbid_unknown_fields=True):
-    entities: tuple[Entity, ...]
-
-
 def read_world(path: Path | None) -> World:
     """The entities of a JSON file; the tangram table without one. Raises InputRefused with the JSON path."""
-    if path is None:
-        from services.simulation.still import tangram_world
+    from services.simulation.still import load_world, tangram_world
 
-        return tangram_world()
-    try:
-        entities = msgspec.json.decode(_bytes(path), type=_World).entities
-    except (msgspec.DecodeError, RecursionError) as error:
-        advice = '{"entities": [{"id": "cup", "kind": "object", "position": [0.5, 0.1, 0.8]}]}'
-        raise InputRefused(Fault(reason=str(error), where=str(path), advice=advice)) from error
-    seen: set[str] = set()
-    for entity in entities:
-        if not entity.id or entity.id in seen:
-            reason = f"duplicate entity id {entity.id!r}" if entity.id else "an entity without an id"
-            raise InputRefused(Fault(reason=reason, where=str(path), advice="give each entity its own id"))
-        seen.add(entity.id)
-    return World(entities=entities)
+    return tangram_world() if path is None else load_world(path)
+
+
+def still(world: World) -> Service:
+    """Perception for a world in which nothing moves by itself."""
+    from services.simulation.still import show_world
+
+    return partial(show_world, world=world)
 
 
 def _bytes(path: Path) -> bytes:
@@ -74,10 +64,3 @@ def _bytes(path: Path) -> bytes:
         return path.read_bytes()
     except OSError as error:
         raise InputRefused(Fault(reason=error.strerror or str(error), where=str(path))) from error
-
-
-def still(world: World) -> Service:
-    """Perception for a world in which nothing moves by itself."""
-    from services.simulation.still import stand_still
-
-    return partial(stand_still, world=world)

@@ -7,8 +7,8 @@ we die without a word, so that nothing outlives its supervisor.
 import asyncio
 import sys
 from asyncio.subprocess import PIPE, STDOUT, Process
-from collections.abc import AsyncIterator, Callable, Mapping, Sequence
-from contextlib import asynccontextmanager, suppress
+from collections.abc import AsyncIterator, Callable, Iterator, Mapping, Sequence
+from contextlib import asynccontextmanager, contextmanager, suppress
 
 from schemas.faults import Fault, RunFailed
 from schemas.units import Seconds
@@ -31,11 +31,20 @@ def pause_after(previous: Seconds | None, lived: Seconds) -> Seconds:
     return min(2 * previous, LONGEST_PAUSE)
 
 
-def without_threads() -> None:
-    """Python 3.11 watches each child with a thread unless told to use what Linux offers."""
-    if sys.version_info < (3, 12) and sys.platform == "linux":
-        watcher = asyncio.PidfdChildWatcher()
-        asyncio.get_event_loop_policy().set_child_watcher(watcher)
+@contextmanager
+def _without_threads() -> Iterator[None]:
+    """Python 3.11 watches each child with a thread unless told to use what Linux offers, as later ones do."""
+    if sys.version_info >= (3, 12) or sys.platform != "linux":
+        yield
+        return
+    policy = asyncio.get_event_loop_policy()
+    before, watcher = policy.get_child_watcher(), asyncio.PidfdChildWatcher()
+    watcher.attach_loop(asyncio.get_running_loop())
+    policy.set_child_watcher(watcher)
+    try:
+        yield
+    finally:
+        policy.set_child_watcher(before)
 
 
 class Child:
@@ -122,10 +131,11 @@ def _ending(code: int) -> str:
 @asynccontextmanager
 async def supervised(children: Mapping[str, Child]) -> AsyncIterator[None]:
     """Keep the children running while the body of `async with` runs; at its end all have ended, last first."""
-    async with asyncio.TaskGroup() as group:
-        tasks = [group.create_task(child.keep(), name=f"child {name}") for name, child in children.items()]
-        try:
-            yield
-        finally:
-            for task in reversed(tasks):
-                task.cancel()
+    with _without_threads():
+        async with asyncio.TaskGroup() as group:
+            tasks = [group.create_task(child.keep(), name=f"child {name}") for name, child in children.items()]
+            try:
+                yield
+            finally:
+                for task in reversed(tasks):
+                    task.cancel()

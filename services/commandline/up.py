@@ -17,7 +17,7 @@ from services.commandline.outputs import Outputs
 from services.commandline.process import DONE, until_signal
 from services.commandline.roster import ROBOT
 from services.commandline.run import Where, forever, unique
-from services.commandline.supervisor import Child, supervised, without_threads
+from services.commandline.supervisor import Child, supervised
 from services.config import Config
 from services.console import tally
 from services.console.follow import following
@@ -37,7 +37,6 @@ class Options(NamedTuple):
 
 def main(options: Options) -> int:
     config = options.where.load(defaults=DEFAULTS if options.task else ())  # refused here, not by every child
-    without_threads()
     with Outputs(options.events, options.feedback) as outputs:
         console = Console(stderr=outputs.own_stdout, quiet=options.quiet)
         asyncio.run(until_signal(_up(options, config, outputs, console)))

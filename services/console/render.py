@@ -1,17 +1,24 @@
 """Draw a scene with rich. No state: the same scene gives the same picture."""
 
+from math import inf
+
 from rich import box
 from rich.console import Group, RenderableType
 from rich.panel import Panel
 from rich.table import Table
 from rich.text import Text
 
+from schemas.units import Seconds
 from services.console import wording
-from services.console.view import BlockInView, EventInView, Point, Scene
+from services.console.view import EventInView, Point, Scene
 
 POINTS_SHOWN = 11
+AHEAD = 4
+"""At least so many of the planned points are among them."""
 UTTERANCES_SHOWN = 5
 EVENTS_SHOWN = 8
+NOTICED: Seconds = 0.1
+"""People notice when speech and gesture are further apart."""
 STATE_STYLES = {
     "started": "yellow",
     "succeeded": "green",
@@ -26,8 +33,8 @@ STATE_STYLES = {
 def render(scene: Scene) -> RenderableType:
     """The whole live view, some 30 lines high."""
     upper = Table.grid(expand=True)
-    upper.add_column(ratio=1)
-    upper.add_column(ratio=1)
+    upper.add_column(ratio=4)
+    upper.add_column(ratio=5)
     upper.add_row(Group(_people(scene), _said(scene)), _points(scene))
     parts: list[RenderableType] = [upper, _events(scene)]
     parts += [Text(f"! {note}", style="yellow", no_wrap=True, overflow="ellipsis") for note in scene.notes]
@@ -76,41 +83,58 @@ def _said(scene: Scene) -> Panel:
 def _points(scene: Scene) -> Panel:
     block = scene.block
     table = Table(box=None, expand=True, pad_edge=False)
-    table.add_column("sync point", no_wrap=True, overflow="ellipsis", ratio=1)
-    for name in ("planned", "realised", "slip"):
-        table.add_column(name, justify="right", no_wrap=True)
-    for point in _window(block) if block else ():
-        came = point.realised is not None
-        slip = point.slip
-        late = slip is not None and abs(slip) >= 0.05
+    table.add_column("sync points (s)", no_wrap=True, overflow="ellipsis", ratio=1)
+    for name in ("plan", "real", "slip"):
+        table.add_column(name, justify="right", no_wrap=True, min_width=5)
+    for points in _window(_together(block.points)) if block else ():
+        first = points[0]
+        came, slip = first.realised is not None, first.slip
+        late = slip is not None and abs(slip) >= NOTICED
+        name = f"{first.behavior}:{' '.join(point.sync for point in points)}"
         table.add_row(
-            Text(f"{point.behavior}:{point.sync}", style="" if came else "dim"),
-            wording.seconds(point.planned),
-            Text(wording.seconds(point.realised), style="green" if came else "dim"),
-            Text(wording.seconds(slip, sign=True), style="yellow" if late else "dim"),
+            Text(name, style="" if came else "dim"),
+            wording.number(first.planned),
+            Text(wording.number(first.realised), style="green" if came else "dim"),
+            Text(wording.number(slip, sign=True), style="yellow" if late else "dim"),
         )
     # Ids are other people's: as Text, so that brackets in them are not read as markup.
     title = Text(f"block {block.id} {block.status or 'running'}" if block else "no block yet")
     return Panel(table, title=title, title_align="left", box=box.ROUNDED, height=POINTS_SHOWN + 4)
 
 
-def _window(block: BlockInView) -> list[Point]:
-    """The newest realised points and the next planned ones, by time."""
-    came = sorted((p for p in block.points if p.realised is not None), key=lambda p: p.realised or 0.0)
-    later = (p.planned for p in block.points if p.planned is not None)
-    horizon = max(later, default=0.0)
-    to_come = sorted(
-        (p for p in block.points if p.realised is None), key=lambda p: horizon if p.planned is None else p.planned
-    )
-    ahead = min(len(to_come), max(4, POINTS_SHOWN - len(came)))
-    return [*came[-(POINTS_SHOWN - ahead) :], *to_come[:ahead]] if ahead < POINTS_SHOWN else to_come[:ahead]
+def _together(points: tuple[Point, ...]) -> list[list[Point]]:
+    """Points of one behavior that are one instant share a row."""
+    rows: list[list[Point]] = []
+    for point in points:
+        last = rows[-1][0] if rows else None
+        if last and (last.behavior, _ms(last.planned), _ms(last.realised)) == (
+            point.behavior, _ms(point.planned), _ms(point.realised),
+        ):  # fmt: skip
+            rows[-1].append(point)
+        else:
+            rows.append([point])
+    return rows
+
+
+def _ms(value: float | None) -> int | None:
+    return None if value is None else round(1000 * value)
+
+
+def _window(rows: list[list[Point]]) -> list[list[Point]]:
+    """The newest realised rows and the next planned ones, by time."""
+    came = sorted((row for row in rows if row[0].realised is not None), key=lambda row: row[0].realised or 0.0)
+    to_come = [row for row in rows if row[0].realised is None]
+    to_come.sort(key=lambda row: inf if row[0].planned is None else row[0].planned)
+    ahead = min(len(to_come), max(AHEAD, POINTS_SHOWN - len(came)))
+    behind = POINTS_SHOWN - ahead
+    return [*(came[-behind:] if behind else ()), *to_come[:ahead]]
 
 
 def _events(scene: Scene) -> Panel:
-    table = Table(box=None, expand=True, pad_edge=False)
-    for name in ("at", "connection event", "who", "about", "cause"):
-        table.add_column(name, no_wrap=True, overflow="ellipsis")
-    table.add_column("outcome", no_wrap=True, ratio=1)
+    table = Table(box=None, expand=True, pad_edge=False, padding=(0, 1, 0, 0))
+    for name, width in (("at", 6), ("connection event", 18), ("who", 11), ("about", 8), ("cause", 5)):
+        table.add_column(name, no_wrap=True, overflow="ellipsis", min_width=width)
+    table.add_column("outcome", no_wrap=True, ratio=1, min_width=16)
     for row in scene.events[-EVENTS_SHOWN:]:
         table.add_row(*_event(row, scene))
     return Panel(table, title="connection events", title_align="left", box=box.ROUNDED, height=EVENTS_SHOWN + 3)
@@ -121,7 +145,7 @@ def _event(row: EventInView, scene: Scene) -> tuple[RenderableType, ...]:
     return (
         wording.clock(row.began - scene.began),
         Text(wording.KINDS[event.kind]),
-        Text(f"{event.initiator} → {event.responder}"),
+        Text(f"{event.initiator}→{event.responder}"),
         Text(wording.names(event.objects)),
         Text(event.cause),
         Text(wording.decision(event), style=STATE_STYLES[event.state]),

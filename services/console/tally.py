@@ -91,36 +91,41 @@ def count(tally: Tally, kind: EventKind, initiator: str | None, robot: str) -> C
     return counted
 
 
+KINDS: tuple[tuple[EventKind, str], ...] = tuple(wording.KINDS.items())
+
+
 def render(tally: Tally, robot: str) -> RenderableType:
-    table = Table(box=box.SIMPLE_HEAD, title="connection events", title_justify="left", title_style="bold")
-    table.add_column("initiator")
-    table.add_column("kind")
-    for name in ("count", "succeeded", "failed", "optional, failed", "given up", "delay min", "mean", "max"):
-        table.add_column(name, justify="right")
+    """The table and the last line, 80 columns wide."""
+    table = Table(box=box.HORIZONTALS, padding=0, show_edge=False)
+    table.add_column("by", no_wrap=True)
+    table.add_column("connection event", no_wrap=True)
+    for name in ("count", "succeeded", "failed", "opt.", "dropped", "delay (s)"):
+        table.add_column(name, justify="right", no_wrap=True)
     for side, who in ((robot, robot), (None, "people")):
-        for kind, name in WORDS:
+        for kind, name in KINDS:
             row = count(tally, kind, side, robot)
             if row.count:
-                delays = row.delays
-                table.add_row(
-                    who,
-                    name,
-                    *map(str, (row.count, row.succeeded, row.failed, row.failed_optional, row.other + row.open)),
-                    wording.seconds(min(delays)) if delays else "-",
-                    wording.seconds(sum(delays) / len(delays)) if delays else "-",
-                    wording.seconds(max(delays)) if delays else "-",
-                )
-    return Group(table, Text(_last_line(tally)))
+                numbers = (row.count, row.succeeded, row.failed, row.failed_optional, row.other + row.open)
+                table.add_row(Text(who), name, *map(str, numbers), _delays(row.delays))
+    return Group(table, Text(_NOTE, style="dim"), Text(_last_line(tally)))
 
 
-WORDS: tuple[tuple[EventKind, str], ...] = tuple(wording.KINDS.items())
+_NOTE = (
+    "opt.: failed, but optional, so no failure; dropped: preempted, withdrawn,\n"
+    "superseded; delay: shortest, mean, longest of those that succeeded"
+)
+
+
+def _delays(delays: tuple[Seconds, ...]) -> str:
+    if not delays:
+        return "-"
+    return " ".join(f"{value:.2f}" for value in (min(delays), sum(delays) / len(delays), max(delays)))
 
 
 def _last_line(tally: Tally) -> str:
     parts = [f"duration {wording.clock(tally.duration)}"]
     if tally.session is not None:
         parts.append(f"MTBCE {wording.seconds(tally.session.mtbce)}")
-        parts.append(f"without own glances {wording.seconds(tally.session.mtbce_without_maintenance)}")
         parts.append(f"longest gap {wording.seconds(tally.session.max_gap)}")
     parts.append(f"{tally.fragments} fragments" + (f", {tally.unfinished} not finished" if tally.unfinished else ""))
     return "; ".join(parts)

@@ -20,8 +20,15 @@ def seconds(value: Seconds | None, sign: bool = False) -> str:
     """`1.24 s`, with `+` or `-` if asked; `-` for None."""
     if value is None:
         return "-"
+    return f"{number(value, sign)} s"
+
+
+def number(value: Seconds | None, sign: bool = False) -> str:
+    """The same without the unit, for tables that name it once."""
+    if value is None:
+        return "-"
     text = f"{value:{'+' if sign else ''}.2f}"
-    return f"{text.replace('-0.00', '0.00').replace('+0.00', '0.00')} s"
+    return text[1:] if text in ("-0.00", "+0.00") else text
 
 
 def clock(value: Seconds) -> str:
@@ -39,11 +46,11 @@ def look(targets: Sequence[str], robot: str) -> str:
 
 
 def decision(event: ConnectionEvent) -> str:
-    """`succeeded after 0.42 s`, `waiting`, `failed (optional)`..."""
+    """`succeeded 0.42 s`, `waiting`, `failed (optional)`..."""
     if event.state == "started":
         text = "waiting"
     elif event.state in ("succeeded", "failed", "completed") and event.delay is not None:
-        text = f"{event.state} after {seconds(event.delay)}"
+        text = f"{event.state} {seconds(event.delay)}"
     else:
         text = event.state
     return f"{text} (optional)" if event.optional and event.state == "failed" else text

@@ -109,7 +109,7 @@ def test_the_view_says_who_speaks_who_looks_where_and_who_owns_the_head(scene: v
 
     for expected in (
         "robot: a rectangle", "looks rectangle", "looks the robot", "fragment: rectangle", "MTBCE 4.20 s",
-        "s:start", "0.60 s", "+0.10 s", "directed gaze", "robot → human", "succeeded after 0.90 s",
+        "s:start", "0.60", "+0.10", "directed gaze", "robot→human", "succeeded 0.90 s",
     ):  # fmt: skip
         assert expected in text
 

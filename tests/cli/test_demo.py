@@ -1,0 +1,127 @@
+"""`engage demo`: the whole system in one process."""
+
+import json
+import re
+from collections import Counter
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from tests.cli.command import Engage
+
+VIRTUAL = ("demo", "--virtual-time")
+
+
+def decided(path: Path) -> dict[str, dict[str, Any]]:
+    """The decision about each connection event."""
+    lines = [json.loads(line) for line in path.read_text().splitlines()]
+    return {line["id"]: line for line in lines if line["state"] != "completed"}
+
+
+@pytest.fixture(scope="module")
+def played(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
+    """One run, in a process of its own, for the tests that only read what it wrote."""
+    import subprocess
+    import sys
+
+    folder = tmp_path_factory.mktemp("demo")
+    done = subprocess.run(
+        [sys.executable, "-m", "services.cli", *VIRTUAL, "--seed", "1",
+         "--events", folder / "events.jsonl", "--feedback", folder / "feedback.jsonl"],
+        capture_output=True, text=True, timeout=120, check=False,
+    )  # fmt: skip
+    return {"code": done.returncode, "out": done.stdout, "err": done.stderr, "folder": folder}
+
+
+def test_it_ends_by_itself_and_says_how_it_went(played: dict[str, Any]) -> None:
+    assert (played["code"], played["err"]) == (0, "")
+    tail = played["out"][-1200:]
+    for expected in ("directed gaze", "mutual facial gaze", "adjacency pair", "MTBCE", "duration", "fragments"):
+        assert expected in tail
+
+
+def test_the_log_tells_both_sides(played: dict[str, Any]) -> None:
+    for expected in (
+        'robot: "Hello, let\'s make a tangram."', "robot points at trapezoid", "human looks at",
+        "human moves blue-square", "directed gaze, robot → human about trapezoid (reference)", "human has left",
+    ):  # fmt: skip
+        assert expected in played["out"]
+
+
+def test_each_event_ends_once_and_has_its_cause(played: dict[str, Any]) -> None:
+    lines = [json.loads(line) for line in (played["folder"] / "events.jsonl").read_text().splitlines()]
+
+    ends = Counter(line["id"] for line in lines if line["state"] not in ("started", "completed"))
+    assert set(ends) == {line["id"] for line in lines}
+    assert set(ends.values()) == {1}
+    assert {line["cause"] for line in lines} >= {"turn", "reference", "human"}
+
+
+def test_each_block_starts_and_ends_once(played: dict[str, Any]) -> None:
+    lines = [json.loads(line) for line in (played["folder"] / "feedback.jsonl").read_text().splitlines()]
+
+    blocks = Counter((line["block"], line["progress"]) for line in lines if line["type"] == "block_progress")
+    assert blocks
+    assert set(blocks.values()) == {1}
+    assert {"step-2", "step-25"} <= {block for block, _ in blocks}
+
+
+def test_the_same_seed_gives_the_same_session(engage: Engage, played: dict[str, Any], tmp_path: Path) -> None:
+    events, feedback = tmp_path / "events.jsonl", tmp_path / "feedback.jsonl"
+
+    result = engage(*VIRTUAL, "--seed", 1, "--events", events, "--feedback", feedback)
+
+    assert result.out == played["out"]
+    assert events.read_bytes() == (played["folder"] / "events.jsonl").read_bytes()
+    assert feedback.read_bytes() == (played["folder"] / "feedback.jsonl").read_bytes()
+
+
+def test_another_seed_gives_other_times_but_the_same_story(
+    engage: Engage, played: dict[str, Any], tmp_path: Path
+) -> None:
+    events = tmp_path / "events.jsonl"
+
+    engage(*VIRTUAL, "--quiet", "--seed", 2, "--events", events)
+
+    def story(path: Path) -> list[tuple[str, str, list[str]]]:
+        return [
+            (line["block"], line["kind"], line["objects"])
+            for line in decided(path).values()
+            if line["initiator"] == "robot" and line["cause"] in ("turn", "reference")
+        ]
+
+    first = played["folder"] / "events.jsonl"
+    assert events.read_bytes() != first.read_bytes()
+    assert story(events) == story(first)
+
+
+def test_quiet_prints_nothing(engage: Engage) -> None:
+    assert engage(*VIRTUAL, "--quiet") == (0, "", "")
+
+
+def test_lines_on_stdout_leave_it_to_them(engage: Engage) -> None:
+    result = engage(*VIRTUAL, "--events", "-")
+
+    assert all(json.loads(line)["type"] == "connection_event" for line in result.out.splitlines())
+    assert "MTBCE" in result.err
+
+
+def test_the_resolution_decides_what_counts_as_shared(engage: Engage, tmp_path: Path) -> None:
+    shared = {}
+    for resolution in ("table", "object"):
+        path = tmp_path / f"{resolution}.jsonl"
+        engage(*VIRTUAL, "--quiet", "--resolution", resolution, "--events", path)
+        events = [line for line in decided(path).values() if line["cause"] == "reference"]
+        shared[resolution] = Counter(line["state"] for line in events)["succeeded"]
+
+    assert shared["object"] < shared["table"]
+
+
+def test_a_misplaced_piece_is_asked_for_again(engage: Engage) -> None:
+    usual = engage(*VIRTUAL).out
+    result = engage(*VIRTUAL, "--human", "misplacing")
+
+    fragments = [int(re.findall(r"(\d+) fragments", text)[-1]) for text in (usual, result.out)]
+    assert result.code == 0
+    assert fragments[1] > fragments[0]
