@@ -35,8 +35,6 @@ class RecognitionConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields
     """A look that follows a robot's directed gaze to the same object so closely is no direction of its own."""
     lost_face_grace: Seconds = 0.5
     """A face lost for less has not gone."""
-    lateness: Seconds = 0.0
-    """How long a limit waits for observations that arrive later than their stamp; results keep the limit's time."""
     window: Seconds = 30.0
     """Of the recent statistics."""
     reference_mtbce: Seconds = 5.7
@@ -55,7 +53,7 @@ class RecognitionConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields
         for name in positive:
             if not getattr(self, name) > 0:
                 raise ValueError(f"{name} must be greater than 0 s, not {getattr(self, name)}")
-        for name in ("after_robot_directed", "lost_face_grace", "lateness", "hysteresis"):
+        for name in ("after_robot_directed", "lost_face_grace", "hysteresis"):
             if getattr(self, name) < 0:
                 raise ValueError(f"{name} must not be negative, but is {getattr(self, name)}")
         if not 0 <= self.disengaged_below + self.hysteresis <= self.engaged_from - self.hysteresis <= 1:

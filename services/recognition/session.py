@@ -67,11 +67,11 @@ class Session:
     def deadline(self) -> Seconds | None:
         """When `advance` has something to do, unless an observation comes first."""
         first = self._first_due()
-        return None if first is None else first.at + self._config.lateness
+        return None if first is None else first.at
 
     def advance(self, now: Seconds) -> list[Effect]:
         """What happens by itself up to and including `now`."""
-        while (due := self._first_due()) is not None and due.at + self._config.lateness <= now:
+        while (due := self._first_due()) is not None and due.at <= now:
             due.happen(due.at)
         return self._take()
 

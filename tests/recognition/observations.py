@@ -129,6 +129,21 @@ class Log:
         return self.feed(progress, at)
 
 
+def asked(*accept: str, turn: str = "turn-1", end: float | None = 2.0) -> Log:
+    """The robot has asked at 1.0 and fallen silent at `end`."""
+    log = Log()
+    log.begins(ROBOT, "speak", 1.0, behavior="block-1:speech-1")
+    log.requests_event("adjacency_pair", 1.0, turn=turn, accept=accept)
+    if end is not None:
+        log.ends(ROBOT, "speak", end, behavior="block-1:speech-1")
+        log.signals("ended", end)
+    return log
+
+
+def backchannel(start: float, end: float) -> list[tuple[str, str, float]]:
+    return [("bc-1", "started", start), ("bc-1", "succeeded", start), ("bc-1", "completed", end)]
+
+
 def request_event(
     kind: EventKind, at: float, *objects: str, request: str = "request-1", block: str = "block-1", **event: Any
 ) -> RequestEvent:
