@@ -26,8 +26,6 @@ from schemas.behaviors import (
     Pose,
     Posture,
     PostureShift,
-    Speech,
-    Wait,
 )
 from schemas.body import NoPointZone, Ray
 from schemas.feedback import WarningKind
@@ -39,13 +37,6 @@ from services.control.kinematics import Side, Unreachable
 from services.control.motion import Leg
 from services.control.vocabulary import ACTION_UNITS, FACES, GESTURES, POSTURES
 
-TYPES: Mapping[type[BlockBehavior], str] = {
-    Gaze: "gaze", GazeShift: "gazeShift", HeadDirectionShift: "headDirectionShift", Pointing: "pointing",
-    Gesture: "gesture", Head: "head", Face: "face", FaceLexeme: "faceLexeme", FaceFacs: "faceFacs",
-    FaceShift: "faceShift", Posture: "posture", PostureShift: "postureShift", Pose: "pose", Speech: "speech",
-    Wait: "wait",
-}  # fmt: skip
-"""What this body performs, by BML name."""
 NOD_RESERVE = radians(18.0)
 """Kept free of the neck's range by gaze, so that a nod finds room anywhere."""
 SAME = 0.3
@@ -111,15 +102,15 @@ def plan(behavior: BlockBehavior, scene: Scene) -> Course:
         case Head(lexeme=lexeme, repetition=repetition, amount=amount):
             return _nod(lexeme.upper(), repetition, amount)
         case Face(amount=amount):
-            return _excursion("face", _face("RAISE_BROWS", amount), scene, sideways=("mouth", 0.02))
+            return _excursion("face", _face("RAISE_BROWS", amount), scene)
         case FaceLexeme(lexeme=lexeme, amount=amount):
-            return _excursion("face", _face(lexeme, amount), scene, sideways=("mouth", 0.02))
+            return _excursion("face", _face(lexeme, amount), scene)
         case FaceFacs(au=unit, amount=amount):
-            return _excursion("face", _face(_unit(unit), amount), scene, sideways=("mouth", 0.02))
+            return _excursion("face", _face(_unit(unit), amount), scene)
         case FaceShift(lexeme=lexeme, au=unit, amount=amount):
             return _shift(kinematics.joints_of("face"), _face(lexeme or _unit(unit), amount), scene)
         case Posture(lexeme=lexeme):
-            return _excursion("torso", _torso(lexeme), scene, sideways=("torso_turn", radians(0.4)))
+            return _excursion("torso", _torso(lexeme), scene)
         case PostureShift(lexeme=lexeme) | Pose(lexeme=lexeme):
             return _shift(("torso_turn", "torso_lean"), _torso(lexeme), scene)
         case _:
@@ -303,15 +294,14 @@ def _nod(lexeme: str, repetition: int, amount: float) -> Course:
     )  # fmt: skip
 
 
-def _excursion(part: str, goal: tuple[float, ...], scene: Scene, sideways: tuple[str, float]) -> Course:
+def _excursion(part: str, goal: tuple[float, ...], scene: Scene) -> Course:
     """Out to `goal`, held there, back: a face or a posture."""
     joints = kinematics.joints_of(part)
+    joint, size = _sideways(part, dict(zip(joints, goal, strict=True)))
     here, rest = _angles(joints, scene.pose), _angles(joints, scene.rest)
     out, back = _moving_time(part, here, goal), _moving_time(part, goal, rest)
     goal = goal if out else here
-    drift = tuple(
-        sideways[1] / SETTLE if joint == sideways[0] and out > 0.0 and back > 0.0 else 0.0 for joint in joints
-    )
+    drift = tuple(size / SETTLE if name == joint and out > 0.0 and back > 0.0 else 0.0 for name in joints)
     settle = SETTLE if any(drift) else 0.0
     after = tuple(angle + speed * settle for angle, speed in zip(goal, drift, strict=True))
     legs = (
@@ -335,6 +325,13 @@ def _course(
         parts=parts, joints=joints, legs=legs, points=points, on_target=dict(zip(joints, goal, strict=True)),
         degrees=kinematics.degrees_between(_angles(joints, scene.pose), goal), ray=ray,
     )  # fmt: skip
+
+
+def _sideways(part: str, goal: Mapping[str, float]) -> tuple[str, float]:
+    """A joint that the motion to `goal` hardly uses and that has room on both sides, and how far it drifts."""
+    if part == "torso":
+        return ("torso_turn", radians(0.4)) if not goal["torso_turn"] else ("torso_lean", radians(0.4))
+    return ("mouth_corners" if not goal["mouth_corners"] else "brows", 0.02)
 
 
 def _face(lexeme: str, amount: float) -> tuple[float, ...]:

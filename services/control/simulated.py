@@ -25,13 +25,14 @@ from services.control.body import (
     Progress,
     Reached,
 )
-from services.control.choreography import TYPES, Course, Impossible, Point, Scene
+from services.control.choreography import Course, Impossible, Point, Scene
 from services.control.config import Variability
 from services.control.estimates import infeasible, moved, spoken, waited
 from services.control.head import Attention
 from services.control.motion import Motion, Path, resting
 from services.control.runs import OVERHEAT, STALL, Run
 from services.control.tracks import Track
+from services.control.vocabulary import TYPES
 from services.control.voice import utter
 from services.control.waiting import Bell
 

@@ -1,6 +1,5 @@
 """Speech and waiting on loop time: the behaviors of the simulated body that move no joint."""
 
-import asyncio
 from collections.abc import AsyncGenerator
 from math import inf
 
@@ -13,22 +12,21 @@ from services.control.waiting import Bell
 
 async def speak(behavior: Speech, authority: Authority, pace: float = 1.0) -> AsyncGenerator[Progress, None]:
     """Say it word by word. Revoked, it finishes the word that it is in. pace: 2 takes twice as long."""
-    loop = asyncio.get_running_loop()
-    begin = loop.time()
-    utterance = utter(behavior.text, pace)
     bell = Bell()
+    begin = bell.now()
+    utterance = utter(behavior.text, pace)
     unwatch = authority.watch(bell.ring)
     try:
         for progress in _score(behavior, utterance, begin):
-            while loop.time() < progress.at and authority.revoked is None:
+            while bell.now() < progress.at and authority.revoked is None:
                 await bell.heard(progress.at)
             if authority.revoked is not None:
                 break
             yield progress
-        since = loop.time() - begin
+        since = bell.now() - begin
         for word in utterance.words:
             if authority.revoked is not None and word.start < since < word.end:
-                while loop.time() < begin + word.end:
+                while bell.now() < begin + word.end:
                     await bell.heard(begin + word.end)
                 yield Spoke(word.text, word.position, begin + word.end)
     finally:
@@ -37,21 +35,20 @@ async def speak(behavior: Speech, authority: Authority, pace: float = 1.0) -> As
 
 async def wait(behavior: Wait, authority: Authority) -> AsyncGenerator[Progress, None]:
     """Let its duration pass, and then hold until its end may be passed."""
-    loop = asyncio.get_running_loop()
-    begin = loop.time()
-    due = begin + (behavior.duration or 0.0)
     bell = Bell()
+    begin = bell.now()
+    due = begin + (behavior.duration or 0.0)
     unwatch = authority.watch(bell.ring)
     try:
         yield Reached("start", begin, begin)
-        while loop.time() < due and authority.revoked is None:
+        while bell.now() < due and authority.revoked is None:
             await bell.heard(due)
         left = due
         if authority.revoked is None and not authority.covers("end"):
             yield Arrived("end", due)
             while authority.revoked is None and not authority.covers("end"):
                 await bell.heard(inf)
-            left = loop.time()
+            left = bell.now()
         if authority.revoked is None:
             yield Reached("end", left, due)
     finally:

@@ -1,6 +1,33 @@
-"""What the simulated torso knows by name: gestures, faces and postures."""
+"""What the simulated torso knows by name: types of behavior, gestures, faces and postures."""
 
 from collections.abc import Mapping
+
+from schemas.behaviors import (
+    BlockBehavior,
+    Face,
+    FaceFacs,
+    FaceLexeme,
+    FaceShift,
+    Gaze,
+    GazeShift,
+    Gesture,
+    Head,
+    HeadDirectionShift,
+    Pointing,
+    Pose,
+    Posture,
+    PostureShift,
+    Speech,
+    Wait,
+)
+
+TYPES: Mapping[type[BlockBehavior], str] = {
+    Gaze: "gaze", GazeShift: "gazeShift", HeadDirectionShift: "headDirectionShift", Pointing: "pointing",
+    Gesture: "gesture", Head: "head", Face: "face", FaceLexeme: "faceLexeme", FaceFacs: "faceFacs",
+    FaceShift: "faceShift", Posture: "posture", PostureShift: "postureShift", Pose: "pose", Speech: "speech",
+    Wait: "wait",
+}  # fmt: skip
+"""What this body performs, by BML name."""
 
 GESTURES: Mapping[str, tuple[tuple[float, float, float], ...]] = {
     "BEAT": ((0, 22, 112), (4, 16, 82), (8, 2, 92)),

@@ -7,11 +7,15 @@ from schemas.units import Seconds
 
 
 class Bell:
-    """One task waits with `heard`; anybody may `ring`, before or while it waits."""
+    """One task waits with `heard`; anybody may `ring`, before or while it waits. And it knows what time it is."""
 
     def __init__(self) -> None:
         self._loop = asyncio.get_running_loop()
         self._rung = asyncio.Event()
+
+    def now(self) -> Seconds:
+        """Loop time."""
+        return self._loop.time()
 
     def ring(self) -> None:
         self._rung.set()
