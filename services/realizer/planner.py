@@ -172,7 +172,7 @@ class _Planner:
         estimate = self.estimates.get(behavior.id)
         longest = {(phase.since, phase.to): phase.longest for phase in estimate.phases} if estimate else {}
         parts = segments(behavior, estimate)
-        limits = (longest.get((part.since, part.to), None if part.hold else part.natural) for part in parts)
+        limits = (longest.get((part.since, part.to)) for part in parts)
         return Chain(behavior, parts, tuple(limits))
 
     def _merge_circles(self, assembly: Assembly, classes: Classes) -> bool:
@@ -214,7 +214,9 @@ class _Planner:
         """The bound to give up; raises if the cycle is worse than that."""
         net = assembly.net
         transitions = [lag.source for lag in cycle.lags]
-        involved = [id for id in chains if any(_holds(net, each, id) for each in transitions)]
+        phases = {_reason(net, lag).behavior for lag in cycle.lags if _reason(net, lag).kind == "phase"}
+        touched = {point.behavior for each in transitions for point in net.transitions[each].points}
+        involved = [id for id in chains if id in (phases or touched)]
         names = _route(net, cycle)
         if 0 in transitions or len(involved) == 1:
             candidates = [id for id in involved if id not in self.relations.required] or involved
@@ -237,10 +239,6 @@ class _Planner:
 
 def _kind(warning: str) -> WarningKind:
     return warning if warning in get_args(WarningKind) else "CANNOT_CREATE_BEHAVIOR"  # type: ignore[return-value]
-
-
-def _holds(net: PetriNet, transition: int, behavior: str) -> bool:
-    return any(point.behavior == behavior for point in net.transitions[transition].points)
 
 
 def _reason(net: PetriNet, lag: Lag) -> Place | Bound:

@@ -43,6 +43,7 @@ NOMINAL_STROKE: tuple[Seconds, ...] = (0.5, 0.1, 0.3, 0.2, 0.1, 0.6)
 NOMINAL_ON_TARGET: tuple[Seconds, ...] = (0.0, 0.0, 0.4, 0.0, 0.0, 0.4)
 NOMINAL_SHIFT: Seconds = 0.5
 NOMINAL_PER_CHARACTER: Seconds = 0.07
+GUESSED_SHORTEST: Seconds = 0.01
 NOMINAL_DELAY: dict[str, Seconds] = {
     "directed_gaze": 0.3, "mutual_facial_gaze": 0.7, "adjacency_pair": 0.4, "backchannel": 0.0,
 }  # fmt: skip
@@ -124,8 +125,11 @@ def segments(behavior: Behavior, estimate: Estimate | None) -> tuple[Segment, ..
         nominal, known = tuple(seconds * scale for seconds in nominal), {}
     result = []
     for (since, to), seconds in zip(pairwise(points), nominal, strict=True):
-        phase = known.get((since, to))
-        shortest, natural = (phase.shortest, phase.natural) if phase else (seconds, seconds)
+        if phase := known.get((since, to)):
+            shortest, natural = phase.shortest, phase.natural
+        else:
+            # A guess must not be what refuses a block: nearly no time at all is thought possible.
+            shortest, natural = seconds if isinstance(behavior, Wait) else min(GUESSED_SHORTEST, seconds), seconds
         result.append(Segment(since, to, min(shortest, natural), natural, to in holds))
     return tuple(result)
 

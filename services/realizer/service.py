@@ -25,7 +25,7 @@ from services.realizer.config import RealizerConfig
 from services.realizer.executor import Ending, Performance
 from services.realizer.planner import Plan, plan_block, poses_before
 from services.realizer.points import performer
-from services.realizer.relations import BlockRefused
+from services.realizer.relations import BlockRefused, relations
 from services.requests import RequestDesk, Requester
 from services.runtime import Ready
 
@@ -91,7 +91,7 @@ class _Realizer:
         block = live.request.block
         if any(other.request.block.id == block.id and not other.ended.done() for other in live.earlier):
             raise BlockRefused(Fault(reason="a block of this id is still being performed", where=block.id))
-        plan_block(block)  # What is wrong with the block alone needs no body to be seen.
+        relations(block)  # A bad reference is seen without asking the body.
         plan = plan_block(block, await self._estimates(live.request, {}))
         if before := poses_before(plan):
             plan = plan_block(block, await self._estimates(live.request, before))
