@@ -172,6 +172,7 @@ class Arbiter:
                 self._glances.began(now)
         if before.kind == "glance" != self._owner.kind:
             self._glances.ended(now)
+        self._glances.head_is_on_face(self._faces.is_face(self._head_on()), now)
         self._waiting = tuple(claim for claim in claims if claim.kind != self._owner.kind)
         changed = self._owner != before or self._waiting != waited
         return Ruling(self._owner, self._since, self._waiting, changed, self._shift(now))
@@ -179,7 +180,6 @@ class Arbiter:
     def _claims(self, now: Seconds) -> list[Claim]:
         face = self._faces.claim(now)
         self._glances.face = face.target if face else ""
-        self._glances.head_is_on_face(self._faces.is_face(self._head_on()), now)
         claims = [
             self._inhibition, self._fragment or self._thought, self._glances.claim(now), self._responses.claim(now),
             self._hands.claim(now), face,

@@ -7,6 +7,7 @@ from functools import partial
 from typing import Any
 
 from schemas import keys
+from schemas.actions import ActionBegan
 from schemas.attention import HeadOwner
 from schemas.behaviors import Gaze, GazeShift, Pointing
 from schemas.blocks import Block, BlockOutcome, PerformBlock
@@ -178,6 +179,10 @@ class Partners:
         fields = {"kind": "directed_gaze", "initiator": "robot", "responder": "human", **fields}
         self.bus.publish(keys.CONNECTION_EVENT, ConnectionEvent(id=id, state=state, at=now, started=now, **fields))
 
+    def speaks(self, actor: str) -> None:
+        key = keys.ROBOT_ACTION if actor == "robot" else keys.PERCEIVED_ACTION
+        self.bus.publish(key, ActionBegan(actor=actor, action="speak", at=self.bus.stamp()))
+
     def see(self, world: World) -> None:
         self.bus.publish(keys.WORLD, world)
 
@@ -222,5 +227,5 @@ def _described(question: Message) -> Message:
     return Capabilities(body="paper", types=("gaze", "pointing", "speech"), parts=("head",), gaze_half_angle=0.1)
 
 
-def gaze(block: Block) -> list[str]:
+def gaze_targets(block: Block) -> list[str]:
     return [behavior.target for behavior in block.behaviors if isinstance(behavior, Gaze)]

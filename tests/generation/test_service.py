@@ -1,30 +1,36 @@
-"""The service on a memory bus: fragment to block to outcome, refusals, turns, inhibition, in exact virtual time."""
+"""The service on a memory bus: fragment to block to outcome, refusals, turns, in exact virtual time."""
 
 import asyncio
 
-from schemas.behaviors import Reference, Speech, SpeechOption
+import pytest
+
+from schemas.behaviors import Event, Gaze, Pointing, Reference, Speech, SpeechOption, TurnSignal
 from schemas.blocks import SpokenText
+from schemas.faults import Fault
 from schemas.fragments import FragmentOutcome, TurnFragment
+from services.generation.config import GenerationConfig
 from services.memory_bus import MemoryHub
-from tests.generation.partners import stage
+from services.requests import GRACE, RequestRefused
+from tests.generation.partners import TABLE, stage
 
-HELLO = TurnFragment(id="hello", behaviors=(Speech(id="s", text="Hello"),))
+HELLO = Speech(id="s", text="Hello")
+THIS = SpeechOption(text="this", cost=1, deictic=True)
 
 
-def refers(id: str = "show", minimum: float = 0.95, **fields: object) -> TurnFragment:
-    return TurnFragment(
-        id=id,
-        behaviors=(
-            Speech(id="s", text="Take"),
-            Reference(
-                id="ref",
-                target="middle",
-                minimum_reliability=minimum,
-                options=(SpeechOption(text="this", cost=1, deictic=True),),
-            ),
-        ),
-        **fields,  # type: ignore[arg-type]
-    )
+def says(id: str, status: str = "full", **fields: object) -> TurnFragment:
+    return TurnFragment(id=id, turn_status=status, behaviors=(HELLO,), **fields)  # type: ignore[arg-type]
+
+
+def refers(id: str = "show", minimum: float = 0.95, target: str = "middle", **fields: object) -> TurnFragment:
+    reference = Reference(id="ref", target=target, minimum_reliability=minimum, options=(THIS,))
+    return TurnFragment(id=id, behaviors=(HELLO, reference), **fields)  # type: ignore[arg-type]
+
+
+def now() -> float:
+    return asyncio.get_running_loop().time()
+
+
+# -- from fragment to outcome -------------------------------------------------------------------------------------
 
 
 async def test_a_fragment_becomes_a_block_and_the_block_an_outcome(hub: MemoryHub) -> None:
@@ -33,19 +39,265 @@ async def test_a_fragment_becomes_a_block_and_the_block_an_outcome(hub: MemoryHu
         block = await partners.fragment_block("show")
         partners.reach("show", "ref-event", "start")
         partners.event("e", "started", block="show", behavior="ref-event")
-        partners.end(partners.request("show"), spoken=(SpokenText(behavior="s", text="Take"),))
+        partners.end(partners.request("show"), spoken=(SpokenText(behavior="s", text="Hello"),))
         await asyncio.sleep(1.0)
         undecided = pending.outcome.done()
         partners.event("e", "succeeded", block="show", behavior="ref-event", delay=0.4)
         outcome = await pending.outcome
 
-        assert [type(behavior).__name__ for behavior in block.behaviors] == [
-            "Event", "Speech", "Gaze", "Pointing", "Speech", "Event", "Gaze", "Event", "TurnSignal",
+        assert [type(behavior) for behavior in block.behaviors] == [
+            Event, Speech, Gaze, Pointing, Speech, Event, Gaze, Event, TurnSignal,
         ]  # fmt: skip
         assert not undecided
         assert isinstance(outcome, FragmentOutcome)
-        assert (outcome.status, outcome.fragment) == ("done", "show")
+        assert (outcome.status, outcome.fragment, outcome.warnings) == ("done", "show", ())
         assert [event.state for event in outcome.events] == ["succeeded"]
         assert outcome.choices[0].gesture == "directed_gaze_with_pointing"
-        assert outcome.spoken == (SpokenText(behavior="s", text="Take"),)
-        assert asyncio.get_running_loop().time() == 1.0
+        assert outcome.spoken == (SpokenText(behavior="s", text="Hello"),)
+        assert now() == 1.0
+
+
+async def test_the_block_names_the_arm_that_was_estimated(hub: MemoryHub) -> None:
+    async with stage(hub) as partners:
+        partners.send(refers(target="left"))
+        block = await partners.fragment_block("show")
+
+        (point,) = (behavior for behavior in block.behaviors if isinstance(behavior, Pointing))
+        assert point.mode == "LEFT_HAND"
+
+
+async def test_an_event_nobody_decides_delays_the_outcome_only_so_long(hub: MemoryHub) -> None:
+    async with stage(hub, GenerationConfig(decision_patience=3.0)) as partners:
+        pending = partners.send(refers())
+        await partners.fragment_block("show")
+        partners.reach("show", "ref-event", "start")
+        partners.event("e", "started", block="show", behavior="ref-event")
+        partners.end(partners.request("show"))
+        outcome = await pending.outcome
+
+        assert isinstance(outcome, FragmentOutcome)
+        assert outcome.warnings == ("ref-event was never decided",)
+        assert now() == 3.0
+
+
+async def test_without_recognition_the_realizers_word_counts(hub: MemoryHub) -> None:
+    async with stage(hub) as partners:
+        pending = partners.send(refers())
+        await partners.fragment_block("show")
+        partners.reach("show", "ref-event", "start")
+        partners.reach("show", "ref-event", "end")
+        partners.end(partners.request("show"))
+        await pending.outcome
+
+        assert now() == 0.0
+
+
+async def test_the_outcome_of_a_turn_tells_all_its_events(hub: MemoryHub) -> None:
+    async with stage(hub) as partners:
+        for id, status in [("a", "beginning"), ("b", "end")]:
+            pending = partners.send(says(id, status))
+            await partners.fragment_block(id)
+            if id == "a":
+                partners.event("pair", "started", kind="adjacency_pair", block="a", behavior="turn-pair", turn="a")
+            partners.event("pair", "succeeded", kind="adjacency_pair", block="a", behavior="turn-pair", turn="a")
+            partners.end(partners.request(id))
+            outcome = await pending.outcome
+
+        assert isinstance(outcome, FragmentOutcome)
+        assert [(event.id, event.state) for event in outcome.events] == [("pair", "succeeded")]
+
+
+async def test_fragments_are_performed_in_order_one_after_the_other(hub: MemoryHub) -> None:
+    async with stage(hub) as partners:
+        sent = [partners.send(says(id, status)) for id, status in [("a", "beginning"), ("b", "end")]]
+        await partners.fragment_block("a")
+        await asyncio.sleep(5.0)
+        waited = [request.block.id for request in partners.blocks if request.block.id in "ab"]
+        partners.end(partners.request("a"))
+        await partners.fragment_block("b")
+        partners.end(partners.request("b"))
+        await asyncio.gather(*(pending.outcome for pending in sent))
+
+        assert waited == ["a"]
+
+
+async def test_what_cannot_be_made_well_enough_is_warned_of_twice(hub: MemoryHub) -> None:
+    async with stage(hub) as partners:
+        pending = partners.send(refers(minimum=0.99))
+        await partners.fragment_block("show")
+        partners.end(partners.request("show"))
+        outcome = await pending.outcome
+
+        assert isinstance(outcome, FragmentOutcome)
+        assert "0.99" in outcome.warnings[0]
+        assert [fault.reason for fault in partners.faults] == list(outcome.warnings)
+
+
+# -- what is refused ----------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("fragment", "reason"),
+    [
+        (refers(target="ghost"), "ghost"),
+        (says("x", "middle"), "no turn open"),
+        (says("x", addressee="nobody"), "nobody"),
+    ],
+)
+async def test_a_bad_fragment_is_refused_and_the_next_good_one_performed(
+    hub: MemoryHub, fragment: TurnFragment, reason: str
+) -> None:
+    async with stage(hub) as partners:
+        with pytest.raises(RequestRefused, match=reason):
+            await partners.send(fragment, "bad").outcome
+        good = partners.send(says("good"))
+        await partners.fragment_block("good")
+        partners.end(partners.request("good"))
+
+        outcome = await good.outcome
+        assert isinstance(outcome, FragmentOutcome)
+        assert outcome.status == "done"
+        assert [reason in str(fault) for fault in partners.faults] == [True]
+
+
+async def test_a_fragment_waits_for_the_world_and_not_for_ever(hub: MemoryHub) -> None:
+    async with stage(hub, GenerationConfig(world_patience=5.0), world=None) as partners:
+        lost = partners.send(says("lost"))
+        with pytest.raises(RequestRefused, match="world is unknown"):
+            await lost.outcome
+        gave_up = now()
+        partners.send(says("early"))
+        await asyncio.sleep(1.0)
+        partners.see(TABLE)
+        await partners.fragment_block("early")
+
+        assert gave_up == 5.0
+        assert now() == 6.0
+
+
+async def test_a_reference_that_cannot_be_made_fails_its_fragment(hub: MemoryHub) -> None:
+    async with stage(hub, GenerationConfig(condition="degraded-generation")) as partners:
+        outcome = await partners.send(refers()).outcome
+
+        assert isinstance(outcome, FragmentOutcome)
+        assert outcome.status == "failed"
+        assert outcome.fault is not None
+        assert "no way to refer to middle" in outcome.fault.reason
+        assert partners.blocks == []
+
+
+# -- what ends a turn early ---------------------------------------------------------------------------------------
+
+
+async def test_a_cancelled_fragment_interrupts_its_block_and_aborts_its_turn(hub: MemoryHub) -> None:
+    async with stage(hub) as partners:
+        first = partners.send(says("a", "beginning"))
+        second = partners.send(says("b", "end"))
+        await partners.fragment_block("a")
+        partners.requests.cancel("ask-a", "changed my mind")
+        outcomes = await asyncio.gather(first.outcome, second.outcome)
+
+        assert [outcome.status for outcome in outcomes] == ["interrupted", "interrupted"]  # type: ignore[attr-defined]
+        assert partners.cancelled == [partners.request("a").id]
+        assert [(each.signal.signal, each.signal.turn) for each in partners.signals] == [("aborted", "a")]
+        with pytest.raises(StopIteration):
+            partners.request("b")
+
+
+async def test_a_cancelled_fragment_in_line_is_never_performed(hub: MemoryHub) -> None:
+    async with stage(hub) as partners:
+        partners.send(says("a"))
+        second = partners.send(says("b"))
+        third = partners.send(says("c"))
+        await partners.fragment_block("a")
+        partners.requests.cancel("ask-b")
+        outcome = await second.outcome
+        partners.end(partners.request("a"))
+        await partners.fragment_block("c")
+        partners.end(partners.request("c"))
+        await third.outcome
+
+        assert isinstance(outcome, FragmentOutcome)
+        assert outcome.status == "interrupted"
+        assert [request.block.id for request in partners.blocks if request.block.id in "abc"] == ["a", "c"]
+
+
+async def test_a_block_that_fails_ends_the_turn_but_not_the_service(hub: MemoryHub) -> None:
+    async with stage(hub) as partners:
+        failing = partners.send(says("a"))
+        await partners.fragment_block("a")
+        partners.end(partners.request("a"), "failed", fault=Fault(reason="the arm is stuck"))
+        outcome = await failing.outcome
+        good = partners.send(says("b"))
+        await partners.fragment_block("b")
+        partners.end(partners.request("b"))
+        await good.outcome
+
+        assert isinstance(outcome, FragmentOutcome)
+        assert (outcome.status, outcome.fault) == ("failed", Fault(reason="the arm is stuck"))
+        assert [each.signal.signal for each in partners.signals] == ["aborted"]
+
+
+async def test_a_failure_after_the_turns_end_does_not_take_the_pair_back(hub: MemoryHub) -> None:
+    async with stage(hub) as partners:
+        pending = partners.send(says("a"))
+        await partners.fragment_block("a")
+        partners.reach("a", "turn-ended", "start")
+        partners.end(partners.request("a"), "failed")
+        await pending.outcome
+        await asyncio.sleep(1.0)
+
+        assert partners.signals == []
+
+
+async def test_silence_aborts_an_open_turn(hub: MemoryHub) -> None:
+    async with stage(hub) as partners:
+        partners.send(says("a", "beginning"))
+        await partners.fragment_block("a")
+        partners.end(partners.request("a"))
+        await asyncio.sleep(9.9)
+        before = len(partners.signals)
+        await asyncio.sleep(0.2)
+        with pytest.raises(RequestRefused, match="no turn open"):
+            await partners.send(says("b", "end")).outcome
+
+        assert before == 0
+        assert [partners.bus.local(each.at) for each in partners.signals] == [10.0]
+
+
+async def test_a_barge_in_interrupts_the_robot(hub: MemoryHub) -> None:
+    async with stage(hub) as partners:
+        pending = partners.send(says("a"))
+        await partners.fragment_block("a")
+        partners.speaks("robot")
+        await asyncio.sleep(1.0)
+        partners.speaks("human")
+        outcome = await pending.outcome
+
+        assert isinstance(outcome, FragmentOutcome)
+        assert outcome.status == "interrupted"
+        assert now() == 1.8
+        assert [each.signal.signal for each in partners.signals] == ["aborted"]
+
+
+async def test_a_dead_realizer_fails_the_fragment(hub: MemoryHub) -> None:
+    async with stage(hub) as partners:
+        pending = partners.send(says("a"))
+        await partners.fragment_block("a")
+        hub.kill("realizer")
+        outcome = await pending.outcome
+
+        assert isinstance(outcome, FragmentOutcome)
+        assert outcome.status == "failed"
+        assert now() == GRACE
+
+
+async def test_a_dead_manager_ends_what_it_asked_for(hub: MemoryHub) -> None:
+    async with stage(hub) as partners:
+        partners.send(says("a"))
+        await partners.fragment_block("a")
+        hub.kill("manager")
+        await asyncio.sleep(GRACE + 0.1)
+
+        assert partners.cancelled == [partners.request("a").id]
+        assert [each.signal.signal for each in partners.signals] == ["aborted"]

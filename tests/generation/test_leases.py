@@ -1,0 +1,80 @@
+"""Leases that inhibit gaze or pointing: renewed, lapsed, released, and what is still permitted."""
+
+import pytest
+
+from schemas.attention import Claim, Inhibit
+from schemas.behaviors import Gaze, Gesture, Pointing, Speech
+from services.generation.config import GenerationConfig
+from services.generation.leases import Leases
+from services.generation.permits import Permits
+
+
+def lease(id: str = "l", **fields: object) -> Inhibit:
+    return Inhibit(id=id, requester="manager", **fields)  # type: ignore[arg-type]
+
+
+def test_a_lease_lapses_unless_it_is_renewed() -> None:
+    leases = Leases(GenerationConfig())
+    leases.take(lease(ttl=5.0), 0.0)
+    leases.take(lease(ttl=5.0), 3.0)
+
+    assert leases.deadline == 8.0
+    assert leases.lapse(7.9) == ()
+    assert not leases.permits().gaze
+    assert leases.lapse(8.0) == ("l",)
+    assert leases.permits() == Permits()
+    assert leases.claim() is None
+
+
+def test_the_newest_lease_on_gaze_claims_the_head() -> None:
+    leases = Leases(GenerationConfig())
+    leases.take(lease("a"), 0.0)
+    leases.take(lease("b", mode="target", target="table"), 0.0)
+    leases.take(lease("c", part="point-left"), 0.0)
+
+    assert leases.claim() == Claim(kind="inhibition", priority=1, target="table", reason="manager: target")
+    assert leases.release("b")
+    assert leases.claim() == Claim(kind="inhibition", priority=1, reason="manager: hold")
+    assert not leases.release("b")
+
+
+@pytest.mark.parametrize(
+    ("parts", "hands"),
+    [
+        ([], ("LEFT_HAND", "RIGHT_HAND")),
+        (["point-left"], ("RIGHT_HAND",)),
+        (["point-right"], ("LEFT_HAND",)),
+        (["point-left", "point-right"], ()),
+    ],
+)
+def test_each_arm_is_inhibited_by_itself(parts: list[str], hands: tuple[str, ...]) -> None:
+    leases = Leases(GenerationConfig())
+    for part in parts:
+        leases.take(lease(part, part=part), 0.0)
+
+    permits = leases.permits()
+
+    assert permits.hands == hands
+    assert permits.allows(Pointing(id="p", target="x")) == bool(hands)
+    assert permits.allows(Pointing(id="p", target="x", mode="BOTH_HANDS")) == (len(hands) == 2)
+    assert bool(permits.no_point) == (not hands)
+
+
+def test_degraded_generation_is_a_standing_inhibition_of_everything_but_words() -> None:
+    leases = Leases(GenerationConfig(condition="degraded-generation"))
+    permits = leases.permits()
+
+    claim = leases.claim()
+    assert claim is not None
+    assert (claim.kind, claim.target) == ("inhibition", "")
+    assert permits.allows(Speech(id="s", text="hello"))
+    assert not permits.allows(Gaze(id="g", target="x"))
+    assert not permits.allows(Gesture(id="b", lexeme="beat"))
+    assert permits.no_gaze == permits.no_point == "speech only"
+
+
+def test_degraded_recognition_changes_nothing_here() -> None:
+    leases = Leases(GenerationConfig(condition="degraded-recognition"))
+
+    assert leases.permits() == Permits()
+    assert leases.claim() is None
