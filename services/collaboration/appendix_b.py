@@ -1,8 +1,21 @@
-"""The transcript of thesis Appendix B as a script. The robot's words are the source's; steps 7-17 are ours."""
+"""The transcript of thesis Appendix B as a script. The robot's words are the source's; steps 7-17 are ours.
+
+The id of a fragment is its step, and ends in `ours` where the source has none: so is every connection event's block.
+"""
 
 from services.collaboration.plans import Manager, Turn
 from services.collaboration.relations import Relation
 from services.collaboration.task import Instruction
+from services.tangram_table import Side
+
+AS_IN_STEP_19 = Relation("purple-triangle", "top right", "trapezoid")
+"""Where the human puts it, against step 18; the robot of step 20 says "good" all the same."""
+
+
+def asks(step: str, piece: str, side: Side, landmark: str, deictic: str = "", *also: Relation) -> Turn:
+    """A request for a placement. deictic: the word that may stand for the piece. also: what else will do."""
+    wanted = Relation(piece, side, landmark)
+    return Turn(step=step, instruction=Instruction(wanted=wanted, deictic=deictic, also=also))
 
 
 def turns(manager: Manager) -> tuple[Turn, ...]:
@@ -11,22 +24,11 @@ def turns(manager: Manager) -> tuple[Turn, ...]:
         Turn(step="step-2", say=("Hello, let's make a tangram.",)),
         Turn(step="step-3", say=manager.introduction(), look=False),
         Turn(step="step-4", say=("Okay, let's start.",)),
-        Turn(step="step-5", instruction=Instruction(wanted=Relation("blue-square", "top", "rectangle"))),
+        asks("step-5", "blue-square", "top", "rectangle"),
         *OURS,
-        # The human of step 19 puts it at the top right of the trapezoid, and the robot of step 20 says "good".
-        Turn(
-            step="step-18",
-            instruction=Instruction(
-                wanted=Relation("purple-triangle", "top right", "pink-square"),
-                deictic="that",
-                also=(Relation("purple-triangle", "top right", "trapezoid"),),
-            ),
-        ),
+        asks("step-18", "purple-triangle", "top right", "pink-square", "that", AS_IN_STEP_19),
         Turn(step="step-20"),
-        Turn(
-            step="step-21",
-            instruction=Instruction(wanted=Relation("green-square", "left", "blue-square"), deictic="this"),
-        ),
+        asks("step-21", "green-square", "left", "blue-square", "this"),
         Turn(step="step-23"),
         Turn(step="step-24", say=("Look, we made an anchor.",), look=False),
         Turn(step="step-25", say=("Thanks for playing. That was fun, goodbye.",), look=False),
@@ -34,15 +36,15 @@ def turns(manager: Manager) -> tuple[Turn, ...]:
 
 
 OURS = (
-    Turn(step="step-7"),
-    Turn(step="step-8", instruction=Instruction(wanted=Relation("trapezoid", "top", "blue-square"))),
-    Turn(step="step-9"),
-    Turn(step="step-10", instruction=Instruction(wanted=Relation("yellow-triangle", "bottom", "rectangle"))),
-    Turn(step="step-11"),
-    Turn(step="step-12", instruction=Instruction(wanted=Relation("red-square", "bottom left", "yellow-triangle"))),
-    Turn(step="step-13"),
-    Turn(step="step-14", instruction=Instruction(wanted=Relation("pink-square", "bottom right", "yellow-triangle"))),
-    Turn(step="step-15"),
-    Turn(step="step-16", instruction=Instruction(wanted=Relation("pink-triangle", "top left", "red-square"))),
-    Turn(step="step-17", instruction=Instruction(wanted=Relation("purple-square", "right", "blue-square"))),
+    Turn(step="step-7-ours"),
+    asks("step-8-ours", "trapezoid", "top", "blue-square"),
+    Turn(step="step-9-ours"),
+    asks("step-10-ours", "yellow-triangle", "bottom", "rectangle"),
+    Turn(step="step-11-ours"),
+    asks("step-12-ours", "red-square", "bottom left", "yellow-triangle"),
+    Turn(step="step-13-ours"),
+    asks("step-14-ours", "pink-square", "bottom right", "yellow-triangle"),
+    Turn(step="step-15-ours"),
+    asks("step-16-ours", "pink-triangle", "top left", "red-square"),
+    asks("step-17-ours", "purple-square", "right", "blue-square"),
 )

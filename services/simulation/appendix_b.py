@@ -46,7 +46,7 @@ def misplacing_rules() -> tuple[Rule, ...]:
     wrong = Lay("pink-square", "bottom left", "red-square")
     return tuple(
         structs.replace(rule, do=tuple(wrong if isinstance(act, Lay) else act for act in rule.do))
-        if rule.step == "step-14"
+        if rule.step == "step-14-ours"
         else rule
         for rule in rules()
     )
@@ -101,17 +101,17 @@ def approves(step: str) -> tuple[Rule, ...]:
 
 
 OURS = (
-    *approves("step-7"),
-    *moves("step-8", "trapezoid", "top", "blue-square", "blue"),
-    *approves("step-9"),
-    *moves("step-10", "yellow-triangle", "bottom", "rectangle", "rectangle"),
-    *approves("step-11"),
-    *moves("step-12", "red-square", "bottom left", "yellow-triangle", "yellow"),
-    *approves("step-13"),
-    *moves("step-14", "pink-square", "bottom right", "yellow-triangle", "yellow"),
-    *approves("step-15"),
-    *moves("step-16", "pink-triangle", "top left", "red-square", "red"),
-    *moves("step-17", "purple-square", "right", "blue-square", "blue"),
+    *approves("step-7-ours"),
+    *moves("step-8-ours", "trapezoid", "top", "blue-square", "blue"),
+    *approves("step-9-ours"),
+    *moves("step-10-ours", "yellow-triangle", "bottom", "rectangle", "rectangle"),
+    *approves("step-11-ours"),
+    *moves("step-12-ours", "red-square", "bottom left", "yellow-triangle", "yellow"),
+    *approves("step-13-ours"),
+    *moves("step-14-ours", "pink-square", "bottom right", "yellow-triangle", "yellow"),
+    *approves("step-15-ours"),
+    *moves("step-16-ours", "pink-triangle", "top left", "red-square", "red"),
+    *moves("step-17-ours", "purple-square", "right", "blue-square", "blue"),
 )
 
 
@@ -167,12 +167,12 @@ GOODBYE = (
 
 PLACES: tuple[tuple[str, str, Side, str], ...] = (
     ("step-5", "blue-square", "top", "rectangle"),
-    ("step-8", "trapezoid", "top", "blue-square"),
-    ("step-10", "yellow-triangle", "bottom", "rectangle"),
-    ("step-12", "red-square", "bottom left", "yellow-triangle"),
-    ("step-14", "pink-square", "bottom right", "yellow-triangle"),
-    ("step-16", "pink-triangle", "top left", "red-square"),
-    ("step-17", "purple-square", "right", "blue-square"),
+    ("step-8-ours", "trapezoid", "top", "blue-square"),
+    ("step-10-ours", "yellow-triangle", "bottom", "rectangle"),
+    ("step-12-ours", "red-square", "bottom left", "yellow-triangle"),
+    ("step-14-ours", "pink-square", "bottom right", "yellow-triangle"),
+    ("step-16-ours", "pink-triangle", "top left", "red-square"),
+    ("step-17-ours", "purple-square", "right", "blue-square"),
     ("step-18", "purple-triangle", "top right", "pink-square"),
     ("step-21", "green-square", "left", "blue-square"),
 )

@@ -179,7 +179,7 @@ def test_a_deictic_phrase_could_mean_any_other_piece() -> None:
 def test_a_misplaced_piece_is_asked_to_be_fixed() -> None:
     fragments = scripted(Player(wrong=1))
 
-    assert list(fragments)[3:6] == ["step-5", "step-5-fix", "step-7-a"]
+    assert list(fragments)[3:6] == ["step-5", "step-5-fix", "step-7-ours-a"]
     fix = spoken(fragments["step-5-fix"])
     assert fix == "Please fix the blue piece so that it is touching the top of the rectangle"
 
@@ -187,7 +187,7 @@ def test_a_misplaced_piece_is_asked_to_be_fixed() -> None:
 def test_a_request_that_nobody_follows_is_repeated() -> None:
     fragments = scripted(Player(idle=2))
 
-    assert list(fragments)[3:7] == ["step-5", "step-5-again", "step-5-again-2", "step-7-a"]
+    assert list(fragments)[3:7] == ["step-5", "step-5-again", "step-5-again-2", "step-7-ours-a"]
     assert spoken(fragments["step-5-again"]) == spoken(fragments["step-5"])
 
 

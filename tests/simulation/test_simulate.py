@@ -12,6 +12,7 @@ from schemas.world import World
 from services.bus import Bus, Keep
 from services.memory_bus import MemoryHub
 from services.runtime import running
+from services.simulation.appendix_b import MOVE
 from services.simulation.config import SimulationConfig
 from services.simulation.service import simulate
 
@@ -77,15 +78,15 @@ async def test_the_person_moves_the_blue_square_to_the_top_of_the_rectangle(hub:
         bus.publish(keys.SYNC_POINT, word)
         await perceived(bus, until=8.0)
         bus.publish(keys.FEEDBACK, BlockProgress(block="step-5", progress="end", status="done", at=bus.stamp()))
-        seen = await perceived(bus, until=12.0)
+        seen = await perceived(bus, until=14.0)
         with bus.subscribe(keys.WORLD, keep=Keep.LATEST) as inbox:
-            received = await inbox.next(12.0)
+            received = await inbox.next(14.0)
 
     assert [(kind, target) for _, kind, target in seen] == [
         ("ActionBegan", "blue-square"),
         ("ActionEnded", "blue-square"),
     ]
-    assert seen[0][0] == pytest.approx(8.6)
+    assert seen[0][0] == pytest.approx(8.0 + MOVE)
     assert received is not None
     assert isinstance(received.message, World)
     blue = received.message.entity("blue-square")
@@ -100,7 +101,7 @@ async def test_the_world_is_reported_often_while_something_moves_and_not_at_all_
             await perceived(bus, until=20.0)
             at_rest = len(inbox)
             bus.publish(keys.FEEDBACK, BlockProgress(block="step-5", progress="end", status="done", at=bus.stamp()))
-            await perceived(bus, until=21.5)
+            await perceived(bus, until=20.0 + MOVE + 1.0)
             while_moving = len(inbox) - at_rest
 
     assert at_rest == 2
