@@ -23,6 +23,7 @@ MACHINERY = {"bus", "memory_bus", "requests", "runtime", "virtual_time", "client
 """Modules of `services` that pure files don't know either; `zenoh_*` too."""
 SHELLS = {
     "services/realizer/executor.py",  # awaits bodies
+    "services/realizer/recognition_link.py",  # asks recognition
     "services/realizer/reporting.py",  # publishes feedback
     "services/control/body.py",  # the interface of bodies: coroutines
     "services/control/simulated.py",  # a body that moves on the loop's clock

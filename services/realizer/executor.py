@@ -4,7 +4,7 @@ Decides nothing: what was measured goes to the `Authority`, and what that says i
 """
 
 import asyncio
-from collections.abc import Callable, MutableMapping
+from collections.abc import Callable, Iterable, MutableMapping
 from typing import Any, Literal
 
 from msgspec import Struct
@@ -22,15 +22,13 @@ from schemas.body import (
 )
 from schemas.faults import EngageError, Fault, InputRefused
 from schemas.feedback import WarningKind
-from schemas.recognition import EventOutcome, RequestEvent, SignalTurn
-from schemas.requests import Outcome
 from schemas.units import Seconds
 from services.bus import Bus
 from services.realizer.authority import Authority, Begin, Effect, Extend, Late, Stalled
 from services.realizer.config import RealizerConfig
-from services.realizer.patience import event_deadline
 from services.realizer.planner import Plan, plan_block
 from services.realizer.points import Point, performer, sync_points
+from services.realizer.recognition_link import RecognitionLink
 from services.realizer.reporting import Reporter
 from services.requests import Pending, Requester, RequestRefused
 
@@ -45,29 +43,34 @@ class Ending(Struct, frozen=True):
     replaced_by: str = ""
 
 
-class Performance:
-    """A block being performed. routes: whose body requests are whose, for the service to find this by."""
+class Surroundings(Struct, frozen=True):
+    """What performances of one realizer share.
 
-    def __init__(
-        self,
-        bus: Bus,
-        requests: Requester,
-        request: PerformBlock,
-        plan: Plan,
-        config: RealizerConfig,
-        is_there: Callable[[str], bool],
-        routes: MutableMapping[str, "Performance"],
-    ) -> None:
+    is_there: is this participant alive? routes: whose body requests are whose. others: what else is performed.
+    """
+
+    bus: Bus
+    requests: Requester
+    config: RealizerConfig
+    is_there: Callable[[str], bool]
+    routes: MutableMapping[str, "Performance"]
+    others: Callable[[], Iterable["Performance"]]
+
+
+class Performance:
+    """A block being performed."""
+
+    def __init__(self, request: PerformBlock, plan: Plan, around: Surroundings) -> None:
         loop = asyncio.get_running_loop()
         self.request = request
         self.plan = plan
-        self._bus = bus
-        self._requests = requests
-        self._config = config
-        self._is_there = is_there
-        self._routes = routes
+        self._around = around
+        self._bus = around.bus
+        self._requests = around.requests
+        self._config = around.config
+        self._recognition = RecognitionLink(around.bus, around.requests, around.config, around.is_there)
         self._loop = loop
-        self._report = Reporter(bus, plan.block.id)
+        self._report = Reporter(around.bus, plan.block.id)
         self._begun: dict[str, asyncio.Future[None]] = {id: loop.create_future() for id in plan.chains}
         self.sync_points: dict[Point, asyncio.Future[Seconds]] = {
             point: loop.create_future() for chain in plan.chains.values() for point in chain.points
@@ -75,6 +78,10 @@ class Performance:
         self._through: dict[str, str] = {}
         self._pending: dict[str, Pending] = {}
         self._dropped: list[str] = list(plan.dropped)
+        self._foreign = frozenset(point for point in plan.at if ":" in point.behavior)
+        """Points of other blocks that this one is tied to."""
+        self._vanished: set[str] = set()
+        """Behaviors of other blocks, of which some point will never be."""
         self._spoken: dict[str, SpokenText] = {}
         self._ending: asyncio.Future[Ending] = loop.create_future()
         self._timer: asyncio.TimerHandle | None = None
@@ -96,6 +103,7 @@ class Performance:
                     )
                     for behavior in self.plan.behaviors
                 }
+                self._catch_up()
                 self._advance()
                 ending = await self._ending
                 await self._end_what_moves(ending, running)
@@ -104,6 +112,9 @@ class Performance:
         finally:
             self._close()
         self._report.ended(ending.status, began)
+        self._tell_others("bml", "end", self._bus.now())
+        for other in self._around.others():
+            other.miss(self.plan.block.id)
         return BlockOutcome(
             id=self.request.id,
             block=self.plan.block.id,
@@ -129,6 +140,55 @@ class Performance:
                 self._reach(point, self._bus.local(at), arrived=self._bus.local(arrived), by_body=True)
         self._advance()
 
+    # -- other blocks ------------------------------------------------------------------------------------------------
+
+    @property
+    def elsewhere(self) -> frozenset[Point]:
+        """This block's points, as other blocks name them."""
+        own = [Point(f"{self.plan.block.id}:bml", sync) for sync in ("start", "end")]
+        return frozenset((*own, *(Point(f"{self.plan.block.id}:{id}", sync) for id, sync in self.sync_points)))
+
+    def hear(self, point: Point, at: Seconds) -> None:
+        """A point of another block is reached."""
+        if point in self._foreign and not self._ending.done():
+            self._authority.reach(point, at)
+            self._advance()
+
+    def miss(self, block: str) -> None:
+        """Another block is over: what has not been reached of it never will be."""
+        lost = {
+            point.behavior
+            for point in self._foreign - self._authority.reached.keys()
+            if point.behavior.rpartition(":")[0] == block
+        }
+        if lost and not self._ending.done():
+            self._vanished |= lost
+            self._replan()
+            self._advance()
+
+    def _catch_up(self) -> None:
+        """What was reached in other blocks before this one began, and who is gone by now."""
+        there = {other.plan.block.id: other for other in self._around.others() if other is not self}
+        for point in self._foreign:
+            block, _, behavior = point.behavior.rpartition(":")
+            if (other := there.get(block)) is None:
+                self._vanished.add(point.behavior)
+            elif (at := other.when(Point(behavior, point.sync))) is not None:
+                self._authority.reach(point, at)
+        if self._vanished:
+            self._replan()
+
+    def when(self, point: Point) -> Seconds | None:
+        """When a point of this block was reached, if it was."""
+        if point.behavior == "bml":
+            return self._authority.began if point.sync == "start" else None
+        return self._authority.reached.get(point)
+
+    def _tell_others(self, behavior: str, sync: str, at: Seconds) -> None:
+        for other in self._around.others():
+            if other is not self:
+                other.hear(Point(f"{self.plan.block.id}:{behavior}", sync), at)
+
     async def _end_what_moves(self, ending: Ending, running: dict[str, "asyncio.Task[None]"]) -> None:
         """Abort what still runs, and wait until all has ended, or for as long as the body is given."""
         moving = set()
@@ -151,7 +211,7 @@ class Performance:
         if self._timer is not None:
             self._timer.cancel()
         for behavior in self.plan.block.behaviors:
-            self._routes.pop(self._request_id(behavior.id), None)
+            self._around.routes.pop(self._request_id(behavior.id), None)
         futures: tuple[asyncio.Future[Any], ...] = (*self._begun.values(), *self.sync_points.values())
         for future in futures:
             future.cancel()
@@ -207,6 +267,7 @@ class Performance:
                 self._report.warn("LATE", message, each.behavior)
             if not (future := self.sync_points[each]).done():
                 future.set_result(at)
+            self._tell_others(each.behavior, each.sync, at)
 
     def _lose(self, id: str, fault: Fault, kind: WarningKind = "EXECUTION_FAILURE") -> None:
         """A behavior cannot be finished: the block fails if it is required, else goes on as if it had not been."""
@@ -219,12 +280,17 @@ class Performance:
         if id in self.plan.required:
             self.stop(Ending("failed", Fault(reason=fault.reason, where=f"{self.plan.block.id}: {id}")))
             return
+        self._replan()
+
+    def _replan(self) -> None:
+        """Go on as if what was dropped, or vanished elsewhere, had never been written."""
+        gone = (*self._dropped, *self._vanished)
         try:
-            plan = plan_block(self.plan.block, self.plan.estimates.values(), dropped=self._dropped)
+            plan = plan_block(self.plan.block, self.plan.estimates.values(), dropped=gone, elsewhere=self._foreign)
         except InputRefused as error:
             self.stop(Ending("failed", error.fault))
-            return
-        self._authority.replan(plan)
+        else:
+            self._authority.replan(plan)
 
     # -- performers --------------------------------------------------------------------------------------------------
 
@@ -236,14 +302,15 @@ class Performance:
             case Event():
                 await self._event(behavior)
             case TurnSignal():
-                self._signal(behavior)
+                self._recognition.signal(self._request_id(behavior.id), self.plan.block.id, behavior)
+                self._at_once(behavior.id)
             case _ if performer(behavior) == "clock":
                 self._at_once(behavior.id)
             case _:
                 await self._by_body(behavior)
 
     async def _by_body(self, behavior: BlockBehavior) -> None:
-        self._routes[self._request_id(behavior.id)] = self
+        self._around.routes[self._request_id(behavior.id)] = self
         pending = self._send(behavior)
         try:
             outcome = await pending.outcome
@@ -307,65 +374,20 @@ class Performance:
             self._reach(Point(id, sync), now)
         self._advance()
 
-    def _signal(self, signal: TurnSignal) -> None:
-        message = SignalTurn(
-            id=self._request_id(signal.id),
-            requester=self._bus.name,
-            signal=signal,
-            at=self._bus.stamp(),
-            block=self.plan.block.id,
-        )
-        if self._is_there("recognition"):
-            self._requests.send(keys.TURN, message)
-        else:
-            self._bus.publish(keys.TURN, message)
-        self._at_once(signal.id)
-
     async def _event(self, event: Event) -> None:
         began = self._bus.now()
         self._reach(Point(event.id, "start"), began)
-        request = RequestEvent(
-            id=self._request_id(event.id),
-            requester=self._bus.name,
-            block=self.plan.block.id,
-            event=event,
-            at=self._bus.stamp(began),
-        )
-        outcome: asyncio.Future[Outcome] | None = None
-        if self._is_there("recognition"):
-            pending = self._pending[event.id] = self._requests.send(keys.EVENT, request)
-            outcome = pending.outcome
+        pending = self._recognition.ask(self._request_id(event.id), self.plan.block.id, event, began)
+        if pending is not None:
+            self._pending[event.id] = pending
         self._advance()
-        if decision := await self._decision(event, outcome):
-            end, by_body = decision
-            self._reach(Point(event.id, "end"), max(began, end), by_body=by_body)
+        try:
+            decision = await self._recognition.decision(event, self.plan.block, pending, self._authority.reached)
+        except RequestRefused as error:
+            self._lose(event.id, error.fault, kind="CANNOT_CREATE_BEHAVIOR")
+        else:
+            self._reach(Point(event.id, "end"), max(began, decision.at), by_body=decision.by_recognition)
         self._advance()
-
-    async def _decision(self, event: Event, outcome: "asyncio.Future[Outcome] | None") -> tuple[Seconds, bool] | None:
-        """When the event was decided, and whether by recognition; None if that refused it."""
-        while True:
-            heard = outcome is not None
-            deadline = event_deadline(event, self.plan.block, self._authority.reached, self._config, is_heard=heard)
-            patience = max(0.0, deadline - self._bus.now())
-            if outcome is None:
-                await asyncio.sleep(patience)
-                if patience == 0.0:
-                    return self._bus.now(), False
-                continue  # An anchor may have been realised meanwhile, and the limit runs from there.
-            await asyncio.wait([outcome], timeout=patience)
-            if outcome.done():
-                try:
-                    decided = await outcome
-                except RequestRefused as error:
-                    self._lose(event.id, error.fault, kind="CANNOT_CREATE_BEHAVIOR")
-                    return None
-                except EngageError:
-                    outcome = None
-                    continue
-                assert isinstance(decided, EventOutcome)
-                return self._bus.local(decided.at), True
-            if patience == 0.0:
-                outcome = None
 
     def _request_id(self, behavior: str) -> str:
         return f"{self.request.id}/{behavior}"

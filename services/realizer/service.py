@@ -22,7 +22,7 @@ from schemas.presence import PeerAlive, PeerGone
 from schemas.requests import Cancel
 from services.bus import Bus
 from services.realizer.config import RealizerConfig
-from services.realizer.executor import Ending, Performance
+from services.realizer.executor import Ending, Performance, Surroundings
 from services.realizer.planner import Plan, plan_block, poses_before
 from services.realizer.points import performer
 from services.realizer.relations import BlockRefused, relations
@@ -58,6 +58,10 @@ class _Realizer:
         self.live: dict[str, _Live] = {}
         self.routes: dict[str, Performance] = {}
         self.peers: set[str] = set()
+        self.around = Surroundings(bus, self.requests, config, self.peers.__contains__, self.routes, self.performing)
+
+    def performing(self) -> list[Performance]:
+        return [live.performance for live in self.live.values() if live.performance is not None]
 
     def cancel(self, cancel: Cancel) -> None:
         if live := self.live.get(cancel.id):
@@ -82,19 +86,18 @@ class _Realizer:
         if live.ending is not None:
             self._end(live, self._never_begun(request, live.ending))
             return
-        live.performance = Performance(
-            self.bus, self.requests, request, plan, self.config, self.peers.__contains__, self.routes
-        )
+        live.performance = Performance(request, plan, self.around)
         self._end(live, await live.performance.run())
 
     async def _plan(self, live: _Live) -> Plan:
         block = live.request.block
         if any(other.request.block.id == block.id and not other.ended.done() for other in live.earlier):
             raise BlockRefused(Fault(reason="a block of this id is still being performed", where=block.id))
-        relations(block)  # A bad reference is seen without asking the body.
-        plan = plan_block(block, await self._estimates(live.request, {}))
+        elsewhere = frozenset(point for other in self.performing() for point in other.elsewhere)
+        relations(block, elsewhere)  # A bad reference is seen without asking the body.
+        plan = plan_block(block, await self._estimates(live.request, {}), elsewhere=elsewhere)
         if before := poses_before(plan):
-            plan = plan_block(block, await self._estimates(live.request, before))
+            plan = plan_block(block, await self._estimates(live.request, before), elsewhere=elsewhere)
         return plan
 
     async def _estimates(self, request: PerformBlock, before: Mapping[str, BodyPose]) -> tuple[Estimate, ...]:

@@ -148,3 +148,31 @@ async def test_a_bus_that_delays_and_doubles_loses_nothing(seed: int) -> None:
     assert outcome.status == "done"
     assert len(seen.times()) == 10
     assert len({(each.behavior, each.sync, each.at) for each in seen.progress()}) == 10
+
+
+async def test_a_block_may_be_tied_to_a_point_of_a_block_that_is_still_performed() -> None:
+    async with stage() as seen:
+        first = seen.ask(block((STORY,), id="one"))
+        await seen.seen("s:start", "one")
+        gaze = Gaze(id="g", target="a")
+        ties = (together("one:s:m", "g:start"), after("one:bml:start+1.75", "g:relax"))
+        second = await seen.perform(block((gaze,), *ties, id="two"))
+        await first.outcome
+
+    assert second.status == "done"
+    assert seen.times("two")["g:start"] == 1.0
+    assert seen.times("two")["g:relax"] == 1.75
+
+
+async def test_what_another_block_never_reaches_holds_nobody() -> None:
+    async with stage() as seen:
+        first = seen.ask(block((STORY,), id="one"))
+        await seen.seen("s:start", "one")
+        second = seen.ask(block((Speech(id="t", text="so"),), after("one:s:end", "t:start"), id="two"))
+        await second.accepted
+        seen.requests.cancel("r-one")
+        await first.outcome
+        outcome = await second.outcome
+
+    assert getattr(outcome, "status", "") == "done"
+    assert seen.times("two")["t:start"] == 0.0
