@@ -7,7 +7,9 @@ from typing import Any
 
 import zenoh
 
+from schemas.faults import Fault, InputRefused
 from schemas.messages import Message
+from schemas.requests import Accepted
 from services.bus import Bus, Hub, Received, Subscription
 from services.memory_bus import MemoryHub
 from services.zenoh_bus import ZenohHub, open_hub
@@ -77,6 +79,9 @@ class ZenohPlace:
             await hub.close()
 
 
+Place = MemoryPlace | ZenohPlace
+
+
 async def acquainted(*hubs: ZenohHub) -> None:
     """Wait until all know one another."""
     loop = asyncio.get_running_loop()
@@ -107,3 +112,18 @@ async def heard(bus: Bus, key: str, message: Message, inbox: Subscription) -> An
         received = await inbox.next(bus.now() + 0.02)
         if received is not None:
             return received.message
+
+
+def state(number: int) -> Accepted:
+    return Accepted(id=str(number))
+
+
+def numbers(received: list[Accepted]) -> list[int]:
+    return [int(message.id) for message in received]
+
+
+def echo(question: Message) -> Message:
+    assert isinstance(question, Accepted)
+    if question.id == "bad":
+        raise InputRefused(Fault(reason="bad indeed", where="here"))
+    return Accepted(id=question.id + "!")

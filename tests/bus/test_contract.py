@@ -2,42 +2,19 @@
 
 import asyncio
 import threading
-from collections.abc import AsyncIterator
 
 import pytest
-import pytest_asyncio
 
 from schemas import keys
 from schemas.attention import Claim, HeadOwner
-from schemas.faults import Fault, InputRefused, NoReply
-from schemas.messages import Message, encode, encode_json, encoding_of
+from schemas.faults import NoReply
 from schemas.presence import PeerAlive, PeerGone
-from schemas.requests import Accepted, Cancel
+from schemas.requests import Accepted
 from schemas.units import Stamp
 from services.bus import Keep
-from services.virtual_time import VirtualTimeLoop
-from tests.bus.places import MemoryPlace, ZenohPlace, heard, messages, take
-
-Place = MemoryPlace | ZenohPlace
-
+from tests.bus.places import Place, echo, heard, messages, numbers, state, take
 
 pytestmark = pytest.mark.each_bus
-
-
-@pytest_asyncio.fixture
-async def place() -> AsyncIterator[Place]:
-    virtual = isinstance(asyncio.get_running_loop(), VirtualTimeLoop)
-    place: Place = MemoryPlace() if virtual else ZenohPlace()
-    yield place
-    await place.close()
-
-
-def state(number: int) -> Accepted:
-    return Accepted(id=str(number))
-
-
-def numbers(received: list[Accepted]) -> list[int]:
-    return [int(message.id) for message in received]
 
 
 async def test_messages_of_one_publisher_keep_their_order_across_keys(place: Place):
@@ -242,58 +219,6 @@ async def test_another_life_of_a_name_has_another_run(place: Place):
     assert lives[0].run != lives[1].run
 
 
-def echo(question: Message) -> Message:
-    assert isinstance(question, Accepted)
-    if question.id == "bad":
-        raise InputRefused(Fault(reason="bad indeed", where="here"))
-    return Accepted(id=question.id + "!")
-
-
-@pytest.mark.parametrize("apart", [True, False])
-async def test_a_question_is_answered_or_refused_with_the_servers_fault(place: Place, apart: bool):
-    process = await place.process()
-    server = process.join("server")
-    client = (await place.process() if apart else process).join("client")
-    server.answer(keys.DESCRIBE, echo)
-
-    assert await client.query(keys.DESCRIBE, Accepted(id="a")) == Accepted(id="a!")
-    with pytest.raises(InputRefused) as refused:
-        await client.query(keys.DESCRIBE, Accepted(id="bad"))
-    assert refused.value.fault == Fault(reason="bad indeed", where="here")
-
-
-async def test_a_question_nobody_answers_fails_at_its_timeout(place: Place):
-    client = (await place.process()).join("client")
-    await place.process()
-    asked = client.now()
-
-    with pytest.raises(NoReply, match="describe"):
-        await client.query(keys.DESCRIBE, Accepted(id="a"), timeout=0.2)
-
-    assert client.now() - asked == pytest.approx(0.2, abs=0.1 if place.is_real else 1e-9)
-
-
-async def test_a_question_asked_too_early_is_answered_once_the_server_stands(place: Place):
-    client, server = (await place.process()).join("client"), (await place.process()).join("server")
-
-    asking = asyncio.create_task(client.query(keys.DESCRIBE, Accepted(id="a"), timeout=5.0), name="asking")
-    await asyncio.sleep(0)
-    server.answer(keys.DESCRIBE, echo)
-
-    assert await asking == Accepted(id="a!")
-
-
-async def test_a_server_that_has_left_answers_no_more(place: Place):
-    client, server = (await place.process()).join("client"), (await place.process()).join("server")
-    server.answer(keys.DESCRIBE, echo)
-    assert await client.query(keys.DESCRIBE, Accepted(id="a")) == Accepted(id="a!")
-
-    await server.leave()
-
-    with pytest.raises(NoReply):
-        await client.query(keys.DESCRIBE, Accepted(id="a"), timeout=0.2)
-
-
 async def test_two_robots_do_not_hear_each_other(place: Place):
     mine, other = (await place.process("left")).join("me"), (await place.process("right")).join("me")
     inbox = mine.subscribe(keys.EVERYTHING)
@@ -307,45 +232,6 @@ async def test_two_robots_do_not_hear_each_other(place: Place):
     with pytest.raises(NoReply):
         await mine.query(keys.DESCRIBE, Accepted(id="a"), timeout=0.3)
     assert len(inbox) == 0
-
-
-@pytest.mark.parametrize(
-    ("payload", "encoding"),
-    [
-        (b"\xc1garbage", "application/msgpack"),
-        (b"{", "application/json"),
-        (b'{"type":"accepted"}', "application/json"),
-        (b'{"type":"no such thing"}', "application/json"),
-        (encode(Accepted(id="x")), "application/msgpack;engage.Accepted/2"),
-        (encode(Accepted(id="x")), "image/png"),
-        (b"", "zenoh/bytes"),
-    ],
-)
-async def test_a_bad_payload_is_answered_with_a_fault_and_harms_nobody(place: Place, payload: bytes, encoding: str):
-    here = (await place.process()).join("here")
-    await place.process()
-    inbox, faults = here.subscribe(keys.BLOCK), here.subscribe(keys.ANY_FAULT)
-
-    await place.inject(keys.BLOCK, payload, encoding)
-    [fault] = await messages(faults)
-    await place.inject(keys.BLOCK, encode(state(1)), encoding_of(state(1)))
-
-    assert numbers(await messages(inbox)) == [1]
-    assert isinstance(fault, Fault)
-    assert fault.service == "here"
-    assert keys.BLOCK in fault.where
-
-
-async def test_other_programs_may_speak_json_without_saying_who_they_are(place: Place):
-    here = (await place.process()).join("here")
-    await place.process()
-    inbox = here.subscribe(keys.commands("realizer"))
-
-    await place.inject(keys.cancel("realizer"), encode_json(Cancel(id="a", requester="me")), "application/json")
-
-    [received] = await take(inbox)
-    assert received.message == Cancel(id="a", requester="me")
-    assert received.source == ""
 
 
 async def test_stamps_of_another_process_read_as_local_time(place: Place):

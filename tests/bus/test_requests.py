@@ -6,72 +6,16 @@ from contextlib import contextmanager
 from typing import Any
 
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from schemas import keys
-from schemas.behaviors import Wait
-from schemas.blocks import Block, BlockOutcome, PerformBlock
-from schemas.body import PerformBehavior
-from schemas.faults import EngageError, Fault, RunFailed
+from schemas.blocks import BlockOutcome
+from schemas.faults import Fault, RunFailed
 from schemas.presence import PeerAlive, PeerGone
-from schemas.requests import Accepted, Cancel, Outcome, Request
+from schemas.requests import Accepted, Cancel, Request
 from services.bus import Received
-from services.memory_bus import Faults, MemoryBus, MemoryHub
+from services.memory_bus import MemoryBus, MemoryHub
 from services.requests import ENDED_KEPT, GRACE, RequestDesk, Requester, RequestRefused
-from services.virtual_time import run_virtual
-
-
-def block(id: str = "b", requester: str = "client") -> PerformBlock:
-    return PerformBlock(id=id, requester=requester, block=Block(id=id))
-
-
-def extent(through: str, id: str = "b") -> PerformBehavior:
-    return PerformBehavior(id=id, requester="client", block="b", behavior=Wait(id="w"), through=through)
-
-
-class Server:
-    """Accepts every block, performs it for `seconds`, and keeps a diary."""
-
-    def __init__(self, hub: MemoryHub, seconds: float = 0.5, name: str = "realizer") -> None:
-        self.bus = hub.join(name)
-        self.desk = RequestDesk(self.bus, name, self.cancel)
-        self.seconds = seconds
-        self.taken: list[Request] = []
-        self.ended: list[str] = []
-        self.timers: dict[str, asyncio.TimerHandle] = {}
-        self.task = asyncio.create_task(self.serve(), name=name)
-
-    async def serve(self) -> None:
-        with self.bus.subscribe(*RequestDesk.patterns(self.bus.name)) as inbox:
-            self.bus.declare_alive()
-            async for received in inbox:
-                match self.desk.take(received):
-                    case Cancel() as cancel:
-                        self.taken.append(cancel)
-                        self.cancel(cancel)
-                    case Request(id=id) as request:
-                        self.taken.append(request)
-                        if id not in self.timers:
-                            self.desk.accept(id)
-                            loop = asyncio.get_running_loop()
-                            self.timers[id] = loop.call_later(self.seconds, self.end, id, "done")
-
-    def cancel(self, cancel: Cancel) -> None:
-        self.timers[cancel.id].cancel()
-        self.end(cancel.id, "interrupted")
-
-    def end(self, id: str, status: Any) -> None:
-        self.ended.append(f"{id} {status}")
-        self.desk.end(BlockOutcome(id=id, block=id, status=status))
-
-    async def die(self, hub: MemoryHub) -> None:
-        hub.kill(self.bus.name)
-        for timer in self.timers.values():
-            timer.cancel()
-        self.desk.close()
-        self.task.cancel()
-        await asyncio.gather(self.task, return_exceptions=True)
+from tests.bus.performer import Server, block, extent
 
 
 @contextmanager
@@ -364,67 +308,3 @@ async def test_a_desk_forgets_the_oldest_ended_requests_and_no_live_one(hub: Mem
     assert is_forgotten("1")
     assert not is_forgotten("2")
     assert len(states) == ENDED_KEPT + 2
-
-
-@given(
-    loss=st.floats(0.0, 0.6),
-    duplicate=st.floats(0.0, 0.5),
-    delay=st.floats(0.0, 0.5),
-    seed=st.integers(0, 1 << 16),
-    script=st.lists(
-        st.tuples(
-            st.sampled_from(["ask", "ask", "update", "cancel", "cut", "heal", "kill server", "start server"]),
-            st.floats(0.0, 2.5),
-        ),
-        max_size=15,
-    ),
-)
-@settings(max_examples=60, deadline=None)
-def test_every_request_ends_exactly_once_at_both_ends(
-    loss: float, duplicate: float, delay: float, seed: int, script: list[tuple[str, float]]
-):
-    async def main() -> None:
-        hub = MemoryHub(faults=Faults(loss=loss, duplicate=duplicate, delay=delay), seed=seed)
-        client = hub.join("client")
-        client.declare_alive()
-        lives: list[Server] = []
-        pendings = []
-        async with Requester(client) as requests:
-            for number, (what, pause) in enumerate(script):
-                match what:
-                    case "ask":
-                        pendings.append(requests.send(keys.BLOCK, block(str(number))))
-                    case "update" if pendings and not pendings[-1].outcome.done():
-                        content = Block(id=pendings[-1].request.id, composition="APPEND")
-                        requests.send(keys.BLOCK, PerformBlock(id=content.id, requester="client", block=content))
-                    case "cancel" if pendings:
-                        requests.cancel(pendings[-1].request.id)
-                    case "cut":
-                        hub.partition("client")
-                    case "heal":
-                        hub.heal()
-                    case "kill server" if lives and not lives[-1].task.done():
-                        await lives[-1].die(hub)
-                    case "start server" if not lives or lives[-1].task.done():
-                        lives.append(Server(hub))
-                await asyncio.sleep(pause)
-            hub.heal()
-            if not lives or lives[-1].task.done():
-                lives.append(Server(hub))
-            ends = await asyncio.wait_for(
-                asyncio.gather(*(pending.outcome for pending in pendings), return_exceptions=True), 600.0
-            )
-            await asyncio.sleep(10.0)
-
-        assert all(isinstance(end, (Outcome, EngageError)) for end in ends)
-        assert all(pending.accepted.done() for pending in pendings)
-        for life in lives:
-            ids = [request.id for request in life.taken if request.id in life.timers]
-            performed = {id for id in ids if f"{id} done" in life.ended or f"{id} interrupted" in life.ended}
-            assert len(life.ended) == len(performed)
-            assert life.task.done() or not any(life.desk.is_live(id) for id in ids)
-        for life in lives:
-            await life.die(hub)
-        await hub.close()
-
-    run_virtual(main())

@@ -1,0 +1,63 @@
+"""A server of long requests that performs blocks by waiting, and keeps a diary."""
+
+import asyncio
+from typing import Any
+
+from schemas.behaviors import Wait
+from schemas.blocks import Block, BlockOutcome, PerformBlock
+from schemas.body import PerformBehavior
+from schemas.requests import Cancel, Request
+from services.memory_bus import MemoryHub
+from services.requests import RequestDesk
+
+
+def block(id: str = "b", requester: str = "client") -> PerformBlock:
+    return PerformBlock(id=id, requester=requester, block=Block(id=id))
+
+
+def extent(through: str, id: str = "b") -> PerformBehavior:
+    return PerformBehavior(id=id, requester="client", block="b", behavior=Wait(id="w"), through=through)
+
+
+class Server:
+    """Accepts every block, performs it for `seconds`, and keeps a diary."""
+
+    def __init__(self, hub: MemoryHub, seconds: float = 0.5, name: str = "realizer") -> None:
+        self.bus = hub.join(name)
+        self.desk = RequestDesk(self.bus, name, self.cancel)
+        self.seconds = seconds
+        self.taken: list[Request] = []
+        self.ended: list[str] = []
+        self.timers: dict[str, asyncio.TimerHandle] = {}
+        self.task = asyncio.create_task(self.serve(), name=name)
+
+    async def serve(self) -> None:
+        with self.bus.subscribe(*RequestDesk.patterns(self.bus.name)) as inbox:
+            self.bus.declare_alive()
+            async for received in inbox:
+                match self.desk.take(received):
+                    case Cancel() as cancel:
+                        self.taken.append(cancel)
+                        self.cancel(cancel)
+                    case Request(id=id) as request:
+                        self.taken.append(request)
+                        if id not in self.timers:
+                            self.desk.accept(id)
+                            loop = asyncio.get_running_loop()
+                            self.timers[id] = loop.call_later(self.seconds, self.end, id, "done")
+
+    def cancel(self, cancel: Cancel) -> None:
+        self.timers[cancel.id].cancel()
+        self.end(cancel.id, "interrupted")
+
+    def end(self, id: str, status: Any) -> None:
+        self.ended.append(f"{id} {status}")
+        self.desk.end(BlockOutcome(id=id, block=id, status=status))
+
+    async def die(self, hub: MemoryHub) -> None:
+        hub.kill(self.bus.name)
+        for timer in self.timers.values():
+            timer.cancel()
+        self.desk.close()
+        self.task.cancel()
+        await asyncio.gather(self.task, return_exceptions=True)
