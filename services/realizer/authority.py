@@ -74,6 +74,14 @@ class Authority:
             if place.kind in ("order", "delay", "series"):
                 self._waits_for[place.target].append((place.source, place.lag))
         self._points = {id: chain.points for id, chain in plan.chains.items()}
+        self._member_at = {
+            (member.behavior, transition): member
+            for transition, members in enumerate(plan.members)
+            for member in members
+        }
+        self._bounds = plan.bounds
+        self._instants: dict[int, Seconds] = {0: self.began}
+        """When each transition fired that has."""
         self._is_predictive = _is_predictive(plan)
         self._open = [each for each in range(len(net.transitions) - 1) if self._measured(each) is None or each == 0]
 
@@ -160,11 +168,16 @@ class Authority:
 
     def _measured(self, transition: int) -> Seconds | None:
         """When the instant was, all its members told; None as long as one has not."""
-        if transition == 0:
-            return self.began
-        times = [self.reached.get(member.point) for member in self.plan.members[transition]]
-        known = [time for time in times if time is not None]
-        return max(known) if known and len(known) == len(times) else None
+        if (instant := self._instants.get(transition)) is not None:
+            return instant
+        latest = None
+        for member in self.plan.members[transition]:
+            if (at := self.reached.get(member.point)) is None:
+                return None
+            latest = at if latest is None else max(latest, at)
+        if latest is not None:
+            self._instants[transition] = latest
+        return latest
 
     def _ready_at(self, transition: int) -> Seconds | None:
         """When everything it waits for will have been; None while something of it has not been measured."""
@@ -229,7 +242,7 @@ class Authority:
                     continue
             if place.kind != "idle":
                 lags.append(Lag(place.source, place.target, place.lag, 0))
-        for bound in self.plan.bounds:
+        for bound in self._bounds:
             if bound.kind != "phase" or self._passed(bound.behavior, bound.target) is None:
                 lags.append(Lag(bound.source, bound.target, bound.lag, -1))
         try:
@@ -238,7 +251,7 @@ class Authority:
             return earliest(times, facts, [lag for lag in lags if lag.reason >= 0])
 
     def _member(self, behavior: str, transition: int) -> Member:
-        return next(member for member in self.plan.members[transition] if member.behavior == behavior)
+        return self._member_at[behavior, transition]
 
     def _passed(self, behavior: str, transition: int) -> Seconds | None:
         return self.reached.get(self._member(behavior, transition).point)

@@ -261,7 +261,7 @@ class Performance:
     def _reach(self, point: Point, at: Seconds, *, arrived: Seconds | None = None, by_body: bool = False) -> None:
         for each in self._authority.reach(point, at):
             came = arrived if each == point else None
-            skew = self._report.reached(self._authority.plan, self._authority, each, arrived=came, by_body=by_body)
+            skew = self._report.reached(self.plan, self._authority, each, arrived=came, by_body=by_body)
             if skew > self._config.skew:
                 message = f"{each.sync} came {skew:.2f} s after what it is synchronized with"
                 self._report.warn("LATE", message, each.behavior)

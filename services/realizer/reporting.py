@@ -36,10 +36,13 @@ class Reporter:
         self._say(PredictionFeedback(block=self._block, points=tuple(points)))
 
     def reached(
-        self, plan: Plan, authority: Authority, point: Point, *, arrived: Seconds | None, by_body: bool
+        self, first_plan: Plan, authority: Authority, point: Point, *, arrived: Seconds | None, by_body: bool
     ) -> Seconds:
-        """Report a point; returns how much later it was than the first of its instant."""
-        at = authority.reached[point]
+        """Report a point; returns how much later it was than the first of its instant.
+
+        first_plan: the one the block began with, which said when the point was to be.
+        """
+        plan, at = authority.plan, authority.reached[point]
         together = (authority.reached.get(member.point) for member in plan.members[plan.at[point]])
         skew = at - min(time for time in (*together, at) if time is not None)
         sync = dialect_sync(point.sync, type_of(plan.chains[point.behavior].behavior), plan.block.dialect)
@@ -51,7 +54,7 @@ class Reporter:
                     sync=sync,
                     at=self._bus.stamp(at),
                     time=at - authority.began,
-                    predicted=plan.predicted(point),
+                    predicted=first_plan.predicted(point),
                     arrived=None if arrived is None or arrived == at else arrived - authority.began,
                     skew=skew,
                     source="body" if by_body else "clock",
