@@ -1,0 +1,423 @@
+"""The simulated body: exact times, fluid motion, gaze that follows, parts that add up, and ends that are safe."""
+
+import asyncio
+import math
+
+import msgspec
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from schemas.behaviors import (
+    BlockBehavior,
+    FaceFacs,
+    FaceLexeme,
+    FaceShift,
+    Gaze,
+    GazeShift,
+    Gesture,
+    Head,
+    HeadDirectionShift,
+    Pointing,
+    Pose,
+    Posture,
+    PostureShift,
+    Speech,
+)
+from schemas.body import NoPointZone
+from schemas.units import Vector
+from schemas.world import Entity, World
+from services.control.body import Arrived, BehaviorRefused, sync_points
+from services.control.simulated import SimulatedBody
+from services.virtual_time import run_virtual
+from tests.control.contract import WORLD, Stage, performed, times
+from tests.control.motions import recorded, stops, violations
+
+ARMS = ("LEFT_HAND", "RIGHT_HAND")
+
+
+def body_in(world: World = WORLD, **settings: object) -> SimulatedBody:
+    body = SimulatedBody(**settings)  # type: ignore[arg-type]
+    body.see(world)
+    return body
+
+
+def moved_to(world: World, id: str, position: Vector) -> World:
+    entities = (
+        msgspec.structs.replace(entity, position=position) if entity.id == id else entity for entity in world.entities
+    )
+    return World(entities=tuple(entities))
+
+
+def misses_by(body: SimulatedBody, target: Vector) -> float:
+    """Degrees between the gaze axis and the direction of `target`."""
+    ray = body.state().gaze
+    to = [b - a for a, b in zip(ray.origin, target, strict=True)]
+    cosine = sum(a * b for a, b in zip(to, ray.axis, strict=True)) / math.hypot(*to)
+    return math.degrees(math.acos(min(1.0, cosine)))
+
+
+async def test_a_pointing_reaches_its_points_at_its_natural_times():
+    body = body_in()
+    await asyncio.sleep(1.0)
+    estimate = body.estimate(Pointing(id="p", target="near-right"), None, WORLD)
+    at = times(await performed(body, Pointing(id="p", target="near-right")))
+
+    assert at["start"] == 1.0
+    assert at["stroke_start"] == pytest.approx(at["ready"] + 0.1, abs=1e-9)
+    assert at["stroke_end"] == pytest.approx(at["stroke"] + 0.2, abs=1e-9)
+    assert at["relax"] == pytest.approx(at["stroke_end"] + 0.1, abs=1e-9)
+    assert at["end"] - 1.0 == pytest.approx(sum(phase.natural for phase in estimate.phases), abs=1e-9)
+    assert all(0.1 - 1e-9 <= phase.natural <= 1.0 for phase in estimate.phases)
+
+
+@pytest.mark.parametrize(("degrees", "seconds"), [(30, 0.3), (60, 0.5)])
+async def test_a_gaze_takes_as_long_as_a_persons(degrees: int, seconds: float):
+    yaw = math.radians(degrees)
+    world = World(entities=(Entity(id="x", kind="object", position=(2 * math.cos(yaw), 2 * math.sin(yaw), 1.17)),))
+    at = times(await performed(body_in(world), Gaze(id="g", target="x")))
+
+    assert at["start"] == at["ready"] == at["stroke_start"]
+    assert at["stroke"] - at["start"] == pytest.approx(seconds, abs=0.01)
+    assert at["stroke_end"] == at["relax"]
+
+
+FREE: list[BlockBehavior] = [
+    *(Pointing(id=f"{target}-{hand}", target=target, mode=hand)  # type: ignore[arg-type]
+      for target in ("near-right", "far-left", "middle") for hand in ARMS),
+    *(Gaze(id=f"gaze-{target}", target=target) for target in ("near-right", "far-left", "middle", "human")),
+    Gesture(id="beat", lexeme="BEAT"), Gesture(id="wave", lexeme="WAVE", mode="BOTH_HANDS"),
+    Head(id="nod", lexeme="NOD", repetition=3), Head(id="shake", lexeme="SHAKE", repetition=2, amount=1.0),
+    *(FaceLexeme(id=lexeme, lexeme=lexeme, amount=1.0) for lexeme in ("SMILE", "FROWN", "BLINK", "RAISE_BROWS")),
+    FaceFacs(id="au", au=12), Posture(id="lean", lexeme="LEAN_FORWARD"), Posture(id="turn", lexeme="TURN_LEFT"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("behavior", FREE, ids=lambda behavior: behavior.id)
+async def test_what_nobody_holds_is_one_fluid_motion_within_its_limits(behavior: BlockBehavior):
+    middle = Entity(id="middle", kind="object", position=(0.55, 0.0, 0.73), radius=0.03)
+    body = body_in(World(entities=(*WORLD.entities, middle)))
+    async with recorded(body) as recording:
+        at = times(await performed(body, behavior))
+
+    assert tuple(at) == sync_points(behavior)
+    assert stops(recording, at["start"], at["end"]) == 0
+    assert violations(recording, body.capabilities.joints) == []
+
+
+async def test_authority_that_comes_in_time_costs_no_stop():
+    body = body_in()
+    behavior = Pointing(id="p", target="far-left")
+    estimate = body.estimate(behavior, None, WORLD)
+    async with recorded(body) as recording:
+        stage = Stage(body, behavior)
+        await asyncio.sleep(0.1)
+        stage.authority.extend("stroke_end")
+        await asyncio.sleep(0.5)
+        stage.authority.extend("end")
+        at = times(await stage.over())
+
+    assert not stage.waits_at
+    assert at["end"] == pytest.approx(sum(phase.natural for phase in estimate.phases), abs=1e-9)
+    assert stops(recording, at["start"], at["end"]) == 0
+
+
+async def test_a_hold_stops_once_per_hold_and_goes_on_at_its_natural_times():
+    body = body_in()
+    behavior = Pointing(id="p", target="far-left")
+    natural = {phase.to: phase.natural for phase in body.estimate(behavior, None, WORLD).phases}
+    async with recorded(body) as recording:
+        stage = Stage(body, behavior)
+        await asyncio.sleep(3.0)
+        stage.authority.extend("end")
+        at = times(await stage.over())
+
+    assert at["stroke_start"] == 3.0
+    assert at["stroke"] - at["stroke_start"] == pytest.approx(natural["stroke"], abs=1e-9)
+    assert stops(recording, at["start"], at["end"]) == 1
+    assert violations(recording, body.capabilities.joints) == []
+
+
+async def test_an_arm_that_holds_points_at_its_target():
+    body = body_in()
+    stage = Stage(body, Pointing(id="p", target="far-left", mode="LEFT_HAND"), "stroke")
+    await asyncio.sleep(5.0)
+    ray, target = body.state().left_arm, WORLD.entity("far-left")
+
+    assert stage.waits_at == ["stroke_end"]
+    assert target is not None
+    to = [b - a for a, b in zip(ray.origin, target.position, strict=True)]
+    assert [a / math.hypot(*to) for a in to] == pytest.approx(ray.axis, abs=1e-6)
+    stage.authority.revoke()
+    await stage.over()
+
+
+async def test_the_nearer_free_arm_points():
+    body = body_in()
+    left = Stage(body, Pointing(id="left", target="far-left"))
+    await asyncio.sleep(0.1)
+    again = Stage(body, Pointing(id="again", target="far-left"))
+    await asyncio.sleep(3.0)
+
+    state = body.state()
+    assert left.waits_at == again.waits_at == ["stroke_start"]
+    assert state.left_arm.tip is not None
+    assert state.right_arm.tip is not None
+    assert state.left_arm.tip[1] > 0.1
+    assert state.right_arm.tip[1] > -0.2
+    await body.home()
+    await asyncio.gather(left.task, again.task)
+
+
+async def test_a_gaze_overlays_the_base_and_returns_to_it():
+    body = body_in()
+    await performed(body, GazeShift(id="base", target="human"))
+    looking = [body.state().looking_at]
+    stage = Stage(body, Gaze(id="g", target="far-left"))
+    await asyncio.sleep(0.1)
+    looking.append(body.state().looking_at)
+    await asyncio.sleep(1.0)
+    looking.append(body.state().looking_at)
+    stage.authority.extend("end")
+    await stage.over()
+    looking.append(body.state().looking_at)
+
+    assert looking == ["human", "", "far-left", "human"]
+    assert misses_by(body, (1.3, 0.0, 1.2)) < 1e-6
+
+
+async def test_a_new_base_beneath_a_gaze_moves_nothing_until_the_gaze_ends():
+    body = body_in()
+    stage = Stage(body, Gaze(id="g", target="near-right"))
+    await asyncio.sleep(1.0)
+    before = body.state().pose
+    await performed(body, GazeShift(id="base", target="far-left"))
+
+    assert body.state().pose == before
+    assert body.state().looking_at == "near-right"
+    stage.authority.extend("end")
+    await stage.over()
+    assert body.state().looking_at == "far-left"
+    assert misses_by(body, (0.70, 0.30, 0.73)) < 0.5
+
+
+async def test_a_gaze_that_holds_follows_a_face():
+    body = body_in()
+    stage = Stage(body, Gaze(id="g", target="human"))
+    world = WORLD
+    async with recorded(body) as recording:
+        for step in range(30):
+            await asyncio.sleep(0.1)
+            world = moved_to(world, "human", (1.3, 0.02 * step, 1.2))
+            body.see(world)
+        await asyncio.sleep(0.5)
+
+    assert stage.waits_at == ["relax"]
+    assert misses_by(body, (1.3, 0.58, 1.2)) < 0.6
+    assert body.state().looking_at == "human"
+    assert violations(recording, body.capabilities.joints) == []
+    stage.authority.revoke()
+    await stage.over()
+
+
+async def test_a_base_gaze_follows_a_hand_on_the_move():
+    body = body_in()
+    await performed(body, GazeShift(id="base", target="near-right"))
+    world = moved_to(WORLD, "near-right", (0.6, 0.2, 0.85))
+    body.see(world)
+    await asyncio.sleep(1.0)
+
+    assert misses_by(body, (0.6, 0.2, 0.85)) < 0.1
+
+
+async def test_a_gaze_whose_target_moves_on_the_way_arrives_at_it():
+    body = body_in()
+    stage = Stage(body, Gaze(id="g", target="far-left"))
+    async with recorded(body) as recording:
+        await asyncio.sleep(0.2)
+        body.see(moved_to(WORLD, "far-left", (0.6, 0.0, 0.73)))
+        await asyncio.sleep(2.0)
+
+    assert stage.passed == ["start", "ready", "stroke_start", "stroke"]
+    assert stage.waits_at == ["relax"]
+    assert misses_by(body, (0.6, 0.0, 0.73)) < 0.1
+    assert violations(recording, body.capabilities.joints) == []
+    stage.authority.extend("end")
+    assert tuple(times(await stage.over())) == sync_points(Gaze(id="g", target="far-left"))
+
+
+async def test_a_nod_adds_to_the_gaze():
+    body = body_in()
+    stage = Stage(body, Gaze(id="g", target="human"))
+    await asyncio.sleep(1.0)
+    nodding = asyncio.create_task(performed(body, Head(id="nod", lexeme="NOD")))
+    async with recorded(body, ["neck_pitch"]) as recording:
+        await nodding
+
+    assert stage.waits_at == ["relax"]
+    assert body.state().looking_at == "human"
+    assert math.degrees(float(recording.angles.max() - recording.angles.min())) == pytest.approx(9, abs=3)
+    assert misses_by(body, (1.3, 0.0, 1.2)) < 1e-6
+    stage.authority.revoke()
+    await stage.over()
+
+
+async def test_eyes_stay_on_target_while_the_torso_leans():
+    body = body_in()
+    await performed(body, GazeShift(id="base", target="human"))
+    await performed(body, PostureShift(id="lean", lexeme="LEAN_FORWARD"))
+    await asyncio.sleep(1.0)
+
+    assert misses_by(body, (1.3, 0.0, 1.2)) < 0.1
+
+
+async def test_shifts_stay():
+    body = body_in()
+    await performed(body, FaceShift(id="face", lexeme="SMILE"))
+    await performed(body, Pose(id="pose", lexeme="TURN_LEFT"))
+    await performed(body, HeadDirectionShift(id="head", target="human"))
+    await asyncio.sleep(5.0)
+    pose = {angle.joint: angle.angle for angle in body.state().pose.joints}
+
+    assert pose["mouth_corners"] == pytest.approx(0.95 * 0.5)
+    assert math.degrees(pose["torso_turn"]) == pytest.approx(15)
+
+
+async def test_estimates_chain_over_poses():
+    body = body_in()
+    one = body.estimate(Gaze(id="one", target="near-right"), None, WORLD)
+    two = body.estimate(Pointing(id="two", target="near-right"), one.pose_after, WORLD)
+    three = body.estimate(Gaze(id="three", target="near-right"), two.pose_after, WORLD)
+    four = body.estimate(Pointing(id="four", target="near-right", mode="RIGHT_HAND"), two.pose_after, WORLD)
+
+    assert one.head_degrees > 30
+    assert two.arm_degrees > 40
+    assert two.head_degrees == one.arm_degrees == 0.0
+    assert three.head_degrees == pytest.approx(0.0, abs=1e-6)
+    assert four.arm_degrees == pytest.approx(0.0, abs=1e-6)
+    assert two.ray is not None
+    assert two.ray.tip is not None
+
+
+@pytest.mark.parametrize(
+    ("behavior", "warning", "reason"),
+    [
+        (Gaze(id="b", target="nobody"), "NO_SUCH_TARGET", "no 'nobody'"),
+        (Gaze(id="b", target="behind"), "CANNOT_CREATE_BEHAVIOR", "neck_yaw cannot turn"),
+        (Pointing(id="b", target="far"), "CANNOT_CREATE_BEHAVIOR", "farther than"),
+        (Pointing(id="b", target="cup"), "CANNOT_CREATE_BEHAVIOR", "no-point zone"),
+        (Pointing(id="b", target="near-right", mode="BOTH_HANDS"), "CANNOT_CREATE_BEHAVIOR", "one hand"),
+        (Gesture(id="b", lexeme="MOONWALK"), "CANNOT_CREATE_BEHAVIOR", "there are BEAT"),
+        (Head(id="b", lexeme="TILT"), "CANNOT_CREATE_BEHAVIOR", "NOD and SHAKE"),
+        (FaceFacs(id="b", au=99), "CANNOT_CREATE_BEHAVIOR", "action unit 99"),
+        (Posture(id="b", lexeme="HANDSTAND"), "CANNOT_CREATE_BEHAVIOR", "no posture"),
+    ],
+)
+async def test_what_it_cannot_do_is_refused_with_the_reason(behavior: BlockBehavior, warning: str, reason: str):
+    world = World(
+        entities=(
+            *WORLD.entities,
+            Entity(id="behind", kind="object", position=(-1.0, 0.1, 1.0)),
+            Entity(id="far", kind="object", position=(4.0, 0.0, 0.5)),
+            Entity(id="cup", kind="object", position=(0.6, 0.0, 0.75)),
+        )
+    )
+    body = body_in(world, zones=(NoPointZone(center=(0.6, 0.0, 0.75), radius=0.1),))
+    estimate = body.estimate(behavior, None, world)
+
+    assert (estimate.feasible, estimate.warning) == (False, warning)
+    assert estimate.fault is not None
+    assert reason in estimate.fault.reason
+    with pytest.raises(BehaviorRefused, match="b: "):
+        await performed(body, behavior)
+
+
+async def test_a_voice_says_one_thing_at_a_time():
+    body = body_in()
+    stage = Stage(body, Speech(id="one", text="wait for me"), "end")
+    await asyncio.sleep(0.1)
+
+    assert body.state().speaking == "wait for me"
+    with pytest.raises(BehaviorRefused, match="busy with 'wait for me'"):
+        await performed(body, Speech(id="two", text="no"))
+    await stage.over()
+
+
+async def test_taking_one_arm_of_two_sends_the_other_home():
+    body = body_in()
+    home = body.state().right_arm
+    both = Stage(body, Gesture(id="both", lexeme="WAVE", mode="BOTH_HANDS"))
+    await asyncio.sleep(2.0)
+    one = Stage(body, Pointing(id="one", target="far-left", mode="LEFT_HAND"))
+    await asyncio.sleep(3.0)
+
+    assert both.passed == list(sync_points(Gesture(id="both", lexeme="WAVE")))
+    assert body.state().right_arm.tip == pytest.approx(home.tip)
+    assert one.waits_at == ["stroke_start"]
+    await body.home()
+    await one.over()
+
+
+async def test_a_frozen_arm_stands_still_before_it_relaxes():
+    body = body_in()
+    stage = Stage(body, Pointing(id="p", target="far-left"), "end")
+    async with recorded(body) as recording:
+        await asyncio.sleep(0.4)
+        stage.authority.revoke("freeze")
+        await stage.over()
+        await asyncio.sleep(2.0)
+
+    still = [speed < 1e-9 for speed in abs(recording.speeds).max(axis=1)]
+    first = still.index(True, 20)
+    assert all(still[first : first + 100])
+    assert violations(recording, body.capabilities.joints) == []
+
+
+TARGETS = st.sampled_from(["near-right", "far-left", "human"])
+ANY = st.one_of(
+    st.builds(lambda target, mode: Pointing(id="p", target=target, mode=mode), TARGETS, st.sampled_from(ARMS)),
+    st.builds(lambda target: Gaze(id="g", target=target), TARGETS),
+    st.builds(lambda target: GazeShift(id="s", target=target), TARGETS),
+    st.builds(lambda lexeme, n: Head(id="h", lexeme=lexeme, repetition=n), st.sampled_from(["NOD", "SHAKE"]),
+              st.integers(1, 3)),
+    st.builds(lambda hand: Gesture(id="b", lexeme="WAVE", mode=hand), st.sampled_from([*ARMS, "BOTH_HANDS"])),
+    st.builds(lambda lexeme: Posture(id="o", lexeme=lexeme), st.sampled_from(["LEAN_FORWARD", "TURN_LEFT"])),
+    st.builds(lambda lexeme: FaceLexeme(id="f", lexeme=lexeme, amount=1.0), st.sampled_from(["SMILE", "FROWN"])),
+)  # fmt: skip
+STORY = st.lists(
+    st.tuples(
+        ANY, st.sampled_from(["start", "stroke", "end"]), st.floats(0.02, 0.8),
+        st.sampled_from(["", "relax", "freeze"]),
+    ),
+    min_size=1, max_size=8,
+)  # fmt: skip
+
+
+@settings(max_examples=25, deadline=None)
+@given(story=STORY)
+def test_no_story_breaks_a_limit_or_leaves_an_arm_in_the_air(story: list[tuple[BlockBehavior, str, float, str]]):
+    async def tell() -> None:
+        body = body_in()
+        home = body.state().pose
+        stages = []
+        async with recorded(body) as recording:
+            for number, (behavior, through, wait, how) in enumerate(story):
+                through = "end" if isinstance(behavior, GazeShift) else through
+                stage = Stage(body, msgspec.structs.replace(behavior, id=f"b{number}"), through)
+                stages.append(stage)
+                await asyncio.sleep(wait)
+                if how:
+                    stage.authority.revoke(how)  # type: ignore[arg-type]
+            await body.home()
+        for stage in stages:
+            stage.authority.extend("end")
+            progress = await stage.over()
+            points = sync_points(stage._behavior)
+            assert tuple(stage.passed) == points[: len(stage.passed)]
+            assert len([item for item in progress if isinstance(item, Arrived)]) <= 2
+
+        assert violations(recording, body.capabilities.joints) == []
+        for angle, there in zip(body.state().pose.joints, home.joints, strict=True):
+            assert angle.angle == pytest.approx(there.angle, abs=1e-6), angle.joint
+
+    run_virtual(tell())
