@@ -2,7 +2,8 @@
 
 A higher claim takes over at once; when the owner lets go the head stays for a dwell before a lower claim gets it.
 Claims 3 to 6 move the base gaze by `gazeShift` blocks, which end on arrival and hold nothing; a fragment's own
-gaze overlays it, and is never fought: while it owns the head nothing is sent.
+gaze overlays it, and is never fought: while it owns the head nothing else is sent. Where it is on a face the base
+goes there too, unseen beneath it: the gaze at the end of a turn must not fall back to where the head was before.
 """
 
 from msgspec import Struct
@@ -207,9 +208,9 @@ class Arbiter:
         owner = self._owner
         if self._retry is not None and now >= self._retry:
             self._retry = None
-        if not owner.target or owner.target == self._base or self._fragment is not None or self._retry is not None:
+        if not owner.target or owner.target == self._base or self._retry is not None or self._lapsed is not None:
             return None
-        if self._lapsed is not None:
+        if self._fragment is not None and not self._faces.is_face(owner.target):
             return None
         self._base = owner.target
         self._shifts += 1

@@ -4,6 +4,7 @@ from msgspec import Struct
 
 from schemas.attention import Claim, Inhibit
 from schemas.behaviors import Hand
+from schemas.faults import Fault, InputRefused
 from schemas.units import Seconds
 from services.generation.config import GenerationConfig
 from services.generation.permits import HANDS, Permits
@@ -24,7 +25,11 @@ class Leases:
         self._leases: dict[str, _Lease] = {}
 
     def take(self, request: Inhibit, now: Seconds) -> None:
-        """A new lease, a renewed one, or one whose owner has changed its mind."""
+        """A new lease, a renewed one, or one whose owner has changed its mind. Raises InputRefused."""
+        if request.ttl <= 0:
+            raise InputRefused(Fault(reason=f"ttl {request.ttl} is not positive", where=f"{request.id}: ttl"))
+        if request.mode == "target" and not request.target:
+            raise InputRefused(Fault(reason="mode 'target' without a target", where=f"{request.id}: target"))
         self._leases[request.id] = _Lease(request, now + request.ttl)
 
     def release(self, id: str) -> bool:

@@ -65,6 +65,9 @@ class Performance:
         self.turn = turn
         self.block_id = f"{request.id}.block"
         self.plan: Plan | None = None
+        self.accepted = False
+        self.refusal: Fault | None = None
+        """The realizer found the block impossible before the fragment was accepted: nothing has moved."""
         self.signalled_end = False
         """Has recognition been told that the turn is over?"""
         self._patience = patience
@@ -128,6 +131,11 @@ class Performance:
         if self._ended is None:
             self._ended = Ended(at, status, spoken, fault)
             self._running.clear()
+
+    def refuse(self, fault: Fault, at: Seconds) -> None:
+        """Its block was. A fragment that had been accepted already has failed."""
+        self.refusal = None if self.accepted else fault
+        self.end(at, "failed", fault=fault)
 
     def end_with(self, outcome: BlockOutcome, at: Seconds) -> None:
         self._warnings += [f"{behavior} was dropped" for behavior in outcome.dropped]

@@ -18,7 +18,7 @@ from schemas.body import (
     Estimates,
     RobotState,
 )
-from schemas.faults import EngageError, Fault, NoReply, RunFailed
+from schemas.faults import EngageError, Fault, InputRefused, NoReply, RunFailed
 from schemas.feedback import SyncPointProgress
 from schemas.fragments import PerformFragment
 from schemas.messages import Message
@@ -36,7 +36,7 @@ from services.generation.motions import Motions, collect, distinct, from_each_ot
 from services.generation.performance import Performance, TurnEvents
 from services.generation.planning import plan, targets
 from services.generation.turn_policy import Aborted, TurnPolicy
-from services.requests import RequestDesk, Requester
+from services.requests import RequestDesk, Requester, RequestRefused
 from services.runtime import Ready
 
 NAME = "generation"
@@ -101,8 +101,7 @@ class _Generation:
             case PerformFragment() as request:
                 self._admit(request, now)
             case Inhibit() as request:
-                self._leases.take(request, now)
-                self._desk.accept(request.id)
+                self._grant(request, now)
             case Cancel() as cancel:
                 self._cancel(cancel)
         match message:
@@ -139,9 +138,26 @@ class _Generation:
             return
         performance = Performance(request, fragment, turn, self._config.decision_patience)
         self._events.expect(fragment.id, turn.turn)
+        if any(not each.is_over for each in self._live.values()):
+            self._accept(performance)
+        # The first in line is accepted with its block: what the realizer finds impossible is refused here, too.
         self._live[request.id] = performance
-        self._desk.accept(request.id)
         self._line.put_nowait(performance)
+
+    def _accept(self, performance: Performance) -> None:
+        if not performance.accepted:
+            performance.accepted = True
+            self._desk.accept(performance.request.id)
+
+    def _grant(self, request: Inhibit, now: Seconds) -> None:
+        try:
+            if request.target and self._world is not None and self._world.entity(request.target) is None:
+                raise InputRefused(Fault(reason=f"the world does not know {request.target!r}", where=request.id))
+            self._leases.take(request, now)
+        except EngageError as error:
+            self._refuse(request.id, error.fault)
+        else:
+            self._desk.accept(request.id)
 
     def _refuse(self, id: str, fault: Fault) -> None:
         self._desk.refuse(id, fault)
@@ -149,11 +165,10 @@ class _Generation:
 
     def _follow(self, progress: SyncPointProgress) -> None:
         """The arbiter sees the gazes of fragments where they are realized."""
-        performance = next(
-            (each for each in self._live.values() if each.fragment.id == progress.block and not each.is_over), None
-        )
-        if performance is None:
+        named = [each for each in self._live.values() if each.fragment.id == progress.block]
+        if not named:
             return
+        performance = min(named, key=lambda each: each.is_over)  # an ended one may still hear of its events
         before = performance.gaze
         performance.feed(progress)
         gaze = performance.gaze
@@ -212,7 +227,10 @@ class _Generation:
             self._abort(aborted, now)
         for performance in list(self._live.values()):
             self._enforce_inhibitions(performance)
-            if (outcome := performance.outcome(self._events, now)) is not None:
+            if performance.refusal is not None:
+                del self._live[performance.request.id]
+                self._refuse(performance.request.id, performance.refusal)
+            elif (outcome := performance.outcome(self._events, now)) is not None:
                 del self._live[performance.request.id]
                 self._desk.end(outcome)
         self._events.forget({each.turn.turn for each in self._live.values()} | {self._turns.open_turn})
@@ -275,6 +293,8 @@ class _Generation:
             )
             outcome = await self._perform_block(performance)
             performance.end_with(outcome, self._bus.now())
+        except RequestRefused as error:
+            performance.refuse(error.fault, self._bus.now())  # the realizer did
         except EngageError as error:
             performance.end(self._bus.now(), "failed", fault=error.fault)
         now = self._bus.now()
@@ -293,7 +313,10 @@ class _Generation:
             fault = Fault(reason=warning, where=performance.fragment.id, service=NAME)
             self._bus.publish(keys.fault(NAME), fault)
         request = PerformBlock(id=performance.block_id, requester=self._bus.name, block=performance.plan.block)
-        outcome = await self._requests.send(keys.BLOCK, request).outcome
+        pending = self._requests.send(keys.BLOCK, request)
+        await pending.accepted
+        self._accept(performance)
+        outcome = await pending.outcome
         if not isinstance(outcome, BlockOutcome):
             raise RunFailed(Fault(reason=f"the realizer answered {type(outcome).__name__}", where=request.id))
         return outcome

@@ -109,6 +109,8 @@ class Partners:
         self.signals: list[SignalTurn] = []
         self.aborts: list[AbortBehavior] = []
         self.faults: list[Fault] = []
+        self.refusal: Fault | None = None
+        """How the realizer answers blocks; None: it takes them."""
         self.told = asyncio.Event()
 
     async def listen(self) -> None:
@@ -117,6 +119,8 @@ class Partners:
             async for received in inbox:
                 self.requests.feed(received)
                 match self.desk.take(received):
+                    case PerformBlock() as request if self.refusal is not None:
+                        self.desk.refuse(request.id, self.refusal)
                     case PerformBlock() as request:
                         self.blocks.append(request)
                         self.desk.accept(request.id)

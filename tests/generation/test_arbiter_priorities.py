@@ -115,6 +115,18 @@ def test_a_fragments_gaze_is_never_fought() -> None:
     assert stage.shifts == [(14.3, "maintenance", "hand")]
 
 
+def test_where_a_fragment_looks_at_a_face_the_base_follows_so_that_its_end_is_no_look_away() -> None:
+    stage = on_the_face()
+    stage.feed(act())  # the base is on the hand
+    stage.do(lambda arbiter: arbiter.fragment_gazes("human"))
+    stage.feed(act(ends=True))
+    stage.until(14.0)
+    stage.do(lambda arbiter: arbiter.fragment_lets_go())
+    stage.until(15.0)
+
+    assert stage.shifts == [(10.0, "maintenance", "hand"), (10.0, "maintenance", "human")]
+
+
 def test_an_event_that_a_fragments_gaze_kept_from_being_answered_stays_unanswered() -> None:
     stage = on_the_face()
     stage.do(lambda arbiter: arbiter.fragment_gazes("other"))

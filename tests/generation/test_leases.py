@@ -4,6 +4,7 @@ import pytest
 
 from schemas.attention import Claim, Inhibit
 from schemas.behaviors import Gaze, Gesture, Pointing, Speech
+from schemas.faults import InputRefused
 from services.generation.config import GenerationConfig
 from services.generation.leases import Leases
 from services.generation.permits import Permits
@@ -36,6 +37,16 @@ def test_the_newest_lease_on_gaze_claims_the_head() -> None:
     assert leases.release("b")
     assert leases.claim() == Claim(kind="inhibition", priority=1, reason="manager: hold")
     assert not leases.release("b")
+
+
+@pytest.mark.parametrize(("fields", "reason"), [({"ttl": 0.0}, "ttl"), ({"mode": "target"}, "target")])
+def test_a_lease_that_means_nothing_is_refused(fields: dict[str, object], reason: str) -> None:
+    leases = Leases(GenerationConfig())
+
+    with pytest.raises(InputRefused, match=reason):
+        leases.take(lease(**fields), 0.0)
+
+    assert leases.permits() == Permits()
 
 
 @pytest.mark.parametrize(

@@ -160,6 +160,32 @@ async def test_a_bad_fragment_is_refused_and_the_next_good_one_performed(
         assert [reason in str(fault) for fault in partners.faults] == [True]
 
 
+async def test_what_the_realizer_refuses_is_refused_whole(hub: MemoryHub) -> None:
+    async with stage(hub) as partners:
+        partners.refusal = Fault(reason="a deadlock", where="a: c", line=4)
+        with pytest.raises(RequestRefused, match="line 4: a deadlock"):
+            await partners.send(says("a")).outcome
+        partners.refusal = None
+        good = partners.send(says("b"))
+        await partners.fragment_block("b")
+        partners.end(partners.request("b"))
+
+        assert await good.outcome
+
+
+async def test_a_fragment_in_line_that_the_realizer_refuses_has_failed(hub: MemoryHub) -> None:
+    async with stage(hub) as partners:
+        partners.send(says("a"))
+        second = partners.send(says("b"))
+        await partners.fragment_block("a")
+        partners.refusal = Fault(reason="a deadlock")
+        partners.end(partners.request("a"))
+        outcome = await second.outcome
+
+        assert isinstance(outcome, FragmentOutcome)
+        assert (outcome.status, outcome.fault) == ("failed", Fault(reason="a deadlock"))
+
+
 async def test_a_fragment_waits_for_the_world_and_not_for_ever(hub: MemoryHub) -> None:
     async with stage(hub, GenerationConfig(world_patience=5.0), world=None) as partners:
         lost = partners.send(says("lost"))

@@ -2,13 +2,15 @@
 
 import asyncio
 
+import pytest
+
 from schemas import keys
 from schemas.attention import Inhibit, InhibitionEnded
 from schemas.behaviors import Gaze, Speech
 from schemas.fragments import FragmentOutcome, TurnFragment
 from services.generation.config import GenerationConfig
 from services.memory_bus import MemoryHub
-from services.requests import GRACE
+from services.requests import GRACE, RequestRefused
 from tests.generation.partners import Partners, gaze_targets, stage
 
 LOOK = Gaze(id="look", target="middle")
@@ -164,3 +166,12 @@ async def test_in_degraded_generation_the_head_is_nobodys(hub: MemoryHub) -> Non
 
         assert [behavior.id for behavior in block.behaviors] == ["turn-pair", "s", "turn-ended"]
         assert partners.shifts == []
+
+
+async def test_the_gaze_cannot_be_held_on_what_nobody_knows(hub: MemoryHub) -> None:
+    async with stage(hub) as partners:
+        with pytest.raises(RequestRefused, match="ghost"):
+            await inhibit(partners, mode="target", target="ghost")
+        await asyncio.sleep(1.0)
+
+        assert owners(partners) == [(0.0, "face", "human")]
