@@ -1,0 +1,96 @@
+"""One process of the tests: `python peer.py ROLE ROBOT RENDEZVOUS [ARGUMENT]`. Says what happens, a line each."""
+
+import asyncio
+import os
+import sys
+import threading
+
+from schemas import keys
+from schemas.blocks import Block, BlockOutcome, PerformBlock
+from schemas.faults import EngageError
+from schemas.feedback import BlockProgress
+from schemas.requests import Cancel
+from services.bus import Bus
+from services.requests import RequestDesk, Requester
+from services.zenoh_bus import open_hub
+
+
+def say(*words: object) -> None:
+    print(*words, flush=True)
+
+
+async def serve(bus: Bus, argument: str) -> None:
+    """Perform blocks: accept, wait for `argument` seconds, done."""
+    loop = asyncio.get_running_loop()
+    timers: dict[str, asyncio.TimerHandle] = {}
+
+    def end(id: str, status: str) -> None:
+        say("ended", id, status)
+        desk.end(BlockOutcome(id=id, block=id, status=status))  # type: ignore[arg-type]
+
+    def cancel(cancel: Cancel) -> None:
+        timers[cancel.id].cancel()
+        end(cancel.id, "interrupted")
+
+    desk = RequestDesk(bus, "realizer", cancel)
+    with bus.subscribe(*RequestDesk.patterns("realizer")) as inbox:
+        bus.declare_alive()
+        say("stands")
+        async for received in inbox:
+            match desk.take(received):
+                case PerformBlock(id=id):
+                    desk.accept(id)
+                    say("accepted", id)
+                    timers[id] = loop.call_later(float(argument), end, id, "done")
+                case Cancel() as request:
+                    cancel(request)
+
+
+async def ask(bus: Bus, argument: str) -> None:
+    """Ask for block `argument` and say how it ended."""
+    bus.declare_alive()
+    async with Requester(bus) as requests:
+        pending = requests.send(keys.BLOCK, PerformBlock(id=argument, requester="client", block=Block(id=argument)))
+        say("sent", argument)
+        try:
+            await pending.accepted
+            say("accepted")
+            say("outcome", (await pending.outcome).status)  # type: ignore[attr-defined]
+        except EngageError as error:
+            say("failed", error.fault.reason)
+
+
+async def tell(bus: Bus, argument: str) -> None:
+    """Publish `argument` events and an outcome as the very last thing before leaving."""
+    for number in range(int(argument)):
+        bus.publish(keys.FEEDBACK, BlockProgress(block=str(number), progress="start", at=bus.stamp()))
+    bus.publish(keys.request_state("realizer"), BlockOutcome(id="last", block="last", status="done"))
+
+
+async def idle(bus: Bus, argument: str) -> None:
+    bus.declare_alive()
+    say("stands")
+    await asyncio.Event().wait()
+
+
+ROLES = {"serve": (serve, "realizer"), "ask": (ask, "client"), "tell": (tell, "teller"), "idle": (idle, "idler")}
+
+
+async def main(role: str, robot: str, rendezvous: str, argument: str = "") -> None:
+    run, name = ROLES[role]
+    async with await open_hub(robot, rendezvous=rendezvous) as hub:
+        await run(hub.join(name), argument)
+        say("leaves", "with", threading.active_count(), "thread")
+
+
+class FarLoop(asyncio.SelectorEventLoop):
+    """The clock of another machine."""
+
+    def time(self) -> float:
+        return super().time() + 12345.0
+
+
+if __name__ == "__main__":
+    loop_factory = FarLoop if os.environ.get("FAR_CLOCK") else asyncio.SelectorEventLoop
+    with asyncio.Runner(loop_factory=loop_factory) as runner:
+        runner.run(main(*sys.argv[1:]))

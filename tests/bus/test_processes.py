@@ -1,0 +1,205 @@
+"""Real processes on real sockets: started in any order, killed, restarted."""
+
+import asyncio
+import os
+import signal
+import sys
+from collections.abc import AsyncIterator
+from pathlib import Path
+
+import pytest
+import pytest_asyncio
+
+from schemas import keys
+from schemas.blocks import Block, BlockOutcome, PerformBlock
+from schemas.faults import RunFailed
+from schemas.presence import PeerAlive, PeerGone
+from services.requests import Requester
+from services.zenoh_bus import ZenohHub, open_hub
+from tests.bus.places import PATIENCE, free_endpoint, messages, take
+
+pytestmark = pytest.mark.real_time
+PEER = Path(__file__).with_name("peer.py")
+
+
+class Process:
+    def __init__(self, process: asyncio.subprocess.Process) -> None:
+        self.process = process
+
+    async def says(self, *words: str) -> None:
+        """Wait until it says a line that starts like this."""
+        assert self.process.stdout is not None
+        heard = []
+        async with asyncio.timeout(2 * PATIENCE):
+            while line := (await self.process.stdout.readline()).decode().split():
+                heard.append(line)
+                if line[: len(words)] == list(words):
+                    return
+        raise AssertionError(f"never said {words}, but {heard}")
+
+    async def kill(self) -> None:
+        self.process.send_signal(signal.SIGKILL)
+        await self.process.wait()
+
+
+class Town:
+    """A rendezvous of its own, and the processes that use it."""
+
+    def __init__(self) -> None:
+        self.robot = f"town-{os.getpid()}"
+        self.rendezvous = free_endpoint()
+        self.processes: list[Process] = []
+        self.hubs: list[ZenohHub] = []
+
+    async def start(self, role: str, argument: str = "", **environment: str) -> Process:
+        process = await asyncio.create_subprocess_exec(
+            sys.executable, str(PEER), role, self.robot, self.rendezvous, argument,
+            stdout=asyncio.subprocess.PIPE,
+            env={**os.environ, "PYTHONPATH": str(PEER.parents[2]), **environment},
+        )  # fmt: skip
+        self.processes.append(Process(process))
+        return self.processes[-1]
+
+    async def hub(self) -> ZenohHub:
+        self.hubs.append(await open_hub(self.robot, rendezvous=self.rendezvous))
+        return self.hubs[-1]
+
+    async def close(self) -> None:
+        for hub in self.hubs:
+            await hub.close()
+        for process in self.processes:
+            if process.process.returncode is None:
+                await process.kill()
+            process.process._transport.close()  # type: ignore[attr-defined]
+
+
+@pytest_asyncio.fixture
+async def town() -> AsyncIterator[Town]:
+    town = Town()
+    yield town
+    await town.close()
+
+
+async def test_a_killed_process_is_missed_at_once(town: Town):
+    inbox = (await town.hub()).join("watch").subscribe(keys.ANY_ALIVE)
+    idler = await town.start("idle")
+    [came] = await messages(inbox)
+    assert isinstance(came, PeerAlive)
+    loop = asyncio.get_running_loop()
+
+    await idler.kill()
+    killed = loop.time()
+    [gone] = await take(inbox)
+
+    assert gone.message == PeerGone(participant="idler")
+    assert gone.at - killed < 1.0
+
+
+@pytest.mark.parametrize("first", ["serve", "ask"])
+async def test_requester_and_server_start_in_either_order(town: Town, first: str):
+    if first == "serve":
+        server = await town.start("serve", "0.05")
+        await server.says("stands")
+        client = await town.start("ask", "b")
+    else:
+        client = await town.start("ask", "b")
+        await client.says("sent")
+        server = await town.start("serve", "0.05")
+
+    await client.says("outcome", "done")
+    await client.says("leaves", "with", "1", "thread")
+
+    assert await client.process.wait() == 0
+
+
+async def test_the_first_process_may_go_and_come_back_while_others_stay(town: Town):
+    holder = await town.start("idle")
+    await holder.says("stands")
+    server = await town.start("serve", "0.05")
+    await server.says("stands")
+
+    await holder.kill()
+    client = await town.start("ask", "b")
+    await client.says("outcome", "done")
+    again = await town.start("ask", "c")
+    await again.says("outcome", "done")
+
+
+async def test_a_server_killed_in_the_middle_and_restarted_gives_one_terminal_state(town: Town):
+    client = (await town.hub()).join("client")
+    client.declare_alive()
+    server = await town.start("serve", "60")
+    states = client.subscribe(keys.ANY_REQUEST_STATE)
+    async with Requester(client) as requests:
+        pending = requests.send(keys.BLOCK, PerformBlock(id="b", requester="client", block=Block(id="b")))
+        await asyncio.wait_for(pending.accepted, 2 * PATIENCE)
+
+        await server.kill()
+        again = await town.start("serve", "0.05")
+        with pytest.raises(RunFailed, match="realizer"):
+            await asyncio.wait_for(pending.outcome, 2 * PATIENCE)
+
+        next_one = requests.send(keys.BLOCK, PerformBlock(id="c", requester="client", block=Block(id="c")))
+        outcome = await asyncio.wait_for(next_one.outcome, 2 * PATIENCE)
+        await again.says("ended", "c", "done")
+
+    assert outcome == BlockOutcome(id="c", block="c", status="done")
+    ended = []
+    while len(states):
+        [state] = await messages(states)
+        ended += [state.id] if isinstance(state, BlockOutcome) else []
+    assert ended == ["c"]
+
+
+async def test_a_requester_killed_in_the_middle_ends_its_request_at_the_server(town: Town):
+    server = await town.start("serve", "60")
+    await server.says("stands")
+    client = await town.start("ask", "b")
+    await server.says("accepted", "b")
+
+    await client.kill()
+
+    await server.says("ended", "b", "interrupted")
+
+
+async def test_what_is_published_right_before_the_end_arrives(town: Town):
+    inbox = (await town.hub()).join("ear").subscribe("engage/v1/evt/**".replace("engage/v1", keys.PREFIX))
+    teller = await town.start("tell", "200")
+
+    received = await messages(inbox, 201)
+
+    assert [message.block for message in received[:200]] == [str(number) for number in range(200)]
+    assert received[200] == BlockOutcome(id="last", block="last", status="done")
+    assert await teller.process.wait() == 0
+
+
+async def test_nobody_at_the_other_end_does_not_delay_opening_or_closing():
+    loop = asyncio.get_running_loop()
+    began = loop.time()
+
+    async with await open_hub("lonely", connect=[free_endpoint()]) as hub:
+        hub.join("me").publish(keys.FEEDBACK, BlockOutcome(id="b", block="b", status="done"))
+
+    assert loop.time() - began < 1.0
+
+
+async def test_stamps_of_another_machine_are_read_through_the_measured_offset(town: Town):
+    hub = await town.hub()
+    bus = hub.join("ear")
+    inbox = bus.subscribe(keys.FEEDBACK, keys.ANY_REQUEST_STATE, keys.ANY_ALIVE)
+    server = await town.start("serve", "0.05", FAR_CLOCK="1")
+    await server.says("stands")
+    async with Requester(bus) as requests:
+        pending = requests.send(keys.BLOCK, PerformBlock(id="b", requester="ear", block=Block(id="b")))
+        await asyncio.wait_for(pending.outcome, PATIENCE)
+    teller = await town.start("tell", "1", FAR_CLOCK="1")
+    while True:
+        [received] = await take(inbox)
+        if received.key == keys.FEEDBACK:
+            break
+
+    stamp = received.message.at
+    assert stamp.clock != bus.clock
+    assert stamp.seconds - bus.now() > 12000.0
+    assert bus.local(stamp) == pytest.approx(received.at, abs=0.1)
+    assert await teller.process.wait() == 0
