@@ -54,13 +54,13 @@ class Record:
         return {it.fragment: it for it in self.messages(FragmentOutcome)}
 
 
-async def play(human: str = "scripted", resolution: str = "table", seed: int = 0, mode: str = "scripted") -> Record:
-    """Until the manager has said goodbye."""
+async def play(human: str = "scripted", resolution: str = "table", seed: int = 0, **manager: Any) -> Record:
+    """Until the manager has said goodbye. manager: its configuration."""
     received: list[Received] = []
     finished = asyncio.Event()
 
     async def collaboration(bus: Bus, ready: Ready) -> None:
-        await collaborate(bus, ready, CollaborationConfig(mode=mode))  # type: ignore[arg-type]
+        await collaborate(bus, ready, CollaborationConfig(**manager))
         finished.set()
 
     services: dict[str, Service] = {

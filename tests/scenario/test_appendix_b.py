@@ -6,6 +6,7 @@ their ids, and do not count.
 
 from collections import Counter
 from functools import cache
+from typing import Any
 
 import pytest
 
@@ -44,8 +45,8 @@ EXPECTED["object"] = EXPECTED["table"] | {
 
 
 @cache
-def played(human: str = "scripted", resolution: str = "table", seed: int = 0, mode: str = "scripted") -> Record:
-    return run_virtual(play(human, resolution, seed, mode))
+def played(human: str = "scripted", resolution: str = "table", seed: int = 0, **manager: Any) -> Record:
+    return run_virtual(play(human, resolution, seed, **manager))
 
 
 def step_of(block: str) -> str:
@@ -220,6 +221,12 @@ def test_the_same_seed_gives_the_same_run_and_another_seed_the_same_events() -> 
     assert [event.at for event in again.robot_initiated()] == [event.at for event in played().robot_initiated()]
     assert by_step(other) == EXPECTED["table"]
     assert [event.at for event in other.robot_initiated()] != [event.at for event in played().robot_initiated()]
+
+
+@pytest.mark.parametrize("settle", [0.8, 1.8, 2.4])
+def test_how_soon_the_robot_speaks_after_a_placement_changes_no_event(settle: float) -> None:
+    """1.8 and 2.4 start a turn while the eyes are on the hand: the look that ends the turn must not fall back to it."""
+    assert by_step(played(settle=settle)) == EXPECTED["table"]
 
 
 def test_a_misplaced_piece_is_asked_to_be_fixed_and_then_is_right() -> None:
