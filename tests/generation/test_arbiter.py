@@ -3,6 +3,7 @@
 import pytest
 
 from schemas.actions import ActorFound, ActorLost
+from schemas.world import Entity, World
 from tests.generation.heads import AT, Stage, act, event, looking_at, on_the_face, statistics, world
 
 # -- each claim, alone against the face -------------------------------------------------------------------------
@@ -49,6 +50,28 @@ def test_a_moving_hand_is_followed_after_its_onset_until_it_has_been_still() -> 
 
     assert stage.owners == [(10.0, "face", "human"), (10.2, "hands", "hand"), (12.1, "face", "human")]
     assert stage.shifts == [(10.2, "maintenance", "hand"), (12.1, "maintenance", "human")]
+
+
+def test_of_two_moving_hands_the_first_is_followed_while_it_moves() -> None:
+    def hands(**speeds: float) -> World:
+        human = Entity(id="human", kind="person", position=(1.3, 0.0, 1.2))
+        moving = [
+            Entity(id=id, kind="hand", owner="human", position=(0.8, 0.0, 0.7), velocity=(speed, 0.0, 0.0))
+            for id, speed in speeds.items()
+        ]
+        return World(entities=(human, *moving))
+
+    stage = on_the_face(glance_factor=100.0)
+    stage.feed(hands(left=0.3, right=0.3))
+    stage.until(10.1)
+    stage.feed(hands(left=0.0, right=0.3))
+    stage.until(11.0)
+    stage.feed(hands(left=0.3, right=0.3))
+    stage.until(12.0)
+    stage.feed(hands(left=0.3, right=0.0))
+    stage.until(13.0)
+
+    assert stage.owners == [(10.0, "face", "human"), (10.2, "hands", "right"), (12.8, "hands", "left")]
 
 
 @pytest.mark.parametrize(("speed", "lasts"), [(0.05, 5.0), (0.3, 0.19)])
