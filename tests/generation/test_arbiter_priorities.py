@@ -127,6 +127,16 @@ def test_where_a_fragment_looks_at_a_face_the_base_follows_so_that_its_end_is_no
     assert stage.shifts == [(10.0, "maintenance", "hand"), (10.0, "maintenance", "human")]
 
 
+def test_beneath_a_fragments_look_at_the_face_the_base_gaze_goes_there_too() -> None:
+    stage = on_the_face(glance_factor=100.0)
+    stage.feed(act())
+    stage.until(11.0)
+    stage.do(lambda arbiter: arbiter.fragment_gazes("human"))
+    stage.until(12.0)
+
+    assert stage.shifts == [(10.0, "maintenance", "hand"), (11.0, "maintenance", "human")]
+
+
 def test_an_event_that_a_fragments_gaze_kept_from_being_answered_stays_unanswered() -> None:
     stage = on_the_face()
     stage.do(lambda arbiter: arbiter.fragment_gazes("other"))
