@@ -122,7 +122,8 @@ class _Control:
         self._world = world
         self._body.see(world)
         self.note_look()
-        self._keep_publishing()
+        if self._body.state().moving:
+            self._keep_publishing()
 
     def serve(self, request: Request) -> None:
         """A request that is new, or that says something new about a live one."""

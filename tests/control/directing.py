@@ -1,0 +1,88 @@
+"""A realizer's end of the bus, by hand: requests out, and everything heard that control says."""
+
+import asyncio
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from functools import partial
+
+from schemas import keys
+from schemas.actions import ActionBegan, ActionEnded
+from schemas.body import BehaviorOutcome, PerformBehavior, RobotState, SyncPointReached
+from schemas.messages import Message
+from schemas.world import World
+from services.bus import Bus
+from services.control.config import ControlConfig
+from services.control.service import embody
+from services.memory_bus import MemoryHub
+from services.requests import Pending, Requester
+from services.runtime import running
+from tests.control.contract import WORLD
+
+
+class Client:
+    """A realizer's end of the bus."""
+
+    def __init__(self, bus: Bus, requests: Requester) -> None:
+        self.bus = bus
+        self.requests = requests
+        self.heard: list[Message] = []
+
+    def perform(self, behavior: object, through: str = "end", block: str = "block-1") -> Pending:
+        id = f"{block}/{behavior.id}"  # type: ignore[attr-defined]
+        request = PerformBehavior(id=id, requester=self.bus.name, block=block, behavior=behavior, through=through)  # type: ignore[arg-type]
+        return self.requests.send(keys.BEHAVIOR, request)
+
+    async def outcome(self, pending: Pending) -> BehaviorOutcome:
+        outcome = await pending.outcome
+        assert isinstance(outcome, BehaviorOutcome)
+        return outcome
+
+    def of(self, kind: type) -> list[Message]:
+        return [message for message in self.heard if isinstance(message, kind)]
+
+    def reached(self, behavior: str) -> dict[str, float]:
+        return {item.sync: item.at.seconds for item in self.of(SyncPointReached) if item.behavior == behavior}  # type: ignore[attr-defined]
+
+    def actions(self) -> list[tuple[str, str, tuple[str, ...], float]]:
+        return [
+            ("began" if isinstance(item, ActionBegan) else "ended", item.action, item.targets, item.at.seconds)
+            for item in self.heard
+            if isinstance(item, ActionBegan | ActionEnded)
+        ]
+
+
+@asynccontextmanager
+async def robot(hub: MemoryHub, world: World = WORLD, **settings: object) -> AsyncIterator[Client]:
+    """Control, and a client called realizer that hears everything it says."""
+    config = ControlConfig(**settings)  # type: ignore[arg-type]
+    eyes, bus = hub.join("simulation"), hub.join("realizer")
+    bus.declare_alive()
+    eyes.publish(keys.WORLD, world)
+    async with running(hub, {"control": partial(embody, config=config)}):
+        inbox = bus.subscribe(
+            keys.SYNC_POINT, keys.ROBOT_ACTION, keys.ROBOT_STATE, keys.fault("control"), *Requester.PATTERNS
+        )
+        client = Client(bus, Requester(bus))
+
+        async def listen() -> None:
+            async for received in inbox:
+                client.requests.feed(received)
+                client.heard.append(received.message)
+
+        listening = asyncio.create_task(listen())
+        try:
+            yield client
+        finally:
+            client.requests.close()
+            listening.cancel()
+            await asyncio.gather(listening, return_exceptions=True)
+            inbox.close()
+    await bus.leave()
+    await eyes.leave()
+
+
+def tip(client: Client) -> tuple[float, float, float]:
+    state = client.of(RobotState)[-1]
+    assert isinstance(state, RobotState)
+    assert state.right_arm.tip is not None
+    return state.right_arm.tip

@@ -1,0 +1,64 @@
+"""The driver in docs/control.md, as it stands there, held to the contract on a simulated SDK."""
+
+import asyncio
+import re
+import types
+from collections.abc import AsyncIterator
+from pathlib import Path
+
+from services.control.body import Body
+from services.control.motion import Leg, Motion, resting
+from services.control.motion import Path as Way
+from tests.control.contract import BodyContract
+
+PAGE = Path(__file__).parents[2] / "docs" / "control.md"
+
+
+def driver() -> types.ModuleType:
+    """The first Python block of the page, as a module."""
+    module = types.ModuleType("pan_tilt")
+    code = re.findall(r"```python\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL)[0]
+    exec(compile(code, str(PAGE), "exec"), module.__dict__)
+    return module
+
+
+class SimulatedSdk:
+    """Two motors that go where they are told in the time they are told, and 50 measurements a second."""
+
+    def __init__(self, body: Body | None = None) -> None:
+        self.motion: Motion | None = None
+        self.limits = driver().PanTilt(None).capabilities.joints
+
+    def goto(self, goal: tuple[float, float], seconds: float) -> None:
+        now = asyncio.get_running_loop().time()
+        start = self.motion.at(now) if self.motion else resting((0.0, 0.0))
+        self.motion = Motion(Way(start, [Leg(goal=goal, seconds=seconds)], self.limits), now)
+
+    def angles(self) -> tuple[float, float]:
+        if self.motion is None:
+            return (0.0, 0.0)
+        pan, tilt = self.motion.at(asyncio.get_running_loop().time()).q
+        return float(pan), float(tilt)
+
+    def is_moving(self) -> bool:
+        return self.motion is not None and asyncio.get_running_loop().time() < self.motion.end
+
+    async def measurements(self) -> AsyncIterator[tuple[float, float]]:
+        while True:
+            await asyncio.sleep(0.02)
+            yield self.angles()
+
+
+class TestPanTilt(BodyContract):
+    tolerance = 0.15
+
+    def make(self) -> Body:
+        body = driver().PanTilt(SimulatedSdk())
+        assert isinstance(body, Body)
+        return body
+
+
+def test_a_newcomers_driver_is_short():
+    code = re.findall(r"```python\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL)[0]
+
+    assert len([line for line in code.splitlines() if line.strip()]) < 120
