@@ -27,7 +27,6 @@ SHELLS = {
     "services/realizer/reporting.py",  # publishes feedback
     "services/control/body.py",  # the interface of bodies: coroutines
     "services/control/simulated.py",  # a body that moves on the loop's clock
-    "services/control/speaking.py",  # says words when they are due
     "services/control/waiting.py",  # waits for a moment or a change of authority
     "services/simulation/still.py",  # a world, published once
     "services/console/follow.py",  # subscribes
