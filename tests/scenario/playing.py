@@ -14,7 +14,7 @@ from services.control.config import ControlConfig
 from services.control.service import embody
 from services.generation.config import GenerationConfig
 from services.generation.service import generate
-from services.memory_bus import MemoryHub
+from services.memory_bus import Faults, MemoryHub
 from services.realizer.config import RealizerConfig
 from services.realizer.service import realize
 from services.recognition.config import RecognitionConfig
@@ -41,7 +41,9 @@ class Record:
         """The life of every connection event, by id, in the order of their starts."""
         lives: dict[str, list[ConnectionEvent]] = {}
         for event in self.messages(ConnectionEvent):
-            lives.setdefault(event.id, []).append(event)
+            life = lives.setdefault(event.id, [])
+            if event not in life:  # a bus may deliver twice
+                life.append(event)
         return dict(sorted(lives.items(), key=lambda it: it[1][0].started.seconds))
 
     def robot_initiated(self) -> list[ConnectionEvent]:
@@ -54,8 +56,10 @@ class Record:
         return {it.fragment: it for it in self.messages(FragmentOutcome)}
 
 
-async def play(human: str = "scripted", resolution: str = "table", seed: int = 0, **manager: Any) -> Record:
-    """Until the manager has said goodbye. manager: its configuration."""
+async def play(
+    human: str = "scripted", resolution: str = "table", seed: int = 0, faults: Faults | None = None, **manager: Any
+) -> Record:
+    """Until the manager has said goodbye. faults: of the bus. manager: its configuration."""
     received: list[Received] = []
     finished = asyncio.Event()
 
@@ -71,7 +75,7 @@ async def play(human: str = "scripted", resolution: str = "table", seed: int = 0
         "simulation": partial(simulate, config=SimulationConfig(human=human, seed=seed)),  # type: ignore[arg-type]
         "collaboration": collaboration,
     }
-    async with MemoryHub() as hub:
+    async with MemoryHub(faults=faults, seed=seed) as hub:
         with hub.join("record").subscribe(
             f"{keys.PREFIX}/cmd/**", f"{keys.PREFIX}/evt/**", f"{keys.PREFIX}/state/**", capacity=10**6
         ) as inbox:

@@ -18,6 +18,7 @@ from schemas.feedback import BlockProgress, SyncPointProgress, WarningFeedback
 from schemas.recognition import ConnectionEvent
 from schemas.world import World
 from services.collaboration.relations import Relation, relation
+from services.memory_bus import Faults
 from services.virtual_time import run_virtual
 from tests.scenario.playing import Record, play
 
@@ -223,9 +224,16 @@ def test_the_same_seed_gives_the_same_run_and_another_seed_the_same_events() -> 
     assert [event.at for event in other.robot_initiated()] != [event.at for event in played().robot_initiated()]
 
 
+def test_a_slow_bus_that_delivers_some_messages_twice_gives_the_same_events() -> None:
+    record = played(seed=3, faults=Faults(delay=0.02, duplicate=0.05))
+
+    assert by_step(record) == EXPECTED["table"]
+    assert {outcome.status for outcome in record.outcomes.values()} == {"done"}
+
+
 @pytest.mark.parametrize("settle", [0.8, 1.8, 2.4])
 def test_how_soon_the_robot_speaks_after_a_placement_changes_no_event(settle: float) -> None:
-    """1.8 and 2.4 start a turn while the eyes are on the hand: the look that ends the turn must not fall back to it."""
+    """1.8 and 2.4 start a turn while the eyes are on the hand: the look that ends it must not fall back there."""
     assert by_step(played(settle=settle)) == EXPECTED["table"]
 
 
