@@ -1,0 +1,174 @@
+"""From a sync point to the command it releases: body -> bus -> realizer -> bus -> body, beside raw Zenoh.
+
+    python benchmarks/sync_to_command.py [--laps 10] [--trips 100] [--chain 10] [--json]
+
+This process plays the body, another one is the realizer. A block is a chain of speeches, each synchronized with
+the end of the one before. A trip begins when the body publishes `SyncPointReached` of an end, and is over when the
+next `PerformBehavior` has come. It contains, at the realizer: the Petri net's step, the feedback about it, and the
+new request. The first row is a raw Zenoh ping-pong of the same payload between two processes, in the same run.
+"""
+
+import argparse
+import asyncio
+import itertools
+import sys
+from functools import partial
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
+from benchmarks.bus_roundtrip import BusPings, RawPings, connected, free_endpoint, serve_bus, serve_raw
+from benchmarks.harness import Contender, OtherSide, compare, report, stands
+from schemas import keys
+from schemas.behaviors import Constraint, Speech, Synchronize
+from schemas.blocks import Block, BlockOutcome, PerformBlock
+from schemas.body import (
+    BehaviorOutcome,
+    Estimate,
+    EstimateBehaviors,
+    Estimates,
+    PerformBehavior,
+    Phase,
+    SyncPointReached,
+)
+from schemas.messages import Message
+from schemas.units import Seconds
+from services.bus import Bus
+from services.realizer.config import RealizerConfig
+from services.realizer.service import realize
+from services.requests import RequestDesk, Requester
+from services.runtime import serve
+from services.zenoh_bus import open_hub
+
+ROBOT = "benchmark"
+NATURAL: Seconds = 0.001
+
+
+def chain(id: str, links: int) -> Block:
+    """Speeches, each starting when the one before has ended."""
+    speeches = tuple(Speech(id=f"speech-{number}", text="go") for number in range(links))
+    ties = tuple(
+        Constraint(operators=(Synchronize(syncs=(f"{before.id}:end", after.id + ":start")),))
+        for before, after in itertools.pairwise(speeches)
+    )
+    return Block(id=id, behaviors=speeches, constraints=ties)
+
+
+def estimate(question: Message) -> Message:
+    assert isinstance(question, EstimateBehaviors)
+    phase = Phase(since="start", to="end", shortest=NATURAL, natural=NATURAL)
+    items = (
+        Estimate(behavior=item.behavior.id, feasible=True, parts=("voice",), phases=(phase,))
+        for item in question.items
+    )
+    return Estimates(items=tuple(items))
+
+
+class Body:
+    """Performs every behavior in no time, and measures how soon the next one is asked for."""
+
+    name = "sync point -> realizer -> next command"
+
+    def __init__(self, bus: Bus, links: int) -> None:
+        self._bus = bus
+        self._links = links
+        self._blocks = itertools.count()
+        self._desk = RequestDesk(bus, "control", lambda cancel: None)
+        self._requests = Requester(bus)
+        self._inbox = bus.subscribe(*RequestDesk.patterns("control"), *Requester.PATTERNS[:1])
+        bus.answer(keys.ESTIMATE, estimate)
+        bus.declare_alive()
+
+    async def lap(self, count: int) -> list[Seconds]:
+        seconds: list[Seconds] = []
+        while len(seconds) < count:
+            seconds += await self._play(min(self._links, count - len(seconds)))
+        return seconds
+
+    async def _play(self, count: int) -> list[Seconds]:
+        """One block, `count` trips."""
+        block = chain(f"block-{next(self._blocks)}", count + 1)
+        request = PerformBlock(id=block.id, requester=self._bus.name, block=block)
+        pending = self._requests.send(keys.BLOCK, request)
+        seconds: list[Seconds] = []
+        reached: Seconds | None = None
+        while not pending.outcome.done():
+            received = await self._inbox.next()
+            assert received is not None
+            self._requests.feed(received)
+            command = self._desk.take(received)
+            if isinstance(command, PerformBehavior):
+                if reached is not None:
+                    seconds.append(self._bus.now() - reached)
+                reached = self._perform(command)
+        outcome = pending.outcome.result()
+        assert isinstance(outcome, BlockOutcome), outcome
+        assert outcome.status == "done", outcome
+        assert len(seconds) == count, f"{len(seconds)} of {count}"
+        return seconds
+
+    def _perform(self, command: PerformBehavior) -> Seconds:
+        self._desk.accept(command.id)
+        self._reach(command, "start")
+        reached = self._bus.now()
+        self._reach(command, "end")
+        self._desk.end(
+            BehaviorOutcome(
+                id=command.id, block=command.block, behavior=command.behavior.id, status="done", at=self._bus.stamp()
+            )
+        )
+        return reached
+
+    def _reach(self, command: PerformBehavior, sync: str) -> None:
+        now = self._bus.stamp()
+        self._bus.publish(
+            keys.SYNC_POINT,
+            SyncPointReached(
+                id=command.id, block=command.block, behavior=command.behavior.id, sync=sync, at=now, arrived=now
+            ),
+        )
+
+
+async def serve_realizer(endpoint: str) -> None:
+    async with await open_hub(ROBOT, listen=[endpoint]) as hub:
+        await serve(hub, "realizer", partial(realize, config=RealizerConfig()), stands)
+
+
+SERVERS = {"raw": serve_raw, "bus": serve_bus, "realizer": serve_realizer}
+
+
+async def measure(laps: int, trips: int, links: int, as_json: bool) -> None:
+    raw_end, bus_end, realizer_end = free_endpoint(), free_endpoint(), free_endpoint()
+    with (
+        OtherSide(__file__, "raw", raw_end),
+        OtherSide(__file__, "bus", bus_end),
+        OtherSide(__file__, "realizer", realizer_end),
+    ):
+        session = await connected(raw_end)
+        async with await open_hub(ROBOT, connect=[bus_end, realizer_end]) as hub:
+            bus, body = hub.join("this"), hub.join("control")
+            with bus.subscribe(keys.ANY_ALIVE) as who:
+                for _ in range(2):
+                    await who.next()
+            contenders: list[Contender] = [RawPings(session), BusPings(bus), Body(body, links)]
+            report(await compare(contenders, laps, trips), as_json)
+        session.close()  # type: ignore[no-untyped-call]
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--laps", type=int, default=10)
+    parser.add_argument("--trips", type=int, default=100)
+    parser.add_argument("--chain", type=int, default=10, help="trips in a block")
+    parser.add_argument("--json", action="store_true")
+    parser.add_argument("--serve", nargs=2, metavar=("ROLE", "ENDPOINT"), help=argparse.SUPPRESS)
+    options = parser.parse_args()
+    if options.serve:
+        role, endpoint = options.serve
+        asyncio.run(SERVERS[role](endpoint))
+    else:
+        asyncio.run(measure(options.laps, options.trips, options.chain, options.json))
+
+
+if __name__ == "__main__":
+    main()
