@@ -155,9 +155,9 @@ def point_at(side: Side, target: Vector, radius: Meters, pose: Pose) -> Aim:
     raise Unreachable(f"the {side} arm finds no way to point at it: {reason}")
 
 
-def touches_table(pose: Pose) -> str:
+def touches_table(pose: Pose, sides: Iterable[Side] = ("left", "right")) -> str:
     """Name of an arm of which elbow or hand is in the table or closer than the clearance, or nothing."""
-    for side in SHOULDER:
+    for side in sides:
         forearm = arm(pose, side)
         assert forearm.tip is not None
         if _in_table(forearm.origin) or _in_table(forearm.tip) or _in_table(_edge_crossing(forearm)):
@@ -183,7 +183,7 @@ def _objection(side: Side, angles: tuple[float, float, float], target: Vector, r
         if not LIMIT[name].low <= angle <= LIMIT[name].high:
             return f"{name} cannot turn to {math.degrees(angle):.0f} degrees"
     there = {**pose, **dict(zip(names, angles, strict=True))}
-    if touches_table(there) == f"{side}_arm":
+    if touches_table(there, (side,)):
         return "the table is in the way"
     hand = arm(there, side).tip
     assert hand is not None

@@ -66,7 +66,6 @@ class _Segment(Struct, frozen=True):
     seconds: Seconds
     coefficients: Array
     """6 x joints, of ascending powers of the time since `start`."""
-    leg: int
 
 
 class Path:
@@ -81,23 +80,25 @@ class Path:
         self.marks: dict[str, Seconds] = {}
         self._limits = _Limits(limits)
         self._segments: list[_Segment] = []
+        self._peaks: list[tuple[float, float]] = []
         self._leg_starts: list[Seconds] = []
         self.length = 0.0
         state = self._limits.soften(start)
-        for index, leg in enumerate(self.legs):
-            state = self._append(index, leg, state)
-        self._peaks = [self._limits.peaks(segment.coefficients, segment.seconds) for segment in self._segments]
+        for leg in self.legs:
+            state = self._append(leg, state)
 
-    def _append(self, index: int, leg: Leg, state: State) -> State:
+    def _append(self, leg: Leg, state: State) -> State:
         goal = np.asarray(leg.goal, dtype=np.float64)
         velocity = np.asarray(leg.velocity or np.zeros_like(goal), dtype=np.float64)
         end = State(goal, velocity, np.zeros_like(goal))
         self._leg_starts.append(self.length)
-        still = np.allclose(state.q, goal, rtol=0.0, atol=1e-7) and state.at_rest and not velocity.any()
+        still = state.at_rest and not velocity.any() and bool(np.all(np.abs(state.q - goal) < 1e-7))
         seconds = 0.0
         if not (still and leg.seconds <= 0.0):
-            coefficients, seconds = self._limits.connect(state, end, max(leg.seconds, 0.02))
-            self._segments.append(_Segment(self.length, seconds, coefficients, index))
+            connection = self._limits.connect(state, end, max(leg.seconds, 0.02))
+            seconds = connection.seconds
+            self._segments.append(_Segment(self.length, seconds, connection.coefficients))
+            self._peaks.append((connection.speed, connection.acceleration))
         for sync, fraction in leg.marks:
             self.marks[sync] = self.length + fraction * seconds
         self.length += seconds
@@ -170,37 +171,38 @@ class _Limits:
         bound = MARGIN * SHARE * self.acceleration
         return State(state.q, state.v, np.clip(state.a, -bound, bound))
 
-    def connect(self, start: State, end: State, seconds: Seconds) -> tuple[Array, Seconds]:
+    def connect(self, start: State, end: State, seconds: Seconds) -> "_Connection":
         """The quintic between two states that takes `seconds`, or as near to it as keeps the limits."""
-        best: tuple[float, Array, Seconds] | None = None
+        best: _Connection | None = None
         for stretch in _STRETCHES:
-            duration = seconds * stretch
-            coefficients = _quintic(start, end, duration)
-            excess = self._excess(coefficients, duration)
-            if excess <= 0.0:
-                return coefficients, duration
-            if best is None or excess < best[0]:
-                best = (excess, coefficients, duration)
+            connection = self._judged(_quintic(start, end, seconds * stretch), seconds * stretch)
+            if connection.excess <= 0.0:
+                return connection
+            if best is None or connection.excess < best.excess:
+                best = connection
         assert best is not None
-        return best[1], best[2]
-
-    def peaks(self, coefficients: Array, seconds: Seconds) -> tuple[float, float]:
-        """Largest speed and acceleration, as fractions of the joints' limits."""
-        _, speed, acceleration = _sampled(coefficients, seconds)
-        return (
-            float(np.max(np.abs(speed) / self.speed)),
-            float(np.max(np.abs(acceleration) / self.acceleration)),
-        )
+        return best
 
     def permits_brake(self, state: State, brake: float) -> bool:
         return bool(np.all(np.abs(state.v) * brake <= (1 - SHARE) * self.acceleration))
 
-    def _excess(self, coefficients: Array, seconds: Seconds) -> float:
-        """By how much the worst limit is exceeded, as a fraction of it; <= 0 if none is."""
-        position, _, _ = _sampled(coefficients, seconds)
-        speed, acceleration = self.peaks(coefficients, seconds)
+    def _judged(self, coefficients: Array, seconds: Seconds) -> "_Connection":
+        position, velocity, change = _sampled(coefficients, seconds)
+        speed = float(np.max(np.abs(velocity) / self.speed))
+        acceleration = float(np.max(np.abs(change) / self.acceleration))
         outside = float(np.max(np.maximum(self.low - position, position - self.high) / (self.high - self.low)))
-        return max(speed / MARGIN - 1.0, acceleration / (MARGIN * SHARE) - 1.0, outside - 1e-9)
+        excess = max(speed / MARGIN - 1.0, acceleration / (MARGIN * SHARE) - 1.0, outside - 1e-9)
+        return _Connection(coefficients, seconds, speed, acceleration, excess)
+
+
+class _Connection(Struct, frozen=True):
+    """A quintic with its peaks, as fractions of the joints' limits. excess: of the worst one; <= 0: all are kept."""
+
+    coefficients: Array
+    seconds: Seconds
+    speed: float
+    acceleration: float
+    excess: float
 
 
 class _Piece(Struct, frozen=True):

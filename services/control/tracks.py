@@ -109,9 +109,10 @@ def meets_table(path: Path, joints: Sequence[str]) -> bool:
     """Does an elbow or hand come into the table anywhere on `path`?"""
     if not path.length:
         return False
-    for step in range(25):
-        angles = dict(zip(joints, path.at(path.length * step / 24).q.tolist(), strict=True))
-        if kinematics.touches_table({**kinematics.HOME, **angles}):
+    sides = [side for side in kinematics.SHOULDER if f"{side}_elbow" in joints]
+    for step in range(17):
+        angles = dict(zip(joints, path.at(path.length * step / 16).q.tolist(), strict=True))
+        if kinematics.touches_table({**kinematics.HOME, **angles}, sides):
             return True
     return False
 
