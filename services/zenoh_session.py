@@ -70,7 +70,8 @@ def _config(robot: str, connect: Sequence[str], listen: Sequence[str], mode: str
         "listen/timeout_ms": 0,
         "connect/endpoints": list(connect),
         "connect/exit_on_failure": False,
-        "connect/timeout_ms": 0,
+        # Keep trying in the background; 0 would give up for good on an endpoint where nobody listens yet.
+        "connect/timeout_ms": -1,
         "connect/retry": RETRY_MS,
         "scouting/multicast/enabled": False,
         "scouting/gossip/enabled": True,

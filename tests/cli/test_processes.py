@@ -1,0 +1,183 @@
+"""The real command line as processes of their own, over real sockets. Nothing sleeps: each wait is for something."""
+
+import asyncio
+import os
+import re
+import signal
+import socket
+from asyncio.subprocess import Process
+from contextlib import suppress
+from pathlib import Path
+
+import pytest
+
+from services.commandline.roster import NAMES
+from tests.cli.command import FRAGMENT, GOOD_BLOCK, start, threads
+
+pytestmark = pytest.mark.real_time
+
+PATIENCE = 30
+ZENOH = re.compile(r"(acc|app|net|rx|tx)-\d+")
+"""How Zenoh's runtime names its threads."""
+
+
+@pytest.fixture
+def endpoint() -> str:
+    """Where nobody listens yet."""
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        return f"tcp/127.0.0.1:{free.getsockname()[1]}"
+
+
+async def line(process: Process, text: str, *, log: bool = True) -> str:
+    """The next line of its standard error (or output) with this text in it."""
+    stream = process.stderr if log else process.stdout
+    assert stream is not None
+    seen = []
+    async with asyncio.timeout(PATIENCE):
+        while raw := await stream.readline():
+            seen.append(raw.decode())
+            if text in seen[-1]:
+                return seen[-1]
+    raise AssertionError(f"ended without {text!r}: {''.join(seen)}")
+
+
+async def stopped(process: Process, how: signal.Signals = signal.SIGINT) -> int:
+    """Its exit code, once stopped."""
+    if process.returncode is None:
+        process.send_signal(how)
+    async with asyncio.timeout(PATIENCE):
+        await process.communicate()
+    assert process.returncode is not None
+    return process.returncode
+
+
+async def gone(pid: int) -> None:
+    """Wait until a process that is not our child has ended."""
+    try:
+        handle = os.pidfd_open(pid)
+    except ProcessLookupError:
+        return
+    loop = asyncio.get_running_loop()
+    ended = asyncio.Event()
+    loop.add_reader(handle, ended.set)
+    try:
+        async with asyncio.timeout(PATIENCE):
+            await ended.wait()
+    finally:
+        loop.remove_reader(handle)
+        os.close(handle)
+
+
+async def strangers(pid: int) -> list[str]:
+    """Threads that are not Zenoh's. Its own carry our name for the instant until they have named themselves."""
+    found: list[str] = []
+    with suppress(TimeoutError):
+        async with asyncio.timeout(5):
+            # Nothing tells when; the pause lets the timeout through.
+            while found := [thread for thread in threads(pid) if not ZENOH.fullmatch(thread)]:  # noqa: ASYNC110
+                await asyncio.sleep(0)
+    return found
+
+
+def children(pid: int) -> list[int]:
+    return list(map(int, Path(f"/proc/{pid}/task/{pid}/children").read_text().split()))
+
+
+async def test_a_running_demo_has_one_thread() -> None:
+    demo = await start("demo", "--quiet", "--feedback", "-")
+    try:
+        await line(demo, "sync_point_progress", log=False)
+
+        assert threads(demo.pid) == []
+    finally:
+        await stopped(demo)
+
+    assert demo.returncode == 130
+
+
+async def test_each_service_runs_alone_with_only_zenohs_threads_and_stops_on_a_signal() -> None:
+    arguments = ("--robot", "alone", "--listen", "tcp/127.0.0.1:0")
+    services = {name: await start("run", name, *arguments) for name in NAMES}
+    try:
+        found = {}
+        for name, process in services.items():
+            await line(process, f"{name} is ready")
+            found[name] = await strangers(process.pid)
+
+        assert found == {name: [] for name in NAMES}
+    finally:
+        codes = {name: await stopped(process, signal.SIGTERM) for name, process in services.items()}
+
+    assert codes == dict.fromkeys(NAMES, 0)
+
+
+async def test_up_performs_what_is_played_and_ctrl_c_ends_all_of_it(endpoint: str, tmp_path: Path) -> None:
+    (tmp_path / "block.xml").write_text(GOOD_BLOCK)
+    (tmp_path / "bad.xml").write_text(FRAGMENT.replace("blue-square", "moon"))
+    up = await start("up", "--robot", "upright", "--listen", endpoint)
+    try:
+        await line(up, "all services are up", log=False)
+        offspring = children(up.pid)
+        where = ("--robot", "upright", "--connect", endpoint)
+        codes = {}
+        for name in ("bad.xml", "block.xml"):
+            play = await start("play", *where, tmp_path / name)
+            async with asyncio.timeout(PATIENCE):
+                out, err = await play.communicate()
+            codes[name] = play.returncode
+
+        assert codes == {"bad.xml": 2, "block.xml": 0}, err
+        assert b"block hello: done" in out
+        assert len(offspring) == 5
+        assert await strangers(up.pid) == []
+    finally:
+        code = await stopped(up)
+
+    assert code == 0
+    for pid in offspring:
+        await gone(pid)
+
+
+async def test_services_do_not_outlive_a_killed_supervisor(endpoint: str) -> None:
+    up = await start("up", "--robot", "orphans", "--listen", endpoint)
+    try:
+        await line(up, "all services are up", log=False)
+        offspring = children(up.pid)
+    finally:
+        await stopped(up, signal.SIGKILL)
+
+    for pid in offspring:
+        await gone(pid)
+
+
+async def test_playing_to_nobody_fails_readably(endpoint: str, tmp_path: Path) -> None:
+    (tmp_path / "block.xml").write_text(GOOD_BLOCK)
+    play = await start("play", "--robot", "nobody", "--connect", endpoint, tmp_path / "block.xml")
+    async with asyncio.timeout(PATIENCE):
+        _, err = await play.communicate()
+
+    assert play.returncode == 3
+    assert b"is realizer running?" in err
+    assert err.count(b"\n") == 1
+
+
+async def test_watch_prints_json_lines_of_a_running_system(endpoint: str, tmp_path: Path) -> None:
+    watch = await start("watch", "--json", "--robot", "seen", "--connect", endpoint)
+    realizer = await start("run", "realizer", "--robot", "seen", "--listen", endpoint)
+    control = await start("run", "control", "--robot", "seen", "--connect", endpoint)
+    try:
+        await line(realizer, "realizer is ready")
+        await line(control, "control is ready")
+        (tmp_path / "wait.xml").write_text('<bml id="w"><wait id="p" duration="0.1"/></bml>')
+        play = await start("play", "--robot", "seen", "--connect", endpoint, tmp_path / "wait.xml")
+        async with asyncio.timeout(PATIENCE):
+            _, err = await play.communicate()
+        assert play.returncode == 0, err
+        seen = await line(watch, "block_progress", log=False)
+
+        assert '"block":"w"' in seen
+    finally:
+        codes = [await stopped(process) for process in (watch, control, realizer)]
+
+    assert codes == [0, 0, 0]
