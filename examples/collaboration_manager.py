@@ -1,6 +1,7 @@
 """A collaboration manager of one's own: `python examples/collaboration_manager.py [ENDPOINT]`.
 
 Run it beside `engage up` (before or after), or on another machine with the endpoint of one of its services.
+It waits for the robot and for a person, says one thing, and tells how it went.
 """
 
 import asyncio
@@ -26,6 +27,7 @@ PUZZLE = TurnFragment(
 
 async def main(endpoints: list[str]) -> None:
     async with connect(connect=endpoints) as robot:
+        await robot.person()
         outcome = await robot.perform(PUZZLE)
         for choice in outcome.choices:
             print(f"{choice.target}: {choice.gesture}, {choice.phrase!r}, R = {choice.reliability:.2f}")

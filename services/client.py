@@ -32,7 +32,7 @@ from schemas.json_codec import read
 from schemas.recognition import ConnectionEvent, Statistics
 from schemas.requests import Outcome, Request
 from schemas.units import Seconds, Stamp
-from schemas.world import World
+from schemas.world import Entity, World
 from services.bus import Bus, Hub, Keep, Subscription
 from services.requests import Pending, Requester, RequestRefused
 
@@ -241,6 +241,16 @@ class Robot:
         """What is perceived now; waits for perception. Raises NoReply after `timeout` seconds without it."""
         with self.worlds() as worlds:
             return _there(await worlds.next(timeout), "world", timeout)
+
+    async def person(self, timeout: Seconds | None = None) -> Entity:
+        """The person who is there, or the first to come. Raises NoReply after `timeout` seconds without one."""
+        deadline = None if timeout is None else self.now() + timeout
+        with self.worlds() as worlds:
+            while True:
+                left = None if deadline is None else max(0.0, deadline - self.now())
+                world = _there(await worlds.next(left), "person in the world", timeout)
+                if world.people:
+                    return world.people[0]
 
     async def statistics(self, actor: str = "all", timeout: Seconds | None = None) -> Statistics:
         """The statistics of a person, or of `all`; waits for recognition. Raises NoReply after `timeout` seconds."""

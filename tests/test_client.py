@@ -201,6 +201,20 @@ async def test_iterating_ends_when_the_client_leaves(hub: MemoryHub) -> None:
     assert [event async for event in events] == []
 
 
+async def test_a_manager_may_wait_for_a_person(hub: MemoryHub) -> None:
+    perception = hub.join("simulation")
+    perception.publish(keys.WORLD, World(entities=(Entity(id="cup", kind="object", position=(0.5, 0.0, 0.7)),)))
+    anna = Entity(id="anna", kind="person", position=(1.3, 0.0, 1.2))
+    asyncio.get_running_loop().call_later(30.0, perception.publish, keys.WORLD, World(entities=(anna,)))
+
+    async with connect(hub=hub) as robot:
+        with pytest.raises(NoReply, match="no person in the world within 5 s"):
+            await robot.person(timeout=5)
+        assert await robot.person() == anna
+
+    assert asyncio.get_running_loop().time() == 30.0
+
+
 async def test_world_and_statistics_are_what_was_last_said(hub: MemoryHub) -> None:
     world = World(entities=(Entity(id="cup", kind="object", position=(0.5, 0.0, 0.7)),))
     statistics = Statistics(
