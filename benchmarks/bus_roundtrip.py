@@ -11,6 +11,7 @@ import socket
 import sys
 from collections.abc import Callable
 from pathlib import Path
+from time import perf_counter
 from typing import Any
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
@@ -68,11 +69,11 @@ class RawPings:
 
     def _ping(self) -> None:
         self._left -= 1
-        self._sent = self._loop.time()
+        self._sent = perf_counter()
         self._publisher.put(PAYLOAD)
 
     def _pong(self, sample: zenoh.Sample) -> None:
-        self._seconds.append(self._loop.time() - self._sent)
+        self._seconds.append(perf_counter() - self._sent)
         if self._left:
             self._ping()
         else:
@@ -93,7 +94,7 @@ class LoopPings(RawPings):
         self._loop.call_soon_threadsafe(self._pong, sample)
 
     def _pong(self, sample: zenoh.Sample) -> None:
-        self._seconds.append(self._loop.time() - self._sent)
+        self._seconds.append(perf_counter() - self._sent)
         if self._left:
             self._ping()
         else:
@@ -112,15 +113,15 @@ class BusPings:
     async def lap(self, count: int) -> list[Seconds]:
         seconds = []
         for _ in range(count):
-            sent = self._bus.now()
+            sent = perf_counter()
             self._bus.publish(PING_KEY, CHEER)
             await self._inbox.next()
-            seconds.append(self._bus.now() - sent)
+            seconds.append(perf_counter() - sent)
         return seconds
 
 
 async def serve_raw(endpoint: str) -> None:
-    session = open_session(ROBOT, [], [endpoint], None)
+    session, _ = open_session(ROBOT, [], [endpoint], None)
     raw, through_loop = session.declare_publisher(PONG, **QOS), session.declare_publisher("loop/pong", **QOS)
     loop = asyncio.get_running_loop()
     session.declare_subscriber(PING, direct(lambda sample: raw.put(sample.payload)))
@@ -147,7 +148,7 @@ SERVERS = {"raw": serve_raw, "bus": serve_bus}
 
 async def connected(endpoint: str) -> zenoh.Session:
     """A session that reaches the raw server: its subscriptions are known."""
-    session = open_session(ROBOT, [endpoint], [], None)
+    session, _ = open_session(ROBOT, [endpoint], [], None)
     loop, matched = asyncio.get_running_loop(), asyncio.Event()
     probe = session.declare_publisher(PING)
     probe.declare_matching_listener(direct(lambda status: loop.call_soon_threadsafe(matched.set)))

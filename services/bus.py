@@ -15,8 +15,11 @@ from typing import Self
 from msgspec import Struct
 
 from schemas import keys
-from schemas.messages import Message
+from schemas.blocks import Block, PerformBlock
+from schemas.fragments import PerformFragment
+from schemas.messages import Message, decode
 from schemas.units import Seconds, Stamp
+from schemas.xml_codec import decode_xml
 
 
 class Keep(Enum):
@@ -203,3 +206,16 @@ class Hub(ABC):
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         await self.close()
+
+
+def read_payload(payload: bytes, encoding: str, key: str, source: str) -> Message:
+    """The message that another program sent, in any encoding. Raises InputRefused.
+
+    XML holds a block or a fragment; the request for it goes by its id.
+    """
+    if encoding.partition(";")[0] not in ("application/xml", "text/xml"):
+        return decode(payload, encoding)
+    thing = decode_xml(payload, key)
+    if isinstance(thing, Block):
+        return PerformBlock(id=thing.id, requester=source, block=thing)
+    return PerformFragment(id=thing.id, requester=source, fragment=thing)

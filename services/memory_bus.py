@@ -13,7 +13,7 @@ from schemas.faults import EngageError, Fault, InputRefused, NoReply
 from schemas.messages import Message, decode, encode
 from schemas.presence import PeerAlive, PeerGone
 from schemas.units import Probability, Seconds, Stamp
-from services.bus import Answer, Bus, Hub, Keep, Received, Subscription
+from services.bus import Answer, Bus, Hub, Keep, Received, Subscription, read_payload
 
 
 class Faults(Struct, frozen=True, kw_only=True):
@@ -80,7 +80,7 @@ class MemoryHub(Hub):
     def inject(self, key: str, payload: bytes, encoding: str) -> None:
         """A payload from outside, as another program would send it. A bad one is answered with a Fault."""
         try:
-            message = decode(payload, encoding)
+            message = read_payload(payload, encoding, key, "")
         except InputRefused as error:
             for bus in [bus for bus in self._buses.values() if bus.wants(key)]:
                 bus.publish(keys.fault(bus.name), msgspec.structs.replace(error.fault, where=key, service=bus.name))

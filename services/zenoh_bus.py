@@ -26,8 +26,8 @@ from services.zenoh_session import QOS, RENDEZVOUS, STREAM_QOS, Doorway, Traffic
 
 FIRST_PULSE: Seconds = 0.25
 NEXT_PULSE: Seconds = 1.0
-OPENING: Seconds = 0.25
-"""How long `open_hub` waits to learn who is there, when somebody is."""
+OPENING: Seconds = 0.5
+"""How long `open_hub` waits for the first link: what is said by who leaves before anybody knows him is lost."""
 
 
 async def open_hub(
@@ -38,14 +38,17 @@ async def open_hub(
     rendezvous: str | None = RENDEZVOUS,
     mode: str = "peer",
 ) -> "ZenohHub":
-    """Join the bus of `robot`. Never waits for anybody: processes may start in any order.
+    """Join the bus of `robot`. Processes may start in any order: waits for nobody for longer than `OPENING`.
 
     connect, listen: Zenoh endpoints (`tcp/HOST:PORT`). Without any, the processes of this machine find one another
     at `rendezvous`. Raises RunFailed when an endpoint is wrong or taken.
     """
     # Blocks the loop for milliseconds, before its work has started: Zenoh has no async API, and we start no thread.
-    session = open_session(robot, connect, listen, None if connect or listen else rendezvous, mode)
-    return ZenohHub(robot, session)
+    session, calls = open_session(robot, connect, listen, None if connect or listen else rendezvous, mode)
+    hub = ZenohHub(robot, session)
+    if calls:
+        await hub.peers.settle(asyncio.get_running_loop().time() + OPENING)
+    return hub
 
 
 class Health(Struct, frozen=True):

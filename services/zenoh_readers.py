@@ -8,13 +8,10 @@ import msgspec
 import zenoh
 
 from schemas import keys
-from schemas.blocks import Block, PerformBlock
 from schemas.faults import EngageError
-from schemas.fragments import PerformFragment
-from schemas.messages import Message, decode
+from schemas.messages import Message
 from schemas.presence import PeerAlive, PeerGone
-from schemas.xml_codec import decode_xml
-from services.bus import Bus, Received, Subscription
+from services.bus import Bus, Received, Subscription, read_payload
 from services.zenoh_order import Envelope, Follower, Ledger, Missing, Past, Pulse, Written
 from services.zenoh_peers import Peers, finish
 from services.zenoh_session import Doorway
@@ -133,7 +130,7 @@ class Readers:
     def _decode(self, bus: Bus, written: Written) -> Message | None:
         """The message; None for a bad one, which is counted and complained about."""
         try:
-            return _decode(written)
+            return read_payload(written.payload, written.encoding, written.key, written.envelope.source)
         except EngageError as error:
             self.refused += 1
             if not keys.matches(keys.ANY_FAULT, written.key):
@@ -216,14 +213,3 @@ class Readers:
         key = keys.alive(message.participant)
         if reader.subscription.wants(key):
             reader.subscription.offer(Received(key, message, message.participant, self._loop.time()))
-
-
-def _decode(written: Written) -> Message:
-    if written.encoding.partition(";")[0] not in ("application/xml", "text/xml"):
-        return decode(written.payload, written.encoding)
-    # BML and EBML as other programs write them: the request is known by the id of what it holds.
-    thing = decode_xml(written.payload, written.key)
-    requester = written.envelope.source
-    if isinstance(thing, Block):
-        return PerformBlock(id=thing.id, requester=requester, block=thing)
-    return PerformFragment(id=thing.id, requester=requester, fragment=thing)

@@ -41,19 +41,22 @@ STREAM_QOS: dict[str, Any] = {
 
 def open_session(
     robot: str, connect: Sequence[str], listen: Sequence[str], rendezvous: str | None, mode: str = "peer"
-) -> zenoh.Session:
-    """A session in the robot's namespace. Blocks for some milliseconds; an endpoint where nobody is costs nothing.
+) -> tuple[zenoh.Session, bool]:
+    """A session in the robot's namespace, and whether it calls others. Blocks for some milliseconds.
 
-    rendezvous None: only the endpoints given. Raises RunFailed when an endpoint is wrong or taken.
+    An endpoint where nobody is costs nothing. rendezvous None: only the endpoints given. Raises RunFailed when one
+    is wrong or taken.
     """
     if rendezvous is not None:
         try:
-            return zenoh.open(_config(robot, connect, (*listen, LOOPBACK, rendezvous), mode))
+            session = zenoh.open(_config(robot, connect, (*listen, LOOPBACK, rendezvous), mode))
+            return session, bool(connect)
         except zenoh.ZError:
             # Somebody listens there already. Never both listen and connect: the holder would call itself for ever.
             connect = (*connect, rendezvous)
     try:
-        return zenoh.open(_config(robot, connect, tuple(listen) or (LOOPBACK,), mode))
+        session = zenoh.open(_config(robot, connect, tuple(listen) or (LOOPBACK,), mode))
+        return session, bool(connect)
     except zenoh.ZError as error:
         where = ", ".join((*listen, *connect))
         raise RunFailed(Fault(reason=f"cannot open the bus: {error}", where=where, advice="tcp/HOST:PORT")) from error

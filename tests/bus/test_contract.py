@@ -121,11 +121,11 @@ async def test_what_is_published_while_somebody_joins_comes_once_and_in_order(pl
 
 async def test_latest_keeps_only_the_newest_of_each_key(place: Place):
     there, here = (await place.process()).join("there"), (await place.process()).join("here")
-    latest = here.subscribe("engage/v1/state/**", keep=Keep.LATEST)
-    every = here.subscribe("engage/v1/state/**")
+    latest = here.subscribe(keys.FEEDBACK, keys.SYNC_POINT, keep=Keep.LATEST)
+    every = here.subscribe(keys.FEEDBACK, keys.SYNC_POINT)
 
     for number in range(10):
-        there.publish(keys.WORLD if number % 2 else keys.HEAD_OWNER, state(number))
+        there.publish(keys.SYNC_POINT if number % 2 else keys.FEEDBACK, state(number))
     await take(every, 10)
 
     assert numbers(await messages(latest, 2)) == [8, 9]

@@ -5,6 +5,7 @@ import asyncio
 import pytest
 
 from schemas import keys
+from schemas.blocks import PerformBlock
 from schemas.faults import Fault, InputRefused, NoReply
 from schemas.messages import encode, encode_json, encoding_of
 from schemas.requests import Accepted, Cancel
@@ -68,6 +69,8 @@ async def test_a_server_that_has_left_answers_no_more(place: Place):
         (encode(Accepted(id="x")), "application/msgpack;engage.Accepted/2"),
         (encode(Accepted(id="x")), "image/png"),
         (b"", "zenoh/bytes"),
+        (b"<bml><speech", "application/xml"),
+        (b"<html/>", "text/xml"),
     ],
 )
 async def test_a_bad_payload_is_answered_with_a_fault_and_harms_nobody(place: Place, payload: bytes, encoding: str):
@@ -95,3 +98,18 @@ async def test_other_programs_may_speak_json_without_saying_who_they_are(place: 
     [received] = await take(inbox)
     assert received.message == Cancel(id="a", requester="me")
     assert received.source == ""
+
+
+@pytest.mark.parametrize("encoding", ["application/xml", "text/xml;engage.PerformBlock/1"])
+async def test_other_programs_may_send_bml_as_it_is(place: Place, encoding: str):
+    here = (await place.process()).join("here")
+    await place.process()
+    inbox = here.subscribe(keys.commands("realizer"))
+    bml = b'<bml id="b1"><speech id="s1"><text>Hello.</text></speech></bml>'
+
+    await place.inject(keys.BLOCK, bml, encoding)
+
+    [request] = await messages(inbox)
+    assert isinstance(request, PerformBlock)
+    assert (request.id, request.block.id, request.requester) == ("b1", "b1", "")
+    assert [behavior.id for behavior in request.block.behaviors] == ["s1"]

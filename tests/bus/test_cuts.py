@@ -1,0 +1,159 @@
+"""A link that is cut and comes back, through a proxy between two processes' sessions."""
+
+import asyncio
+import contextlib
+import os
+from collections.abc import AsyncIterator
+
+import pytest
+import pytest_asyncio
+
+from schemas import keys
+from schemas.blocks import Block, BlockOutcome, PerformBlock
+from schemas.presence import PeerAlive, PeerGone
+from services.requests import RequestDesk, Requester
+from services.zenoh_bus import ZenohHub, open_hub
+from tests.bus.places import PATIENCE, acquainted, free_endpoint, messages, numbers, state
+
+pytestmark = pytest.mark.real_time
+
+
+class Cable:
+    """A TCP proxy that can be cut: connections break, new ones are refused, until it is joined."""
+
+    def __init__(self, end: str) -> None:
+        self.endpoint = free_endpoint()
+        self._end = end.removeprefix("tcp/").split(":")
+        self._writers: set[asyncio.StreamWriter] = set()
+        self._pumps: set[asyncio.Task[None]] = set()
+        self._server: asyncio.Server | None = None
+
+    async def join(self) -> None:
+        host, port = self.endpoint.removeprefix("tcp/").split(":")
+        self._server = await asyncio.start_server(self._connect, host, int(port))
+
+    async def _connect(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        far_reader, far_writer = await asyncio.open_connection(*self._end)
+        self._writers |= {writer, far_writer}
+        for source, sink in ((reader, far_writer), (far_reader, writer)):
+            self._pumps.add(asyncio.create_task(self._pump(source, sink), name="pump"))
+
+    async def _pump(self, source: asyncio.StreamReader, sink: asyncio.StreamWriter) -> None:
+        with contextlib.suppress(OSError):
+            while data := await source.read(65536):
+                sink.write(data)
+                await sink.drain()
+        sink.close()
+
+    async def cut(self) -> None:
+        assert self._server is not None
+        self._server.close()
+        for writer in self._writers:
+            writer.transport.abort()
+        for pump in self._pumps:
+            pump.cancel()
+        await asyncio.gather(*self._pumps, return_exceptions=True)
+        self._writers, self._pumps = set(), set()
+
+
+@pytest_asyncio.fixture
+async def apart() -> AsyncIterator[tuple[ZenohHub, ZenohHub, Cable]]:
+    """Two processes that know each other only through the cable."""
+    robot, end = f"cut-{os.getpid()}", free_endpoint()
+    cable = Cable(end)
+    await cable.join()
+    here = await open_hub(robot, listen=[end])
+    there = await open_hub(robot, connect=[cable.endpoint])
+    await acquainted(here, there)
+    yield here, there, cable
+    await there.close()
+    await here.close()
+    await cable.cut()
+
+
+async def test_what_is_published_during_a_cut_arrives_in_order_and_once(apart: tuple[ZenohHub, ZenohHub, Cable]):
+    hub, far_hub, cable = apart
+    here, there = hub.join("here"), far_hub.join("there")
+    ways = [keys.FEEDBACK, keys.BLOCK, keys.request_state("there")]
+    inbox = here.subscribe(*ways)
+    for number in range(-3, 0):
+        there.publish(ways[number], state(number))
+    await messages(inbox, 3)
+
+    await cable.cut()
+    for number in range(200):
+        there.publish(ways[number % 3], state(number))
+    await cable.join()
+    there.publish(keys.BLOCK, state(200))
+
+    assert numbers(await messages(inbox, 201)) == list(range(201))
+    assert hub.health.lost == 0
+
+
+async def test_a_cut_shows_as_gone_and_back_in_the_same_life(apart: tuple[ZenohHub, ZenohHub, Cable]):
+    hub, far_hub, cable = apart
+    far_hub.join("there").declare_alive()
+    inbox = hub.join("here").subscribe(keys.ANY_ALIVE)
+    [first] = await messages(inbox)
+
+    await cable.cut()
+    [gone] = await messages(inbox)
+    await cable.join()
+    [back] = await messages(inbox)
+
+    assert gone == PeerGone(participant="there")
+    assert isinstance(back, PeerAlive)
+    assert back == first
+
+
+async def test_a_cut_shorter_than_the_grace_neither_loses_nor_doubles_an_outcome(
+    apart: tuple[ZenohHub, ZenohHub, Cable],
+):
+    hub, far_hub, cable = apart
+    server, client = hub.join("realizer"), far_hub.join("client")
+    taken: list[str] = []
+    desk = RequestDesk(server, "realizer", lambda cancel: taken.append("cancel"))
+    inbox = server.subscribe(*RequestDesk.patterns("realizer"))
+    states = client.subscribe(keys.ANY_REQUEST_STATE)
+    server.declare_alive()
+    client.declare_alive()
+
+    async def serve() -> None:
+        async for received in inbox:
+            match desk.take(received):
+                case PerformBlock(id=id):
+                    taken.append(id)
+                    desk.accept(id)
+
+    serving = asyncio.create_task(serve(), name="serve")
+    async with Requester(client) as requests:
+        pending = requests.send(keys.BLOCK, PerformBlock(id="b", requester="client", block=Block(id="b")))
+        await asyncio.wait_for(pending.accepted, PATIENCE)
+        await cable.cut()
+        desk.end(BlockOutcome(id="b", block="b", status="done"))
+        with server.subscribe(keys.WORLD) as never:
+            await never.next(server.now() + 0.5)
+        await cable.join()
+
+        outcome = await asyncio.wait_for(pending.outcome, PATIENCE)
+
+    assert outcome == BlockOutcome(id="b", block="b", status="done")
+    assert taken == ["b"]
+    assert [message for message in await messages(states, 2) if isinstance(message, BlockOutcome)] == [outcome]
+    inbox.close()
+    await serving
+
+
+async def test_an_endpoint_where_nobody_listens_yet_is_tried_until_somebody_does():
+    robot, end = f"early-{os.getpid()}", free_endpoint()
+    early = await open_hub(robot, connect=[end])
+    with early.join("early").subscribe(keys.ANY_ALIVE) as inbox:
+        assert await inbox.next(asyncio.get_running_loop().time() + 1.0) is None
+        late = await open_hub(robot, listen=[end])
+        late.join("late").declare_alive()
+
+        [came] = await messages(inbox)
+
+    assert isinstance(came, PeerAlive)
+    await late.close()
+    await early.close()
