@@ -27,7 +27,7 @@ from services.zenoh_session import QOS, RENDEZVOUS, STREAM_QOS, Doorway, Traffic
 FIRST_PULSE: Seconds = 0.25
 NEXT_PULSE: Seconds = 1.0
 OPENING: Seconds = 0.5
-"""How long `open_hub` waits for the first link: what is said by who leaves before anybody knows him is lost."""
+"""How long `open_hub` waits for the first acquaintance: who leaves before anybody knows him is heard by nobody."""
 
 
 async def open_hub(

@@ -68,21 +68,9 @@ class Peers:
     # on_process: it has come, or come back. on_participant: come or, with False, gone.
 
     async def settle(self, deadline: Seconds) -> None:
-        """Wait for the first link, and then until all who can be seen through it are known."""
-        linked: asyncio.Future[None] = self._loop.create_future()
-        timer = self._loop.call_at(deadline, _resolve, linked)
-        listener = self._session.info.declare_transport_events_listener(
-            self._doorway.entrance(lambda event: _resolve(linked)), history=True
-        )
-        await linked
-        timer.cancel()
-        listener.undeclare()  # type: ignore[no-untyped-call]
-        left = deadline - self._loop.time()
-        if left > 0:
-            seen: asyncio.Future[None] = self._loop.create_future()
-            handler = self._doorway.entrance(lambda reply: None, lambda _: _resolve(seen))
-            self._session.liveliness().get(keys.ANY_TOKEN, handler, timeout=left)
-            await seen
+        """Wait until the first other process is known."""
+        while not self.processes and await self.change(deadline):
+            pass
 
     def close(self) -> None:
         for declared in reversed(self._declared):
