@@ -3,14 +3,14 @@
 import asyncio
 import sys
 from collections.abc import AsyncIterator, Sequence
-from contextlib import asynccontextmanager
+from contextlib import asynccontextmanager, suppress
 from pathlib import Path
 from typing import NamedTuple
 
 from rich.console import Console
 
 from schemas.blocks import Block, BlockOutcome
-from schemas.faults import EngageError, Fault, InputRefused
+from schemas.faults import EngageError, Fault, InputRefused, NoReply
 from schemas.feedback import BlockProgress, SyncPointProgress, WarningFeedback
 from schemas.fragments import FragmentOutcome, TurnFragment
 from schemas.messages import Message
@@ -19,12 +19,12 @@ from schemas.units import Seconds
 from schemas.world import World
 from services.bus import Hub
 from services.client import Robot, connect
-from services.commandline import roster
+from services.commandline import checking, roster
 from services.commandline.errors import readable
 from services.commandline.outputs import Outputs
 from services.commandline.process import DONE, FAILED, REFUSED, run
 from services.commandline.run import Where, unique
-from services.commandline.sources import Source, Thing, read_source, read_world, still
+from services.commandline.sources import Source, Thing, read_world, still
 from services.config import Config
 from services.console.follow import Sink, following
 from services.console.live import Log
@@ -77,6 +77,10 @@ class Job(NamedTuple):
     outputs: Outputs
     console: Console
 
+    @property
+    def has_fragments(self) -> bool:
+        return any(isinstance(thing, TurnFragment) for source in self.sources for thing in source.things)
+
 
 def main(options: Options) -> int:
     for given, option in ((options.world, "--world"), (options.virtual_time, "--virtual-time")):
@@ -85,10 +89,9 @@ def main(options: Options) -> int:
     config = options.where.load()
     times = submission_times(options.at, len(options.files))
     with Outputs(options.events, options.feedback) as outputs:
-        sources = _read(options.files, outputs)
         world = read_world(options.world)
-        if options.embedded:
-            _check(sources, world, config, outputs)
+        sources = checking.read_all(options.files, outputs)
+        checking.check(sources, world if options.embedded else None, config.robot, outputs)
         played = Played(sources)
         outputs.wanted = played.concerns
         console = Console(stderr=outputs.own_stdout, quiet=options.quiet)
@@ -114,47 +117,6 @@ def submission_times(text: str | None, files: int) -> tuple[Seconds, ...] | None
     return times
 
 
-def _read(files: tuple[Path, ...], outputs: Outputs) -> tuple[Source, ...]:
-    """All files, or InputRefused for the first bad one, with its warning among the feedback."""
-    sources = []
-    for path in files:
-        try:
-            sources.append(read_source(path))
-        except InputRefused as error:
-            _warn(outputs, _block_of(error.fault, path), error.fault)
-            raise
-    return tuple(sources)
-
-
-def _block_of(fault: Fault, path: Path) -> str | None:
-    """Whose fault it is, as far as the place says: `file: block-1: gaze-1`, with a line, else unknown."""
-    place = fault.where.removeprefix(str(path)).removeprefix(": ")
-    return place.partition(": ")[0] if fault.line and place else None
-
-
-def _warn(outputs: Outputs, block: str | None, fault: Fault) -> None:
-    """Bad input never reaches the realizer; its feedback is the same all the same."""
-    outputs(WarningFeedback(block=block, kind="PARSING_FAILURE", message=readable(fault)), 0.0)
-
-
-def _check(sources: Sequence[Source], world: World, config: Config, outputs: Outputs) -> None:
-    """What a known world tells, and contradictions, before anything moves. Raises InputRefused."""
-    from services.generation.fragment_check import checked
-    from services.realizer.planner import plan_block
-
-    for source in sources:
-        for thing in source.things:
-            try:
-                with source.blamed():
-                    if isinstance(thing, TurnFragment):
-                        checked(thing, world, config.robot)
-                    else:
-                        plan_block(thing)
-            except InputRefused as error:
-                _warn(outputs, thing.id, error.fault)
-                raise
-
-
 @asynccontextmanager
 async def _private(job: Job, config: Config, world: World) -> AsyncIterator[Hub]:
     """A system of our own: simulated body, still world; the policies only if a fragment needs them.
@@ -162,7 +124,7 @@ async def _private(job: Job, config: Config, world: World) -> AsyncIterator[Hub]
     Without a fragment nobody but the blocks themselves moves the head.
     """
     names = ["realizer", "recognition", "control"]
-    if any(isinstance(thing, TurnFragment) for source in job.sources for thing in source.things):
+    if job.has_fragments:
         names.append("generation")
     services: dict[str, Service] = {name: roster.service(name, config) for name in names}
     async with MemoryHub(config.robot) as hub, running(hub, {"simulation": still(world), **services}):
@@ -176,6 +138,11 @@ async def _embedded(job: Job, config: Config, world: World) -> int:
 
 async def _remote(job: Job, config: Config, where: Where) -> int:
     async with await where.open(config.robot) as hub:
+        if job.has_fragments:
+            async with connect(hub=hub) as robot:
+                # Without perception generation waits or refuses by itself.
+                with suppress(NoReply):
+                    checking.check(job.sources, await robot.world(PATIENCE), config.robot, job.outputs)
         return await _perform_all(job, hub, PATIENCE)
 
 

@@ -139,3 +139,26 @@ def test_a_world_of_ones_own(engage: Engage, tmp_path: Path) -> None:
 
     assert result.code == 0, result.err
     assert "stroke" in points(result.out, "g")
+
+
+def test_a_block_may_wait_for_a_point_of_another_file(engage: Engage, files: dict[str, Path], tmp_path: Path) -> None:
+    path = tmp_path / "after.xml"
+    path.write_text('<bml id="after"><gaze id="g" target="trapezoid" start="long:s:end"/></bml>')
+
+    result = engage(*PLAY, "--at", "0,0.5", "--feedback", "-", files["long"], path)
+
+    (said,) = lines(result.out, block="long", behavior="s", sync="end")
+    (looked,) = lines(result.out, block="after", behavior="g", sync="start")
+    assert result.code == 0, result.err
+    assert looked["global_time"] == pytest.approx(said["global_time"])
+
+
+def test_a_point_of_a_block_that_is_not_there_is_refused(engage: Engage, tmp_path: Path) -> None:
+    path = tmp_path / "after.xml"
+    path.write_text('<bml id="after">\n<gaze id="g" target="trapezoid" start="long:s:end"/>\n</bml>')
+
+    result = engage(*PLAY, path)
+
+    assert result.code == 2
+    assert result.err.startswith(f"{path}:2: ")
+    assert "long:s:end" in result.err

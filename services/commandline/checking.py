@@ -1,0 +1,71 @@
+"""Is everything that is to be played good? Known before any of it moves, and told as the realizer would tell it."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from schemas.blocks import Block
+from schemas.faults import Fault, InputRefused
+from schemas.feedback import WarningFeedback, WarningKind
+from schemas.references import sites
+from schemas.syncref import SyncRef
+from schemas.world import World
+from services.commandline.errors import readable
+from services.commandline.outputs import Outputs
+from services.commandline.sources import Source, read_source
+
+
+def read_all(files: Sequence[Path], outputs: Outputs) -> tuple[Source, ...]:
+    """All files. Raises InputRefused for the first bad one, its warning among the feedback."""
+    sources = []
+    for path in files:
+        try:
+            sources.append(read_source(path))
+        except InputRefused as error:
+            _warn(outputs, _block_of(error.fault, path), error.fault)
+            raise
+    return tuple(sources)
+
+
+def check(sources: Sequence[Source], world: World | None, robot: str, outputs: Outputs) -> None:
+    """Contradictions in blocks; in fragments what the world does not know, if it is known. Raises InputRefused."""
+    from services.generation.fragment_check import checked
+    from services.realizer.planner import plan_block
+    from services.realizer.points import Point
+    from services.realizer.relations import BlockRefused
+
+    for source in sources:
+        for thing in source.things:
+            try:
+                with source.blamed():
+                    if isinstance(thing, Block):
+                        # Whether other blocks will be alive when this one comes is for the realizer to say.
+                        plan_block(
+                            thing, elsewhere=[Point(f"{block}:{id}", sync) for block, id, sync in _foreign(thing)]
+                        )
+                    elif world is not None:
+                        checked(thing, world, robot)
+            except InputRefused as error:
+                refusal = error.__cause__
+                kind = refusal.kind if isinstance(refusal, BlockRefused) else "PARSING_FAILURE"
+                _warn(outputs, thing.id, error.fault, kind)
+                raise
+
+
+def _foreign(block: Block) -> list[tuple[str, str, str]]:
+    """Block, behavior and sync point of each reference to another block."""
+    references = [SyncRef.parse(site.text) for site in sites(block)]
+    return [
+        (reference.block, reference.behavior or "bml", reference.sync or "start")
+        for reference in references
+        if reference.block not in ("", block.id)
+    ]
+
+
+def _block_of(fault: Fault, path: Path) -> str | None:
+    """Whose fault it is, as far as the place says: `file: block-1: gaze-1`, with a line, else unknown."""
+    place = fault.where.removeprefix(str(path)).removeprefix(": ")
+    return place.partition(": ")[0] if fault.line and place else None
+
+
+def _warn(outputs: Outputs, block: str | None, fault: Fault, kind: WarningKind = "PARSING_FAILURE") -> None:
+    outputs(WarningFeedback(block=block, kind=kind, message=readable(fault)), 0.0)
