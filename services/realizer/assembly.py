@@ -129,7 +129,7 @@ class Assembler:
         for id, syncs in groups.items():
             if chain := self.chains.get(id):
                 type = type_of(chain.behavior)
-                kind, sync = gate(type, frozenset(syncs)), gate_point(type, tuple(syncs))
+                kind, sync = gate(type, tuple(syncs)), gate_point(type, tuple(syncs))
                 members.append(Member(id, kind, Point(id, sync)))
             elif id:
                 members.append(Member(id, "passive", Point(id, syncs[0])))

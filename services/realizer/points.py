@@ -100,18 +100,20 @@ def one_instant(type: str) -> tuple[tuple[str, ...], ...]:
     return _ONE_INSTANT.get(type, _LASTING_INSTANT if type in ON_TARGET else ())
 
 
-def gate(type: str, syncs: frozenset[str]) -> Gate:
-    """How a behavior can wait at the instant that holds its points `syncs`."""
-    if "start" in syncs:
+def gate(type: str, syncs: tuple[str, ...]) -> Gate:
+    """How a behavior can wait at the instant that holds its points `syncs`, in order.
+
+    Where it comes to the first of them it must wait for all: holding at a later one would let the first pass alone.
+    """
+    if syncs[0] == "start":
         return "start"
-    return "hold" if syncs & hold_points(type) else "passive"
+    return "hold" if gate_point(type, syncs) in hold_points(type) else "passive"
 
 
 def gate_point(type: str, syncs: tuple[str, ...]) -> str:
     """Of its points in one instant (in order), the one whose report says that the behavior is there."""
-    if syncs[0] == "start":
-        return "start"
-    return next((sync for sync in syncs if sync in hold_points(type)), syncs[0])
+    first = next((group for group in one_instant(type) if syncs[0] in group), syncs[:1])
+    return next((sync for sync in syncs if sync in first and sync in hold_points(type)), syncs[0])
 
 
 def segments(behavior: Behavior, estimate: Estimate | None) -> tuple[Segment, ...]:

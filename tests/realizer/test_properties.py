@@ -6,7 +6,7 @@ The oracle knows neither nets nor classes: it relaxes inequalities between singl
 import asyncio
 from itertools import pairwise
 
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from msgspec import Struct
 
@@ -148,8 +148,24 @@ def test_an_exact_body_keeps_every_constraint_of_any_block(block: Block) -> None
         assert seen.warnings == []
 
 
+TARGET_AND_AWAY_AT_ONCE = Block(
+    id="b",
+    behaviors=(Speech(id="s2", text="three"), Gaze(id="g", target="a")),
+    constraints=(
+        Constraint(
+            operators=(
+                Synchronize(ref="s2:start", syncs=("g:stroke-1",)),
+                Synchronize(ref="g:stroke-1", syncs=("g:stroke_end-1",)),
+            )
+        ),
+    ),
+)
+"""The gaze may not stay on target, so it cannot wait there: it has to start late enough."""
+
+
 @settings(max_examples=30, deadline=None)
 @given(blocks())
+@example(TARGET_AND_AWAY_AT_ONCE)
 def test_an_exact_body_keeps_the_predicted_schedule(block: Block) -> None:
     plan = planned(block)
     if plan is None or plan.loose or plan.dropped:
