@@ -1,0 +1,51 @@
+import asyncio
+
+import pytest
+
+from schemas import keys
+from schemas.presence import PeerAlive, PeerGone
+from services.bus import Bus
+from services.memory_bus import MemoryHub
+from services.runtime import Ready, running
+
+
+async def stand_late(bus: Bus, ready: Ready) -> None:
+    await asyncio.sleep(2.0)
+    ready()
+    await asyncio.Event().wait()
+
+
+async def test_the_body_runs_when_all_services_stand_and_its_end_stops_them(hub: MemoryHub):
+    inbox = hub.join("watch").subscribe(keys.ANY_ALIVE)
+
+    async with running(hub, {"one": stand_late, "other": stand_late}):
+        stood_at = asyncio.get_running_loop().time()
+
+    seen = [received.message for received in [await inbox.next() for _ in range(4)] if received]
+    assert stood_at == 2.0
+    assert [type(message) for message in seen] == [PeerAlive, PeerAlive, PeerGone, PeerGone]
+    assert sorted(message.participant for message in seen[2:]) == ["one", "other"]  # type: ignore[union-attr]
+
+
+async def test_a_bug_in_a_service_ends_all_of_them_loudly(hub: MemoryHub):
+    async def stumble(bus: Bus, ready: Ready) -> None:
+        ready()
+        await asyncio.sleep(1.0)
+        raise ZeroDivisionError
+
+    with pytest.raises(ExceptionGroup) as failed:
+        async with running(hub, {"one": stand_late, "clumsy": stumble}):
+            await asyncio.Event().wait()
+
+    assert failed.group_contains(ZeroDivisionError)
+
+
+async def test_a_service_that_ends_before_it_stands_is_a_failure_and_not_a_wait_for_ever(hub: MemoryHub):
+    async def give_up(bus: Bus, ready: Ready) -> None:
+        await asyncio.sleep(1.0)
+
+    with pytest.raises(ExceptionGroup) as failed:
+        async with running(hub, {"quitter": give_up}):
+            raise AssertionError("it never stood")
+
+    assert failed.group_contains(RuntimeError, match="quitter ended before it stood")
