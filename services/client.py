@@ -309,6 +309,8 @@ def _fragment(source: FragmentSource) -> TurnFragment:
                 raise InputRefused(Fault(reason=error.strerror or str(error), where=str(source))) from error
         case str():
             data, place = source.encode(), ""
+        case bytes():
+            data, place = source, ""
     things = read(data, place)
     match things:
         case (TurnFragment() as fragment,):

@@ -66,14 +66,20 @@ async def test_perform_returns_the_outcome(hub: MemoryHub) -> None:
     ],
     ids=["xml", "json"],
 )
-async def test_a_fragment_may_be_xml_or_json(hub: MemoryHub, source: str) -> None:
+async def test_a_fragment_may_be_xml_or_json_in_text_bytes_or_a_file(
+    hub: MemoryHub, source: str, tmp_path: Path
+) -> None:
+    file = tmp_path / "hello"
+    file.write_text(source)
     seen: list[object] = []
     async with running(hub, {"generation": partial(server, seen=seen)}), connect(hub=hub) as robot:
-        await robot.perform(source)
+        for form in (source, source.encode(), file):
+            await robot.perform(form)
 
-    (fragment,) = seen
-    assert isinstance(fragment, TurnFragment)
-    assert [(type(it), it.id) for it in fragment.behaviors] == [(Speech, "speech-1")]
+    for fragment in seen:
+        assert isinstance(fragment, TurnFragment)
+        assert [(type(it), it.id) for it in fragment.behaviors] == [(Speech, "speech-1")]
+    assert len(seen) == 3
 
 
 async def test_the_client_may_come_before_the_robot(hub: MemoryHub) -> None:
