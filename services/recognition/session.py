@@ -345,14 +345,13 @@ class Session:
                 for person in self._addressees(signal):
                     if person.pair.is_turn(signal.turn):
                         person.turn_ends(at)
-            case "answered":
+            case "answered" | "repaired":
                 for person in self._addressees(signal):
-                    person.pair.robot_begins("speak", at)
+                    if signal.signal == "repaired":
+                        person.pair.repaired(at)
+                    person.pair.robot_begins("speak", at)  # either turn answers a person who waits
                     if request.block and self.blocks.ended(request.block) is None:
                         self._answering_blocks[request.block] = person
-            case "repaired":
-                for person in self._addressees(signal):
-                    person.pair.repaired(at)
             case "aborted":
                 for person in self._addressees(signal):
                     person.abort(at, turn=signal.turn)

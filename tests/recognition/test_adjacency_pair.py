@@ -211,11 +211,12 @@ def test_robot_answers_with_a_gesture(action):
     assert log.states("ap-1") == ["started", "succeeded", "completed"]
 
 
-def test_an_answering_fragment_is_the_answer():
+@pytest.mark.parametrize("signal", ["answered", "repaired"])
+def test_a_fragment_that_is_a_second_or_third_turn_answers_whoever_waits(signal):
     log = Log()
     log.begins(HUMAN, "speak", 1.0)
     log.ends(HUMAN, "speak", 2.0)
-    log.signals("answered", 2.3, block="block-1")
+    log.signals(signal, 2.3, block="block-1")
     log.block_ends(2.9)
 
     assert log.told() == [("ap-1", "started", 1.0), ("ap-1", "succeeded", 2.3), ("ap-1", "completed", 2.9)]
