@@ -15,7 +15,7 @@ from schemas.world import Entity, World
 
 
 def checked(fragment: TurnFragment, world: World, robot: str) -> TurnFragment:
-    """The fragment with its addressee filled in and marks that look like offsets made explicit.
+    """The fragment with its addressee filled in, as far as it says, and marks that look like offsets made explicit.
 
     robot: its actor id, which may be a target too. Raises InputRefused with JSON path and XML line of the first
     thing that is wrong, by itself or with regard to the world.
@@ -34,7 +34,10 @@ def checked(fragment: TurnFragment, world: World, robot: str) -> TurnFragment:
 
 
 def addressee(fragment: TurnFragment, world: World) -> str:
-    """Who is spoken to: the one named, else the only person there is. Raises InputRefused."""
+    """Who is spoken to: the one named, else the only person there is. Raises InputRefused.
+
+    Empty for the rest of a turn that names nobody: whom the turn speaks to is said already.
+    """
     people = [person.id for person in world.people]
     if fragment.addressee:
         if fragment.addressee not in people:
@@ -42,6 +45,8 @@ def addressee(fragment: TurnFragment, world: World) -> str:
             reason = f"the world does not know the person {fragment.addressee!r}"
             raise _refused(fragment, "$.addressee", reason, 0, advice)
         return fragment.addressee
+    if fragment.turn_status in ("middle", "end"):
+        return ""
     if len(people) != 1:
         reason = f"no addressee, and the world knows {len(people) or 'no'} people"
         advice = f"name one of {', '.join(people)}" if people else "the world needs a person to speak to"

@@ -280,7 +280,7 @@ class _Generation:
     async def _perform(self, performance: Performance) -> None:
         fragment = performance.fragment
         self._arbiter.stop_thinking()
-        self._arbiter.speak_to(fragment.addressee)
+        self._arbiter.speak_to(performance.turn.addressee)
         try:
             motions = await self._ask_body(targets(fragment))
             if performance.is_over:  # cancelled meanwhile

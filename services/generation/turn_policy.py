@@ -95,21 +95,30 @@ class TurnPolicy:
         return self._open is not None or any(not plan.backchannel for plan in self._live.values())
 
     def accept(self, fragment: TurnFragment, addressee: str) -> TurnPlan:
-        """Take a fragment into the conversation. Raises InputRefused, and changes nothing, where it is illegal."""
+        """Take a fragment into the conversation. Raises InputRefused, and changes nothing, where it is illegal.
+
+        addressee: may be empty for the rest of a turn.
+        """
         status = fragment.turn_status
         if fragment.id in self._live:
-            raise _illegal(fragment, "a fragment with this id is being performed", "give every fragment its own id")
+            reason = "a fragment with this id is being performed"
+            raise _illegal(fragment, "id", reason, "give every fragment its own id")
         if status in ("middle", "end"):
             if self._open is None:
-                raise _illegal(fragment, f"{status!r} with no turn open", "begin a turn with 'beginning' or 'full'")
+                advice = "begin a turn with 'beginning' or 'full'"
+                raise _illegal(fragment, "turn_status", f"{status!r} with no turn open", advice)
             turn = self._open.turn
+            addressee = addressee or self._open.addressee
             if addressee != self._open.addressee:
-                raise _illegal(fragment, f"turn {turn} speaks to {self._open.addressee}, not to {addressee}", "")
+                reason = f"turn {turn} speaks to {self._open.addressee}, not to {addressee}"
+                raise _illegal(fragment, "addressee", reason, "end the turn first")
         else:
             if status == "backchannel" and self.holds_the_turn:
-                raise _illegal(fragment, "'backchannel' while the robot holds the turn", "end the turn first")
+                reason = "'backchannel' while the robot holds the turn"
+                raise _illegal(fragment, "turn_status", reason, "end the turn first")
             if self._open is not None:
-                raise _illegal(fragment, f"{status!r} while turn {self._open.turn} is open", "send its 'end' first")
+                reason = f"{status!r} while turn {self._open.turn} is open"
+                raise _illegal(fragment, "turn_status", reason, "send its 'end' first")
             turn = fragment.id
         plan = plan_turn(fragment, turn, addressee)
         self._live[fragment.id] = plan
@@ -178,5 +187,5 @@ class TurnPolicy:
         return Aborted(plan.turn, plan.addressee, ended, reason)
 
 
-def _illegal(fragment: TurnFragment, reason: str, advice: str) -> InputRefused:
-    return InputRefused(Fault(reason=reason, where=f"{fragment.id}: turnStatus", advice=advice))
+def _illegal(fragment: TurnFragment, field: str, reason: str, advice: str) -> InputRefused:
+    return InputRefused(Fault(reason=reason, where=f"{fragment.id}: $.{field}", advice=advice))

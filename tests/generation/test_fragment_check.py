@@ -94,3 +94,12 @@ def test_the_robot_itself_and_surfaces_may_be_looked_at() -> None:
     gazes = (Gaze(id="a", target="table"), Gaze(id="b", target="robot"))
 
     assert checked(TurnFragment(id="f", behaviors=gazes), TABLE, "robot").behaviors == gazes
+
+
+def test_the_rest_of_a_turn_need_not_say_again_whom_it_speaks_to() -> None:
+    two = World(entities=(*TABLE.entities, Entity(id="ann", kind="person", position=(1.2, 0.5, 1.3))))
+
+    with pytest.raises(InputRefused, match="knows 2 people"):
+        checked(TurnFragment(id="f", turn_status="beginning"), two, "robot")
+
+    assert checked(TurnFragment(id="f", turn_status="end"), two, "robot").addressee == ""

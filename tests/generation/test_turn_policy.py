@@ -103,6 +103,21 @@ def test_a_turn_cannot_change_whom_it_speaks_to() -> None:
         turns.accept(fragment("b", "end"), "bob")
 
 
+def test_the_rest_of_a_turn_speaks_to_whom_it_began_with() -> None:
+    turns = policy()
+    turns.accept(fragment("a", "beginning"), "alice")
+
+    assert turns.accept(fragment("b", "middle"), "").addressee == "alice"
+    assert turns.accept(fragment("c", "end"), "alice").addressee == "alice"
+
+
+def test_what_is_illegal_is_named_by_its_json_path() -> None:
+    with pytest.raises(InputRefused) as refusal:
+        policy().accept(fragment("a", "middle"), "human")
+
+    assert refusal.value.fault.where == "a: $.turn_status"
+
+
 def test_a_backchannel_is_fine_once_the_turn_is_over() -> None:
     turns = policy()
     turns.accept(fragment("a", "full"), "human")
