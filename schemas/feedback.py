@@ -8,8 +8,9 @@ from schemas.units import Seconds, Stamp
 
 WarningKind = Literal[
     "PARSING_FAILURE", "NO_SUCH_TARGET", "IMPOSSIBLE_TO_SCHEDULE", "BEHAVIOR_TYPE_NOT_SUPPORTED",
-    "CANNOT_CREATE_BEHAVIOR", "EXECUTION_FAILURE", "LATE",
+    "CANNOT_CREATE_BEHAVIOR", "EXECUTION_FAILURE", "LATE", "POLICY",
 ]  # fmt: skip
+"""POLICY: generation performs a fragment otherwise than it asks, for example with a less reliable reference."""
 
 
 class BlockProgress(Struct, frozen=True, kw_only=True, tag="block_progress", omit_defaults=True):
@@ -54,7 +55,7 @@ class PredictionFeedback(Struct, frozen=True, kw_only=True, tag="prediction", om
 
 
 class WarningFeedback(Struct, frozen=True, kw_only=True, tag="warning", omit_defaults=True):
-    """evt: something was refused or dropped. behavior empty: the whole block."""
+    """evt: something was refused, dropped or done otherwise than asked. behavior empty: the whole block."""
 
     block: str | None
     kind: WarningKind

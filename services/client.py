@@ -219,8 +219,8 @@ class Robot:
         return self._feed((ConnectionEvent,), keys.CONNECTION_EVENT)
 
     def feedback(self) -> Feed[Feedback]:
-        """What the realizer tells of blocks: progress, sync points as realised, warnings."""
-        return self._feed(Feedback.__args__, keys.FEEDBACK)
+        """What is told of blocks: progress, sync points as realised, warnings."""
+        return self._feed(Feedback.__args__, keys.ANY_FEEDBACK)
 
     def actions(self) -> Feed[ActionBegan | ActionEnded | ActorFound | ActorLost]:
         """What the robot and the people are seen to do."""

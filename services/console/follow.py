@@ -12,7 +12,7 @@ from services.bus import Bus, Received
 Sink = Callable[[Message, Seconds], None]
 FOLLOWED = (
     keys.FRAGMENT,
-    keys.FEEDBACK,
+    keys.ANY_FEEDBACK,
     keys.SYNC_POINT,
     keys.ANY_ACTION,
     keys.CONNECTION_EVENT,

@@ -19,7 +19,7 @@ from schemas.body import (
     RobotState,
 )
 from schemas.faults import EngageError, Fault, InputRefused, NoReply, RunFailed
-from schemas.feedback import SyncPointProgress
+from schemas.feedback import SyncPointProgress, WarningFeedback
 from schemas.fragments import PerformFragment
 from schemas.messages import Message
 from schemas.presence import PeerGone
@@ -309,9 +309,9 @@ class _Generation:
 
     async def _perform_block(self, performance: Performance) -> BlockOutcome:
         assert performance.plan is not None
-        for warning in performance.plan.warnings:
-            fault = Fault(reason=warning, where=performance.fragment.id, service=NAME)
-            self._bus.publish(keys.fault(NAME), fault)
+        for message in performance.plan.warnings:
+            warning = WarningFeedback(block=performance.fragment.id, kind="POLICY", message=message)
+            self._bus.publish(keys.FRAGMENT_FEEDBACK, warning)
         request = PerformBlock(id=performance.block_id, requester=self._bus.name, block=performance.plan.block)
         pending = self._requests.send(keys.BLOCK, request)
         await pending.accepted

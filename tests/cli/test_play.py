@@ -72,6 +72,17 @@ def test_a_fragment_starts_its_connection_events(engage: Engage, files: dict[str
     assert kinds == ["adjacency_pair", "directed_gaze", "mutual_facial_gaze"]
 
 
+def test_a_reference_that_is_less_reliable_than_asked_is_a_warning(engage: Engage, tmp_path: Path) -> None:
+    path = tmp_path / "ask.xml"
+    path.write_text(FRAGMENT.replace("0.95", "0.99"))
+
+    result = engage(*PLAY, "--feedback", "-", path)
+
+    (warning,) = lines(result.out, type="warning")
+    assert (result.code, warning["block"], warning["kind"]) == (0, "ask", "POLICY")
+    assert "nothing reaches the minimum reliability 0.99" in warning["message"]
+
+
 def test_files_come_one_after_the_other(engage: Engage, files: dict[str, Path]) -> None:
     result = engage(*PLAY, "--feedback", "-", files["long"], files["hello"])
 

@@ -23,7 +23,7 @@ from schemas.body import (
     Ray,
 )
 from schemas.faults import Fault
-from schemas.feedback import BlockProgress, SyncPointProgress
+from schemas.feedback import BlockProgress, SyncPointProgress, WarningFeedback
 from schemas.fragments import PerformFragment, TurnFragment
 from schemas.messages import Message
 from schemas.recognition import ConnectionEvent, SignalTurn, TurnOutcome
@@ -109,13 +109,14 @@ class Partners:
         self.signals: list[SignalTurn] = []
         self.aborts: list[AbortBehavior] = []
         self.faults: list[Fault] = []
+        self.warnings: list[WarningFeedback] = []
         self.refusal: Fault | None = None
         """How the realizer answers blocks; None: it takes them."""
         self.told = asyncio.Event()
 
     async def listen(self) -> None:
         patterns = (*RequestDesk.patterns("realizer"), keys.TURN, keys.HEAD_OWNER, keys.BEHAVIOR, keys.ANY_FAULT)
-        with self.bus.subscribe(*patterns, keys.ANY_REQUEST_STATE) as inbox:
+        with self.bus.subscribe(*patterns, keys.ANY_REQUEST_STATE, keys.FRAGMENT_FEEDBACK) as inbox:
             async for received in inbox:
                 self.requests.feed(received)
                 match self.desk.take(received):
@@ -138,6 +139,8 @@ class Partners:
                             self.turns.end(TurnOutcome(id=signal.id, at=self.bus.stamp()))
                     case AbortBehavior() as abort:
                         self.aborts.append(abort)
+                    case WarningFeedback() as warning:
+                        self.warnings.append(warning)
                     case Fault() as fault:
                         self.faults.append(fault)
                 self.told.set()

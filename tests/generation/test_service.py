@@ -130,7 +130,7 @@ async def test_what_cannot_be_made_well_enough_is_warned_of_twice(hub: MemoryHub
 
         assert isinstance(outcome, FragmentOutcome)
         assert "0.99" in outcome.warnings[0]
-        assert [fault.reason for fault in partners.faults] == list(outcome.warnings)
+        assert [(it.block, it.message) for it in partners.warnings] == [("show", text) for text in outcome.warnings]
 
 
 # -- what is refused ----------------------------------------------------------------------------------------------
