@@ -4,47 +4,41 @@ Facts go in (`arrive`, `reach`), `advance(now)` says what to do about them, `dea
 
 An instant fires when all who share it are there and all it waits for has been measured. Until then those who are
 early hold; the last to come is told to pass, and never stops. What cannot hold is kept back where it last can, so
-that by prediction it comes on time; every new fact corrects the prediction.
+that by prediction it comes on time, and told to be faster or slower if that does not do; every new fact corrects
+the prediction. Only what a fact touches is looked at again.
 """
+
+import heapq
+from collections.abc import Iterable
 
 from msgspec import Struct
 
 from schemas.units import Seconds
 from services.realizer.assembly import Member
 from services.realizer.config import RealizerConfig
+from services.realizer.experience import Experience
+from services.realizer.forecast import Forecast
+from services.realizer.pacing import Pace, differs, pace
+from services.realizer.patience import Late, Patience, Stalled
 from services.realizer.planner import Plan
 from services.realizer.points import Point, performer
-from services.realizer.schedule import EPSILON, Lag, PositiveCycle, earliest
+from services.realizer.schedule import EPSILON
 
 
 class Begin(Struct, frozen=True):
-    """Start `behavior`; it may go through `through` without asking."""
+    """Start `behavior`; it may go through `through` without asking. pace: see `Pace`; empty: as is natural."""
 
     behavior: str
     through: str
+    pace: Pace = ()
 
 
 class Extend(Struct, frozen=True):
-    """`behavior` may now go through `through`."""
+    """`behavior` may now go through `through`, and is to come to its points as `pace` says."""
 
     behavior: str
     through: str
-
-
-class Late(Struct, frozen=True):
-    """`behavior` is taking much longer to `sync` than it should."""
-
-    behavior: str
-    sync: str
-    overdue: Seconds
-
-
-class Stalled(Struct, frozen=True):
-    """`behavior` has been late for `sync` so long that it must be given up."""
-
-    behavior: str
-    sync: str
-    overdue: Seconds
+    pace: Pace = ()
 
 
 Effect = Begin | Extend | Late | Stalled
@@ -59,52 +53,132 @@ class Authority:
         self.reached: dict[Point, Seconds] = {}
         self.arrived: dict[Point, Seconds] = {}
         self.begun: dict[str, Seconds] = {}
-        self.deadline: Seconds | None = None
+        self.experience = Experience(plan.estimates)
+        self.patience = Patience(config)
+        self._next: dict[str, int] = {}
+        """Of each behavior, how many of its points are reached."""
         self._through: dict[str, int] = {}
         self._granted_at: dict[str, Seconds] = {}
-        self._warned: set[str] = set()
+        self._paces: dict[str, Pace] = {}
+        self._not_before: dict[str, Seconds] = {}
+        """When a behavior that is overdue is expected at its next point."""
         self.replan(plan)
 
     def replan(self, plan: Plan) -> None:
         """Go on with another plan of the same block, from the same facts: something was dropped."""
         self.plan = plan
-        net = plan.net
-        self._waits_for: list[list[tuple[int, Seconds]]] = [[] for _ in net.transitions]
-        for place in net.places:
-            if place.kind in ("order", "delay", "series"):
-                self._waits_for[place.target].append((place.source, place.lag))
+        size = len(plan.net.transitions)
         self._points = {id: chain.points for id, chain in plan.chains.items()}
         self._member_at = {
             (member.behavior, transition): member
             for transition, members in enumerate(plan.members)
             for member in members
         }
-        self._bounds = plan.bounds
-        self._instants: dict[int, Seconds] = {0: self.began}
+        self._waits_for: list[list[tuple[int, Seconds]]] = [[] for _ in range(size)]
+        self._awaited_by: list[list[int]] = [[] for _ in range(size)]
+        for place in plan.net.places:
+            if place.kind in ("order", "delay", "series"):
+                self._waits_for[place.target].append((place.source, place.lag))
+                self._awaited_by[place.source].append(place.target)
+        self._latest: list[list[tuple[int, Seconds]]] = [[] for _ in range(size)]
+        """Of each transition, those it may not be later than: and by how many seconds."""
+        for bound in plan.net.bounds:
+            if bound.kind != "phase":
+                self._latest[bound.source].append((bound.target, -bound.lag))
+        self._unmet = [len(sources) for sources in self._waits_for]
+        self._unreached = [len(members) for members in plan.members]
+        self._instants: dict[int, Seconds] = {}
         """When each transition fired that has."""
-        self._is_predictive = _is_predictive(plan)
-        self._open = [each for each in range(len(net.transitions) - 1) if self._measured(each) is None or each == 0]
+        self._granted: set[tuple[int, str]] = set()
+        self._wakes: list[tuple[Seconds, int]] = []
+        self._arrivals: list[tuple[Seconds, Seconds, str, int]] = []
+        """Until when and since when each behavior is expected at its next point: overdue from there."""
+        self._touched: set[str] = set()
+        self._forecast = Forecast(plan, self.began, self.experience.factor) if _is_predictive(plan) else None
+        self._unended = {id for id in plan.waited_for if not self.has_ended(id)}
+        self._dirty = {each for each in range(size) if not self._unmet[each]}
+        self._fire(0, self.began)
+        for point in (*self.reached, *(self.arrived.keys() - self.reached.keys())):
+            if point in plan.at:
+                self._note(point)
+        for behavior in self.begun:
+            if behavior not in plan.chains:
+                self.patience.forget(behavior)
+            elif not self.has_ended(behavior):
+                self._await(behavior)
 
     # -- facts ---------------------------------------------------------------------------------------------------
 
     def arrive(self, point: Point, at: Seconds) -> None:
         """The behavior holds at `point`."""
-        if point in self.plan.at:
-            self.arrived.setdefault(point, at)
+        if point in self.plan.at and point not in self.arrived:
+            self._learn(point, at)
+            self.arrived[point] = at
+            self._note(point)
+            self._watch(point.behavior)
 
     def reach(self, point: Point, at: Seconds) -> tuple[Point, ...]:
         """The behavior has passed `point`: it, and earlier points whose report was lost, unless known already."""
         points = self._points.get(point.behavior, ())
         if point not in points:
-            if point in self.plan.at:
-                self.reached.setdefault(point, at)
+            if point in self.plan.at and point not in self.reached:
+                self.reached[point] = at
+                self._note(point)
             return ()
-        news = []
-        for each in points[: points.index(point) + 1]:
-            if each not in self.reached:
-                self.reached[each] = at
-                news.append(each)
-        return tuple(news)
+        known = self._next.get(point.behavior, 0)
+        news = points[known : points.index(point) + 1]
+        if len(news) == 1 and point not in self.arrived:
+            self._learn(point, at)
+        for each in news:
+            self.reached[each] = at
+            self._note(each)
+        if news:
+            self._next[point.behavior] = known + len(news)
+            if self.has_ended(point.behavior):
+                self._unended.discard(point.behavior)
+            self._watch(point.behavior)
+            self._await(point.behavior)
+        return news
+
+    def _note(self, point: Point) -> None:
+        """Count a point that is reached, or arrived at, into its instant."""
+        transition = self.plan.at[point]
+        member = self._member_at.get((point.behavior, transition))
+        at = self.reached.get(point)
+        self._dirty.add(transition)
+        if self._forecast is not None:
+            if at is None:
+                self._forecast.come(point.behavior, transition, self.arrived[point])
+            else:
+                self._forecast.passed(point.behavior, transition, at)
+        if at is not None and member is not None and member.point == point:
+            self._unreached[transition] -= 1
+            if not self._unreached[transition] and transition:
+                self._fire(transition, max(self.reached[each.point] for each in self.plan.members[transition]))
+
+    def _fire(self, transition: int, at: Seconds) -> None:
+        self._instants[transition] = at
+        for target in self._awaited_by[transition]:
+            self._unmet[target] -= 1
+            self._dirty_if_open(target)
+        if self._forecast is not None:
+            self._forecast.fix(transition, at)
+
+    def _dirty_if_open(self, transition: int) -> None:
+        if not self._unmet[transition]:
+            self._dirty.add(transition)
+
+    def _learn(self, point: Point, at: Seconds) -> None:
+        """Correct what is expected of the same parts by how long a phase took that nobody has hurried or held up."""
+        chain = self.plan.chains.get(point.behavior)
+        number = self._next.get(point.behavior, 0)
+        if chain is None or number == 0 or chain.points[number] != point or self._paces.get(point.behavior):
+            return
+        if performer(chain.behavior) == "body":
+            took = at - self.reached[chain.points[number - 1]]
+            changed = self.experience.learn(point.behavior, chain.segments[number - 1].natural, took)
+            if self._forecast is not None:
+                self._forecast.relearn(changed)
 
     def has_ended(self, behavior: str) -> bool:
         points = self._points.get(behavior)
@@ -113,193 +187,209 @@ class Authority:
     @property
     def is_over(self) -> bool:
         """Has everything ended that the block waits for?"""
-        return all(self.has_ended(behavior) for behavior in self.plan.waited_for)
+        return not self._unended
+
+    def lateness(self, point: Point) -> Seconds:
+        """How much later than its constraints allow a point was that is reached; 0 if it was not."""
+        at, transition = self.reached[point], self.plan.at[point]
+        late = (
+            at - since - seconds
+            for other, seconds in self._latest[transition]
+            if (since := self._instants.get(other)) is not None
+        )
+        return max((0.0, *late))
 
     # -- decisions -----------------------------------------------------------------------------------------------
 
     def advance(self, now: Seconds) -> list[Effect]:
         """What to do now. Extensions come before beginnings: who hands over leaves before his successor comes."""
-        self.deadline = None
-        self._open = [each for each in self._open if each == 0 or self._measured(each) is None]
-        forecast = self._forecast(now) if self._is_predictive else None
-        granted: set[tuple[int, str]] = set()
+        self._predict(now)
+        while self._wakes and self._wakes[0][0] <= now + EPSILON:
+            self._dirty.add(heapq.heappop(self._wakes)[1])
         beginning: list[str] = []
-        for transition in self._open:
-            self._decide(transition, now, forecast, granted, beginning)
+        for transition in sorted(self._dirty):
+            self._decide(transition, now, beginning)
+        self._dirty.clear()
         effects: list[Effect] = []
-        for behavior in self.begun:
-            if not self.has_ended(behavior) and (through := self._extension(behavior, granted, now)):
-                effects.append(Extend(behavior, through))
+        for behavior in sorted(self._touched):
+            if behavior in self.begun and not self.has_ended(behavior):
+                effects += self._extension(behavior, now)
+        self._touched.clear()
         for behavior in beginning:
             self.begun[behavior] = now
-            effects.append(Begin(behavior, self._extension(behavior, granted, now) or "start"))
-        effects += self._overdue(now)
+            through = self._furthest(behavior, now)
+            self._paces[behavior] = pace(behavior, self, now)
+            effects.append(Begin(behavior, self._points[behavior][through].sync, self._paces[behavior]))
+            self._watch(behavior)
+        effects += self.patience.overdue(now)
         return effects
 
-    def _decide(
-        self,
-        transition: int,
-        now: Seconds,
-        forecast: list[Seconds] | None,
-        granted: set[tuple[int, str]],
-        beginning: list[str],
-    ) -> None:
+    @property
+    def deadline(self) -> Seconds | None:
+        """When to ask again, whatever happens until then."""
+        wake = self._wakes[0][0] if self._wakes else None
+        return min((at for at in (wake, self.patience.deadline) if at is not None), default=None)
+
+    def _predict(self, now: Seconds) -> None:
+        """Who is overdue is expected to take as long again as he is late already. What that changes is decided anew."""
+        if self._forecast is None:
+            return
+        while self._arrivals and self._arrivals[0][0] < now - EPSILON:
+            _, expected, behavior, number = heapq.heappop(self._arrivals)
+            points = self._points.get(behavior, ())
+            if self._next.get(behavior) != number or number >= len(points) or self.holds(points[number]):
+                continue
+            until = self._not_before[behavior] = now + (now - expected)
+            self._forecast.overdue(self.plan.at[points[number]], until)
+            heapq.heappush(self._arrivals, (until, expected, behavior, number))
+        for transition in self._forecast.update():
+            if transition < len(self.plan.members):
+                self._dirty_if_open(transition)
+                self._touched.update(member.behavior for member in self.plan.members[transition])
+
+    def _decide(self, transition: int, now: Seconds, beginning: list[str]) -> None:
         members = self.plan.members[transition]
-        ready = self._ready_at(transition)
-        if ready is None:
+        if self._unmet[transition] or (transition and transition in self._instants):
             return
         missing = [member for member in members if member.kind != "start" and not self._is_there(member)]
-        due = ready if forecast is None else max(ready, forecast[transition])
+        may_pass = missing[0] if len(missing) == 1 and missing[0].kind == "hold" else None
+        ready = max((self._instants[source] + lag for source, lag in self._waits_for[transition]), default=self.began)
+        due = ready if self._forecast is None else max(ready, self._forecast.times[transition])
         if due > now + EPSILON:
-            self._wake_at(due)
-            if len(missing) != 1 or missing[0].kind != "hold":
-                return
-            arrival = self._arrival(missing[0])
-            if arrival is not None and arrival >= due - EPSILON:
-                granted.add((transition, missing[0].behavior))
+            self._wake(transition, due)
+            if may_pass is not None and (arrival := self._arrival(may_pass)) is not None and arrival >= due - EPSILON:
+                # Told no earlier than it needs to know: should it be faster than expected, it must wait after all.
+                if ready - self.config.lead > now + EPSILON:
+                    self._wake(transition, ready - self.config.lead)
+                else:
+                    self._grant(transition, may_pass)
             return
+        if may_pass is not None:
+            self._grant(transition, may_pass)
         if not missing:
             for member in members:
-                granted.add((transition, member.behavior))
+                self._grant(transition, member)
                 if member.kind == "start" and member.behavior not in self.begun:
                     beginning.append(member.behavior)
-        elif len(missing) == 1 and missing[0].kind == "hold":
-            granted.add((transition, missing[0].behavior))
 
-    def _measured(self, transition: int) -> Seconds | None:
-        """When the instant was, all its members told; None as long as one has not."""
-        if (instant := self._instants.get(transition)) is not None:
-            return instant
-        latest = None
-        for member in self.plan.members[transition]:
-            if (at := self.reached.get(member.point)) is None:
-                return None
-            latest = at if latest is None else max(latest, at)
-        if latest is not None:
-            self._instants[transition] = latest
-        return latest
-
-    def _ready_at(self, transition: int) -> Seconds | None:
-        """When everything it waits for will have been; None while something of it has not been measured."""
-        ready = self.began
-        for source, lag in self._waits_for[transition]:
-            measured = self._measured(source)
-            if measured is None:
-                return None
-            ready = max(ready, measured + lag)
-        return ready
+    def _grant(self, transition: int, member: Member) -> None:
+        if (transition, member.behavior) not in self._granted:
+            self._granted.add((transition, member.behavior))
+            self._touched.add(member.behavior)
 
     def _is_there(self, member: Member) -> bool:
         return member.point in self.reached or (member.kind == "hold" and member.point in self.arrived)
 
     def _arrival(self, member: Member) -> Seconds | None:
         """When a behavior under way will come to its hold point; None if it has not begun."""
-        chain = self.plan.chains[member.behavior]
-        seconds = 0.0
-        for number in range(chain.points.index(member.point), -1, -1):
-            if (since := self.reached.get(chain.points[number])) is not None:
-                return since + seconds
-            if number:
-                seconds += chain.segments[number - 1].natural
-        return None
+        points, number = self._points[member.behavior], self._next.get(member.behavior, 0)
+        if not number:
+            return None
+        at = self.reached[points[number - 1]]
+        for each in range(number, points.index(member.point) + 1):
+            at += self._phase(member.behavior, each)
+            if each == number:
+                at = max(at, self._not_before.get(member.behavior, at))
+        return at
 
-    def _extension(self, behavior: str, granted: set[tuple[int, str]], now: Seconds) -> str | None:
-        """The last point it may go through, if that is further than before."""
+    def _phase(self, behavior: str, number: int) -> Seconds:
+        """How long it is expected to take from the point before to the one of that number."""
+        if self._forecast is None:
+            return self.plan.chains[behavior].segments[number - 1].natural * self.experience.factor(behavior)
+        before, here = (self.plan.at[point] for point in self._points[behavior][number - 1 : number + 1])
+        return 0.0 if before == here else self._forecast.phase(behavior, here)
+
+    def _extension(self, behavior: str, now: Seconds) -> Iterable[Extend]:
+        """Its new authority, if that is further than before or asks for another pace."""
+        known, before = self._through[behavior], self._paces.get(behavior, ())
+        through = self._furthest(behavior, now)
+        after = self._paces[behavior] = pace(behavior, self, now)
+        if through > known or differs(before, after):
+            self._watch(behavior)
+            yield Extend(behavior, self._points[behavior][through].sync, after)
+        else:
+            self._paces[behavior] = before
+
+    def _furthest(self, behavior: str, now: Seconds) -> int:
+        """The number of the last point that it may go through."""
         points = self._points[behavior]
-        known = self._through.get(behavior, -1)
-        furthest = known
+        known = furthest = self._through.get(behavior, -1)
         for number in range(known + 1, len(points)):
-            transition = self.plan.at[points[number]]
-            member = self._member(behavior, transition)
-            if member.kind == "hold" and points[number] not in self.reached and (transition, behavior) not in granted:
+            if not self.may_pass(points[number]):
                 break
             furthest = number
-        if furthest == known:
-            return None
-        self._through[behavior] = furthest
-        self._granted_at[behavior] = now
-        return points[furthest].sync
+        if furthest > known:
+            self._through[behavior] = furthest
+            self._granted_at[behavior] = now
+        return max(0, furthest)
 
-    def _wake_at(self, at: Seconds) -> None:
-        self.deadline = at if self.deadline is None else min(at, self.deadline)
+    def may_pass(self, point: Point) -> bool:
+        transition = self.plan.at[point]
+        if self._member_at[point.behavior, transition].kind != "hold" or point in self.reached:
+            return True
+        return (transition, point.behavior) in self._granted
 
-    def _forecast(self, now: Seconds) -> list[Seconds]:
-        """When each instant will be, as far as is known now: bounds included."""
-        net = self.plan.net
-        times = [now] * len(net.transitions)
-        facts = []
-        for transition in range(len(net.transitions)):
-            if (measured := self._measured(transition)) is not None:
-                times[transition] = measured
-                facts.append(transition)
-        lags = []
-        for place in net.places:
-            if place.kind == "phase":
-                if self._has_come(place.behavior, place.target):
-                    continue
-                if (since := self._passed(place.behavior, place.source)) is not None:
-                    times[place.target] = max(times[place.target], since + place.lag)
-                    continue
-            if place.kind != "idle":
-                lags.append(Lag(place.source, place.target, place.lag, 0))
-        for bound in self._bounds:
-            if bound.kind != "phase" or self._passed(bound.behavior, bound.target) is None:
-                lags.append(Lag(bound.source, bound.target, bound.lag, -1))
-        try:
-            return earliest(times, facts, lags)
-        except PositiveCycle:
-            return earliest(times, facts, [lag for lag in lags if lag.reason >= 0])
+    def holds(self, point: Point) -> bool:
+        """Has it come to that instant? A gaze holds at `relax`, where its `stroke_end` is reported too."""
+        return self.member(point).point in self.arrived
 
-    def _member(self, behavior: str, transition: int) -> Member:
-        return self._member_at[behavior, transition]
+    def _wake(self, transition: int, at: Seconds) -> None:
+        heapq.heappush(self._wakes, (at, transition))
 
-    def _passed(self, behavior: str, transition: int) -> Seconds | None:
-        return self.reached.get(self._member(behavior, transition).point)
+    # -- who owes a report ---------------------------------------------------------------------------------------
 
-    def _has_come(self, behavior: str, transition: int) -> bool:
-        return self._is_there(self._member(behavior, transition))
+    def _watch(self, behavior: str) -> None:
+        chain = self.plan.chains.get(behavior)
+        if chain is None or behavior not in self.begun or performer(chain.behavior) != "body":
+            return
+        points, number = chain.points, self._next.get(behavior, 0)
+        if number >= len(points):
+            self.patience.forget(behavior)
+            return
+        is_there = self.holds(points[number])
+        if is_there and not self.may_pass(self.member(points[number]).point):
+            self.patience.forget(behavior)
+            return
+        since = self.reached[points[number - 1]] if number else self.begun[behavior]
+        natural = chain.segments[number - 1].natural if number else 0.0
+        asked = dict(self._paces.get(behavior, ())).get(points[number].sync, since + natural)
+        expected = max(since + natural, asked, self._granted_at[behavior] if is_there else 0.0)
+        self.patience.expect(behavior, points[number].sync, expected, natural)
 
-    # -- patience ------------------------------------------------------------------------------------------------
+    def _await(self, behavior: str) -> None:
+        """What is expected of it next, now that it has come so far; and from when on it is overdue."""
+        points, number = self._points[behavior], self._next.get(behavior, 0)
+        for each in range(number, len(points)):
+            # Whether it comes on time to where it must ask next can be told only now that it is under way.
+            if not self.may_pass(points[each]):
+                self._dirty.add(self.plan.at[points[each]])
+                break
+        if self._forecast is not None and 0 < number < len(points):
+            self._not_before.pop(behavior, None)
+            expected = self.reached[points[number - 1]] + self._phase(behavior, number)
+            heapq.heappush(self._arrivals, (expected, expected, behavior, number))
 
-    def _overdue(self, now: Seconds) -> list[Effect]:
-        effects: list[Effect] = []
-        for behavior, began in self.begun.items():
-            chain = self.plan.chains.get(behavior)
-            if chain is None or self.has_ended(behavior) or performer(chain.behavior) != "body":
-                continue
-            points = chain.points
-            number = next(number for number, point in enumerate(points) if point not in self.reached)
-            # A gaze holds at `relax`, where its `stroke_end` is reported too: what counts is the instant.
-            holds_at = self._member(behavior, self.plan.at[points[number]]).point
-            if holds_at in self.arrived and self._through[behavior] < points.index(holds_at):
-                continue
-            since = self.reached[points[number - 1]] if number else began
-            natural = chain.segments[number - 1].natural if number else 0.0
-            expected = max(since + natural, self._granted_at[behavior] if holds_at in self.arrived else 0.0)
-            late = expected + self.config.late + self.config.late_factor * natural
-            stalled = expected + self.config.stall + self.config.stall_factor * natural
-            if now >= stalled - EPSILON:
-                effects.append(Stalled(behavior, points[number].sync, now - expected))
-            elif now >= late - EPSILON:
-                self._wake_at(stalled)
-                if behavior not in self._warned:
-                    self._warned.add(behavior)
-                    effects.append(Late(behavior, points[number].sync, now - expected))
-            else:
-                self._wake_at(late)
-        return effects
+    # -- what pacing asks ----------------------------------------------------------------------------------------
+
+    @property
+    def forecast(self) -> Forecast | None:
+        """None: nothing in this block needs one."""
+        return self._forecast
+
+    def next_number(self, behavior: str) -> int:
+        """How many points of it are reached."""
+        return self._next.get(behavior, 0)
+
+    def member(self, point: Point) -> Member:
+        return self._member_at[point.behavior, self.plan.at[point]]
 
 
 def _is_predictive(plan: Plan) -> bool:
     """Is anything constrained that cannot wait, or bounded from above? Else nothing need be predicted."""
     if any(bound.kind != "phase" for bound in plan.bounds):
         return True
-    for transition, members in enumerate(plan.members):
-        if any(member.kind == "passive" for member in members) and (
-            len(members) > 1
-            or any(
-                place.target == transition and place.kind in ("order", "delay", "series") for place in plan.net.places
-            )
-        ):
-            return True
-    return False
+    constrained = {place.target for place in plan.net.places if place.kind in ("order", "delay", "series")}
+    return any(
+        any(member.kind == "passive" for member in members) and (len(members) > 1 or transition in constrained)
+        for transition, members in enumerate(plan.members)
+    )

@@ -1,6 +1,9 @@
-"""How long the realizer waits for the decision of a connection event, when it must help itself."""
+"""How long the realizer waits: for the next report of a behavior under way, and for the decision of an event."""
 
+import heapq
 from collections.abc import Mapping
+
+from msgspec import Struct
 
 from schemas.behaviors import Event, Speech
 from schemas.blocks import Block
@@ -8,6 +11,83 @@ from schemas.syncref import SyncRef, canonical_sync
 from schemas.units import Seconds
 from services.realizer.config import RealizerConfig
 from services.realizer.points import Point, type_of
+from services.realizer.schedule import EPSILON
+
+
+class Late(Struct, frozen=True):
+    """`behavior` is taking much longer to `sync` than it should."""
+
+    behavior: str
+    sync: str
+    overdue: Seconds
+
+
+class Stalled(Struct, frozen=True):
+    """`behavior` has been late for `sync` so long that it must be given up."""
+
+    behavior: str
+    sync: str
+    overdue: Seconds
+
+
+class _Awaited(Struct, frozen=True):
+    """What a behavior is to report next."""
+
+    sync: str
+    expected: Seconds
+    late: Seconds
+    stalled: Seconds
+
+
+class Patience:
+    """What each behavior under way is to report next, and when that becomes too late."""
+
+    def __init__(self, config: RealizerConfig) -> None:
+        self._config = config
+        self._awaited: dict[str, _Awaited] = {}
+        self._warned: set[str] = set()
+        self._alarms: list[tuple[Seconds, str]] = []
+
+    def expect(self, behavior: str, sync: str, expected: Seconds, natural: Seconds) -> None:
+        """Its next report is `sync`, about at `expected`; natural: the duration of the phase before."""
+        limits = self._config
+        late = expected + limits.late + limits.late_factor * natural
+        stalled = expected + limits.stall + limits.stall_factor * natural
+        awaited = _Awaited(sync, expected, late, stalled)
+        if awaited != self._awaited.get(behavior):
+            self._awaited[behavior] = awaited
+            heapq.heappush(self._alarms, (stalled if behavior in self._warned else late, behavior))
+
+    def forget(self, behavior: str) -> None:
+        """It owes no report: it has ended, or waits for us."""
+        self._awaited.pop(behavior, None)
+
+    @property
+    def deadline(self) -> Seconds | None:
+        """When to ask again."""
+        while self._alarms and not self._is_current(*self._alarms[0]):
+            heapq.heappop(self._alarms)
+        return self._alarms[0][0] if self._alarms else None
+
+    def _is_current(self, at: Seconds, behavior: str) -> bool:
+        awaited = self._awaited.get(behavior)
+        return awaited is not None and at in (awaited.late, awaited.stalled)
+
+    def overdue(self, now: Seconds) -> list[Late | Stalled]:
+        """Who is late, once each, and who has been for too long."""
+        found: list[Late | Stalled] = []
+        while (deadline := self.deadline) is not None and deadline <= now + EPSILON:
+            _, behavior = heapq.heappop(self._alarms)
+            awaited = self._awaited[behavior]
+            if now >= awaited.stalled - EPSILON:
+                found.append(Stalled(behavior, awaited.sync, now - awaited.expected))
+                self.forget(behavior)
+                continue
+            heapq.heappush(self._alarms, (awaited.stalled, behavior))
+            if behavior not in self._warned:
+                self._warned.add(behavior)
+                found.append(Late(behavior, awaited.sync, now - awaited.expected))
+        return found
 
 
 def event_deadline(

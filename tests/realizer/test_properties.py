@@ -101,9 +101,8 @@ def perform(block: Block, body: FakeBody) -> Seen:
 
 
 def value(text: str, times: dict[str, float], block: Block) -> float:
-    marks = [mark.id for each in block.behaviors if isinstance(each, Speech) for mark in each.marks]
-    ref = SyncRef.parse(text, marks)
-    return times[f"{ref.behavior}:{ref.sync}"] + ref.offset
+    point, offset = _split(text, block)
+    return times[point] + offset
 
 
 def broken(block: Block, times: dict[str, float]) -> list[str]:
@@ -252,6 +251,8 @@ def oracle(block: Block) -> dict[str, float] | None:
         holds = HOLDS.get(type_of(behavior), ("end",) if isinstance(behavior, Wait) else ())
         for (since, to), seconds in zip(pairwise(points), durations, strict=True):
             lags.append((since, to, seconds))
+            if isinstance(behavior, Gaze) and to.endswith(":relax"):
+                lags.append((to, since, 0.0))  # It leaves: `stroke_end` and `relax` are one instant.
             held = to.rpartition(":")[2] in holds or (isinstance(behavior, Gaze) and to.endswith(":stroke_end"))
             if not held:
                 lags.append((to, since, -seconds))
@@ -274,8 +275,8 @@ def oracle(block: Block) -> dict[str, float] | None:
 
 
 def _split(text: str, block: Block) -> tuple[str, float]:
-    marks = [mark.id for each in block.behaviors if isinstance(each, Speech) for mark in each.marks]
-    ref = SyncRef.parse(text, marks)
+    behavior = next(each for each in block.behaviors if each.id == SyncRef.parse(text).behavior)
+    ref = SyncRef.parse(text, [mark.id for mark in getattr(behavior, "marks", ())])
     return f"{ref.behavior}:{ref.sync}", ref.offset
 
 
