@@ -77,18 +77,17 @@ GREETING = (
 # -- moving pieces ----------------------------------------------------------------------------------------------
 
 
-def moves(step: str, piece: str, side: Side, landmark: str, name: str) -> tuple[Rule, ...]:
-    """The person follows an instruction as in steps 5 and 6. name: last word of the phrase for the landmark."""
+def moves(step: str, piece: str, side: Side, landmark: str) -> tuple[Rule, ...]:
+    """The person follows an instruction as in steps 5 and 6."""
     return (
         Rule(step, RobotDoes("point", piece), (LookAt(piece),), FOLLOW),
         Rule(step, Word("so"), (Grab(piece),), GLANCE),
         Rule(step, Event("directed_gaze", "started", landmark), (LookAt(landmark),), 0.6),
-        Rule(step, Word(name), (LookAt(landmark),), GLANCE),
         Rule(step, Ended(), (Lay(piece, side, landmark), Withdraw(), Pause(0.2), LookAt(FACE)), MOVE),
     )
 
 
-FIRST_PIECE = moves("step-5", "blue-square", "top", "rectangle", "rectangle")
+FIRST_PIECE = moves("step-5", "blue-square", "top", "rectangle")
 
 
 def approves(step: str) -> tuple[Rule, ...]:
@@ -102,16 +101,16 @@ def approves(step: str) -> tuple[Rule, ...]:
 
 OURS = (
     *approves("step-7-ours"),
-    *moves("step-8-ours", "trapezoid", "top", "blue-square", "blue"),
+    *moves("step-8-ours", "trapezoid", "top", "blue-square"),
     *approves("step-9-ours"),
-    *moves("step-10-ours", "yellow-triangle", "bottom", "rectangle", "rectangle"),
+    *moves("step-10-ours", "yellow-triangle", "bottom", "rectangle"),
     *approves("step-11-ours"),
-    *moves("step-12-ours", "red-square", "bottom left", "yellow-triangle", "yellow"),
+    *moves("step-12-ours", "red-square", "bottom left", "yellow-triangle"),
     *approves("step-13-ours"),
-    *moves("step-14-ours", "pink-square", "bottom right", "yellow-triangle", "yellow"),
+    *moves("step-14-ours", "pink-square", "bottom right", "yellow-triangle"),
     *approves("step-15-ours"),
-    *moves("step-16-ours", "pink-triangle", "top left", "red-square", "red"),
-    *moves("step-17-ours", "purple-square", "right", "blue-square", "blue"),
+    *moves("step-16-ours", "pink-triangle", "top left", "red-square"),
+    *moves("step-17-ours", "purple-square", "right", "blue-square"),
 )
 
 
@@ -122,7 +121,7 @@ LAST_PIECES = (
     Rule("step-18", Begun(), (LookAt(AWAY),), 0.05),
     Rule("step-18", Word("that"), (LookAt(FACE),), GLANCE),
     # On the table in time for the landmark, but not while the first event still waits.
-    Rule("step-18", Event("directed_gaze", "started", "pink-square"), (LookAt(TABLE),), 0.3),
+    Rule("step-18", Event("directed_gaze", "failed", "purple-triangle"), (LookAt(TABLE),), 0.05),
     Rule("step-18", Word("square"), (LookAt("purple-triangle"),), FOLLOW),
     Rule(
         "step-18",
@@ -136,7 +135,7 @@ LAST_PIECES = (
     Rule("step-21", Word("please"), (LookAt(FACE),), GLANCE),
     Rule("step-21", RobotDoes("point", "green-square"), (LookAt("green-square"),), FOLLOW),
     Rule("step-21", Word("this"), (LookAt(FACE),), 0.4),
-    Rule("step-21", Word("of"), (LookAt(TABLE),), 0.05),
+    Rule("step-21", Word("side"), (LookAt(TABLE),), 0.05),
     Rule(
         "step-21",
         Ended(),
@@ -148,7 +147,7 @@ LAST_PIECES = (
     ),
     Rule("step-23-a", Begun(), (LookAt(FACE),), 0.1),
     Rule("step-23-a", Word("ummmm"), (LookAt(TABLE),), GLANCE),
-    Rule("step-23-b", Begun(), (LookAt(FACE),), 0.1),
+    Rule("step-23-a", RobotDoes("look", "table"), (LookAt(FACE),), FOLLOW),
 )  # fmt: skip
 
 GOODBYE = (
@@ -179,12 +178,8 @@ PLACES: tuple[tuple[str, str, Side, str], ...] = (
 """Step, piece, side, landmark: where pieces belong, as the robot said."""
 
 FIXES = tuple(
-    Rule(
-        f"{step}-{again}",
-        Ended(),
-        (LookAt(piece), Pause(0.3), Grab(piece), Lay(piece, side, landmark), Withdraw(), Pause(0.2), LookAt(FACE)),
-        MOVE,
-    )
+    rule
     for step, piece, side, landmark in PLACES
     for again in ("fix", "again")
+    for rule in moves(f"{step}-{again}", piece, side, landmark)
 )

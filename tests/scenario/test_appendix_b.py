@@ -22,7 +22,30 @@ from services.memory_bus import Faults
 from services.virtual_time import run_virtual
 from tests.scenario.playing import Record, play
 
+PERSON_LOOKS = {
+    "step-1": "table robot table robot",
+    "step-3": "table robot table rectangle trapezoid robot table",
+    "step-5": "blue-square rectangle robot",
+    "step-18": "away robot table purple-triangle",
+    "step-20": "table robot table",
+    "step-21": "robot green-square robot table green-square robot",
+    "step-23": "table robot",
+    "step-24": "table",
+    "step-25": "robot table robot table",
+}
+"""Changes of the person's gaze from the start of a step to that of the next: those of the transcript."""
+ROBOT_LOOKS = {
+    "step-1": "human",
+    "step-3": "rectangle trapezoid human",
+    "step-5": "blue-square human rectangle human hand human",
+    "step-18": "purple-triangle human pink-square human hand",
+    "step-20": "human table human",
+    "step-21": "green-square human blue-square human green-square hand human",
+    "step-23": "table human",
+}
+"""The same of the robot, where it arrives."""
 SHORT = {"adjacency_pair": "AP", "directed_gaze": "DG", "mutual_facial_gaze": "MFG", "backchannel": "BC"}
+ENDINGS = {"failed", "preempted", "withdrawn", "superseded", "completed"}
 DEGREE = {"succeeded": "S", "completed": "S", "failed": "F"}
 
 EXPECTED: dict[str, dict[str, list[str]]] = {
@@ -78,6 +101,19 @@ def by_step(record: Record, resolution: str = "table") -> dict[str, list[str]]:
     return steps
 
 
+def looks(record: Record, actor: str) -> dict[str, str]:
+    """What an actor comes to look at, in order, in each step of the source."""
+    step, found = "step-1", dict[str, list[str]]()
+    for message in record.received:
+        match message.message:
+            case BlockProgress(progress="start", block=str() as block) if block.startswith("step-"):
+                step = block if "ours" in block else step_of(block)
+            case ActionBegan(action="look", targets=targets) as began if began.actor == actor:
+                target = "hand" if targets and targets[0].endswith("hand") else (*targets, "away")[0]
+                found.setdefault(step, []).append(target)
+    return {step: " ".join(targets) for step, targets in found.items() if "ours" not in step}
+
+
 def words(record: Record, block: str) -> str:
     spoken = [it.word for it in record.messages(WordSpoken) if it.block == block]
     return " ".join(spoken)
@@ -94,6 +130,24 @@ def test_totals_of_causes_turn_and_reference(resolution: str, gazes: dict[str, i
 
     assert Counter(SHORT[event.kind] for event in events) == {"AP": 10, "DG": 8, "MFG": 10}
     assert Counter(DEGREE[event.state] for event in events if event.kind == "directed_gaze") == gazes
+
+
+@pytest.mark.parametrize("seed", [0, 3])
+def test_everybody_looks_where_the_transcript_says(seed: int) -> None:
+    record = played(seed=seed)
+
+    assert looks(record, "human") == PERSON_LOOKS
+    assert looks(record, "robot") == ROBOT_LOOKS
+
+
+def test_the_person_looks_at_the_table_between_the_two_references_of_step_18() -> None:
+    record = played()
+    first, second = (life for life in record.events.values() if life[0].block == "step-18" and life[0].objects)
+    looked = [
+        it.at.seconds for it in record.messages(ActionBegan) if it.actor == "human" and it.targets == ("table",)
+    ]
+
+    assert [at for at in looked if first[-1].at.seconds < at < second[0].at.seconds]
 
 
 def test_four_of_the_references_are_made_with_pointing() -> None:
@@ -203,16 +257,22 @@ def test_the_person_leaves_and_no_event_stays_open() -> None:
     record = played()
     lost = record.messages(ActorLost)[-1].at.seconds
 
-    assert all(life[-1].state != "started" for life in record.events.values())
+    assert all(life[0].state == "started" for life in record.events.values())
+    assert all(
+        [it.state in ENDINGS for it in life] == [False] * (len(life) - 1) + [True] for life in record.events.values()
+    )
     assert all(life[-1].at.seconds <= lost + 1e-6 for life in record.events.values())
 
 
-def test_every_action_that_began_has_ended_or_was_followed_by_another() -> None:
+def test_every_action_of_the_person_that_began_has_ended() -> None:
     record = played()
-    human = [it for it in record.messages(ActionBegan) + record.messages(ActionEnded) if it.actor == "human"]
+    began, ended = (
+        Counter((it.action, it.targets) for it in record.messages(kind) if it.actor == "human")
+        for kind in (ActionBegan, ActionEnded)
+    )
 
-    acts = Counter(type(it).__name__ for it in human if it.action == "act")
-    assert acts["ActionBegan"] == acts["ActionEnded"] == 9
+    assert began == ended
+    assert sum(count for (action, _), count in began.items() if action == "act") == 9
 
 
 def test_the_same_seed_gives_the_same_run_and_another_seed_the_same_events() -> None:
@@ -243,6 +303,10 @@ def test_a_misplaced_piece_is_asked_to_be_fixed_and_then_is_right() -> None:
     pink, yellow = final.entity("pink-square"), final.entity("yellow-triangle")
 
     assert words(record, "step-14-ours-fix").startswith("Please fix the pink square so that it is touching")
+    assert [it.state for it in record.robot_initiated() if it.block == "step-14-ours-fix" and it.objects] == [
+        "succeeded",
+        "succeeded",
+    ]
     assert relation(pink, yellow) == Relation("pink-square", "bottom right", "yellow-triangle")
     assert by_step(record) == EXPECTED["table"]
 
