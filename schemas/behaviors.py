@@ -179,6 +179,12 @@ class TurnSignal(Behavior, frozen=True, kw_only=True, tag="turn", omit_defaults=
     """The addressee."""
 
 
+class Unknown(Behavior, frozen=True, kw_only=True, tag="unknown", omit_defaults=True):
+    """What a block calls `element`, which nobody here knows: dropped with a warning, unless it is required."""
+
+    element: str
+
+
 class SpeechOption(Struct, frozen=True, kw_only=True, omit_defaults=True):
     """One phrase for a reference. cost: words, or what the manager thinks it costs; >= 0."""
 
@@ -197,12 +203,13 @@ class Reference(Behavior, frozen=True, kw_only=True, tag="reference", omit_defau
     options: tuple[SpeechOption, ...]
 
 
-BlockBehavior = (
+_Spelled = (
     Gaze | GazeShift | Pointing | Gesture | Head | HeadDirectionShift | Face | FaceLexeme | FaceFacs | FaceShift
     | Posture | PostureShift | Pose | Locomotion | Speech | Wait | Emit | Event | TurnSignal
 )  # fmt: skip
+BlockBehavior = _Spelled | Unknown
 """What a BML block may hold."""
-FragmentBehavior = BlockBehavior | Reference
+FragmentBehavior = _Spelled | Reference
 """What a turn fragment may hold."""
 
 

@@ -6,10 +6,19 @@ from msgspec import Struct
 
 from schemas.behaviors import BlockBehavior, Constraint
 from schemas.faults import Fault
+from schemas.feedback import WarningKind
 from schemas.requests import Outcome, Request
 
 Composition = Literal["MERGE", "APPEND", "REPLACE"]
 Dialect = Literal["draft", "bml-1.0"]
+
+
+class Unread(Struct, frozen=True, kw_only=True, omit_defaults=True):
+    """Something in a block that its reader did not understand and left out. behavior empty: of the block itself."""
+
+    message: str
+    behavior: str = ""
+    kind: WarningKind = "PARSING_FAILURE"
 
 
 class Block(Struct, frozen=True, kw_only=True, tag="block", omit_defaults=True):
@@ -23,6 +32,10 @@ class Block(Struct, frozen=True, kw_only=True, tag="block", omit_defaults=True):
     constraints: tuple[Constraint, ...] = ()
     composition: Composition = "MERGE"
     dialect: Dialect = "draft"
+    character_id: str = ""
+    """Whom its author means to perform it. Feedback repeats it; the robot on the bus performs it in any case."""
+    unread: tuple[Unread, ...] = ()
+    """The realizer warns of each when the block begins."""
 
 
 class PerformBlock(Request, frozen=True, kw_only=True, tag="perform_block", omit_defaults=True):

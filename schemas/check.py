@@ -36,7 +36,7 @@ def check(thing: Input, source: str = "", *, prefix: str = "$", paths: bool = Fa
     source: file or sender. paths: say where by JSON path, which starts with `prefix`, even if lines are known.
     """
     for problem in problems(thing):
-        raise InputRefused(_fault(thing, problem, source, prefix, paths))
+        raise InputRefused(_fault(thing, problem, source, prefix, paths), thing.id or None)
 
 
 def _fault(thing: Input, problem: Problem, source: str, prefix: str, paths: bool) -> Fault:

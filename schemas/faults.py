@@ -29,7 +29,14 @@ class EngageError(Exception):
 
 
 class InputRefused(EngageError):
-    """The input is wrong. Nothing has moved; the fault says where and what to do."""
+    """The input is wrong. Nothing has moved; the fault says where and what to do.
+
+    block: id of the block or fragment, as far as it could be read.
+    """
+
+    def __init__(self, fault: Fault | str, block: str | None = None) -> None:
+        super().__init__(fault)
+        self.block = block
 
 
 class RunFailed(EngageError):

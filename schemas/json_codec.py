@@ -38,7 +38,7 @@ def decode_json(data: bytes | str, source: str = "") -> Block | TurnFragment:
 def read(data: bytes, source: str = "") -> tuple[Block | TurnFragment, ...]:
     """Everything in a file: one XML document, one JSON object, or a JSON array of several. Raises InputRefused."""
     start = data[:64].removeprefix(b"\xef\xbb\xbf").lstrip()
-    if start.startswith((b"<", *_UTF_16)):
+    if start.startswith((b"<", b"\0<", *_UTF_16)):
         return (decode_xml(data, source),)
     if not start.startswith((b"{", b"[")):
         advice = "BML or EBML (XML), or the same as JSON"
@@ -75,9 +75,9 @@ def _thing(parsed: Any, source: str, path: str) -> Block | TurnFragment:
         raise _refusal(f"expected an object, found {type(parsed).__name__}", path, source)
     kind = parsed.get("type") or ("fragment" if _looks_like_fragment(parsed) else "block")
     if kind == "fragment":
-        return _converted(parsed, TurnFragment, source, path)
+        return _blamed(parsed, TurnFragment, source, path)
     if kind == "block":
-        return _converted(parsed, Block, source, path)
+        return _blamed(parsed, Block, source, path)
     raise _refusal(f"unknown type {kind!r}", f"{path}.type", source, 'use "fragment" or "block"')
 
 
@@ -87,6 +87,15 @@ def _looks_like_fragment(parsed: dict[str, Any]) -> bool:
         isinstance(each, dict) and each.get("type") == "reference" for each in behaviors
     )
     return refers or not _FRAGMENT_ONLY.isdisjoint(parsed)
+
+
+def _blamed(parsed: dict[str, Any], kind: type[T], source: str, path: str) -> T:
+    """A refusal knows whose it is."""
+    try:
+        return _converted(parsed, kind, source, path)
+    except InputRefused as error:
+        id = parsed.get("id")
+        raise InputRefused(error.fault, id if isinstance(id, str) and id else None) from error
 
 
 def _converted(parsed: dict[str, Any], kind: type[T], source: str, path: str) -> T:

@@ -53,7 +53,8 @@ class SyncRef(Struct, frozen=True, omit_defaults=True):
         """
         if len(text) > LONGEST:
             raise _bad(text, f"longer than {LONGEST} characters")
-        *heads, tail = (part.strip() for part in text.split(":"))
+        # Collapsed, so that no run of spaces keeps the expressions below busy.
+        *heads, tail = (" ".join(part.split()) for part in text.split(":"))
         if len(heads) > 3:
             raise _bad(text, "more than four parts")
         for head in heads:

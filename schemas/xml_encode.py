@@ -18,10 +18,10 @@ from schemas.syncref import SYNC_POINTS
 from schemas.xml_source import BML_1_0, DRAFT, EBML
 from schemas.xml_speech import fill
 
-_EXTENSIONS = ("reference", "event", "turn")
+_EXTENSIONS = ("reference", "event", "turn", "unknown")
 _ELSEWHERE = frozenset({
     "id", "line", "timing", "required", "marks", "text", "markup", "options", "objects", "anchors", "distractors",
-    "behaviors", "constraints", "operators", "syncs", "dialect",
+    "behaviors", "constraints", "operators", "syncs", "dialect", "unread",
 })  # fmt: skip
 """Fields that are not simply an attribute."""
 _NAMES = {"minimum_reliability": "minReliability"}

@@ -4,7 +4,7 @@ lxml reports the line on which a start tag ends; people look for the line on whi
 """
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Set
 from typing import cast
 
 from lxml import etree
@@ -22,27 +22,50 @@ LARGEST = 4 * 1024 * 1024
 DEEPEST = 64
 """Levels of nesting."""
 
+MOST_ELEMENTS = 120_000
+MOST_BEHAVIORS = 20_000
+MOST_ATTRIBUTES = 100
+"""Of one element. Nobody's has twenty, and lxml takes time quadratic in their number."""
+MOST_PREFIXES = 100
+"""That may be used without being declared."""
+
 _UNDECLARED_PREFIX = "NS_ERR_UNDEFINED_NAMESPACE"
+_UNDECLARED = re.compile(r"Namespace prefix ([^\s\"'<>&=/]+) (?:for|on) ")
+_NOBODYS = "urn:undeclared:"
+_DECLARED = re.compile(rb"(?:\xef\xbb\xbf)?<\?xml[^>?]*?\sencoding\s*=\s*[\"']([A-Za-z0-9._-]+)[\"']")
+_ENCODINGS = re.compile(r"utf-?8|(?:us-)?ascii|iso-?8859-\d+|latin-?\d|windows-125\d|cp125\d", re.IGNORECASE)
+"""In all of them a `<` is a byte 0x3C: no tag can hide from `_start_lines`."""
 _DOCTYPE = re.compile(r"\A\ufeff?(?>\s+|<\?.*?\?>|<!--.*?-->)*+<!DOCTYPE", re.DOTALL)
 _TAGS = re.compile(r"<!--.*?-->|<!\[CDATA\[.*?\]\]>|<\?.*?\?>|<([^\s/>!?][^\s/>]*)", re.DOTALL)
 
 
 class Source:
-    """A parsed document. `root`, the name of its source, and the line of each element."""
+    """A parsed document. `root`, its id (`block`), the name of its source, and the line of each element."""
 
     def __init__(self, data: bytes | str, name: str = "") -> None:
         """Raises InputRefused: too large, too deep, not well-formed, or with a document type."""
         self.name = name
+        self.block: str | None = None
         if len(data) > LARGEST:
             raise self.refusal(
                 f"{len(data)} bytes; at most {LARGEST} are read", advice="split it into several blocks"
             )
-        text = data if isinstance(data, str) else _decoded(data)
+        text = data if isinstance(data, str) else self._decoded(data)
+        text = text.removeprefix("\ufeff")
         if _DOCTYPE.match(text):
             raise self.refusal("a document type (<!DOCTYPE>) is not read", advice="remove it: no entities, no DTD")
-        self.root = self._parse(data)
-        self._lines = dict(zip(self._elements(), _start_lines(text), strict=False))
-        self._require_declared()
+        self.root = self._parse(text)
+        self.block = self.root.get("id") or None
+        elements = list(self.root.iter(etree.Element))
+        for count, most, what in (
+            (len(self.root), MOST_BEHAVIORS, "behaviors and constraints"),
+            (len(elements), MOST_ELEMENTS, "elements"),
+        ):
+            if count > most:
+                reason = f"{count} {what}; at most {most} are read"
+                raise self.refusal(reason, advice="split it into several blocks")
+        self._lines = dict(zip(elements, _start_lines(text), strict=False))
+        self._require_plain(elements)
         self._require_shallow()
 
     def line(self, element: etree._Element) -> int:
@@ -54,43 +77,68 @@ class Source:
     ) -> InputRefused:
         if element is not None:
             line = self.line(element)
-        return InputRefused(Fault(reason=reason, where=self.name, line=line, advice=advice))
+        return InputRefused(Fault(reason=reason, where=self.name, line=line, advice=advice), self.block)
 
-    def _elements(self) -> Iterator[etree._Element]:
-        return self.root.iter(etree.Element)
-
-    def _parse(self, data: bytes | str) -> etree._Element:
-        raw, encoding = (data, None) if isinstance(data, bytes) else (data.encode(), "utf-8")
-        parser = _parser(encoding, recover=False)
+    def _decoded(self, data: bytes) -> str:
+        """Raises InputRefused for an encoding other than its declaration says, or one in which tags could hide."""
+        if data[:2] in (b"\xff\xfe", b"\xfe\xff"):
+            encoding = "utf-16"
+        elif data[:2] in (b"<\0", b"\0<"):
+            encoding = "utf-16-le" if data[0] else "utf-16-be"
+        else:
+            declared = _DECLARED.match(data)
+            encoding = declared[1].decode() if declared else "utf-8"
+            if not _ENCODINGS.fullmatch(encoding):
+                reason = f"malformed XML: encoding {encoding[:40]!r} is not read"
+                raise self.refusal(reason, line=1, advice="save it as UTF-8")
         try:
-            root = etree.fromstring(raw, parser)
-        except etree.XMLSyntaxError as error:
-            root = self._without_undeclared(raw, encoding, parser, error)
+            return data.decode(encoding)
+        except UnicodeDecodeError as error:
+            line = data.count(b"\n", 0, error.start) + 1
+            reason = f"malformed XML: this is not {encoding} ({error.reason})"
+            raise self.refusal(reason, line=line, advice="save it as UTF-8, or declare its encoding") from error
+        except LookupError as error:
+            raise self.refusal(f"malformed XML: encoding {encoding!r} is not known", line=1) from error
+
+    def _parse(self, text: str) -> etree._Element:
+        """An attribute whose prefix nobody declared is somebody else's; every other error refuses the document.
+
+        Such prefixes are declared here and the text is read again, as strictly: so nothing else can slip through.
+        """
+        declared: set[str] = set()
+        while True:
+            parser = _parser()
+            try:
+                root = etree.fromstring(_declaring(text, declared).encode(errors="surrogatepass"), parser)
+            except etree.XMLSyntaxError as error:
+                declared |= self._undeclared(parser, error, declared)
+            else:
+                break
         if root.getroottree().docinfo.doctype:  # type: ignore[union-attr]
             raise self.refusal("a document type (<!DOCTYPE>) is not read", advice="remove it: no entities, no DTD")
         return root
 
-    def _without_undeclared(
-        self, raw: bytes, encoding: str | None, parser: etree.XMLParser, error: etree.XMLSyntaxError
-    ) -> etree._Element:
-        """An attribute whose prefix nobody declared is somebody else's; every other error refuses the document."""
+    def _undeclared(self, parser: etree.XMLParser, error: etree.XMLSyntaxError, known: Set[str]) -> set[str]:
+        """Prefixes to declare, at least one. Raises InputRefused if anything else is wrong."""
         bad = [entry for entry in parser.error_log if entry.level_name != "WARNING"]
-        for entry in bad or [None]:
-            if entry is None or entry.type_name != _UNDECLARED_PREFIX:
-                line = int(entry.line if entry else error.lineno or 0)
-                reason = entry.message.strip() if entry else str(error)
-                raise self.refusal(
-                    f"malformed XML: {reason}", line=line, advice="close and quote everything"
-                ) from error
-        return etree.fromstring(raw, _parser(encoding, recover=True))
+        found = {match[1] for entry in bad if (match := _UNDECLARED.match(entry.message))} - known
+        wrong = next((entry for entry in bad if entry.type_name != _UNDECLARED_PREFIX), None)
+        if wrong is None and found and len(known) < MOST_PREFIXES:
+            return found
+        reason = wrong.message.strip() if wrong else str(error)
+        line = int(wrong.line if wrong else error.lineno or 0)
+        raise self.refusal(f"malformed XML: {reason}", line=line, advice="close and quote everything") from error
 
-    def _require_declared(self) -> None:
-        for element in self._elements():
-            if ":" in split(str(element.tag))[1]:
+    def _require_plain(self, elements: Iterable[etree._Element]) -> None:
+        """Raises InputRefused for an element of an undeclared prefix, or with more attributes than anyone needs."""
+        for element in elements:
+            namespace, local = split(str(element.tag))
+            if namespace.startswith(_NOBODYS):
+                name = f"<{namespace.removeprefix(_NOBODYS)}:{local}>"
                 advice = f'declare the prefix, for example xmlns:ebml="{EBML}"'
-                raise self.refusal(
-                    f"malformed XML: prefix of <{element.tag}> is not declared", element, advice=advice
-                )
+                raise self.refusal(f"malformed XML: prefix of {name} is not declared", element, advice=advice)
+            if (count := len(element.attrib)) > MOST_ATTRIBUTES:
+                raise self.refusal(f"<{local}> has {count} attributes; at most {MOST_ATTRIBUTES} are read", element)
 
     def _require_shallow(self) -> None:
         depth = 0
@@ -100,10 +148,10 @@ class Source:
                 raise self.refusal(f"nested deeper than {DEEPEST} levels", element)
 
 
-def _parser(encoding: str | None, *, recover: bool) -> etree.XMLParser:
+def _parser() -> etree.XMLParser:
     return etree.XMLParser(
-        encoding=encoding,
-        recover=recover,
+        encoding="utf-8",
+        recover=False,
         resolve_entities=False,
         load_dtd=False,
         dtd_validation=False,
@@ -114,14 +162,17 @@ def _parser(encoding: str | None, *, recover: bool) -> etree.XMLParser:
     )
 
 
+def _declaring(text: str, prefixes: Set[str]) -> str:
+    """The text with `prefixes` declared at its root, on the same lines."""
+    if not prefixes:
+        return text
+    end = next(tag.end(1) for tag in _TAGS.finditer(text) if tag[1])
+    declarations = "".join(f' xmlns:{prefix}="{_NOBODYS}{prefix}"' for prefix in sorted(prefixes))
+    return f"{text[:end]}{declarations}{text[end:]}"
+
+
 def _last_line(element: etree._Element) -> int:
     return cast(int, element.sourceline or 0)
-
-
-def _decoded(data: bytes) -> str:
-    """Good enough to find tags and line ends, whatever single-byte encoding is declared."""
-    encoding = "utf-16" if data[:2] in (b"\xff\xfe", b"\xfe\xff") else "utf-8"
-    return data.decode(encoding, errors="replace")
 
 
 def _start_lines(text: str) -> Iterator[int]:

@@ -38,7 +38,9 @@ def spoken(source: Source, speech: etree._Element, id: str) -> Spoken:
     reading = _Reading(source, id, preserve=content.get(f"{{{XML}}}space") == "preserve")
     reading.content(content)
     if not texts and not (said := reading.result("")).text and not said.marks:
-        raise source.refusal(f"speech {id!r} says nothing", speech, advice="write <text>…</text> into it")
+        if (description := _ssml(speech)) is None:
+            raise source.refusal(f"speech {id!r} says nothing", speech, advice="write <text>…</text> into it")
+        reading.content(description)
     if texts and any(part.strip() for part in [speech.text or "", *(child.tail or "" for child in speech)]):
         raise source.refusal("words beside <text>", speech, advice="put all words inside <text>")
     return reading.result(_described(speech))
@@ -46,11 +48,15 @@ def spoken(source: Source, speech: etree._Element, id: str) -> Spoken:
 
 def _described(speech: etree._Element) -> str:
     """Prosodic markup from a BML 1.0 `<description type="application/ssml+xml">`, empty without one."""
+    description = _ssml(speech)
+    return "" if description is None else serialized(description)
+
+
+def _ssml(speech: etree._Element) -> etree._Element | None:
     for child in speech:
         if _kind(child) == "description" and child.get("type") == "application/ssml+xml":
-            inner = child[0] if len(child) and split(str(child[0].tag))[1] == "speak" else child
-            return serialized(inner)
-    return ""
+            return child[0] if len(child) and split(str(child[0].tag))[1] == "speak" else child
+    return None
 
 
 def _kind(element: etree._Element) -> str:

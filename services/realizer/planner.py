@@ -10,7 +10,7 @@ from typing import get_args
 
 from msgspec import Struct
 
-from schemas.behaviors import BlockBehavior, Event
+from schemas.behaviors import BlockBehavior, Event, Unknown
 from schemas.blocks import Block
 from schemas.body import BodyPose, Estimate, Estimates
 from schemas.faults import Fault
@@ -98,6 +98,8 @@ class _Planner:
                     behavior.id, "its timing names a sync point it does not have", "PARSING_FAILURE"
                 )
                 self.dropped.append(behavior.id)
+            elif isinstance(behavior, Unknown):
+                self._drop(behavior.id, "BEHAVIOR_TYPE_NOT_SUPPORTED", f"unknown element <{behavior.element}>")
             elif (estimate := estimates.get(behavior.id)) and not estimate.feasible:
                 self._drop(behavior.id, _kind(estimate.warning), str(estimate.fault or "the body cannot do it"))
 

@@ -33,7 +33,9 @@ WITH_STROKE = frozenset({"gesture", "pointing", "head"})
 ON_TARGET = frozenset({"gaze", "face", "faceLexeme", "faceFacs", "posture"})
 """They last: having arrived, they stay until something ends them."""
 _FAMILY = {"faceLexeme": "face", "faceFacs": "face"}
-_PERFORMERS: dict[str, Performer] = {"event": "recognition", "turn": "recognition", "wait": "clock", "emit": "clock"}
+_PERFORMERS: dict[str, Performer] = {
+    "event": "recognition", "turn": "recognition", "wait": "clock", "emit": "clock", "unknown": "clock"
+}  # fmt: skip
 
 _ONE_INSTANT = {"gaze": (("start", "ready", "stroke_start"), ("stroke_end", "relax"))}
 _LASTING_INSTANT = (("stroke_end", "relax"),)

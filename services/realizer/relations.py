@@ -7,11 +7,11 @@ from collections.abc import Collection, Mapping
 
 from msgspec import Struct
 
-from schemas.behaviors import After, Before, Behavior, Speech, Synchronize
+from schemas.behaviors import After, Before, Behavior, Speech, Synchronize, Unknown
 from schemas.blocks import Block
 from schemas.faults import Fault, InputRefused
 from schemas.feedback import WarningKind
-from schemas.syncref import BLOCK_ITSELF, SyncRef, canonical_sync
+from schemas.syncref import BLOCK_ITSELF, SyncRef, canonical_sync, dialect_sync
 from schemas.units import Seconds
 from services.realizer.points import ORIGIN, Point, sync_points, type_of
 
@@ -79,7 +79,7 @@ class _Reader:
         self.points = {id: frozenset(sync_points(behavior)) for id, behavior in self.behaviors.items()}
         self.equals: list[Equal] = []
         self.orders: list[Order] = []
-        self.problems: list[Problem] = []
+        self.problems = [Problem(each.kind, each.message, each.behavior) for each in block.unread]
         self.unusable: set[str] = set()
         self.required = {behavior.id for behavior in block.behaviors if behavior.required}
 
@@ -103,9 +103,16 @@ class _Reader:
         if behavior is None:
             raise self.refusal(f"unknown behavior {ref.behavior!r}", where, line, self._advice())
         sync = canonical_sync(ref.sync, type_of(behavior), self.block.dialect)
-        if sync not in self.points[behavior.id] or ref.repetition > 1:
+        if isinstance(behavior, Unknown):
+            return Term(Point(behavior.id, sync), ref.offset, text, line)  # It will vanish with its behavior.
+        if not self._has(behavior, sync) or ref.repetition > 1:
             return Problem("PARSING_FAILURE", f"{where}: {type_of(behavior)} has no sync point {text!r}", behavior.id)
         return Term(Point(behavior.id, sync), ref.offset, text, line)
+
+    def _has(self, behavior: Behavior, sync: str) -> bool:
+        """BML 1.0 knows fewer points than the drafts."""
+        spelled = dialect_sync(sync, type_of(behavior), self.block.dialect)
+        return spelled is not None and sync in self.points[behavior.id]
 
     def _elsewhere(self, point: Point, ref: SyncRef, text: str, where: str, line: int) -> Term:
         if point not in self.elsewhere:
@@ -155,7 +162,7 @@ class _Reader:
                 sync = canonical_sync(timing.sync, type_of(behavior), self.block.dialect)
                 own = f"{behavior.id}:{timing.sync}"
                 problem: Problem | None = None
-                if sync not in self.points[behavior.id]:
+                if not self._has(behavior, sync):
                     problem = Problem("PARSING_FAILURE", f"{type_of(behavior)} has no sync point {timing.sync!r}")
                 else:
                     other = self.term(timing.ref, behavior.id, behavior.line)

@@ -117,6 +117,7 @@ def blocks(draw: st.DrawFn) -> Block:
         constraints=constraints,
         composition=draw(st.sampled_from(get_args(Composition))),
         dialect=draw(st.sampled_from(get_args(Dialect))),
+        character_id=draw(words),
     )
 
 
