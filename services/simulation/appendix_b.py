@@ -122,7 +122,8 @@ LAST_PIECES = (
     Rule("step-18", Word("that"), (LookAt(FACE),), GLANCE),
     # On the table in time for the landmark, but not while the first event still waits.
     Rule("step-18", Event("directed_gaze", "failed", "purple-triangle"), (LookAt(TABLE),), 0.05),
-    Rule("step-18", Word("square"), (LookAt("purple-triangle"),), FOLLOW),
+    # Within 2 s after the event at the triangle failed: as its answer, not to direct the robot there.
+    Rule("step-18", Word("pink"), (LookAt("purple-triangle"),), 0.05),
     Rule(
         "step-18",
         Ended(),

@@ -10,7 +10,7 @@ from schemas.recognition import ConnectionEvent
 from services.bus import Bus, Received
 from services.collaboration.config import CollaborationConfig
 from services.collaboration.service import collaborate
-from services.control.config import ControlConfig
+from services.control.config import ControlConfig, Variability
 from services.control.service import embody
 from services.generation.config import GenerationConfig
 from services.generation.service import generate
@@ -57,9 +57,14 @@ class Record:
 
 
 async def play(
-    human: str = "scripted", resolution: str = "table", seed: int = 0, faults: Faults | None = None, **manager: Any
+    human: str = "scripted",
+    resolution: str = "table",
+    seed: int = 0,
+    faults: Faults | None = None,
+    variability: Variability = Variability(),
+    **manager: Any,
 ) -> Record:
-    """Until the manager has said goodbye. faults: of the bus. manager: its configuration."""
+    """Until the manager has said goodbye. faults: of the bus. variability: of the body. manager: its configuration."""
     received: list[Received] = []
     finished = asyncio.Event()
 
@@ -68,7 +73,7 @@ async def play(
         finished.set()
 
     services: dict[str, Service] = {
-        "control": partial(embody, config=ControlConfig()),
+        "control": partial(embody, config=ControlConfig(variability=variability)),
         "realizer": partial(realize, config=RealizerConfig()),
         "recognition": partial(recognize, config=RecognitionConfig(gaze_resolution=resolution)),  # type: ignore[arg-type]
         "generation": partial(generate, config=GenerationConfig()),
