@@ -1,30 +1,23 @@
 """Relations between points, assembled into a Petri net: the middle part of planning."""
 
+import heapq
 from collections.abc import Mapping
 from itertools import pairwise
+from math import inf
 
 from msgspec import Struct
 
-from schemas.behaviors import Behavior, BlockBehavior
 from schemas.units import Seconds
+from services.realizer.chains import Chain
+from services.realizer.circles import components
 from services.realizer.classes import Classes, Instant, instants
-from services.realizer.net import Bound, PetriNet, Place, Transition, order
-from services.realizer.points import (
-    ON_TARGET,
-    ORIGIN,
-    Gate,
-    Point,
-    Segment,
-    family,
-    gate,
-    gate_point,
-    one_instant,
-    performer,
-    sync_points,
-    type_of,
-)
-from services.realizer.relations import Equal, Order, Relations, Term
+from services.realizer.handover import Arrangement
+from services.realizer.net import Bound, PetriNet, Place, PlaceKind, Transition
+from services.realizer.points import ORIGIN, Gate, Point, gate, gate_point, one_instant, performer
+from services.realizer.relations import Order, Relations
 from services.realizer.schedule import EPSILON
+
+_Tie = tuple[int, int, PlaceKind, Seconds, str, tuple[int, ...], Seconds]
 
 
 class Member(Struct, frozen=True):
@@ -35,110 +28,77 @@ class Member(Struct, frozen=True):
     point: Point
 
 
-class Chain(Struct, frozen=True):
-    """A behavior with the seconds between its points."""
-
-    behavior: BlockBehavior
-    segments: tuple[Segment, ...]
-    longest: tuple[Seconds | None, ...]
-    """Of each segment; None: it can be stretched without limit."""
-
-    @property
-    def points(self) -> tuple[Point, ...]:
-        return tuple(Point(self.behavior.id, sync) for sync in sync_points(self.behavior))
-
-
 class Assembly(Struct, frozen=True):
+    """is_ordered: transitions are numbered as they can fire; else some wait for each other."""
+
     net: PetriNet
+    is_ordered: bool
     at: Mapping[Point, int]
     """The transition of each point."""
     members: tuple[tuple[Member, ...], ...]
     """Of each transition."""
 
 
-def ends_naturally(chain: Chain, named: frozenset[Point]) -> bool:
-    """Does it last until something else takes its place or ends? True if nobody has said when it ends."""
-    if type_of(chain.behavior) not in ON_TARGET:
-        return False
-    return not any(Point(chain.behavior.id, sync) in named for sync in ("stroke_end", "relax", "end"))
-
-
 class Assembler:
-    """chains: in document order. successors: of a behavior that ends naturally, who takes its place.
-
-    cut: behaviors that are not given the time to go home, because their successor has begun by then.
-    """
+    """chains: in document order. waited_for: behaviors that the end of the block waits for."""
 
     def __init__(
-        self,
-        block: str,
-        chains: Mapping[str, Chain],
-        relations: Relations,
-        classes: Classes,
-        successors: Mapping[str, str],
-        cut: frozenset[str],
-        waited_for: frozenset[str],
+        self, chains: Mapping[str, Chain], relations: Relations, classes: Classes, waited_for: frozenset[str]
     ) -> None:
-        self.block = block
         self.chains = chains
         self.relations = relations
-        self.classes = classes
-        self.successors = successors
-        self.cut = cut
         self.waited_for = waited_for
-        """Behaviors that the end of the block waits for."""
-        self.natural = {id for id, chain in chains.items() if ends_naturally(chain, relations.named)}
-        self.places: list[Place] = []
-        self.bounds: list[Bound] = []
-
-    def assemble(self) -> Assembly:
-        foreign = sorted(point for point in self.relations.named if ":" in point.behavior)
-        own = [point for id in sorted(self.chains) for point in self.chains[id].points]
-        for chain in self.chains.values():
-            for syncs in one_instant(type_of(chain.behavior)):
-                points = [Term(Point(chain.behavior.id, sync), 0.0, f"{chain.behavior.id}:{sync}") for sync in syncs]
-                self.classes.tie(Equal(tuple(points)), self.block)
-        found = instants(self.classes, [ORIGIN, *foreign, *own])
+        foreign = sorted(point for point in relations.named if ":" in point.behavior)
+        own = [point for id in sorted(chains) for point in chains[id].points]
+        found = instants(classes, [ORIGIN, *foreign, *own])
         # The start of the block first; the others keep their canonical order.
         found.sort(key=lambda instant: ORIGIN not in instant.points)
+        self.size = len(found)
         self.at = {point: number for number, instant in enumerate(found) for point in instant.points}
-        self.members = tuple(self._members(instant) for instant in found)
+        self.members = [self._members(instant.points) for instant in found]
+        self.kinds = {
+            (member.behavior, number): member.kind for number, those in enumerate(self.members) for member in those
+        }
+        self.transitions = [
+            *(Transition(" = ".join(map(str, instant.points)), instant.points) for instant in found),
+            Transition("bml:end", ()),
+        ]
+        self.places: list[Place] = []
+        self.bounds: list[Bound] = []
         self._class_delays(found)
+        for relation in relations.orders:
+            self._order(relation)
+        self._fixed = (self.places, self.bounds)
+
+    def assemble(self, arrangement: Arrangement) -> Assembly:
+        self.arrangement = arrangement
+        places, bounds = self._fixed
+        self.places, self.bounds = list(places), list(bounds)
         for id in sorted(self.chains):
             self._phases(self.chains[id])
-        for relation in self.relations.orders:
-            self._order(relation)
         self._series()
-        self._natural_ends()
+        self._arranged()
         self._never_too_soon()
-        end = len(found)
-        self._ending(end)
-        transitions = [Transition(" = ".join(map(str, instant.points)), instant.points) for instant in found]
-        transitions.append(Transition("bml:end", ()))
-        places = sorted(set(self.places), key=_place_order)
-        net = PetriNet(
-            tuple(transitions), (*places, Place("idle", end, 0)), tuple(sorted(self.bounds, key=_bound_order))
-        )
-        return Assembly(net, self.at, (*self.members, ()))
+        self._ending(self.size)
+        return self._in_firing_order()
 
-    def _members(self, instant: Instant) -> tuple[Member, ...]:
+    def _members(self, points: tuple[Point, ...]) -> tuple[Member, ...]:
         groups: dict[str, list[str]] = {}
-        for point in instant.points:
-            groups.setdefault(point.behavior, []).append(point.sync)
+        for behavior, sync in points:
+            groups.setdefault(behavior, []).append(sync)
         members = []
         for id, syncs in groups.items():
             if chain := self.chains.get(id):
-                type = type_of(chain.behavior)
-                kind, sync = gate(type, tuple(syncs)), gate_point(type, tuple(syncs))
-                members.append(Member(id, kind, Point(id, sync)))
+                ordered = tuple(syncs)
+                members.append(Member(id, gate(chain.type, ordered), Point(id, gate_point(chain.type, ordered))))
             elif id:
                 members.append(Member(id, "passive", Point(id, syncs[0])))
         return tuple(members)
 
     def _class_delays(self, found: list[Instant]) -> None:
         by_class: dict[int, list[tuple[Seconds, int]]] = {}
-        for instant in found:
-            by_class.setdefault(instant.class_id, []).append((instant.offset, self.at[instant.points[0]]))
+        for number, instant in enumerate(found):
+            by_class.setdefault(instant.class_id, []).append((instant.offset, number))
         for ladder in by_class.values():
             for (low, source), (high, target) in pairwise(sorted(ladder)):
                 seconds = round(high - low, 9)
@@ -146,25 +106,26 @@ class Assembler:
                 self.bounds.append(Bound("delay", target, source, -seconds))
 
     def _phases(self, chain: Chain) -> None:
-        id, type = chain.behavior.id, type_of(chain.behavior)
-        always = {pair for group in one_instant(type) for pair in pairwise(group)}
-        lines = _lines(chain.behavior.line)
-        if (start := self.at[Point(id, "start")]) != 0:
+        id, lines, at = chain.behavior.id, _lines(chain.behavior.line), self.at
+        always = {pair for group in one_instant(chain.type) for pair in pairwise(group)}
+        cut = self.arrangement.cuts.get(id)
+        if (start := at[chain.points[0]]) != 0:
             self.places.append(Place("order", 0, start, behavior=id, lines=lines))
         lag, shortest, longest = 0.0, 0.0, 0.0
         unlimited = False
-        for segment, limit in zip(chain.segments, chain.longest, strict=True):
-            gone = id in self.cut and (segment.since == "relax" or segment.to == "relax")
-            lag += 0.0 if gone else segment.natural
-            shortest += 0.0 if gone else segment.shortest
-            longest += limit if limit is not None else segment.natural
-            unlimited = unlimited or limit is None
-            source, target = self.at[Point(id, segment.since)], self.at[Point(id, segment.to)]
+        for number, segment in enumerate(chain.segments):
+            source, target = at[chain.points[number]], at[chain.points[number + 1]]
+            gone = cut is not None and number >= cut
+            limit = chain.longest[number]
+            if not gone:
+                lag += segment.natural
+                shortest += segment.shortest
+                longest += limit if limit is not None else segment.natural
+                unlimited = unlimited or limit is None
             if (segment.since, segment.to) in always or (source == target and shortest <= EPSILON):
                 continue
             self.places.append(Place("phase", source, target, lag, shortest, id, lines))
-            can_wait = any(each.behavior == id and each.kind == "hold" for each in self.members[target])
-            if not can_wait and source != target:
+            if not gone and source != target and self.kinds[id, target] != "hold":
                 stretch = None if unlimited else max(0.0, longest - lag)
                 self.bounds.append(Bound("phase", target, source, -lag, stretch, id, lines))
             lag, shortest, longest, unlimited = 0.0, 0.0, 0.0, False
@@ -188,138 +149,161 @@ class Assembler:
         named = {point.behavior for point in self.relations.named}
         previous: dict[str, Chain] = {}
         for id, chain in self.chains.items():
-            type = type_of(chain.behavior)
-            before = previous.get(type)
-            previous[type] = chain
-            if before is None or id in named or performer(chain.behavior) != "body":
+            before = previous.get(chain.type)
+            previous[chain.type] = chain
+            if before is None or id in named or performer(chain.behavior) == "recognition":
                 continue
             other = before.behavior.id
             sync, seconds = "end", 0.0
-            if other in self.natural:
+            if other in self.arrangement.natural:
                 # It would last until this one takes over: this one does as soon as it is on target.
                 sync = "stroke"
                 seconds = sum(each.natural for each in before.segments if each.since in ("stroke", "stroke_end"))
-            source, target = self.at[Point(other, sync)], self.at[Point(id, "start")]
-            self.places.append(Place("series", source, target, seconds, seconds, lines=_lines(chain.behavior.line)))
+            self._follow(Point(other, sync), Point(id, "start"), seconds, lines=_lines(chain.behavior.line))
 
-    def _natural_ends(self) -> None:
-        others = [id for id in self.chains if id in self.waited_for and id not in self.natural]
-        for id in sorted(self.natural):
-            target = self.at[Point(id, "relax")]
-            if (successor := self.successors.get(id)) is not None:
-                self.places.append(Place("series", self.at[Point(successor, "start")], target, behavior=id))
-                continue
+    def _arranged(self) -> None:
+        for later, earlier in self.arrangement.turns:
+            self._follow(earlier, Point(later, "start"), behavior=later)
+        for id, (successor, point) in self.arrangement.successors.items():
+            self._follow(Point(successor, "start"), point, behavior=id)
+        others = [id for id in self.chains if id in self.waited_for and id not in self.arrangement.natural]
+        for id in self.arrangement.lasting:
             for other in others:
-                end = self.at[self.chains[other].points[-1]]
-                self.places.append(Place("series", end, target, behavior=id))
+                self._follow(self.chains[other].points[-1], Point(id, "relax"), behavior=id)
+
+    def _follow(
+        self, before: Point, point: Point, seconds: Seconds = 0.0, *, behavior: str = "", lines: tuple[int, ...] = ()
+    ) -> None:
+        source, target = self.at[before], self.at[point]
+        if source != target:
+            self.places.append(Place("series", source, target, seconds, seconds, behavior, lines))
 
     def _never_too_soon(self) -> None:
         """An order on a point that cannot wait is kept for certain by where its behavior can: it waits there.
 
         Unless what it would wait for waits for it in turn; then prediction must do.
         """
-        for place in [place for place in self.places if place.kind == "order" and place.source != 0]:
-            for member in self.members[place.target]:
-                if member.kind != "passive" or member.behavior not in self.chains:
-                    continue
-                waits_at, seconds = self._last_wait(self.chains[member.behavior], place.target)
-                if not self._leads_to(waits_at, place.source):
-                    lag = max(0.0, round(place.lag - seconds, 9))
-                    self.places.append(Place("order", place.source, waits_at, lag, lag, lines=place.lines))
+        waits = []
+        for place in self.places:
+            if place.kind == "order" and place.source != 0:
+                for member in self.members[place.target]:
+                    if member.kind == "passive" and (chain := self.chains.get(member.behavior)):
+                        waits_at, seconds = self._last_wait(chain, place.target)
+                        lag = max(0.0, round(place.lag - seconds, 9))
+                        waits.append(Place("order", place.source, waits_at, lag, lag, lines=place.lines))
+        if not waits:
+            return
+        out: dict[int, list[int]] = {}
+        for place in (*self.places, *waits):
+            out.setdefault(place.source, []).append(place.target)
+        circle = {each: number for number, group in enumerate(components(self.size, out)) for each in group}
+        self.places += [place for place in waits if circle[place.source] != circle[place.target]]
 
     def _last_wait(self, chain: Chain, transition: int) -> tuple[int, Seconds]:
         """Where the behavior can last wait before `transition`, and how long it takes from there."""
-        points = chain.points
-        reached = next(number for number, point in enumerate(points) if self.at[point] == transition)
+        stations = [self.at[point] for point in chain.points]
         seconds = 0.0
-        for number in range(reached - 1, -1, -1):
+        for number in range(stations.index(transition) - 1, -1, -1):
             seconds += chain.segments[number].natural
-            here = self.at[points[number]]
-            if here != transition and any(
-                each.behavior == chain.behavior.id and each.kind != "passive" for each in self.members[here]
-            ):
+            here = stations[number]
+            if here != transition and self.kinds[chain.behavior.id, here] != "passive":
                 return here, seconds
-        return self.at[points[0]], seconds
-
-    def _leads_to(self, source: int, target: int) -> bool:
-        out: dict[int, list[int]] = {}
-        for place in self.places:
-            out.setdefault(place.source, []).append(place.target)
-        seen, todo = {source}, [source]
-        while todo:
-            here = todo.pop()
-            if here == target:
-                return True
-            fresh = set(out.get(here, ())) - seen
-            seen |= fresh
-            todo += fresh
-        return False
+        return stations[0], seconds
 
     def _ending(self, end: int) -> None:
+        """Everything follows the start and leads to the end, or it could happen again before that has come.
+
+        What may outlast the block holds a token from its end to its start instead: it is not begun again before.
+        """
         self.places.append(Place("order", 0, end))
-        for id in sorted(self.waited_for & self.chains.keys()):
-            self.places.append(Place("order", self.at[self.chains[id].points[-1]], end, behavior=id))
-
-
-def equal_by_order(net: PetriNet) -> list[list[int]]:
-    """Transitions that wait for each other in a circle of no length: circular synchronization, so one instant."""
-    if order(net) is not None:
-        return []
-    out: dict[int, list[int]] = {}
-    for place in net.places:
-        if place.kind != "idle" and place.shortest <= EPSILON:
-            out.setdefault(place.source, []).append(place.target)
-    return [group for group in _strong_components(len(net.transitions), out) if len(group) > 1]
-
-
-def _strong_components(size: int, out: Mapping[int, list[int]]) -> list[list[int]]:
-    """Kosaraju, without recursion."""
-    into: dict[int, list[int]] = {}
-    for source, targets in out.items():
-        for target in targets:
-            into.setdefault(target, []).append(source)
-    finished: list[int] = []
-    seen: set[int] = set()
-    for root in range(size):
-        stack = [(root, iter(out.get(root, [])))] if root not in seen else []
-        seen.add(root)
-        while stack:
-            here, rest = stack[-1]
-            step = next((each for each in rest if each not in seen), None)
-            if step is None:
-                finished.append(here)
-                stack.pop()
+        for id, chain in self.chains.items():
+            start, last = self.at[chain.points[0]], self.at[chain.points[-1]]
+            if id in self.waited_for:
+                self.places.append(Place("order", last, end, behavior=id))
             else:
-                seen.add(step)
-                stack.append((step, iter(out.get(step, []))))
-    groups = []
-    taken: set[int] = set()
-    for root in reversed(finished):
-        if root in taken:
-            continue
-        taken.add(root)
-        group: list[int] = []
-        todo = [root]
-        while todo:
-            group.append(here := todo.pop())
-            unseen = [each for each in into.get(here, []) if each not in taken]
-            taken.update(unseen)
-            todo += unseen
-        groups.append(sorted(group))
-    return groups
+                self.places.append(Place("order", start, end, behavior=id))
+                self.places.append(Place("idle", last, start, behavior=id))
+        fed = {place.target for place in self.places if place.kind != "idle"}
+        left = {place.source for place in self.places}
+        self.places += [Place("order", 0, each) for each in range(1, end) if each not in fed]
+        self.places += [Place("order", each, end) for each in range(end) if each not in left]
+        self.places.append(Place("idle", end, 0))
+
+    def _in_firing_order(self) -> Assembly:
+        """Numbered in an order in which they can fire: the same for any order of elements."""
+        ranked = _firing_order(len(self.transitions), self.places)
+        is_ordered = len(ranked) == len(self.transitions)
+        if not is_ordered:
+            known = set(ranked)
+            ranked += [each for each in range(len(self.transitions)) if each not in known]
+        number = [0] * len(ranked)
+        for new, old in enumerate(ranked):
+            number[old] = new
+        places = [
+            (number[it.source], number[it.target], it.kind, it.lag, it.behavior, it.lines, it.shortest)
+            for it in self.places
+        ]
+        bounds = [
+            (number[it.source], number[it.target], it.kind, it.lag, it.behavior, it.lines, _sortable(it.stretch))
+            for it in self.bounds
+        ]
+        net = PetriNet(
+            tuple([self.transitions[each] for each in ranked]),
+            tuple(
+                [
+                    Place(kind, source, target, lag, shortest, behavior, lines)
+                    for source, target, kind, lag, behavior, lines, shortest in _sorted(places)
+                ]
+            ),
+            tuple(
+                [
+                    Bound(kind, source, target, lag, None if stretch == inf else stretch, behavior, lines)
+                    for source, target, kind, lag, behavior, lines, stretch in _sorted(bounds)
+                ]
+            ),
+        )
+        members = [*self.members, ()]
+        at = {point: number[each] for point, each in self.at.items()}
+        return Assembly(net, is_ordered, at, tuple([members[each] for each in ranked]))
+
+    def circles(self) -> list[list[Point]]:
+        """Points that wait for each other in a circle of no length, so are one instant: circular synchronization."""
+        out: dict[int, list[int]] = {}
+        for place in self.places:
+            if place.kind != "idle" and place.shortest <= EPSILON:
+                out.setdefault(place.source, []).append(place.target)
+        groups = [group for group in components(len(self.transitions), out) if len(group) > 1]
+        return [[self.transitions[each].points[0] for each in group if each < self.size] for group in groups]
 
 
-def same_part(one: Behavior, other: Behavior) -> bool:
-    return family(type_of(one)) == family(type_of(other))
+def _firing_order(size: int, places: list[Place]) -> list[int]:
+    """The transitions as they can fire, the last one last, without those that wait for each other."""
+    out: list[list[int]] = [[] for _ in range(size)]
+    missing = [0] * size
+    for place in places:
+        if place.kind != "idle":
+            out[place.source].append(place.target)
+            missing[place.target] += 1
+    ready = [each for each in range(size - 1) if not missing[each]]
+    found = []
+    while ready:
+        found.append(here := heapq.heappop(ready))
+        for target in out[here]:
+            missing[target] -= 1
+            if not missing[target]:
+                heapq.heappush(ready, target)
+    return found
+
+
+def _sorted(ties: list[_Tie]) -> list[_Tie]:
+    """In order, each once."""
+    ties.sort()
+    return [tie for tie, before in zip(ties, [None, *ties], strict=False) if tie != before]
+
+
+def _sortable(stretch: Seconds | None) -> Seconds:
+    return inf if stretch is None else stretch
 
 
 def _lines(*lines: int) -> tuple[int, ...]:
     return tuple(sorted(set(lines) - {0}))
-
-
-def _place_order(place: Place) -> tuple[int, int, str, Seconds, str, tuple[int, ...]]:
-    return (place.source, place.target, place.kind, place.lag, place.behavior, place.lines)
-
-
-def _bound_order(bound: Bound) -> tuple[int, int, str, Seconds, str, tuple[int, ...]]:
-    return (bound.source, bound.target, bound.kind, bound.lag, bound.behavior, bound.lines)

@@ -5,6 +5,7 @@ Synchronizations that share a point merge, whatever their number, direction and 
 
 from collections import defaultdict, deque
 from collections.abc import Iterable
+from contextlib import suppress
 
 from msgspec import Struct
 
@@ -68,6 +69,16 @@ class Classes:
             if known is None:
                 (root, start), (other, end) = self.find(first.point), self.find(term.point)
                 self._parent[other], self._offset[other] = root, start + apart - end
+
+    def tie_if_possible(self, equal: Equal) -> None:
+        """Merge what does not contradict what is known."""
+        for term in equal.terms[1:]:
+            with suppress(BlockRefused):
+                self.tie(Equal((equal.terms[0], term)), "")
+
+    def lines(self, *points: Point) -> set[int]:
+        """Where it is written that the first of `points` and the last are tied, if they are."""
+        return {term.line for term in self._chain(points[0], points[-1])} - {0} if len(points) > 1 else set()
 
     def _contradiction(self, first: Term, second: Term, known: Seconds, block: str) -> BlockRefused:
         chain = self._chain(first.point, second.point)

@@ -52,8 +52,8 @@ def as_json(plan: Plan) -> str:
             for place, tokens in zip(net.places, net.initial, strict=True)
         ],
         "bounds": [
-            {"kind": bound.kind, "source": bound.source, "target": bound.target, "lag": bound.lag, "kept": kept}
-            for bound, kept in ((bound, number not in plan.loose) for number, bound in enumerate(net.bounds))
+            {"kind": bound.kind, "source": bound.source, "target": bound.target, "lag": bound.lag}
+            for bound in net.bounds
         ],
         "behaviors": {
             id: {point.sync: round(plan.predicted(point), 6) for point in chain.points}

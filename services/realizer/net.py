@@ -2,14 +2,19 @@
 
 A transition is one instant, shared by all sync points that are synchronized there. A place is the phase of a
 behavior between two of its points, a delay, or a mere order. Every place has one input and one output: a timed
-marked graph, live if and only if every cycle holds a token. The only token at rest lies in `idle`, between the
-end of the block and its start, so the net is live exactly if nothing in the block waits for itself.
+marked graph. Transitions are numbered in an order in which they can fire.
+
+`idle` places hold the tokens at rest. One lies between the end of the block and its start; one at each behavior
+that may outlast the block, from its end to its start. So the net is live exactly if nothing in the block waits for
+itself, and no place ever holds a second token.
 
 Backward arcs (an upper bound, a phase that cannot stretch) hold no tokens: they only bound the schedule.
 """
 
 from collections import deque
-from typing import Literal
+from collections.abc import Iterable, Sequence
+from functools import cached_property
+from typing import Literal, NamedTuple
 
 from msgspec import Struct
 
@@ -17,8 +22,8 @@ from schemas.units import Seconds
 from services.realizer.points import Point
 
 PlaceKind = Literal["phase", "delay", "order", "series", "idle"]
-Marking = tuple[int, ...]
-"""Tokens in each place."""
+Marking = bytes
+"""Tokens in each place; a byte each, so that the next marking is a copy and not a walk."""
 
 
 class Transition(Struct, frozen=True):
@@ -58,68 +63,138 @@ class Bound(Struct, frozen=True):
     lines: tuple[int, ...] = ()
 
 
-class PetriNet(Struct, frozen=True):
+class PetriNet(Struct, frozen=True, dict=True):
     """Transition 0 is the start of the block, the last one its end."""
 
     transitions: tuple[Transition, ...]
     places: tuple[Place, ...]
     bounds: tuple[Bound, ...] = ()
 
-    @property
+    @cached_property
     def initial(self) -> Marking:
-        return tuple(int(place.kind == "idle") for place in self.places)
+        return bytes(place.kind == "idle" for place in self.places)
+
+    @cached_property
+    def inputs(self) -> Sequence[Sequence[int]]:
+        """Of each transition, the places it takes a token from."""
+        return self._by_transition([place.target for place in self.places])
+
+    @cached_property
+    def outputs(self) -> Sequence[Sequence[int]]:
+        """Of each transition, the places it puts a token into."""
+        return self._by_transition([place.source for place in self.places])
+
+    def _by_transition(self, ends: list[int]) -> list[list[int]]:
+        found: list[list[int]] = [[] for _ in self.transitions]
+        for place, transition in enumerate(ends):
+            found[transition].append(place)
+        return found
 
 
-def inputs(net: PetriNet) -> tuple[tuple[int, ...], ...]:
-    """Of each transition, the places it takes a token from."""
-    return _by_transition(net, [place.target for place in net.places])
-
-
-def outputs(net: PetriNet) -> tuple[tuple[int, ...], ...]:
-    """Of each transition, the places it puts a token into."""
-    return _by_transition(net, [place.source for place in net.places])
-
-
-def _by_transition(net: PetriNet, ends: list[int]) -> tuple[tuple[int, ...], ...]:
-    found: list[list[int]] = [[] for _ in net.transitions]
-    for place, transition in enumerate(ends):
-        found[transition].append(place)
-    return tuple(map(tuple, found))
-
-
-def enabled(net: PetriNet, marking: Marking) -> tuple[int, ...]:
-    """The transitions whose every input place holds a token."""
-    return tuple(each for each, places in enumerate(inputs(net)) if all(marking[place] for place in places))
+def enabled(net: PetriNet, marking: Marking, among: Iterable[int] | None = None) -> tuple[int, ...]:
+    """The transitions (of those `among`, or all) whose every input place holds a token."""
+    inputs = net.inputs
+    each = range(len(net.transitions)) if among is None else among
+    return tuple(one for one in each if all(marking[place] for place in inputs[one]))
 
 
 def fire(net: PetriNet, marking: Marking, transition: int) -> Marking:
     """The marking after `transition`. Raises ValueError if it is not enabled."""
-    tokens = list(marking)
-    for place in inputs(net)[transition]:
+    tokens = bytearray(marking)
+    for place in net.inputs[transition]:
         if not tokens[place]:
             raise ValueError(f"{net.transitions[transition].name!r} is not enabled: place {place} is empty")
         tokens[place] -= 1
-    for place in outputs(net)[transition]:
+    for place in net.outputs[transition]:
         tokens[place] += 1
-    return tuple(tokens)
+    return bytes(tokens)
 
 
-def order(net: PetriNet) -> tuple[int, ...] | None:
-    """Transitions in an order they can fire in, starting with 0; None if some wait for each other for ever."""
-    into, out = inputs(net), outputs(net)
-    missing = [sum(net.places[place].kind != "idle" for place in places) for places in into]
-    ready = deque(each for each, count in enumerate(missing) if count == 0)
-    fired = []
+class Firing(NamedTuple):
+    """fired: in order. marking: after the last of them."""
+
+    fired: tuple[int, ...]
+    marking: Marking
+
+
+def fire_once_each(net: PetriNet, marking: Marking) -> Firing:
+    """Fire whatever is enabled, each transition once at most, until none is left that could.
+
+    From the initial marking of a live net: every transition, and the initial marking again.
+    """
+    tokens = bytearray(marking)
+    inputs, outputs, places = net.inputs, net.outputs, net.places
+    empty = [sum([not tokens[place] for place in into]) for into in inputs]
+    ready = deque(each for each, count in enumerate(empty) if not count)
+    fired: list[int] = []
+    done = bytearray(len(inputs))
     while ready:
-        fired.append(transition := ready.popleft())
-        for place in out[transition]:
-            if net.places[place].kind != "idle":
-                missing[target := net.places[place].target] -= 1
-                if missing[target] == 0:
+        if done[transition := ready.popleft()]:
+            continue
+        done[transition] = 1
+        fired.append(transition)
+        for place in inputs[transition]:
+            tokens[place] -= 1
+            if not tokens[place]:
+                empty[transition] += 1
+        for place in outputs[transition]:
+            tokens[place] += 1
+            if tokens[place] == 1:
+                target = places[place].target
+                empty[target] -= 1
+                if not empty[target]:
                     ready.append(target)
-    return tuple(fired) if len(fired) == len(net.transitions) else None
+    return Firing(tuple(fired), bytes(tokens))
 
 
 def is_live(net: PetriNet) -> bool:
-    """Can every transition always fire again? For a marked graph: does every cycle hold a token?"""
+    """Can every transition always fire again? For a marked graph: does every cycle hold a token?
+
+    It does if the transitions can be put in order along the places that hold none.
+    """
     return order(net) is not None
+
+
+def order(net: PetriNet) -> tuple[int, ...] | None:
+    """The transitions in an order along all places without a token; None if there is none."""
+    initial, places = net.initial, net.places
+    missing = [sum([not initial[place] for place in into]) for into in net.inputs]
+    found = [each for each, count in enumerate(missing) if not count]
+    for here in found:  # it grows
+        for place in net.outputs[here]:
+            if not initial[place]:
+                missing[target := places[place].target] -= 1
+                if not missing[target]:
+                    found.append(target)
+    return tuple(found) if len(found) == len(net.transitions) else None
+
+
+def is_safe(net: PetriNet) -> bool:
+    """Does no place ever hold a second token? For a live marked graph: is each on a cycle that holds one alone?"""
+    tokens = {(place.source, place.target) for place, count in zip(net.places, net.initial, strict=True) if count}
+    open_places = {
+        (place.source, place.target)
+        for place, count in zip(net.places, net.initial, strict=True)
+        if not count and (place.target, place.source) not in tokens
+    }
+    for source, target in sorted(tokens, key=lambda ends: ends[0] - ends[1], reverse=True):
+        if not open_places:
+            break
+        after, before = _reachable(net, target, forward=True), _reachable(net, source, forward=False)
+        open_places = {(since, to) for since, to in open_places if since not in after or to not in before}
+    return not open_places and is_live(net)
+
+
+def _reachable(net: PetriNet, start: int, *, forward: bool) -> set[int]:
+    """Along places that hold no token."""
+    found, todo = {start}, [start]
+    while todo:
+        here = todo.pop()
+        for number in net.outputs[here] if forward else net.inputs[here]:
+            if not net.initial[number]:
+                place = net.places[number]
+                there = place.target if forward else place.source
+                if there not in found:
+                    found.add(there)
+                    todo.append(there)
+    return found

@@ -9,26 +9,32 @@ from collections.abc import Iterable, Mapping
 from typing import get_args
 
 from msgspec import Struct
+from msgspec.structs import replace
 
-from schemas.behaviors import BlockBehavior, Event, Unknown
+from schemas.behaviors import BlockBehavior, Event, Hand, Unknown
 from schemas.blocks import Block
 from schemas.body import BodyPose, Estimate, Estimates
 from schemas.faults import Fault
 from schemas.feedback import WarningKind
 from schemas.units import Seconds
-from services.realizer.assembly import Assembler, Assembly, Chain, Member, equal_by_order, same_part
+from services.realizer.assembly import Assembler, Assembly, Member
+from services.realizer.chains import Chain, chain, natural_ends
 from services.realizer.classes import Classes
-from services.realizer.net import Bound, PetriNet, Place
-from services.realizer.points import Point, segments, sync_points
-from services.realizer.relations import BlockRefused, Equal, Problem, Relations, Term, relations
-from services.realizer.schedule import EPSILON, Lag, PositiveCycle, earliest
+from services.realizer.handover import Arrangement, Conflict, arrange, free_hand
+from services.realizer.net import Bound, PetriNet
+from services.realizer.points import Point, one_instant
+from services.realizer.prediction import Impossible, predict
+from services.realizer.relations import BlockRefused, Equal, Order, Problem, Relations, Term, relations
+from services.realizer.schedule import Solution
+from services.realizer.verdict import Loss, judge
 
 
 class Plan(Struct, frozen=True, kw_only=True):
     """schedule: of each transition of the net, seconds from the block's start, if all goes as estimated.
 
+    block: with a hand for each gesture that must use a certain one. critical: the transitions that make the block as
+    long as it is, from first to last.
     behaviors: those that will be performed, in document order. dropped: those that will not, with `problems`.
-    loose: bounds of the net that cannot be kept even if all goes as estimated; what they bound will be late.
     natural: behaviors that end when something takes their place, or with the block.
     waited_for: behaviors that the end of the block waits for.
     """
@@ -44,7 +50,7 @@ class Plan(Struct, frozen=True, kw_only=True):
     natural: frozenset[str]
     required: frozenset[str]
     waited_for: frozenset[str]
-    loose: frozenset[int] = frozenset()
+    critical: tuple[int, ...] = ()
     dropped: tuple[str, ...] = ()
     problems: tuple[Problem, ...] = ()
 
@@ -53,16 +59,7 @@ class Plan(Struct, frozen=True, kw_only=True):
 
     @property
     def bounds(self) -> tuple[Bound, ...]:
-        """Those to be kept."""
-        return tuple(bound for number, bound in enumerate(self.net.bounds) if number not in self.loose)
-
-
-class _Unreachable(Exception):
-    """A behavior that cannot be on time."""
-
-    def __init__(self, behavior: str, reason: str) -> None:
-        self.behavior = behavior
-        super().__init__(reason)
+        return self.net.bounds
 
 
 def plan_block(
@@ -89,19 +86,25 @@ class _Planner:
         self._check_ids()
         self.relations = relations(block, elsewhere)
         self.problems = list(self.relations.problems)
-        self.dropped = list(dropped)
+        self.dropped = dict.fromkeys(dropped)
+        """In the order in which they were; the values say nothing."""
+        self.turns: frozenset[tuple[str, Point]] = frozenset()
+        self.hands: dict[str, Hand] = {}
+        self.chains: dict[str, Chain] = {}
         for behavior in block.behaviors:
             if behavior.id in self.dropped:
                 continue
-            if behavior.id in self.relations.unusable:
+            if isinstance(behavior, Unknown):
+                self._drop(behavior.id, "BEHAVIOR_TYPE_NOT_SUPPORTED", f"unknown element <{behavior.element}>")
+            elif behavior.id in self.relations.unusable:
                 self._refuse_if_required(
                     behavior.id, "its timing names a sync point it does not have", "PARSING_FAILURE"
                 )
-                self.dropped.append(behavior.id)
-            elif isinstance(behavior, Unknown):
-                self._drop(behavior.id, "BEHAVIOR_TYPE_NOT_SUPPORTED", f"unknown element <{behavior.element}>")
+                self.dropped[behavior.id] = None
             elif (estimate := estimates.get(behavior.id)) and not estimate.feasible:
                 self._drop(behavior.id, _kind(estimate.warning), str(estimate.fault or "the body cannot do it"))
+            else:
+                self.chains[behavior.id] = chain(behavior, estimate)
 
     def _check_ids(self) -> None:
         if not self.block.id:
@@ -121,206 +124,142 @@ class _Planner:
 
     def _drop(self, id: str, kind: WarningKind, reason: str) -> None:
         self._refuse_if_required(id, reason, kind)
-        self.dropped.append(id)
+        self.chains.pop(id, None)
+        self.dropped[id] = None
         self.problems.append(Problem(kind, reason, id))
 
     def plan(self) -> Plan:
+        """What cannot be on time is dropped, until the rest can be."""
         while True:
+            present = self._present()
+            classes = self._classes(present)
             try:
-                return self._plan()
-            except _Unreachable as error:
-                self._drop(error.behavior, "IMPOSSIBLE_TO_SCHEDULE", str(error))
+                return self._plan(present, classes)
+            except Loss as loss:
+                self.turns = frozenset()
+                self._drop(loss.behavior, "IMPOSSIBLE_TO_SCHEDULE", str(loss))
 
-    def _plan(self) -> Plan:
-        kept = tuple(behavior for behavior in self.block.behaviors if behavior.id not in self.dropped)
-        chains = {behavior.id: self._chain(behavior) for behavior in kept}
-        present = _without(self.relations, frozenset(self.dropped))
-        classes = Classes()
-        for equal in self.relations.equals:
-            # With the points of what was dropped: what it tied together stays tied.
-            classes.tie(equal, self.block.id)
-        waited_for = frozenset(chains) - _unawaited_events(kept, present)
-        successors: dict[str, str] = {}
-        cut: frozenset[str] = frozenset()
-        for _ in range(3):
-            assembler = Assembler(self.block.id, chains, present, classes, successors, cut, waited_for)
-            assembly = assembler.assemble()
-            while self._merge_circles(assembly, classes):
-                assembly = Assembler(self.block.id, chains, present, classes, successors, cut, waited_for).assemble()
-            loose = self._check(assembly, chains)
-            schedule, loose = _predict(assembly, loose)
-            new_successors, new_cut = _handovers(chains, assembly, schedule, assembler.natural)
-            if (new_successors, new_cut) == (successors, cut):
+    def _plan(self, present: Relations, classes: Classes) -> Plan:
+        """Raises Loss: a behavior that cannot be on time."""
+        natural = natural_ends(self.chains, present)
+        waited_for = frozenset(self.chains) - self._unawaited_events(present)
+        arrangement = Arrangement(natural=natural)
+        assembler = Assembler(self.chains, present, classes, waited_for)
+        while True:
+            assembler, assembly, solution = self._solved(assembler, arrangement, classes)
+            times = {point: solution.times[transition] for point, transition in assembly.at.items()}
+            arranged, conflicts = arrange(self.chains, present, arrangement, times)
+            for conflict in conflicts:
+                self._resolve(conflict, times)
+            if conflicts:
+                arrangement = Arrangement(natural=natural, turns=self.turns)
+            elif arranged == arrangement:
                 break
-            successors, cut = new_successors, new_cut
+            else:
+                arrangement = arranged
         return Plan(
-            block=self.block,
-            behaviors=kept,
+            block=self._block(),
+            behaviors=tuple([chain.behavior for chain in self.chains.values()]),
             net=assembly.net,
             at=assembly.at,
             members=assembly.members,
-            schedule=tuple(schedule),
-            chains=chains,
+            schedule=tuple(solution.times),
+            chains=dict(self.chains),
             estimates=self.estimates,
-            natural=frozenset(assembler.natural),
+            natural=natural,
             required=present.required,
             waited_for=waited_for,
-            loose=loose,
+            critical=_critical(solution),
             dropped=tuple(self.dropped),
             problems=tuple(self.problems),
         )
 
-    def _chain(self, behavior: BlockBehavior) -> Chain:
-        estimate = self.estimates.get(behavior.id)
-        longest = {(phase.since, phase.to): phase.longest for phase in estimate.phases} if estimate else {}
-        parts = segments(behavior, estimate)
-        limits = (longest.get((part.since, part.to)) for part in parts)
-        return Chain(behavior, parts, tuple(limits))
+    def _present(self) -> Relations:
+        """What is said about the points of those that are performed."""
 
-    def _merge_circles(self, assembly: Assembly, classes: Classes) -> bool:
-        """Make one instant of transitions that wait for each other without delay; whether there were any."""
-        groups = equal_by_order(assembly.net)
-        for group in groups:
-            points = [
-                assembly.net.transitions[each].points[0] for each in group if assembly.net.transitions[each].points
-            ]
-            classes.tie(Equal(tuple(Term(point, 0.0, str(point)) for point in points)), self.block.id)
-        return bool(groups)
+        def there(term: Term) -> bool:
+            return term.point.behavior not in self.dropped
 
-    def _check(self, assembly: Assembly, chains: Mapping[str, Chain]) -> frozenset[int]:
-        """Is there a schedule at all, with every phase as short or long as can be? The bounds to give up if so.
-
-        Raises _Unreachable for a behavior that misses an absolute time, BlockRefused for a deadlock.
-        """
-        net = assembly.net
-        loose: set[int] = {number for number, bound in enumerate(net.bounds) if bound.stretch is None}
-        while True:
-            lags = [
-                Lag(place.source, place.target, place.shortest, number)
-                for number, place in enumerate(net.places)
-                if place.kind != "idle"
-            ]
-            lags += [
-                Lag(bound.source, bound.target, bound.lag - (bound.stretch or 0.0), -1 - number)
-                for number, bound in enumerate(net.bounds)
-                if number not in loose
-            ]
-            try:
-                earliest([0.0] * len(net.transitions), (), lags)
-            except PositiveCycle as cycle:
-                loose.add(self._verdict(cycle, assembly, chains))
-            else:
-                return frozenset(loose - {n for n, bound in enumerate(net.bounds) if bound.stretch is None})
-
-    def _verdict(self, cycle: PositiveCycle, assembly: Assembly, chains: Mapping[str, Chain]) -> int:
-        """The bound to give up; raises if the cycle is worse than that."""
-        net = assembly.net
-        transitions = [lag.source for lag in cycle.lags]
-        phases = {_reason(net, lag).behavior for lag in cycle.lags if _reason(net, lag).kind == "phase"}
-        touched = {point.behavior for each in transitions for point in net.transitions[each].points}
-        involved = [id for id in chains if id in (phases or touched)]
-        names = _route(net, cycle)
-        if 0 in transitions or len(involved) == 1:
-            candidates = [id for id in involved if id not in self.relations.required] or involved
-            if candidates:
-                raise _Unreachable(candidates[-1], f"cannot be on time: {names}")
-        bounded = [-1 - lag.reason for lag in cycle.lags if lag.reason < 0]
-        for number in bounded:
-            if net.bounds[number].kind == "phase":
-                return number
-        lines = sorted({line for lag in cycle.lags for line in _reason(net, lag).lines})
-        advice = f"see lines {', '.join(map(str, lines))}" if len(lines) > 1 else ""
-        fault = Fault(
-            reason=f"these points wait for each other in a circle: {names}",
-            where=self.block.id,
-            line=lines[0] if lines else 0,
-            advice=advice,
+        shown = self._timed
+        equals = [tuple(map(shown, filter(there, equal.terms))) for equal in self.relations.equals]
+        orders = [each for each in self.relations.orders if there(each.earlier) and there(each.later)]
+        return Relations(
+            tuple([Equal(terms) for terms in equals if len(terms) > 1]),
+            tuple([Order(shown(each.earlier), shown(each.later)) for each in orders]),
+            self.relations.required - self.dropped.keys(),
         )
-        raise BlockRefused(fault, "IMPOSSIBLE_TO_SCHEDULE")
+
+    def _timed(self, term: Term) -> Term:
+        """A later stroke as so much later than the first: bodies report only that."""
+        if not term.share or (movement := self.chains.get(term.point.behavior)) is None:
+            return term
+        strokes = next(each.natural for each in movement.segments if each.since == "stroke")
+        return replace(term, offset=term.offset + term.share * strokes, share=0.0)
+
+    def _classes(self, present: Relations) -> Classes:
+        classes = Classes()
+        for each in self.chains.values():
+            for syncs in one_instant(each.type):
+                classes.tie(Equal(tuple([Term(Point(each.behavior.id, sync), 0.0, sync) for sync in syncs])), "")
+        for equal in present.equals:
+            classes.tie(equal, self.block.id)
+        if self.dropped:
+            # What the points of a dropped behavior tied together stays tied, unless they could not have been.
+            for equal in self.relations.equals:
+                if any(term.point.behavior in self.dropped for term in equal.terms):
+                    classes.tie_if_possible(Equal(tuple(map(self._timed, equal.terms))))
+        return classes
+
+    def _unawaited_events(self, present: Relations) -> frozenset[str]:
+        """Events whose decision nothing in the block waits for."""
+        events = {id for id, each in self.chains.items() if isinstance(each.behavior, Event)}
+        awaited = {point.behavior for point in present.named if point.sync == "end"} if events else ()
+        return frozenset(events.difference(awaited))
+
+    def _solved(
+        self, assembler: Assembler, arrangement: Arrangement, classes: Classes
+    ) -> tuple[Assembler, Assembly, Solution]:
+        """What waits for each other without delay is made one instant. Raises Loss, or BlockRefused: a deadlock."""
+        while not (assembly := assembler.assemble(arrangement)).is_ordered and (circles := assembler.circles()):
+            for points in circles:
+                terms = tuple([Term(point, 0.0, str(point)) for point in points])
+                classes.tie(Equal(terms), self.block.id)
+            assembler = Assembler(self.chains, assembler.relations, classes, assembler.waited_for)
+        try:
+            return assembler, assembly, predict(assembly.net)
+        except Impossible as circle:
+            required = self.relations.required
+            raise judge(circle, assembly, self.chains, required, classes, self.block.id, self.turns) from None
+
+    def _resolve(self, conflict: Conflict, times: Mapping[Point, Seconds]) -> None:
+        """Use the other arm, or wait for one's turn."""
+        if (choice := free_hand(conflict, self.chains, times)) is None:
+            self.turns |= {(conflict.later, conflict.point)}
+            return
+        id, hand = choice
+        self.hands[id] = hand
+        behavior = replace(self.chains[id].behavior, mode=hand)
+        self.chains[id] = chain(behavior, self.estimates.get(id))
+
+    def _block(self) -> Block:
+        if not self.hands:
+            return self.block
+        chosen = [
+            replace(each, mode=hand) if (hand := self.hands.get(each.id)) else each for each in self.block.behaviors
+        ]
+        return replace(self.block, behaviors=tuple(chosen))
 
 
 def _kind(warning: str) -> WarningKind:
     return warning if warning in get_args(WarningKind) else "CANNOT_CREATE_BEHAVIOR"  # type: ignore[return-value]
 
 
-def _reason(net: PetriNet, lag: Lag) -> Place | Bound:
-    return net.places[lag.reason] if lag.reason >= 0 else net.bounds[-1 - lag.reason]
-
-
-def _route(net: PetriNet, cycle: PositiveCycle) -> str:
-    steps = [f"{net.transitions[lag.source].name} ({lag.seconds:+g} s)" for lag in cycle.lags]
-    return " -> ".join((*steps, net.transitions[cycle.lags[0].source].name))
-
-
-def _without(relations: Relations, dropped: frozenset[str]) -> Relations:
-    def there(term: Term) -> bool:
-        return term.point.behavior not in dropped
-
-    return Relations(
-        tuple(Equal(kept) for equal in relations.equals if len(kept := tuple(filter(there, equal.terms))) > 1),
-        tuple(order for order in relations.orders if there(order.earlier) and there(order.later)),
-        relations.required - dropped,
-    )
-
-
-def _unawaited_events(behaviors: tuple[BlockBehavior, ...], present: Relations) -> frozenset[str]:
-    """Events whose decision nothing in the block waits for."""
-    events = {behavior.id for behavior in behaviors if isinstance(behavior, Event)}
-    awaited = {point.behavior for point in present.named if point.sync == "end"}
-    return frozenset(events - awaited)
-
-
-def _predict(assembly: Assembly, loose: frozenset[int]) -> tuple[list[Seconds], frozenset[int]]:
-    """The earliest schedule with natural durations, and the bounds it had to break."""
-    net = assembly.net
-    broken = set(loose)
-    while True:
-        lags = [
-            Lag(place.source, place.target, place.lag, number)
-            for number, place in enumerate(net.places)
-            if place.kind != "idle"
-        ]
-        lags += [
-            Lag(bound.source, bound.target, bound.lag, -1 - number)
-            for number, bound in enumerate(net.bounds)
-            if number not in broken
-        ]
-        try:
-            return earliest([0.0] * len(net.transitions), (), lags), frozenset(broken)
-        except PositiveCycle as cycle:
-            bounded = [-1 - lag.reason for lag in cycle.lags if lag.reason < 0]
-            broken.add(next((each for each in bounded if net.bounds[each].kind == "phase"), bounded[0]))
-
-
-def _handovers(
-    chains: Mapping[str, Chain], assembly: Assembly, schedule: list[Seconds], natural: set[str]
-) -> tuple[dict[str, str], frozenset[str]]:
-    """Who takes whose place, and who is therefore not given the time to go home."""
-    documents = {id: number for number, id in enumerate(chains)}
-
-    def start(id: str) -> tuple[Seconds, int]:
-        return schedule[assembly.at[Point(id, "start")]], documents[id]
-
-    successors: dict[str, str] = {}
-    cut = set()
-    for id, chain in chains.items():
-        if "relax" not in sync_points(chain.behavior):
-            continue
-        later = [
-            other
-            for other in chains
-            if other != id and same_part(chain.behavior, chains[other].behavior) and start(other) > start(id)
-        ]
-        if not later:
-            continue
-        successor = min(later, key=start)
-        relax = schedule[assembly.at[Point(id, "relax")]]
-        if id in natural:
-            successors[id] = successor
-            cut.add(id)
-        elif abs(start(successor)[0] - relax) <= EPSILON:
-            cut.add(id)
-    return successors, frozenset(cut)
+def _critical(solution: Solution) -> tuple[int, ...]:
+    """From the end of the block back along what keeps each instant from being earlier."""
+    path = [len(solution.times) - 1]
+    while (cause := solution.causes.get(path[-1])) is not None:
+        path.append(cause.source)
+    return tuple(path[::-1])
 
 
 def poses_before(plan: Plan) -> dict[str, BodyPose]:
@@ -328,17 +267,15 @@ def poses_before(plan: Plan) -> dict[str, BodyPose]:
 
     How long a look takes depends on what was looked at before it, not on where the head is as the block comes in.
     """
+    latest: dict[str, Estimate] = {}
     poses = {}
-    for id, chain in plan.chains.items():
-        start = plan.predicted(Point(id, "start"))
-        before = [
-            (began, number, estimate.pose_after)
-            for number, (other, earlier) in enumerate(plan.chains.items())
-            if same_part(chain.behavior, earlier.behavior)
-            and "relax" in sync_points(earlier.behavior)
-            and (began := plan.predicted(Point(other, "start"))) < start
-            and (estimate := plan.estimates.get(other)) is not None
-        ]
-        if before and (pose := max(before, key=lambda it: it[:2])[2]) is not None:
-            poses[id] = pose
+    order = {id: (plan.predicted(each.points[0]), number) for number, (id, each) in enumerate(plan.chains.items())}
+    for id in sorted(plan.chains, key=order.__getitem__):
+        estimate = plan.estimates.get(id)
+        for part in plan.chains[id].parts:
+            before = latest.get(part)
+            if before is not None and before.pose_after is not None:
+                poses[id] = before.pose_after
+            if estimate is not None:
+                latest[part] = estimate
     return poses

@@ -3,6 +3,7 @@
 Thesis 4.1.2, with BML 1.0's types. Everything here uses the drafts' names; `schemas.syncref` knows the dialects.
 """
 
+from functools import lru_cache
 from itertools import pairwise
 from typing import Literal, NamedTuple
 
@@ -102,6 +103,7 @@ def one_instant(type: str) -> tuple[tuple[str, ...], ...]:
     return _ONE_INSTANT.get(type, _LASTING_INSTANT if type in ON_TARGET else ())
 
 
+@lru_cache(maxsize=1024)
 def gate(type: str, syncs: tuple[str, ...]) -> Gate:
     """How a behavior can wait at the instant that holds its points `syncs`, in order.
 
@@ -112,6 +114,7 @@ def gate(type: str, syncs: tuple[str, ...]) -> Gate:
     return "hold" if gate_point(type, syncs) in hold_points(type) else "passive"
 
 
+@lru_cache(maxsize=1024)
 def gate_point(type: str, syncs: tuple[str, ...]) -> str:
     """Of its points in one instant (in order), the one whose report says that the behavior is there."""
     first = next((group for group in one_instant(type) if syncs[0] in group), syncs[:1])

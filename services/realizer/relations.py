@@ -7,7 +7,7 @@ from collections.abc import Collection, Mapping
 
 from msgspec import Struct
 
-from schemas.behaviors import After, Before, Behavior, Speech, Synchronize, Unknown
+from schemas.behaviors import After, Before, Behavior, Head, Speech, Synchronize, Unknown
 from schemas.blocks import Block
 from schemas.faults import Fault, InputRefused
 from schemas.feedback import WarningKind
@@ -25,12 +25,16 @@ class BlockRefused(InputRefused):
 
 
 class Term(Struct, frozen=True):
-    """A point and an offset: the instant `offset` seconds after the point. text: as its author wrote it."""
+    """A point and an offset: the instant `offset` seconds after the point. text: as its author wrote it.
+
+    share: a later stroke of a repeated movement: how far it is from the first stroke to the end of the last.
+    """
 
     point: Point
     offset: Seconds
     text: str
     line: int = 0
+    share: float = 0.0
 
 
 class Equal(Struct, frozen=True):
@@ -65,10 +69,14 @@ class Relations(Struct, frozen=True):
 
     @property
     def named(self) -> frozenset[Point]:
-        """Every point that something is said about, alone or with others."""
-        terms = [term for equal in self.equals for term in equal.terms]
-        terms += [term for order in self.orders for term in (order.earlier, order.later)]
-        return frozenset(term.point for term in terms)
+        """Every point that something is said about."""
+        return self.held | {order.earlier.point for order in self.orders}
+
+    @property
+    def held(self) -> frozenset[Point]:
+        """Every point that must share an instant or wait for one: it cannot come at any earlier time."""
+        points = {term.point for equal in self.equals for term in equal.terms}
+        return frozenset(points | {order.later.point for order in self.orders})
 
 
 class _Reader:
@@ -105,14 +113,17 @@ class _Reader:
         sync = canonical_sync(ref.sync, type_of(behavior), self.block.dialect)
         if isinstance(behavior, Unknown):
             return Term(Point(behavior.id, sync), ref.offset, text, line)  # It will vanish with its behavior.
-        if not self._has(behavior, sync) or ref.repetition > 1:
+        strokes = behavior.repetition if isinstance(behavior, Head) else 1
+        if not self._has(behavior, sync) or ref.repetition > strokes:
             return Problem("PARSING_FAILURE", f"{where}: {type_of(behavior)} has no sync point {text!r}", behavior.id)
-        return Term(Point(behavior.id, sync), ref.offset, text, line)
+        share = (ref.repetition - 1) / strokes if ref.repetition else 0.0
+        return Term(Point(behavior.id, sync), ref.offset, text, line, share)
 
     def _has(self, behavior: Behavior, sync: str) -> bool:
-        """BML 1.0 knows fewer points than the drafts."""
+        """BML 1.0 knows fewer points than the drafts. Of an unknown element any may be."""
         spelled = dialect_sync(sync, type_of(behavior), self.block.dialect)
-        return spelled is not None and sync in self.points[behavior.id]
+        is_known = spelled is not None and sync in self.points[behavior.id]
+        return is_known or isinstance(behavior, Unknown)
 
     def _elsewhere(self, point: Point, ref: SyncRef, text: str, where: str, line: int) -> Term:
         if point not in self.elsewhere:
@@ -130,17 +141,20 @@ class _Reader:
             where = constraint.id or f"constraint {number}"
             for operator in constraint.operators:
                 line = operator.line or constraint.line
-                terms = self._terms((*([operator.ref] if operator.ref else []), *operator.syncs), where, line)
+                texts = (*([operator.ref] if operator.ref else []), *operator.syncs)
+                terms = self._terms(texts, where, line, required=constraint.required)
                 self._relate(operator, terms)
                 if constraint.required:
                     self.required |= {term.point.behavior for term in terms.values()} & self.behaviors.keys()
 
-    def _terms(self, texts: tuple[str, ...], where: str, line: int) -> dict[str, Term]:
+    def _terms(self, texts: tuple[str, ...], where: str, line: int, *, required: bool) -> dict[str, Term]:
         terms = {}
         for text in texts:
             match self.term(text, where, line):
                 case Term() as term:
                     terms[text] = term
+                case Problem(message=message) if required:
+                    raise self.refusal(message.removeprefix(f"{where}: "), where, line, "the constraint is required")
                 case Problem(message=message):
                     self.problems.append(Problem("PARSING_FAILURE", f"{message}; the line is ignored"))
         return terms

@@ -7,7 +7,6 @@ from schemas.units import Seconds
 
 EPSILON: Seconds = 1e-6
 """Times closer than this are the same instant."""
-NEVER: Seconds = float("-inf")
 
 
 class Lag(NamedTuple):
@@ -20,47 +19,69 @@ class Lag(NamedTuple):
 
 
 class PositiveCycle(Exception):
-    """No schedule: these lags lead back to their start and take longer than no time at all."""
+    """No schedule: these lags lead back to their start and take longer than no time at all.
 
-    def __init__(self, lags: Sequence[Lag]) -> None:
-        self.lags = tuple(lags)
-        super().__init__(f"a cycle of {sum(lag.seconds for lag in lags):+g} s")
+    cycles: all that were found, no two of which share an instant. lags: of the first.
+    """
+
+    def __init__(self, cycles: Sequence[Sequence[Lag]]) -> None:
+        self.cycles = tuple(map(tuple, cycles))
+        self.lags = self.cycles[0]
+        super().__init__(f"a cycle of {sum(lag.seconds for lag in self.lags):+g} s")
 
 
-def earliest(start: Sequence[Seconds], fixed: Iterable[int], lags: Sequence[Lag]) -> list[Seconds]:
+class Solution(NamedTuple):
+    """times: of each instant. causes: what keeps an instant from being earlier; none where nothing does."""
+
+    times: list[Seconds]
+    causes: dict[int, Lag]
+
+
+def solve(start: Sequence[Seconds], fixed: Iterable[int], lags: Sequence[Lag]) -> Solution:
     """Least instants, each no earlier than its `start`, that satisfy `lags`. Raises PositiveCycle.
 
     fixed: instants that are facts and never move; a bound that they break is ignored.
-    Lags in an order in which they can be met make this one pass; backward bounds cost a pass for each time
-    they move something.
+    Sweeps go to and fro over the lags. Where these are in an order in which they can be met, forward lags need one
+    sweep, what backward ones push back another; only what is pushed to and fro costs more (Yen's Bellman-Ford).
     """
     times = list(start)
     facts = frozenset(fixed)
-    live = [lag for lag in lags if lag.target not in facts]
-    cause: dict[int, Lag] = {}
-    for _ in range(len(times) + 1):
+    live = [lag for lag in lags if lag.target not in facts] if facts else list(lags)
+    causes: dict[int, Lag] = {}
+    sweeps = (live, live[::-1])
+    for number in range(len(times) + 2):
         moved = None
-        for lag in live:
-            at = times[lag.source] + lag.seconds
-            if at > times[lag.target] + EPSILON / 100:
-                times[lag.target] = at
-                cause[lag.target] = lag
-                moved = lag.target
+        for lag in sweeps[number % 2]:
+            source, target, seconds, _ = lag
+            at = times[source] + seconds
+            if at > times[target] + EPSILON / 100:
+                times[target] = at
+                causes[target] = lag
+                moved = target
         if moved is None:
-            return times
-        if cycle := _cycle(cause, moved):
-            raise PositiveCycle(cycle)
+            return Solution(times, causes)
+        if number and (cycles := _cycles(causes)):
+            raise PositiveCycle(cycles)
     raise AssertionError("every transition moved once too often, yet no cycle of causes")  # pragma: no cover
 
 
-def _cycle(cause: dict[int, Lag], transition: int) -> list[Lag]:
-    """The cycle that the causes of `transition` lead into, if any."""
-    seen: dict[int, int] = {}
-    path: list[Lag] = []
-    while transition in cause:
-        if transition in seen:
-            return path[seen[transition] :][::-1]
-        seen[transition] = len(path)
-        path.append(cause[transition])
-        transition = cause[transition].source
-    return []
+def earliest(start: Sequence[Seconds], fixed: Iterable[int], lags: Sequence[Lag]) -> list[Seconds]:
+    """The times of `solve`."""
+    return solve(start, fixed, lags).times
+
+
+def _cycles(causes: dict[int, Lag]) -> list[list[Lag]]:
+    """Every cycle among the causes: each instant has one, so they are disjoint."""
+    found = []
+    visited: dict[int, int] = {}
+    for root in causes:
+        here = root
+        while here in causes and here not in visited:
+            visited[here] = root
+            here = causes[here].source
+        if here in causes and visited[here] == root:
+            cycle = [causes[here]]
+            while (before := cycle[-1].source) != here:
+                cycle.append(causes[before])
+            found.append(cycle[::-1])
+    return found

@@ -11,7 +11,7 @@ from itertools import pairwise
 from msgspec import Struct, field
 
 from schemas import keys
-from schemas.behaviors import BlockBehavior, Speech
+from schemas.behaviors import BlockBehavior, Gesture, Pointing, Speech
 from schemas.body import (
     AbortBehavior,
     BehaviorOutcome,
@@ -44,7 +44,8 @@ HOLDS = {
     "faceFacs": ("relax",),
     "posture": ("relax",),
 }
-PART = {"gaze": "head", "gazeShift": "head", "pointing": "right_arm", "gesture": "right_arm", "speech": "voice"}
+PART = {"head": "nod", "gaze": "head", "gazeShift": "head", "speech": "voice"}
+ARMS = {None: ("right_arm",), "RIGHT_HAND": ("right_arm",), "LEFT_HAND": ("left_arm",)}
 DURATIONS: dict[str, tuple[Seconds, ...]] = {
     "pointing": (0.5, 0.25, 0.5, 0.25, 0.25, 0.5),
     "gesture": (0.5, 0.25, 0.5, 0.25, 0.25, 0.5),
@@ -66,6 +67,13 @@ def points_of(behavior: BlockBehavior) -> tuple[str, ...]:
     if isinstance(behavior, Speech):
         return ("start", *(mark.id for mark in sorted(behavior.marks, key=lambda mark: mark.position)), "end")
     return SEVEN if type_of(behavior) in HOLDS else ("start", "end")
+
+
+def parts_of(behavior: BlockBehavior) -> tuple[str, ...]:
+    if isinstance(behavior, Pointing | Gesture):
+        return ARMS.get(behavior.mode, ("left_arm", "right_arm"))
+    type = type_of(behavior)
+    return (PART.get(type, "face" if type.startswith("face") else type),)
 
 
 def natural_durations(behavior: BlockBehavior) -> tuple[Seconds, ...]:
@@ -157,8 +165,7 @@ class FakeBody:
             Phase(since=since, to=to, shortest=seconds, natural=seconds, longest=seconds, hold=to in holds)
             for (since, to), seconds in zip(pairwise(points_of(behavior)), durations, strict=True)
         )
-        parts = (PART.get(type_of(behavior), type_of(behavior)),)
-        return Estimate(behavior=behavior.id, feasible=True, parts=parts, phases=phases)
+        return Estimate(behavior=behavior.id, feasible=True, parts=parts_of(behavior), phases=phases)
 
     def _estimate(self, question: Message) -> Message:
         assert isinstance(question, EstimateBehaviors)
@@ -180,9 +187,10 @@ class FakeBody:
 
     def _take_over(self, perform: PerformBehavior) -> None:
         type = type_of(perform.behavior)
+        if type not in HOLDS or type == "head":
+            return
         for other in list(self.acts.values()):
-            same_arm = getattr(other.perform.behavior, "mode", None) == getattr(perform.behavior, "mode", None)
-            if type_of(other.perform.behavior) == type and type in HOLDS and type != "head" and same_arm:
+            if set(parts_of(perform.behavior)) & set(parts_of(other.perform.behavior)):
                 assert other.task is not None
                 other.task.cancel()
                 for sync in points_of(other.perform.behavior)[len(other.passed) :]:

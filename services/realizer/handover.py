@@ -1,0 +1,136 @@
+"""Behaviors of one block that move the same part: who takes it from whom, and who must wait for his turn."""
+
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from itertools import pairwise
+from typing import NamedTuple
+
+from msgspec import Struct
+
+from schemas.behaviors import Gesture, Hand, Pointing
+from schemas.syncref import SYNC_POINTS
+from schemas.units import Seconds
+from services.realizer.chains import Chain
+from services.realizer.points import WITH_STROKE, Point
+from services.realizer.relations import Relations
+from services.realizer.schedule import EPSILON
+
+_OTHER: dict[str, tuple[str, Hand]] = {
+    "left_arm": ("right_arm", "RIGHT_HAND"),
+    "right_arm": ("left_arm", "LEFT_HAND"),
+}
+_STROKE, _STROKE_END, _RELAX = (SYNC_POINTS.index(each) for each in ("stroke", "stroke_end", "relax"))
+"""Numbers of these points: everything that is handed over has all seven."""
+
+
+class Arrangement(Struct, frozen=True):
+    """natural: behaviors that end when something takes their place, or with the block; lasting: those with the block.
+
+    successors: who takes a behavior's part, and the first of its points that this brings about.
+    cuts: number of the first segment that is not given its time, because a successor has the part by then.
+    turns: who waits for which point of another behavior before it takes its part.
+    """
+
+    natural: frozenset[str] = frozenset()
+    lasting: tuple[str, ...] = ()
+    successors: Mapping[str, tuple[str, Point]] = {}
+    cuts: Mapping[str, int] = {}
+    turns: frozenset[tuple[str, Point]] = frozenset()
+
+
+class Conflict(NamedTuple):
+    """`later` would take the part from `earlier` before the latter's `point`, which is not to be given up."""
+
+    earlier: str
+    later: str
+    point: Point
+
+
+def arrange(
+    chains: Mapping[str, Chain],
+    relations: Relations,
+    before: Arrangement,
+    times: Mapping[Point, Seconds],
+) -> tuple[Arrangement, list[Conflict]]:
+    """Who else takes whose place in a schedule made with `before` and where that would break what was asked for."""
+    held = relations.held
+    mentioned = {point.behavior for point in relations.named}
+    successors, cuts = dict(before.successors), dict(before.cuts)
+    conflicts = []
+    for id, successor in _successors(chains, mentioned, times).items():
+        chain = chains[id]
+        taken = times[Point(successor, "start")]
+        first = next((number for number, point in enumerate(chain.points) if times[point] > taken + EPSILON), 0)
+        is_natural = id in before.natural
+        if first and (last := _not_given_up(chain, first, held, is_natural, is_asked=successor in mentioned)):
+            conflicts.append(Conflict(id, successor, chain.points[last]))
+        if id in successors:
+            continue
+        if is_natural:
+            first = min(first or _RELAX, _RELAX)
+        if first:
+            successors[id] = (successor, chain.points[first])
+            cuts[id] = first - 1
+    lasting = tuple(sorted(before.natural - successors.keys()))
+    return Arrangement(before.natural, lasting, successors, cuts, before.turns), conflicts
+
+
+def _not_given_up(
+    chain: Chain, first: int, held: frozenset[Point], is_natural: bool, *, is_asked: bool
+) -> int | None:
+    """The last of its points from number `first` on that a successor must wait for.
+
+    What shares an instant with others or waits for them; and all of it, if nobody has asked for the successor now.
+    """
+    broken = [number for number in range(first, len(chain.points)) if chain.points[number] in held]
+    if not is_asked:
+        broken.append(_STROKE if is_natural else len(chain.points) - 1)
+    if not broken or broken[-1] < first:
+        return None
+    return max(broken[-1], _STROKE_END) if chain.type in WITH_STROKE else broken[-1]
+
+
+def _successors(
+    chains: Mapping[str, Chain], mentioned: Collection[str], times: Mapping[Point, Seconds]
+) -> dict[str, str]:
+    """The next of each behavior on any of its parts. Of those that start together what nobody mentions comes last."""
+    users: dict[str, list[str]] = {}
+    for id, chain in chains.items():
+        for part in chain.parts:
+            users.setdefault(part, []).append(id)
+    rank = {
+        id: (times[chain.points[0]], id not in mentioned, number) for number, (id, chain) in enumerate(chains.items())
+    }
+    found: dict[str, str] = {}
+    for those in users.values():
+        those.sort(key=rank.__getitem__)
+        for earlier, later in pairwise(those):
+            if earlier not in found or rank[later] < rank[found[earlier]]:
+                found[earlier] = later
+    return found
+
+
+def free_hand(
+    conflict: Conflict, chains: Mapping[str, Chain], times: Mapping[Point, Seconds]
+) -> tuple[str, Hand] | None:
+    """Which of the two can use the other arm instead, since it names none and the arm is free all the while."""
+    for id in (conflict.later, conflict.earlier):
+        chain = chains[id]
+        other = _OTHER.get(chain.parts[0]) if len(chain.parts) == 1 else None
+        if other is None or not isinstance(chain.behavior, Pointing | Gesture) or chain.behavior.mode is not None:
+            continue
+        arm, hand = other
+        if _is_free(arm, _window(chain, times), (each for each in chains.values() if each is not chain), times):
+            return id, hand
+    return None
+
+
+def _window(chain: Chain, times: Mapping[Point, Seconds]) -> tuple[Seconds, Seconds]:
+    return times[chain.points[0]], times[chain.points[-1]]
+
+
+def _is_free(
+    arm: str, window: tuple[Seconds, Seconds], others: Iterable[Chain], times: Mapping[Point, Seconds]
+) -> bool:
+    since, to = window
+    windows: Sequence[tuple[Seconds, Seconds]] = [_window(each, times) for each in others if arm in each.parts]
+    return all(end <= since + EPSILON or start >= to - EPSILON for start, end in windows)
