@@ -61,10 +61,10 @@ async def play(
     resolution: str = "table",
     seed: int = 0,
     faults: Faults | None = None,
-    variability: Variability = Variability(),
+    noise: float = 0.0,
     **manager: Any,
 ) -> Record:
-    """Until the manager has said goodbye. faults: of the bus. variability: of the body. manager: its configuration."""
+    """Until the manager has said goodbye. faults: of the bus. noise: of the body's durations. manager: its configuration."""
     received: list[Received] = []
     finished = asyncio.Event()
 
@@ -73,7 +73,7 @@ async def play(
         finished.set()
 
     services: dict[str, Service] = {
-        "control": partial(embody, config=ControlConfig(variability=variability)),
+        "control": partial(embody, config=ControlConfig(variability=Variability(seed=seed, noise=noise))),
         "realizer": partial(realize, config=RealizerConfig()),
         "recognition": partial(recognize, config=RecognitionConfig(gaze_resolution=resolution)),  # type: ignore[arg-type]
         "generation": partial(generate, config=GenerationConfig()),

@@ -18,7 +18,6 @@ from schemas.feedback import BlockProgress, SyncPointProgress, WarningFeedback
 from schemas.recognition import ConnectionEvent
 from schemas.world import World
 from services.collaboration.relations import Relation, relation
-from services.control.config import Variability
 from services.memory_bus import Faults
 from services.virtual_time import run_virtual
 from tests.scenario.playing import Record, play
@@ -293,7 +292,7 @@ def test_a_slow_bus_that_delivers_some_messages_twice_gives_the_same_events() ->
 
 @pytest.mark.parametrize("resolution", ["table", "object"])
 def test_a_body_that_is_early_or_late_by_a_tenth_gives_the_same_events(resolution: str) -> None:
-    record = played(resolution=resolution, seed=18, variability=Variability(seed=18, noise=0.1))
+    record = played(resolution=resolution, seed=18, noise=0.1)
 
     assert by_step(record, resolution) == EXPECTED[resolution]
 
