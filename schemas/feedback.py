@@ -21,6 +21,7 @@ class BlockProgress(Struct, frozen=True, kw_only=True, tag="block_progress", omi
     at: Stamp
     time: Seconds = 0.0
     status: Literal["", "done", "failed", "interrupted"] = ""
+    character_id: str = ""
 
 
 class SyncPointProgress(Struct, frozen=True, kw_only=True, tag="sync_point_progress", omit_defaults=True):
@@ -39,19 +40,28 @@ class SyncPointProgress(Struct, frozen=True, kw_only=True, tag="sync_point_progr
     arrived: Seconds | None = None
     skew: Seconds = 0.0
     source: Literal["body", "clock"] = "body"
+    character_id: str = ""
 
 
 class PlannedPoint(Struct, frozen=True, kw_only=True, omit_defaults=True):
+    """type: the BML element of its behavior."""
+
     behavior: str
     sync: str
     time: Seconds
+    type: str = ""
 
 
 class PredictionFeedback(Struct, frozen=True, kw_only=True, tag="prediction", omit_defaults=True):
-    """evt: when the points that are still to come are expected, from the block's start."""
+    """evt: when the points that are still to come are expected, from the block's start, which was `at`.
+
+    Once at the start, and again when an expectation has moved noticeably.
+    """
 
     block: str
     points: tuple[PlannedPoint, ...]
+    at: Stamp | None = None
+    character_id: str = ""
 
 
 class WarningFeedback(Struct, frozen=True, kw_only=True, tag="warning", omit_defaults=True):
@@ -61,6 +71,8 @@ class WarningFeedback(Struct, frozen=True, kw_only=True, tag="warning", omit_def
     kind: WarningKind
     message: str
     behavior: str = ""
+    at: Stamp | None = None
+    character_id: str = ""
 
 
 Feedback = BlockProgress | SyncPointProgress | PredictionFeedback | WarningFeedback

@@ -35,7 +35,11 @@ Events = Annotated[
     Path | None, typer.Option(metavar="FILE", help="Write connection events as JSON lines; - for standard output.")
 ]
 Feedback = Annotated[
-    Path | None, typer.Option(metavar="FILE", help="Write the blocks' feedback as JSON lines; - for standard output.")
+    Path | None,
+    typer.Option(
+        metavar="FILE",
+        help="Write the blocks' feedback as JSON lines, into FILE.xml as XML; - for standard output.",
+    ),
 ]
 VirtualTime = Annotated[bool, typer.Option("--virtual-time", help="As fast as it goes, on a clock that jumps.")]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")]
@@ -136,6 +140,9 @@ def play(
     ] = None,
     events: Events = None,
     feedback: Feedback = None,
+    feedback_format: Annotated[
+        Literal["json", "xml"] | None, typer.Option(help="Form of the feedback, whatever its file is called.")
+    ] = None,
     robot: Robot = None,
     connect: Connect = None,
     config: ConfigFile = None,
@@ -146,9 +153,10 @@ def play(
     from services.commandline import play, run
 
     where = run.Where(config, robot, tuple(connect or ()), settings=tuple(settings or ()))
-    raise typer.Exit(
-        play.main(play.Options(tuple(files), where, embedded, world, virtual_time, at, events, feedback, quiet))
+    options = play.Options(
+        tuple(files), where, embedded, world, virtual_time, at, events, feedback, quiet, feedback_format
     )
+    raise typer.Exit(play.main(options))
 
 
 @app.command()

@@ -21,7 +21,7 @@ def read_all(files: Sequence[Path], outputs: Outputs) -> tuple[Source, ...]:
         try:
             sources.append(read_source(path))
         except InputRefused as error:
-            _warn(outputs, _block_of(error.fault, path), error.fault)
+            _warn(outputs, error.block, error.fault)
             raise
     return tuple(sources)
 
@@ -59,12 +59,6 @@ def _foreign(block: Block) -> list[tuple[str, str, str]]:
         for reference in references
         if reference.block not in ("", block.id)
     ]
-
-
-def _block_of(fault: Fault, path: Path) -> str | None:
-    """Whose fault it is, as far as the place says: `file: block-1: gaze-1`, with a line, else unknown."""
-    place = fault.where.removeprefix(str(path)).removeprefix(": ")
-    return place.partition(": ")[0] if fault.line and place else None
 
 
 def _warn(outputs: Outputs, block: str | None, fault: Fault, kind: WarningKind = "PARSING_FAILURE") -> None:

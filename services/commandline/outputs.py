@@ -1,33 +1,41 @@
-"""The JSON lines of `--events` and `--feedback`, as they come. `-` is standard output."""
+"""What `--events` and `--feedback` write, as it comes: JSON lines, or feedback as XML. `-` is standard output."""
 
 import sys
 from collections.abc import Callable
 from contextlib import ExitStack
 from pathlib import Path
 from types import TracebackType
-from typing import Self, TextIO
+from typing import Literal, Self, TextIO
 
 from schemas import lines
 from schemas.faults import Fault, InputRefused
-from schemas.feedback import BlockProgress, SyncPointProgress, WarningFeedback
+from schemas.feedback import BlockProgress, PredictionFeedback, SyncPointProgress, WarningFeedback
+from schemas.feedback_xml import HEAD, TAIL, encode_feedback
 from schemas.messages import Message
 from schemas.recognition import ConnectionEvent
 from schemas.units import Seconds
 
 STDOUT = Path("-")
+FeedbackFormat = Literal["json", "xml"]
 
 
 class Outputs:
-    """A sink that writes public JSON lines. A bad path is refused before anything starts.
+    """A sink that writes what is public. A bad path is refused before anything starts.
 
-    wanted: which messages to write; all by default.
+    wanted: which messages to write; all by default. format: of the feedback; None: as its file's name ends.
     """
 
     def __init__(
-        self, events: Path | None, feedback: Path | None, wanted: Callable[[Message], bool] = lambda message: True
+        self,
+        events: Path | None,
+        feedback: Path | None,
+        wanted: Callable[[Message], bool] = lambda message: True,
+        format: FeedbackFormat | None = None,
     ) -> None:
         self._paths = (events, feedback)
         self.wanted = wanted
+        named_xml = feedback is not None and feedback.suffix.lower() == ".xml"
+        self._is_xml = format == "xml" or (format is None and named_xml)
         self._files = ExitStack()
         self._events: TextIO | None = None
         self._feedback: TextIO | None = None
@@ -39,11 +47,16 @@ class Outputs:
 
     def __enter__(self) -> Self:
         self._events, self._feedback = (self._open(path) for path in self._paths)
+        if self._is_xml and self._feedback is not None:
+            self._feedback.write(HEAD)
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
+        if self._is_xml and self._feedback is not None:
+            self._feedback.write(TAIL)
+            self._feedback.flush()
         self._files.close()
 
     def _open(self, path: Path | None) -> TextIO | None:
@@ -60,10 +73,13 @@ class Outputs:
     def __call__(self, message: Message, at: Seconds) -> None:
         match message:
             case ConnectionEvent():
-                file = self._events
+                self._write(self._events, message, str(lines.line(message)))
             case BlockProgress() | SyncPointProgress() | WarningFeedback():
-                file = self._feedback
-            case _:
-                return
+                text = encode_feedback(message, in_stream=True) if self._is_xml else str(lines.line(message))
+                self._write(self._feedback, message, text)
+            case PredictionFeedback() if self._is_xml:
+                self._write(self._feedback, message, encode_feedback(message, in_stream=True))
+
+    def _write(self, file: TextIO | None, message: Message, text: str) -> None:
         if file is not None and self.wanted(message):
-            print(lines.line(message), file=file, flush=True)
+            print(text, file=file, flush=True)

@@ -11,7 +11,7 @@ from rich.console import Console
 
 from schemas.blocks import Block, BlockOutcome
 from schemas.faults import EngageError, Fault, InputRefused, NoReply
-from schemas.feedback import BlockProgress, SyncPointProgress, WarningFeedback
+from schemas.feedback import BlockProgress, PredictionFeedback, SyncPointProgress, WarningFeedback
 from schemas.fragments import FragmentOutcome, TurnFragment
 from schemas.messages import Message
 from schemas.recognition import ConnectionEvent
@@ -21,7 +21,7 @@ from services.bus import Hub
 from services.client import Robot, connect
 from services.commandline import checking, roster
 from services.commandline.errors import readable
-from services.commandline.outputs import Outputs
+from services.commandline.outputs import FeedbackFormat, Outputs
 from services.commandline.process import DONE, FAILED, REFUSED, run
 from services.commandline.run import Where, unique
 from services.commandline.sources import Source, Thing, read_world, still
@@ -46,6 +46,7 @@ class Options(NamedTuple):
     events: Path | None = None
     feedback: Path | None = None
     quiet: bool = False
+    feedback_format: FeedbackFormat | None = None
 
 
 class Played:
@@ -56,7 +57,12 @@ class Played:
 
     def concerns(self, message: Message) -> bool:
         match message:
-            case BlockProgress(block=block) | SyncPointProgress(block=block) | WarningFeedback(block=block):
+            case (
+                BlockProgress(block=block)
+                | SyncPointProgress(block=block)
+                | PredictionFeedback(block=block)
+                | WarningFeedback(block=block)
+            ):
                 return block is None or block in self.blocks
             case ConnectionEvent(block=block):
                 return block in self.blocks
@@ -88,7 +94,7 @@ def main(options: Options) -> int:
             raise InputRefused(Fault(reason=f"{option} is for a private system", advice="add --embedded"))
     config = options.where.load()
     times = submission_times(options.at, len(options.files))
-    with Outputs(options.events, options.feedback) as outputs:
+    with Outputs(options.events, options.feedback, format=options.feedback_format) as outputs:
         world = read_world(options.world)
         sources = checking.read_all(options.files, outputs)
         checking.check(sources, world if options.embedded else None, config.robot, outputs)

@@ -1,5 +1,7 @@
 """What the realizer says about a block while it runs, in the words of the block's dialect."""
 
+from collections.abc import Iterable, Mapping
+
 from schemas import keys
 from schemas.feedback import (
     BlockProgress,
@@ -17,6 +19,17 @@ from services.realizer.authority import Authority
 from services.realizer.planner import Plan
 from services.realizer.points import Point, type_of
 
+NOTICEABLE: Seconds = 0.1
+"""What people notice between what they see and what they hear; a prediction that moves less is not worth telling."""
+
+
+def moved_noticeably(old: Mapping[Point, Seconds], new: Mapping[Point, Seconds]) -> bool:
+    """Is any point of `new` expected at another time than `old` said, by more than people notice, or unheard of?
+
+    Points that `new` lacks have been, or were dropped: their feedback says so.
+    """
+    return any(point not in old or abs(time - old[point]) > NOTICEABLE for point, time in new.items())
+
 
 class Reporter:
     """The feedback of one block."""
@@ -24,16 +37,35 @@ class Reporter:
     def __init__(self, bus: Bus, block: str) -> None:
         self._bus = bus
         self._block = block
+        self._character = ""
+        self._predicted: Mapping[Point, Seconds] = {}
 
     def started(self, plan: Plan, began: Seconds) -> None:
-        self._say(BlockProgress(block=self._block, progress="start", at=self._bus.stamp(began)))
-        points = [
-            PlannedPoint(behavior=point.behavior, sync=sync, time=plan.predicted(point))
-            for chain in plan.chains.values()
-            for point in chain.points
-            if (sync := dialect_sync(point.sync, type_of(chain.behavior), plan.block.dialect)) is not None
-        ]
-        self._say(PredictionFeedback(block=self._block, points=tuple(points)))
+        self._character = plan.block.character_id
+        start = BlockProgress(
+            block=self._block, progress="start", at=self._bus.stamp(began), character_id=self._character
+        )
+        self._say(start)
+        self._predict(plan, began, {point: plan.predicted(point) for point in _points(plan)})
+
+    def expect(self, plan: Plan, began: Seconds, times: Mapping[Point, Seconds]) -> None:
+        """Tell when the points still to come are expected, seconds from the block's start, if that is news."""
+        ours = {point: times[point] for point in _points(plan) if point in times}
+        if moved_noticeably(self._predicted, ours):
+            self._predict(plan, began, ours)
+
+    def _predict(self, plan: Plan, began: Seconds, times: Mapping[Point, Seconds]) -> None:
+        self._predicted = times
+        points = []
+        for point, time in times.items():
+            type = type_of(plan.chains[point.behavior].behavior)
+            sync = dialect_sync(point.sync, type, plan.block.dialect)
+            if sync is not None:
+                points.append(PlannedPoint(behavior=point.behavior, sync=sync, time=time, type=type))
+        prediction = PredictionFeedback(
+            block=self._block, points=tuple(points), at=self._bus.stamp(began), character_id=self._character
+        )
+        self._say(prediction)
 
     def reached(
         self, first_plan: Plan, authority: Authority, point: Point, *, arrived: Seconds | None, by_body: bool
@@ -58,12 +90,21 @@ class Reporter:
                     arrived=None if arrived is None or arrived == at else arrived - authority.began,
                     skew=skew,
                     source="body" if by_body else "clock",
+                    character_id=self._character,
                 )
             )
         return skew
 
     def warn(self, kind: WarningKind, message: str, behavior: str = "") -> None:
-        self._say(WarningFeedback(block=self._block, kind=kind, message=message, behavior=behavior))
+        warning = WarningFeedback(
+            block=self._block,
+            kind=kind,
+            message=message,
+            behavior=behavior,
+            at=self._bus.stamp(),
+            character_id=self._character,
+        )
+        self._say(warning)
 
     def ended(self, status: str, began: Seconds) -> None:
         now = self._bus.now()
@@ -73,8 +114,13 @@ class Reporter:
             at=self._bus.stamp(now),
             time=now - began,
             status=status,  # type: ignore[arg-type]
+            character_id=self._character,
         )
         self._say(progress)
 
     def _say(self, feedback: Feedback) -> None:
         self._bus.publish(keys.FEEDBACK, feedback)
+
+
+def _points(plan: Plan) -> Iterable[Point]:
+    return (point for chain in plan.chains.values() for point in chain.points)
