@@ -64,7 +64,7 @@ async def play(
     noise: float = 0.0,
     **manager: Any,
 ) -> Record:
-    """Until the manager has said goodbye. faults: of the bus. noise: of the body's durations. manager: its configuration."""
+    """Until the manager has said goodbye. faults: of the bus. noise: of the body. manager: its configuration."""
     received: list[Received] = []
     finished = asyncio.Event()
 
