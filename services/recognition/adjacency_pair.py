@@ -65,10 +65,6 @@ class AdjacencyPair(Machine):
         return self._by_robot and self._turn_end is None and self.state in (ROBOT_WAITING, INTERRUPTED)
 
     @property
-    def person_holds_turn(self) -> bool:
-        return not self._by_robot and self._turn_end is None and self.state in (HUMAN_WAITING, INTERRUPTED)
-
-    @property
     def deadline(self) -> Seconds | None:
         if self.event is None or self.state not in (ROBOT_WAITING, HUMAN_WAITING, INTERRUPTED):
             return None

@@ -152,9 +152,6 @@ class Machine:
     def expire(self, at: Seconds) -> None:
         """`deadline` has passed; at: that instant."""
 
-    def defines(self, given: str) -> bool:
-        return (self.state, given) in self.TABLE
-
     def step(self, given: str, at: Seconds) -> bool:
         """Take one transition and publish what its row says.
 

@@ -19,7 +19,7 @@ from schemas.feedback import BlockProgress
 from schemas.messages import Message
 from schemas.recognition import ConnectionEvent, EventState
 from schemas.units import Seconds
-from services.tangram_table import Pose, Side
+from services.tangram_table import Side
 
 FACE = "@robot"
 """Stands for the robot's face, whose id the script does not know."""
@@ -51,12 +51,11 @@ class Grab(Struct, frozen=True):
 
 
 class Lay(Struct, frozen=True):
-    """Move a piece to where it touches `side` of `landmark`, or to `pose`."""
+    """Move a piece to where it touches `side` of `landmark`."""
 
     piece: str
-    side: Side = "top"
-    landmark: str = ""
-    pose: Pose | None = None
+    side: Side
+    landmark: str
 
 
 class Withdraw(Struct, frozen=True):
@@ -111,10 +110,7 @@ Trigger = Entrance | Begun | Ended | Word | RobotDoes | Event
 
 
 class Rule(Struct, frozen=True):
-    """In fragment `step`, `delay` seconds after `when`: do these one after the other. Once.
-
-    step: id of the fragment. A rule for `*` applies to every fragment whose id ends with what follows the star.
-    """
+    """In fragment `step`, `delay` seconds after `when`: do these one after the other. Once."""
 
     step: str
     when: Trigger
@@ -171,7 +167,7 @@ class Human:
 
     def _observe(self, step: str, seen: Trigger, now: Seconds) -> None:
         for index, rule in enumerate(self._rules):
-            if index not in self._fired and rule.when == seen and _is_for(rule, step):
+            if index not in self._fired and rule.when == seen and rule.step == step:
                 self._fired.add(index)
                 self.go_on(rule.do, max(now, now + rule.delay + self._vary()))
 
@@ -186,10 +182,6 @@ class Human:
         if acts:
             self._number += 1
             heappush(self._due, _Due(at, self._number, acts))
-
-
-def _is_for(rule: Rule, step: str) -> bool:
-    return step.endswith(rule.step[1:]) if rule.step.startswith("*") else step == rule.step
 
 
 def _words(text: str) -> list[str]:

@@ -84,7 +84,7 @@ class Scene:
             case Grab(piece=piece):
                 following = self._table.reach(piece, now)
             case Lay(piece=piece) as lay:
-                if pose := lay.pose or self._place_for(lay, now):
+                if pose := self._place_for(lay, now):
                     following = self._table.carry(piece, pose, now)
                     yield self._act(ActionBegan, piece, now)
             case Withdraw():
