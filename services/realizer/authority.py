@@ -215,7 +215,8 @@ class Authority:
             if behavior in self.begun and not self.has_ended(behavior):
                 effects += self._extension(behavior, now)
         self._touched.clear()
-        for behavior in beginning:
+        # Of two that begin together on one part, the later in the document takes it over.
+        for behavior in sorted(beginning, key=list(self.plan.chains).index) if len(beginning) > 1 else beginning:
             self.begun[behavior] = now
             through = self._furthest(behavior, now)
             self._paces[behavior] = pace(behavior, self, now)
@@ -231,7 +232,7 @@ class Authority:
         return min((at for at in (wake, self.patience.deadline) if at is not None), default=None)
 
     def _predict(self, now: Seconds) -> None:
-        """Who is overdue is expected to take as long again as he is late already. What that changes is decided anew."""
+        """Who is overdue is expected to be late by as much again. What that changes is decided anew."""
         if self._forecast is None:
             return
         while self._arrivals and self._arrivals[0][0] < now - EPSILON:

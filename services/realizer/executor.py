@@ -24,8 +24,9 @@ from schemas.faults import EngageError, Fault, InputRefused
 from schemas.feedback import WarningKind
 from schemas.units import Seconds
 from services.bus import Bus
-from services.realizer.authority import Authority, Begin, Effect, Extend, Late, Stalled
+from services.realizer.authority import Authority, Begin, Effect, Extend
 from services.realizer.config import RealizerConfig
+from services.realizer.patience import Late, Stalled
 from services.realizer.planner import Plan, plan_block
 from services.realizer.points import Point, performer, sync_points
 from services.realizer.recognition_link import RecognitionLink

@@ -53,6 +53,8 @@ class Forecast:
         net = plan.net
         size = len(net.transitions)
         self.times: list[Seconds] = [began] * size
+        self._there: list[Seconds] = [began] * size
+        """When the last of those was there who are there."""
         self._base: list[Seconds] = [began] * size
         self._is_fact = [False] * size
         self._cause: list[int] = [-1] * size
@@ -131,11 +133,13 @@ class Forecast:
         if (number := self._phase_from.get((behavior, transition))) is None:
             return
         arc = self._arcs[number]
-        self._loosen(number)
-        self._out[arc.source].remove(number)
-        arc.source = self._whereabouts(behavior)
-        self._out[arc.source] = [number]
-        self._set(arc.source, at, -1)
+        if arc.source != (node := self._whereabouts(behavior)):
+            arc.is_on = False
+            self._loosen(number)
+            self._out[arc.source].remove(number)
+            arc.source, arc.is_on = node, True
+            self._out[node] = [number]
+        self._set(node, at, -1)
         for other in self._of_behavior[behavior]:
             # What has begun to run no longer keeps its beginning back.
             if self._arcs[other].is_bound and self._arcs[other].target == transition:
@@ -157,11 +161,19 @@ class Forecast:
 
     def come(self, behavior: str, transition: int, at: Seconds) -> None:
         """The behavior is at its point there, or past it."""
-        if (number := self._phase_to.get((behavior, transition))) is not None and self._arcs[number].is_on:
-            self._switch_off(number)
-            self._base[transition] = at
-            if not self._is_fact[transition] and self._cause[transition] < 0:
-                self._invalidate(transition)
+        self._there[transition] = max(self._there[transition], at)
+        number = self._phase_to.get((behavior, transition))
+        if number is None or not self._arcs[number].is_on:
+            self._raise_base(transition, at)
+            return
+        self._switch_off(number)
+        self._base[transition] = self._there[transition]
+        if self._is_fact[transition]:
+            return
+        if self._cause[transition] < 0:
+            self._invalidate(transition)
+        elif self._base[transition] > self.times[transition]:
+            self._set(transition, self._base[transition], -1)
 
     def overdue(self, transition: int, at: Seconds) -> None:
         """What was to come there has not; it is not expected before `at`."""
@@ -320,7 +332,8 @@ class Forecast:
 
     def _circle(self, transition: int) -> list[int]:
         """The circle of causes that leads to `transition`, if there is one."""
-        path, seen = [], {}
+        path: list[int] = []
+        seen: dict[int, int] = {}
         here = transition
         while (number := self._cause[here]) >= 0:
             if here in seen:
