@@ -1,0 +1,129 @@
+"""Two spellings of one block compile to the identical net."""
+
+import re
+from pathlib import Path
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from msgspec import structs
+
+from schemas import behaviors as of
+from schemas.blocks import Block
+from schemas.faults import InputRefused
+from schemas.json_codec import encode_json, read
+from schemas.references import rewritten, type_name
+from schemas.syncref import SYNC_POINTS, SyncRef, dialect_sync
+from schemas.xml_codec import encode_xml
+from services.realizer.planner import Plan, plan_block
+from tests.conformance.case import Case, cases
+
+CASES = list(cases(Path(__file__).parent / "cases"))
+RULES = {
+    case.rule: [each for each in CASES if each.rule == case.rule]
+    for case in CASES
+    if case.outcome[0] != "refused" and len(case.blocks) == 1
+}
+
+
+def net_of(case: Case) -> object:
+    (block,) = read(case.blocks[0].xml.encode())
+    assert isinstance(block, Block)
+    return _essence(plan_block(block))
+
+
+def _essence(plan: Plan) -> object:
+    kinds = [(problem.kind, problem.behavior) for problem in plan.problems]
+    return plan.net, plan.schedule, plan.at, plan.natural, plan.dropped, kinds
+
+
+@pytest.mark.parametrize("rule", RULES)
+def test_the_cases_have_the_same_net_in_each_dialect(rule: str) -> None:
+    first, *others = [net_of(case) for case in RULES[rule]]
+
+    assert all(other == first for other in others)
+
+
+def points(type: str) -> list[str]:
+    """Those that BML 1.0 can name, too; as the drafts spell them."""
+    if type == "speech":
+        return ["start", "m-a", "end"]
+    if type in ("gazeShift", "wait", "postureShift"):
+        return ["start", "end"]
+    return [sync for sync in SYNC_POINTS if dialect_sync(sync, type, "bml-1.0") is not None]
+
+
+KINDS: list[of.BlockBehavior] = [
+    of.Gaze(id="", target="t"), of.GazeShift(id="", target="t"), of.Pointing(id="", target="t", mode="LEFT_HAND"),
+    of.Gesture(id="", lexeme="BEAT"), of.Head(id="", lexeme="NOD"), of.FaceLexeme(id="", lexeme="SMILE"),
+    of.FaceFacs(id="", au=12, side="LEFT"), of.Posture(id="", stance="SITTING"), of.PostureShift(id="", stance="X"),
+    of.Speech(id="", text="One two", marks=(of.Mark("m-a", 4),)), of.Wait(id="", duration=1.0),
+]  # fmt: skip
+
+
+@st.composite
+def any_blocks(draw: st.DrawFn) -> Block:
+    """In the drafts' spelling, of what every dialect can say."""
+    chosen = draw(st.lists(st.sampled_from(KINDS), min_size=1, max_size=5))
+    behaviors = [structs.replace(kind, id=f"x-{number}") for number, kind in enumerate(chosen)]
+
+    def reference() -> str:
+        behavior = draw(st.sampled_from(behaviors))
+        offset = draw(st.sampled_from([0.0, 0.0, 0.5, -1.0, 2.0]))
+        if draw(st.integers(0, 5)) == 0:
+            return str(abs(offset))
+        sync = draw(st.sampled_from(points(type_name(behavior))))
+        return str(SyncRef(behavior=behavior.id, sync=sync, offset=offset))
+
+    timed = []
+    for behavior in behaviors:
+        syncs = draw(st.lists(st.sampled_from(points(type_name(behavior))), max_size=1))
+        timed.append(structs.replace(behavior, timing=tuple(of.Timing(sync, reference()) for sync in syncs)))
+    operators = [
+        draw(st.sampled_from([of.Synchronize, of.After, of.Before]))(ref=reference(), syncs=(reference(),))
+        for _ in range(draw(st.integers(0, 2)))
+    ]
+    return Block(id="b", behaviors=tuple(timed), constraints=(of.Constraint(operators=tuple(operators)),))
+
+
+def in_bml_1_0(block: Block) -> Block:
+    types = {behavior.id: type_name(behavior) for behavior in block.behaviors}
+
+    def name(sync: str, type: str) -> str:
+        spelled = dialect_sync(sync, type, "bml-1.0")
+        assert spelled is not None
+        return spelled
+
+    def change(text: str) -> str:
+        ref = SyncRef.parse(text)
+        return str(structs.replace(ref, sync=name(ref.sync, types[ref.behavior]))) if ref.behavior else text
+
+    behaviors = tuple(
+        structs.replace(
+            each, timing=tuple(of.Timing(name(timing.sync, type_name(each)), timing.ref) for timing in each.timing)
+        )
+        for each in block.behaviors
+    )
+    return rewritten(structs.replace(block, behaviors=behaviors, dialect="bml-1.0"), change)
+
+
+def verdict(data: bytes) -> object:
+    """The plan, or on which line there is none."""
+    (block,) = read(data)
+    assert isinstance(block, Block)
+    try:
+        return _essence(plan_block(block))
+    except InputRefused as error:
+        return error.fault.line, re.sub("'[^']*'", "", error.fault.reason)
+
+
+@settings(max_examples=80, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@given(any_blocks())
+def test_any_block_has_the_same_net_in_each_dialect(block: Block) -> None:
+    draft = encode_xml(block)
+    expected = verdict(draft)
+
+    assert verdict(draft.replace(b' xmlns="org.mindmakers.bml"', b"")) == expected
+    assert verdict(encode_xml(in_bml_1_0(block))) == expected
+    (read_back,) = read(draft)
+    assert verdict(encode_json(read_back)) == expected
