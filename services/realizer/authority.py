@@ -96,12 +96,15 @@ class Authority:
         self._touched: set[str] = set()
         self._forecast = Forecast(plan, self.began, self.experience.factor) if _is_predictive(plan) else None
         self._unended = {id for id in plan.waited_for if not self.has_ended(id)}
-        self._dirty = {each for each in range(size) if not self._unmet[each]}
+        self._dirty: set[int] = set()
+        for transition in [each for each in range(size) if not self._unmet[each]]:
+            self._open(transition)
         self._fire(0, self.began)
         for point in (*self.reached, *(self.arrived.keys() - self.reached.keys())):
             if point in plan.at:
                 self._note(point)
         for behavior in self.begun:
+            self._follow(behavior)
             if behavior not in plan.chains:
                 self.patience.forget(behavior)
             elif not self.has_ended(behavior):
@@ -160,13 +163,16 @@ class Authority:
         self._instants[transition] = at
         for target in self._awaited_by[transition]:
             self._unmet[target] -= 1
-            self._dirty_if_open(target)
+            if not self._unmet[target]:
+                self._open(target)
         if self._forecast is not None:
             self._forecast.fix(transition, at)
 
-    def _dirty_if_open(self, transition: int) -> None:
-        if not self._unmet[transition]:
-            self._dirty.add(transition)
+    def _open(self, transition: int) -> None:
+        """All that it waits for has been measured."""
+        self._dirty.add(transition)
+        if self._forecast is not None:
+            self._forecast.require(transition)
 
     def _learn(self, point: Point, at: Seconds) -> None:
         """Correct what is expected of the same parts by how long a phase took that nobody has hurried or held up."""
@@ -218,6 +224,7 @@ class Authority:
         # Of two that begin together on one part, the later in the document takes it over.
         for behavior in sorted(beginning, key=list(self.plan.chains).index) if len(beginning) > 1 else beginning:
             self.begun[behavior] = now
+            self._follow(behavior)
             through = self._furthest(behavior, now)
             self._paces[behavior] = pace(behavior, self, now)
             effects.append(Begin(behavior, self._points[behavior][through].sync, self._paces[behavior]))
@@ -243,9 +250,14 @@ class Authority:
             until = self._not_before[behavior] = now + (now - expected)
             self._forecast.overdue(self.plan.at[points[number]], until)
             heapq.heappush(self._arrivals, (until, expected, behavior, number))
+        self._conclude()
+
+    def _conclude(self) -> None:
+        assert self._forecast is not None
         for transition in self._forecast.update():
             if transition < len(self.plan.members):
-                self._dirty_if_open(transition)
+                if not self._unmet[transition]:
+                    self._dirty.add(transition)
                 self._touched.update(member.behavior for member in self.plan.members[transition])
 
     def _decide(self, transition: int, now: Seconds, beginning: list[str]) -> None:
@@ -272,6 +284,13 @@ class Authority:
                 self._grant(transition, member)
                 if member.kind == "start" and member.behavior not in self.begun:
                     beginning.append(member.behavior)
+
+    def _follow(self, behavior: str) -> None:
+        """It begins: when its points are to be matters from now on."""
+        if self._forecast is not None:
+            for point in self._points.get(behavior, ()):
+                self._forecast.require(self.plan.at[point])
+            self._conclude()
 
     def _grant(self, transition: int, member: Member) -> None:
         if (transition, member.behavior) not in self._granted:

@@ -44,7 +44,7 @@ class _Cycle(Exception):
 
 
 class Forecast:
-    """times: of each transition; facts where measured.
+    """times: of each transition that was measured, that is required, or that those depend on.
 
     factor: how much longer than estimated a behavior takes, by its id.
     """
@@ -57,6 +57,8 @@ class Forecast:
         """When the last of those was there who are there."""
         self._base: list[Seconds] = [began] * size
         self._is_fact = [False] * size
+        self._is_known = [False] * size
+        """Is its time kept? What no decision depends on yet need not be known."""
         self._cause: list[int] = [-1] * size
         self._effects: list[set[int]] = [set() for _ in range(size)]
         self._factor = factor
@@ -91,8 +93,7 @@ class Forecast:
             behavior = bound.behavior if bound.kind == "phase" else ""
             least = bound.lag if not behavior else -inf if bound.stretch is None else bound.lag - bound.stretch
             self._add(bound.source, bound.target, bound.lag, least, behavior, is_bound=True)
-        for transition in sorted(range(size), key=self._rank.__getitem__):
-            self._recompute(transition)
+        self._drop_idle_bounds()
         self.fix(0, began)
 
     def _add(
@@ -111,17 +112,46 @@ class Forecast:
         self._in[target].append(number)
         return number
 
+    def _drop_idle_bounds(self) -> None:
+        """A phase need not be bounded from above where nothing but the phase itself makes its end come late."""
+        pending = {arc.source for arc in self._arcs if arc.is_bound and arc.behavior}
+        while pending:
+            here = pending.pop()
+            into = [self._arcs[number] for number in self._in[here] if self._arcs[number].is_on]
+            if len(into) != 1:
+                continue
+            for number in self._out[here]:
+                bound = self._arcs[number]
+                if bound.is_on and bound.is_bound and bound.behavior == into[0].behavior != "":
+                    bound.is_on = False
+                    pending.add(bound.target)
+
+    def require(self, transition: int) -> None:
+        """Keep its time from now on, and all that it depends on."""
+        stack, found = [transition], []
+        while stack:
+            here = stack.pop()
+            if not self._is_known[here] and not self._is_fact[here]:
+                self._is_known[here] = True
+                found.append(here)
+                stack += [self._arcs[number].source for number in self._in[here] if self._arcs[number].is_on]
+        for here in sorted(found, key=self._rank.__getitem__):
+            self._recompute(here)
+
     # -- facts ---------------------------------------------------------------------------------------------------
 
     def fix(self, transition: int, at: Seconds) -> None:
         """The instant was at `at`."""
-        expected = self.times[transition]
-        self._is_fact[transition] = True
-        if abs(at - expected) <= FINEST:
+        expected, was_known = self.times[transition], self._is_known[transition]
+        self._is_fact[transition] = self._is_known[transition] = True
+        for number in self._in[transition]:
+            if self._arcs[number].is_bound and not self._arcs[number].behavior:
+                self.require(self._arcs[number].source)
+        if was_known and abs(at - expected) <= FINEST:
             self._uncause(transition)
             return
         self._set(transition, at, -1)
-        if at < expected:
+        if was_known and at < expected:
             for effect in list(self._effects[transition]):
                 self._invalidate(effect)
             for number in self._in[transition]:
@@ -133,13 +163,19 @@ class Forecast:
         if (number := self._phase_from.get((behavior, transition))) is None:
             return
         arc = self._arcs[number]
-        if arc.source != (node := self._whereabouts(behavior)):
-            arc.is_on = False
+        if arc.source == (node := self._whereabouts(behavior)):
+            return
+        is_cause = self._cause[arc.target] == number
+        as_expected = is_cause and abs(at + arc.seconds - self.times[arc.target]) <= FINEST
+        if is_cause:
+            self._effects[arc.source].discard(arc.target)
+            self._effects[node].add(arc.target)
+        self._out[arc.source].remove(number)
+        arc.source, self.times[node] = node, at
+        self._out[node] = [number]
+        if not as_expected:
             self._loosen(number)
-            self._out[arc.source].remove(number)
-            arc.source, arc.is_on = node, True
-            self._out[node] = [number]
-        self._set(node, at, -1)
+            self._touch(node)
         for other in self._of_behavior[behavior]:
             # What has begun to run no longer keeps its beginning back.
             if self._arcs[other].is_bound and self._arcs[other].target == transition:
@@ -152,6 +188,7 @@ class Forecast:
             self.times.append(0.0)
             self._base.append(0.0)
             self._is_fact.append(True)
+            self._is_known.append(True)
             self._cause.append(-1)
             self._effects.append(set())
             self._out.append([])
@@ -166,11 +203,13 @@ class Forecast:
         if number is None or not self._arcs[number].is_on:
             self._raise_base(transition, at)
             return
-        self._switch_off(number)
         self._base[transition] = self._there[transition]
+        if self._cause[transition] == number and abs(at - self.times[transition]) <= FINEST:
+            self._uncause(transition)
+        self._switch_off(number)
         if self._is_fact[transition]:
             return
-        if self._cause[transition] < 0:
+        if self._cause[transition] < 0 and self.times[transition] > self._base[transition] + FINEST:
             self._invalidate(transition)
         elif self._base[transition] > self.times[transition]:
             self._set(transition, self._base[transition], -1)
@@ -250,6 +289,8 @@ class Forecast:
                     if is_late and at > self.times[arc.target] + EPSILON:
                         violated = number
                     continue
+                if not self._is_known[arc.target]:
+                    continue
                 self._set(arc.target, at, number)
                 moves += 1
                 if moves & (moves - 1) == 0 and (cycle := self._circle(arc.target)):
@@ -292,7 +333,7 @@ class Forecast:
             self._recompute(here)
 
     def _recompute(self, transition: int) -> None:
-        if self._is_fact[transition]:
+        if self._is_fact[transition] or not self._is_known[transition]:
             return
         for number in self._in[transition]:
             arc = self._arcs[number]
