@@ -29,6 +29,7 @@ from schemas import (
     units,
     world,
 )
+from services.zenoh_order import KEPT
 
 PAGE = Path(__file__).parent / "protocol.md"
 
@@ -155,8 +156,31 @@ with zenoh.open(config) as session:
         print(sample.encoding, sample.payload.to_bytes())
 ```
 
-Answers come as MessagePack. `mode` `client` suits a visitor: Zenoh forwards it everything through the one it connects
-to.
+What is published comes as MessagePack. `mode` `client` suits a visitor: Zenoh forwards it everything through the one
+it connects to.
+
+A subscriber of Zenoh hears what is said from now on. What was said before, every process hands out to an ordinary
+query, as it was published: same encoding, attachment and timestamp.
+
+| `session.get` of | brings |
+|---|---|
+| `<robot>/{keys.of_class("state")}` | the last value of every state, from each process that is there |
+| `<robot>/{keys.of_class("evt")}`, `<robot>/{keys.of_class("cmd")}`, or any part of them | the last {keys.HISTORY_MAX_AGE:g} s, of each process in its order |
+
+- Parameters of the selector, joined by `;`: `format=json` for JSON instead of MessagePack; `age=60` for the events and
+  commands of the last 60 s (a process keeps its last {KEPT}).
+- Pass `consolidation=zenoh.ConsolidationMode.NONE` for events and commands: by default Zenoh keeps only the newest
+  reply of each key, which is right for states alone.
+- To miss nothing, subscribe first and then ask; what comes twice has the same timestamp. Sort by timestamp for one order
+  over all processes.
+- Short questions (`rpc`) are queries with a payload. Asked in JSON, or with `format=json`, they are answered in JSON. A
+  refusal is an error reply that holds a `Fault`.
+
+```python
+for reply in session.get("robot/{keys.of_class("state")}?format=json"):
+    if reply.ok:
+        print(reply.ok.key_expr, json.loads(reply.ok.payload.to_bytes()))
+```
 
 ## Blocks and fragments in files
 

@@ -50,6 +50,11 @@ ANY_ALIVE = f"{PREFIX}/alive/*"
 EVERYTHING = f"{PREFIX}/**"
 
 
+def of_class(kind: KeyClass) -> str:
+    """Every key of a class."""
+    return f"{PREFIX}/{kind}/**"
+
+
 def commands(server: str) -> str:
     """Every command for `server`; cancellations too."""
     return f"{PREFIX}/cmd/{server}/*"

@@ -23,6 +23,7 @@ from services.zenoh_order import Envelope, Ledger, Pulse
 from services.zenoh_peers import Peers, finish, pack
 from services.zenoh_readers import Readers
 from services.zenoh_session import QOS, RENDEZVOUS, STREAM_QOS, Doorway, Traffic, open_session
+from services.zenoh_visitors import Visitors, form_asked, in_form, refuse
 
 FIRST_PULSE: Seconds = 0.25
 NEXT_PULSE: Seconds = 1.0
@@ -75,6 +76,7 @@ class ZenohHub(Hub):
         self._closed = False
         self.peers = Peers(session, self.doorway, self._ledger, self.clocks)
         self.readers = Readers(session, self.doorway, self._ledger, self.peers)
+        self._visitors = Visitors(session, self.doorway)
         self.peers.stand(self.readers.process_came, self.readers.participant_changed)
 
     @property
@@ -102,6 +104,7 @@ class ZenohHub(Hub):
         if self._pulse is not None:
             self._pulse.cancel()
         self.readers.close()
+        self._visitors.close()
         self.peers.close()
         for publisher in self._publishers.values():
             publisher.undeclare()  # type: ignore[no-untyped-call]
@@ -113,29 +116,34 @@ class ZenohHub(Hub):
         ordered = keys.key_class(key) != "stream"
         now = self._loop.time()
         payload, encoding = encode(message), encoding_of(message)
+        stamp = self.session.new_timestamp()
         if ordered:
-            envelope = self._ledger.write(key, encoding, payload, bus.name, self.clocks.own, now).envelope
+            written = self._ledger.write(key, encoding, payload, bus.name, self.clocks.own, now)
+            envelope = written.envelope
+            self._visitors.note(written, stamp)
             if self._pulse is None:
                 self._pulse = self._loop.call_later(FIRST_PULSE, self._send_pulse)
         else:
             envelope = Envelope(bus.name, self.clocks.own, now, self.run)
-        self._put(key, payload, encoding, pack(envelope), ordered)
+        self._publisher(key, ordered).put(payload, encoding=encoding, attachment=pack(envelope), timestamp=stamp)
         self.readers.offer(Received(key, message, bus.name, now))
 
-    def _put(self, key: str, payload: bytes, encoding: str, attachment: bytes | None, ordered: bool) -> None:
+    def _publisher(self, key: str, ordered: bool) -> zenoh.Publisher:
         publisher = self._publishers.get(key)
         if publisher is None:
             qos = QOS if ordered else STREAM_QOS
             publisher = self.session.declare_publisher(key, allowed_destination=zenoh.Locality.REMOTE, **qos)
             self._publishers[key] = publisher
-        publisher.put(payload, encoding=encoding, attachment=attachment)
+        return publisher
 
     def _send_pulse(self) -> None:
         """Tell the recent counts, a few times: a receiver that lost the last message of a burst sees it by them."""
         counts = self._ledger.recent(self._loop.time())
         self._pulse = self._loop.call_later(NEXT_PULSE, self._send_pulse) if counts else None
         if counts:
-            self._put(keys.own(self.run, "pulse"), pack(Pulse(counts)), "application/msgpack", None, True)
+            self._publisher(keys.own(self.run, "pulse"), True).put(
+                pack(Pulse(counts)), encoding="application/msgpack"
+            )
 
 
 class ZenohBus(Bus):
@@ -180,7 +188,7 @@ class ZenohBus(Bus):
             if reply is not None and reply.ok is not None:
                 return decode(reply.ok.payload.to_bytes(), str(reply.ok.encoding))
             if reply is not None and reply.err is not None:
-                raise InputRefused(_fault(reply.err.payload.to_bytes()))
+                raise InputRefused(_fault(reply.err.payload.to_bytes(), str(reply.err.encoding)))
             # Nobody serves it, or its server died over it: there is hope only if somebody comes.
             if not await self._hub.peers.change(deadline, since=known):
                 break
@@ -198,12 +206,14 @@ class ZenohBus(Bus):
 
     def answer(self, key: str, answer: Answer) -> None:
         def reply(query: zenoh.Query) -> None:
+            form = "json"
             try:
+                form = form_asked(query)
                 question = decode(query.payload.to_bytes() if query.payload else b"", str(query.encoding))
-                message = answer(question)
-                query.reply(key, encode(message), encoding=encoding_of(message))
+                payload, encoding = in_form(answer(question), form)
+                query.reply(key, payload, encoding=encoding)
             except EngageError as error:
-                query.reply_err(encode(error.fault), encoding=encoding_of(error.fault))
+                refuse(query, error.fault, form)
             finally:
                 finish(query)
 
@@ -232,9 +242,9 @@ class ZenohBus(Bus):
         self._hub.forget(self.name)
 
 
-def _fault(payload: bytes) -> Fault:
+def _fault(payload: bytes, encoding: str) -> Fault:
     try:
-        fault = decode(payload)
+        fault = decode(payload, encoding)
     except EngageError as error:
         return error.fault
     return fault if isinstance(fault, Fault) else Fault(reason=f"answered with {type(fault).__name__}")

@@ -1,0 +1,203 @@
+"""Programs that know only Zenoh: a plain session in client mode, no line of Engage in what it does."""
+
+import asyncio
+import json
+import os
+from collections.abc import AsyncIterator
+from typing import Any
+
+import pytest
+import pytest_asyncio
+import zenoh
+
+from schemas import keys
+from schemas.messages import decode, encode, encode_json
+from schemas.requests import Accepted
+from services.zenoh_bus import ZenohHub, open_hub
+from services.zenoh_visitors import BATCH
+from tests.bus.places import PATIENCE, acquainted, echo, free_endpoint, state
+
+pytestmark = pytest.mark.real_time
+
+
+class Visitor:
+    """Asks as the documentation says."""
+
+    def __init__(self, endpoint: str, robot: str) -> None:
+        config = zenoh.Config()
+        config.insert_json5("mode", '"client"')
+        config.insert_json5("connect/endpoints", json.dumps([endpoint]))
+        self.session: Any = zenoh.open(config)
+        self.robot = robot
+
+    async def get(self, selector: str, **options: Any) -> list[zenoh.Reply]:
+        """All replies, in the order in which they came."""
+        loop, ended, replies = asyncio.get_running_loop(), asyncio.Event(), []
+        handler = zenoh.handlers.Callback(
+            replies.append, lambda: loop.call_soon_threadsafe(ended.set), indirect=False
+        )
+        self.session.get(f"{self.robot}/{selector}", handler, timeout=PATIENCE, **options)
+        await asyncio.wait_for(ended.wait(), 2 * PATIENCE)
+        return replies
+
+    async def samples(self, selector: str, **options: Any) -> list[zenoh.Sample]:
+        return [reply.ok for reply in await self.get(selector, **options) if reply.ok is not None]
+
+
+Town = tuple[ZenohHub, ZenohHub, Visitor]
+
+
+@pytest_asyncio.fixture
+async def town() -> AsyncIterator[Town]:
+    """Two processes, and a visitor at the first's door."""
+    robot, end = f"visited-{os.getpid()}", free_endpoint()
+    near = await open_hub(robot, listen=[end])
+    far = await open_hub(robot, connect=[end])
+    await acquainted(near, far)
+    visitor = Visitor(end, robot)
+    yield near, far, visitor
+    visitor.session.close()
+    await far.close()
+    await near.close()
+
+
+def texts(samples: list[zenoh.Sample]) -> list[str]:
+    return [decode(sample.payload.to_bytes(), str(sample.encoding)).id for sample in samples]  # type: ignore[union-attr]
+
+
+async def test_a_visitor_gets_the_last_state_of_every_key_of_every_process(town: Town):
+    near, far, visitor = town
+    here, there = near.join("here"), far.join("there")
+    for number in range(3):
+        here.publish(keys.WORLD, state(number))
+        there.publish(keys.statistics("all"), state(10 + number))
+        there.publish(keys.HEAD_OWNER, state(20 + number))
+    here.publish(keys.FEEDBACK, state(99))
+
+    samples = await visitor.samples("engage/v1/state/**")
+
+    found = dict(zip([str(sample.key_expr) for sample in samples], texts(samples), strict=True))
+    assert found == {
+        f"{visitor.robot}/{keys.WORLD}": "2",
+        f"{visitor.robot}/{keys.statistics('all')}": "12",
+        f"{visitor.robot}/{keys.HEAD_OWNER}": "22",
+    }
+
+
+async def test_a_reply_is_what_was_published_down_to_attachment_and_timestamp(town: Town):
+    _, far, visitor = town
+    loop, came = asyncio.get_running_loop(), asyncio.Queue[zenoh.Sample]()
+    handler = zenoh.handlers.Callback(
+        lambda sample: loop.call_soon_threadsafe(came.put_nowait, sample), indirect=False
+    )
+    visitor.session.declare_subscriber(f"{visitor.robot}/engage/v1/evt/**", handler)
+    there = far.join("there")
+    await matched(far, keys.FEEDBACK)
+
+    there.publish(keys.FEEDBACK, state(1))
+    live = await asyncio.wait_for(came.get(), PATIENCE)
+    [kept] = await visitor.samples(keys.FEEDBACK)
+
+    for one in (live, kept):
+        assert one.attachment is not None
+        assert one.timestamp is not None
+    assert kept.payload.to_bytes() == live.payload.to_bytes() == encode(state(1))
+    assert str(kept.encoding) == str(live.encoding) == "application/msgpack;engage.Accepted/1"
+    assert kept.attachment.to_bytes() == live.attachment.to_bytes()  # type: ignore[union-attr]
+    assert kept.timestamp == live.timestamp
+
+
+async def matched(hub: ZenohHub, key: str) -> None:
+    """Wait until what the hub publishes on the key goes to somebody."""
+    loop, match = asyncio.get_running_loop(), asyncio.Event()
+    publisher: Any = hub.session.declare_publisher(key)
+    handler = zenoh.handlers.Callback(lambda status: loop.call_soon_threadsafe(match.set), indirect=False)
+    publisher.declare_matching_listener(handler)
+    if not publisher.matching_status.matching:
+        await asyncio.wait_for(match.wait(), PATIENCE)
+    publisher.undeclare()
+
+
+async def test_recent_events_and_commands_come_in_order_across_keys_unless_zenoh_is_let_merge_them(town: Town):
+    _, far, visitor = town
+    there = far.join("there")
+    ways = [keys.FEEDBACK, keys.request_state("there"), keys.BLOCK]
+    for number in range(100):
+        there.publish(ways[number % 3], state(number))
+    there.publish(keys.WORLD, state(100))
+
+    everything = {"consolidation": zenoh.ConsolidationMode.NONE}
+    both = await visitor.samples("engage/v1/evt/**", **everything)
+    commands = await visitor.samples("engage/v1/cmd/realizer/*", **everything)
+    last = await visitor.samples("engage/v1/evt/**")
+
+    assert texts(both) == [str(number) for number in range(100) if number % 3 != 2]
+    assert [sample.timestamp for sample in both] == sorted(sample.timestamp for sample in both)  # type: ignore[type-var]
+    assert texts(commands) == [str(number) for number in range(2, 100, 3)]
+    assert sorted(texts(last)) == ["97", "99"]
+
+
+async def test_age_says_how_far_back_commands_and_events_go_and_states_have_none(town: Town):
+    near, _, visitor = town
+    here = near.join("here")
+    here.publish(keys.FEEDBACK, state(1))
+    here.publish(keys.WORLD, state(2))
+    with here.subscribe(keys.INHIBIT) as never:
+        assert await never.next(here.now() + keys.HISTORY_MAX_AGE + 0.1) is None
+    here.publish(keys.FEEDBACK, state(3))
+
+    everything = {"consolidation": zenoh.ConsolidationMode.NONE}
+    assert texts(await visitor.samples("engage/v1/evt/**", **everything)) == ["3"]
+    assert texts(await visitor.samples("engage/v1/evt/**?age=60", **everything)) == ["1", "3"]
+    assert texts(await visitor.samples("engage/v1/state/**?age=0")) == ["2"]
+
+
+async def test_json_comes_when_the_selector_asks_for_it(town: Town):
+    near, _, visitor = town
+    near.join("here").publish(keys.WORLD, state(1))
+
+    [sample] = await visitor.samples("engage/v1/state/**?format=json")
+
+    assert str(sample.encoding) == "application/json;engage.Accepted/1"
+    assert json.loads(sample.payload.to_bytes()) == {"type": "accepted", "id": "1"}
+
+
+async def test_a_question_in_json_is_answered_in_json(town: Town):
+    _, far, visitor = town
+    far.join("there").answer(keys.DESCRIBE, echo)
+    good, bad = ({"payload": encode_json(Accepted(id=id)), "encoding": "application/json"} for id in ("a", "bad"))
+
+    [answer] = await visitor.get(keys.DESCRIBE, **good)
+    [refusal] = await visitor.get(keys.DESCRIBE, **bad)
+
+    assert json.loads(answer.ok.payload.to_bytes()) == {"type": "accepted", "id": "a!"}  # type: ignore[union-attr]
+    assert json.loads(refusal.err.payload.to_bytes())["reason"] == "bad indeed"  # type: ignore[union-attr]
+
+
+@pytest.mark.parametrize("parameters", ["format=xml", "age=soon", "age=-1", "age=nan"])
+async def test_a_parameter_that_makes_no_sense_is_refused_by_every_process(town: Town, parameters: str):
+    *_, visitor = town
+
+    replies = await visitor.get(f"engage/v1/state/**?{parameters}")
+
+    faults = [json.loads(reply.err.payload.to_bytes()) for reply in replies if reply.err is not None]
+    assert len(faults) == len(replies) == 2
+    assert all(parameters.partition("=")[2] in fault["reason"] for fault in faults)
+    assert all(fault["advice"] for fault in faults)
+
+
+async def test_a_long_history_is_handed_out_in_parts_so_that_the_loop_goes_on(town: Town):
+    near, _, visitor = town
+    here = near.join("here")
+    for number in range(2000):
+        here.publish(keys.FEEDBACK, state(number))
+    asking = asyncio.create_task(
+        visitor.samples("engage/v1/evt/**?age=600;format=json", consolidation=zenoh.ConsolidationMode.NONE)
+    )
+    turns = 0
+    while not asking.done():
+        turns += 1
+        await asyncio.sleep(0)
+
+    assert texts(await asking) == [str(number) for number in range(2000)]
+    assert turns > 2000 / BATCH
