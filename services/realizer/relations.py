@@ -6,8 +6,9 @@ Constraints and inline timing mean the same thing and become the same relations;
 from collections.abc import Collection, Mapping
 
 from msgspec import Struct
+from msgspec.structs import replace
 
-from schemas.behaviors import After, Before, Behavior, Head, Speech, Synchronize, Unknown
+from schemas.behaviors import After, Before, Behavior, Head, Speech, Synchronize, Unknown, Wait
 from schemas.blocks import Block
 from schemas.faults import Fault, InputRefused
 from schemas.feedback import WarningKind
@@ -194,13 +195,21 @@ class _Reader:
                 self.equals += relations
 
     def result(self) -> Relations:
-        return Relations(
+        found = Relations(
             tuple(self.equals),
             tuple(self.orders),
             frozenset(self.required),
             tuple(self.problems),
             frozenset(self.unusable),
         )
+        endless = tuple(
+            Problem("PARSING_FAILURE", "wait has neither a duration nor an end; it ends at once", behavior.id)
+            for behavior in self.block.behaviors
+            if isinstance(behavior, Wait)
+            and behavior.duration is None
+            and Point(behavior.id, "end") not in found.held
+        )
+        return replace(found, problems=found.problems + endless)
 
 
 def relations(block: Block, elsewhere: Collection[Point] = ()) -> Relations:
