@@ -163,7 +163,7 @@ def play(
 def plan(
     file: Annotated[Path, typer.Argument(metavar="FILE", help="A BML block (XML or JSON).", show_default=False)],
     format: Annotated[
-        Literal["text", "json", "dot"], typer.Option("--format", help="How to print the net.")
+        Literal["text", "json", "dot", "pnml"], typer.Option("--format", help="How to print the net.")
     ] = "text",
     world: WorldFile = None,
     config: ConfigFile = None,

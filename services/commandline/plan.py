@@ -26,7 +26,7 @@ def main(path: Path, format: str, world: Path | None, where: Where) -> int:
     config = where.load()
     source = read_source(path)
     around = read_world(world)
-    write = {"text": export.as_text, "json": export.as_json, "dot": export.as_dot}[format]
+    write = {"text": export.as_text, "json": export.as_json, "dot": export.as_dot, "pnml": export.as_pnml}[format]
     texts = []
     for thing in source.things:
         with source.blamed():

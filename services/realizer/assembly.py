@@ -1,7 +1,7 @@
 """Relations between points, assembled into a Petri net: the middle part of planning."""
 
 import heapq
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from itertools import pairwise
 from math import inf
 
@@ -38,6 +38,15 @@ class Assembly(Struct, frozen=True):
     members: tuple[tuple[Member, ...], ...]
     """Of each transition."""
 
+    def waits(self, ties: Iterable[Place | Bound]) -> set[tuple[str, str]]:
+        """Those of `ties` that only make sure of an order: from which transition for which, by their names."""
+        names = [each.name for each in self.net.transitions]
+        return {
+            (names[tie.source], names[tie.target])
+            for tie in ties
+            if tie.kind == "order" and tie.behavior and tie.source and tie.target != len(names) - 1
+        }
+
 
 class Assembler:
     """chains: in document order. waited_for: behaviors that the end of the block waits for."""
@@ -69,6 +78,7 @@ class Assembler:
         for relation in relations.orders:
             self._order(relation)
         self._fixed = (self.places, self.bounds)
+        self.waived: set[tuple[str, str]] = set()
 
     def assemble(self, arrangement: Arrangement) -> Assembly:
         self.arrangement = arrangement
@@ -121,7 +131,7 @@ class Assembler:
                 lag += segment.natural
                 shortest += segment.shortest
                 longest += limit if limit is not None else segment.natural
-                unlimited = unlimited or limit is None
+                unlimited = unlimited or (limit is None and source != target)
             if (segment.since, segment.to) in always or (source == target and shortest <= EPSILON):
                 continue
             self.places.append(Place("phase", source, target, lag, shortest, id, lines))
@@ -181,7 +191,7 @@ class Assembler:
     def _never_too_soon(self) -> None:
         """An order on a point that cannot wait is kept for certain by where its behavior can: it waits there.
 
-        Unless what it would wait for waits for it in turn; then prediction must do.
+        Unless what it would wait for waits for it in turn, or it has no time to; then prediction must do.
         """
         waits = []
         for place in self.places:
@@ -190,7 +200,9 @@ class Assembler:
                     if member.kind == "passive" and (chain := self.chains.get(member.behavior)):
                         waits_at, seconds = self._last_wait(chain, place.target)
                         lag = max(0.0, round(place.lag - seconds, 9))
-                        waits.append(Place("order", place.source, waits_at, lag, lag, lines=place.lines))
+                        wait = Place("order", place.source, waits_at, lag, lag, member.behavior, place.lines)
+                        if (self._name(place.source), self._name(waits_at)) not in self.waived:
+                            waits.append(wait)
         if not waits:
             return
         out: dict[int, list[int]] = {}
@@ -198,6 +210,13 @@ class Assembler:
             out.setdefault(place.source, []).append(place.target)
         circle = {each: number for number, group in enumerate(components(self.size, out)) for each in group}
         self.places += [place for place in waits if circle[place.source] != circle[place.target]]
+
+    def _name(self, transition: int) -> str:
+        return self.transitions[transition].name
+
+    def waive(self, ties: Iterable[tuple[str, str]]) -> None:
+        """Do without these waits: from one transition for another, by their names."""
+        self.waived |= set(ties)
 
     def _last_wait(self, chain: Chain, transition: int) -> tuple[int, Seconds]:
         """Where the behavior can last wait before `transition`, and how long it takes from there."""

@@ -1,20 +1,30 @@
-"""A plan for people and programs: text, JSON, and a drawing of its net (DOT)."""
+"""A plan for people and programs: text, JSON, a drawing of its net (DOT), and the net for other tools (PNML)."""
 
 import json
 
-from services.realizer.net import Bound, Place
+from services.realizer import pnml
+from services.realizer.net import Bound, Place, is_live, is_safe
 from services.realizer.planner import Plan, plan_block
 from services.realizer.points import Point
 
-__all__ = ["as_dot", "as_json", "as_text", "plan_block"]
+__all__ = ["as_dot", "as_json", "as_pnml", "as_text", "plan_block"]
 
 
 def as_text(plan: Plan) -> str:
-    """The schedule, instant by instant, then what ties the instants, then what was dropped."""
+    """The schedule, instant by instant, then what ties the instants, then what was dropped.
+
+    A star marks the critical path: what makes the block as long as it is.
+    """
     net = plan.net
     by_time = sorted(range(len(net.transitions)), key=lambda each: (plan.schedule[each], each))
-    lines = [f"block {plan.block.id}: {len(net.transitions)} transitions, {len(net.places)} places", ""]
-    lines += [f"{plan.schedule[each]:9.3f} s  {net.transitions[each].name}" for each in by_time]
+    soundness = ("live" if is_live(net) else "NOT live") + (", safe" if is_safe(net) else ", NOT safe")
+    size = f"{len(net.transitions)} transitions, {len(net.places)} places"
+    critical = frozenset(plan.critical)
+    lines = [f"block {plan.block.id}: {size}, {soundness}", ""]
+    lines += [
+        f"{'*' if each in critical else ' '}{plan.schedule[each]:8.3f} s  {net.transitions[each].name}"
+        for each in by_time
+    ]
     ties = [_tie(plan, place) for place in net.places if place.kind in ("order", "delay", "series") and place.source]
     ties += [_tie(plan, bound) for bound in plan.bounds if bound.kind != "phase"]
     lines += ["", *ties] if ties else []
@@ -45,6 +55,7 @@ def as_json(plan: Plan) -> str:
                 "source": place.source,
                 "target": place.target,
                 "lag": place.lag,
+                "shortest": place.shortest,
                 "behavior": place.behavior,
                 "lines": list(place.lines),
                 "tokens": tokens,
@@ -52,9 +63,20 @@ def as_json(plan: Plan) -> str:
             for place, tokens in zip(net.places, net.initial, strict=True)
         ],
         "bounds": [
-            {"kind": bound.kind, "source": bound.source, "target": bound.target, "lag": bound.lag}
+            {
+                "kind": bound.kind,
+                "source": bound.source,
+                "target": bound.target,
+                "lag": bound.lag,
+                "stretch": bound.stretch,
+                "behavior": bound.behavior,
+                "lines": list(bound.lines),
+            }
             for bound in net.bounds
         ],
+        "critical": list(plan.critical),
+        "live": is_live(net),
+        "safe": is_safe(net),
         "behaviors": {
             id: {point.sync: round(plan.predicted(point), 6) for point in chain.points}
             for id, chain in plan.chains.items()
@@ -69,13 +91,20 @@ def as_json(plan: Plan) -> str:
     return json.dumps(document, indent=2, ensure_ascii=False)
 
 
+def as_pnml(plan: Plan) -> str:
+    """The net as a P/T net of ISO/IEC 15909-2; `pnml.read_pnml` reads it back."""
+    return pnml.as_pnml(plan.net, plan.block.id)
+
+
 def as_dot(plan: Plan) -> str:
-    """The net for Graphviz: transitions are bars, places circles, backward arcs dashed."""
+    """The net for Graphviz: transitions are bars (on the critical path, framed), places circles, bounds dashed."""
     net = plan.net
+    critical = frozenset(plan.critical)
     lines = [f"digraph {_quoted(plan.block.id)} {{", "  rankdir=LR;", '  node [fontname="sans-serif", fontsize=10];']
     for number, transition in enumerate(net.transitions):
         label = _quoted(f"{transition.name}\n{plan.schedule[number]:.2f} s")
-        lines.append(f"  t{number} [shape=box, style=filled, fillcolor=gray85, label={label}];")
+        frame = 2 if number in critical else 0.5
+        lines.append(f"  t{number} [shape=box, style=filled, fillcolor=gray85, penwidth={frame}, label={label}];")
     for number, place in enumerate(net.places):
         text = "●" if net.initial[number] else f"{place.lag:g}" if place.lag else ""
         constraint = ", constraint=false" if place.kind == "idle" else ""

@@ -37,6 +37,7 @@ class Place(Struct, frozen=True):
     """From transition `source` to `target`, taking at least `lag` seconds. lines: of the XML that asks for it.
 
     shortest: what the lag can be at the very least; differs from `lag` only for the phase of a behavior.
+    behavior: whose phase it is, or who waits there for the sake of a later point of his that cannot.
     """
 
     kind: PlaceKind

@@ -228,6 +228,9 @@ class _Planner:
         try:
             return assembler, assembly, predict(assembly.net)
         except Impossible as circle:
+            if waits := assembly.waits(tie for tie, _ in circle.ties):
+                assembler.waive(waits)
+                return self._solved(assembler, arrangement, classes)
             required = self.relations.required
             raise judge(circle, assembly, self.chains, required, classes, self.block.id, self.turns) from None
 
