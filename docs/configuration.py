@@ -101,8 +101,7 @@ def _keys(node: ast.ClassDef, module: ast.Module) -> tuple[str, list[Key]]:
             documented[name] = str(below[0].value.value)
         default = ast.unparse(field.value) if field.value else ""
         meaning = _cell(documented.get(name, ""))
-        meaning = meaning[:1].upper() + meaning[1:]
-        keys.append(Key(name, _cell(_kind(field.annotation, module)), _cell(default), meaning))
+        keys.append(Key(name, _cell(_kind(field.annotation, module)), _cell(default), _capitalized(meaning)))
     return general, keys
 
 
@@ -117,6 +116,11 @@ def _kind(annotation: ast.expr, module: ast.Module) -> str:
         ):
             return ast.unparse(statement.value)
     return ast.unparse(annotation)
+
+
+def _capitalized(text: str) -> str:
+    """A sentence begins with a capital; a symbol, unit or name stays what it is (`kg, s/degree:`)."""
+    return text if re.match(r"[\w/]+[:,] ", text) else text[:1].upper() + text[1:]
 
 
 def _cell(text: str) -> str:

@@ -9,7 +9,10 @@ from schemas.units import Degrees, Probability, Seconds
 
 
 class Displaced(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """A joint that is elsewhere than the body believes, until it first moves (Fig. 4.7: an arm near already)."""
+    """A joint that is elsewhere than the body believes, until it first moves (Fig. 4.7: an arm near already).
+
+    joint: its name in the body's `Capabilities`. angle: where it really is.
+    """
 
     joint: str
     angle: Degrees
@@ -29,7 +32,11 @@ class Stall(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
 
 
 class Slow(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """Everything `part` does takes `factor` times as long. Thesis 4.2.2. Less than 1: faster, within the limits."""
+    """A part that moves slower than it should. Thesis 4.2.2.
+
+    part: head, left_arm, right_arm, torso or face. factor: everything takes this many times as long; less than 1:
+        faster, within the limits.
+    """
 
     part: str
     factor: float

@@ -69,16 +69,21 @@ class GenerationConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=
     mtbce_prior: Seconds = 5.7
     """Until `mtbce_events` connection events were seen. Section 2.3."""
     mtbce_low: Seconds = 3.0
+    """The recent mean counts as no shorter than this. Ours."""
     mtbce_high: Seconds = 15.0
-    """The recent mean is clamped to this range."""
+    """And as no longer than this. Ours."""
     mtbce_events: int = 5
+    """How many connection events make a mean worth believing. Ours."""
     glance_duration: Seconds = 0.9
+    """How long a glance at the face lasts before the head goes back. Ours."""
     response_hold: Seconds = 0.8
     """How long shared gaze lasts before the response lets go."""
     hand_speed: float = 0.05
     """m/s: a hand is moving above this."""
     hand_onset: Seconds = 0.2
+    """How long a hand moves before the head tracks it. Section 3.3.4 tracks hands; the numbers are ours."""
     hand_stillness: Seconds = 0.8
+    """How long it is still before the head leaves it. Ours."""
     face_lost: Seconds = 2.0
     """A face lost for longer is no longer tracked; the head holds its direction."""
     retry: Seconds = 1.0

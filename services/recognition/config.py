@@ -40,8 +40,11 @@ class RecognitionConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields
     reference_mtbce: Seconds = 5.7
     """Table 2.1; the pace to compare with until `enough_events` have been seen."""
     enough_events: int = 5
+    """How many connection events make a mean of a person's own; at least 2. Ours."""
     engaged_from: Probability = 0.5
+    """The engagement estimate from which a person is engaged: say, all events good but half as fast as usual. Ours."""
     disengaged_below: Probability = 0.25
+    """The estimate below which a person is disengaged; between the two, weakening. Ours."""
     hysteresis: Probability = 0.05
     """How far the estimate passes a threshold before the level changes."""
 

@@ -1,3 +1,4 @@
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -16,6 +17,14 @@ def test_the_page_is_what_the_code_says() -> None:
     )
 
     assert check.returncode == 0, check.stderr
+
+
+def test_every_key_says_what_it_means() -> None:
+    page = (ROOT / "docs" / "configuration.md").read_text(encoding="utf-8")
+    rows = re.findall(r"^\| `(\w+)` \| `(.+?)` \| (?:`.+?`|required) \| (.*) \|$", page, re.MULTILINE)
+
+    assert len(rows) == len(re.findall(r"^\| `", page, re.MULTILINE)) > 60
+    assert [name for name, _, meaning in rows if len(meaning.split()) < 2] == []
 
 
 def test_without_a_file_everything_has_its_default() -> None:
