@@ -42,7 +42,7 @@ class RecognitionConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields
     enough_events: int = 5
     """How many connection events make a mean of a person's own; at least 2. Ours."""
     engaged_from: Probability = 0.5
-    """The engagement estimate from which a person is engaged: say, all events good but half as fast as usual. Ours."""
+    """The estimate from which a person is engaged: all events good but half as fast as usual, say. Ours."""
     disengaged_below: Probability = 0.25
     """The estimate below which a person is disengaged; between the two, weakening. Ours."""
     hysteresis: Probability = 0.05
