@@ -15,6 +15,13 @@ from schemas.requests import Outcome, Request
 from schemas.units import Degrees, Meters, Radians, Seconds, Stamp, Vector
 
 
+class PlannedInstant(Struct, frozen=True, kw_only=True, omit_defaults=True):
+    """When the body is to come to a sync point."""
+
+    sync: str
+    at: Stamp
+
+
 class PerformBehavior(Request, frozen=True, kw_only=True, tag="perform_behavior", omit_defaults=True):
     """cmd: realizer -> control. Terminal state: `BehaviorOutcome`.
 
@@ -24,6 +31,9 @@ class PerformBehavior(Request, frozen=True, kw_only=True, tag="perform_behavior"
     block: str
     behavior: BlockBehavior
     through: str
+    pace: tuple[PlannedInstant, ...] = ()
+    """Where its own pace would miss them, instants of its coming points: it is to be slower, or faster, or smaller,
+    as near to them as it can. The newest says all; empty: as is natural."""
 
 
 class AbortBehavior(Request, frozen=True, kw_only=True, tag="abort_behavior", omit_defaults=True):

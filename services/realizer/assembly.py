@@ -20,7 +20,7 @@ from services.realizer.schedule import EPSILON
 _Tie = tuple[int, int, PlaceKind, Seconds, str, tuple[int, ...], Seconds]
 
 
-class Member(Struct, frozen=True):
+class Member(Struct, frozen=True, gc=False):
     """A behavior's part in an instant: how it can be made to wait there, and the point whose report counts."""
 
     behavior: str

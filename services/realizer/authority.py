@@ -11,37 +11,21 @@ the prediction. Only what a fact touches is looked at again.
 import heapq
 from collections.abc import Iterable
 
-from msgspec import Struct
-
 from schemas.units import Seconds
 from services.realizer.assembly import Member
 from services.realizer.config import RealizerConfig
+from services.realizer.effects import Begin, Effect, Extend
 from services.realizer.experience import Experience
-from services.realizer.forecast import Forecast
+from services.realizer.forecast import Forecast, full_forecast
 from services.realizer.pacing import Pace, differs, pace
-from services.realizer.patience import Late, Patience, Stalled
+from services.realizer.patience import Patience
 from services.realizer.planner import Plan
 from services.realizer.points import Point, performer
 from services.realizer.schedule import EPSILON
+from services.realizer.wiring import Wiring
 
-
-class Begin(Struct, frozen=True):
-    """Start `behavior`; it may go through `through` without asking. pace: see `Pace`; empty: as is natural."""
-
-    behavior: str
-    through: str
-    pace: Pace = ()
-
-
-class Extend(Struct, frozen=True):
-    """`behavior` may now go through `through`, and is to come to its points as `pace` says."""
-
-    behavior: str
-    through: str
-    pace: Pace = ()
-
-
-Effect = Begin | Extend | Late | Stalled
+SURPRISE: Seconds = 0.1
+"""What comes as far from when it was expected as this moves what depends on it noticeably."""
 
 
 class Authority:
@@ -62,30 +46,19 @@ class Authority:
         self._paces: dict[str, Pace] = {}
         self._not_before: dict[str, Seconds] = {}
         """When a behavior that is overdue is expected at its next point."""
+        self._expected = {point: began + plan.predicted(point) for point in plan.at}
         self.replan(plan)
+        self.is_surprised = False
+        """Has something come at another time than was last expected?"""
 
     def replan(self, plan: Plan) -> None:
         """Go on with another plan of the same block, from the same facts: something was dropped."""
         self.plan = plan
+        self.is_surprised = True
         size = len(plan.net.transitions)
-        self._points = {id: chain.points for id, chain in plan.chains.items()}
-        self._member_at = {
-            (member.behavior, transition): member
-            for transition, members in enumerate(plan.members)
-            for member in members
-        }
-        self._waits_for: list[list[tuple[int, Seconds]]] = [[] for _ in range(size)]
-        self._awaited_by: list[list[int]] = [[] for _ in range(size)]
-        for place in plan.net.places:
-            if place.kind in ("order", "delay", "series"):
-                self._waits_for[place.target].append((place.source, place.lag))
-                self._awaited_by[place.source].append(place.target)
-        self._latest: list[list[tuple[int, Seconds]]] = [[] for _ in range(size)]
-        """Of each transition, those it may not be later than: and by how many seconds."""
-        for bound in plan.net.bounds:
-            if bound.kind != "phase":
-                self._latest[bound.source].append((bound.target, -bound.lag))
-        self._unmet = [len(sources) for sources in self._waits_for]
+        self._wiring = Wiring(plan)
+        self._points = self._wiring.points
+        self._unmet = [len(sources) for sources in self._wiring.waits_for]
         self._unreached = [len(members) for members in plan.members]
         self._instants: dict[int, Seconds] = {}
         """When each transition fired that has."""
@@ -94,7 +67,8 @@ class Authority:
         self._arrivals: list[tuple[Seconds, Seconds, str, int]] = []
         """Until when and since when each behavior is expected at its next point: overdue from there."""
         self._touched: set[str] = set()
-        self._forecast = Forecast(plan, self.began, self.experience.factor) if _is_predictive(plan) else None
+        # None: nothing in this block needs one.
+        self.forecast = Forecast(plan, self.began, self.experience.factor) if self._wiring.is_predictive else None
         self._unended = {id for id in plan.waited_for if not self.has_ended(id)}
         self._dirty: set[int] = set()
         for transition in [each for each in range(size) if not self._unmet[each]]:
@@ -135,6 +109,7 @@ class Authority:
         for each in news:
             self.reached[each] = at
             self._note(each)
+            self.is_surprised = self.is_surprised or abs(at - self._expected.get(each, at)) > SURPRISE
         if news:
             self._next[point.behavior] = known + len(news)
             if self.has_ended(point.behavior):
@@ -146,14 +121,14 @@ class Authority:
     def _note(self, point: Point) -> None:
         """Count a point that is reached, or arrived at, into its instant."""
         transition = self.plan.at[point]
-        member = self._member_at.get((point.behavior, transition))
+        member = self._wiring.member(point)
         at = self.reached.get(point)
         self._dirty.add(transition)
-        if self._forecast is not None:
+        if self.forecast is not None:
             if at is None:
-                self._forecast.come(point.behavior, transition, self.arrived[point])
+                self.forecast.come(point.behavior, transition, self.arrived[point])
             else:
-                self._forecast.passed(point.behavior, transition, at)
+                self.forecast.passed(point.behavior, transition, at)
         if at is not None and member is not None and member.point == point:
             self._unreached[transition] -= 1
             if not self._unreached[transition] and transition:
@@ -161,18 +136,18 @@ class Authority:
 
     def _fire(self, transition: int, at: Seconds) -> None:
         self._instants[transition] = at
-        for target in self._awaited_by[transition]:
+        for target in self._wiring.awaited_by[transition]:
             self._unmet[target] -= 1
             if not self._unmet[target]:
                 self._open(target)
-        if self._forecast is not None:
-            self._forecast.fix(transition, at)
+        if self.forecast is not None:
+            self.forecast.fix(transition, at)
 
     def _open(self, transition: int) -> None:
         """All that it waits for has been measured."""
         self._dirty.add(transition)
-        if self._forecast is not None:
-            self._forecast.require(transition)
+        if self.forecast is not None:
+            self.forecast.require(transition)
 
     def _learn(self, point: Point, at: Seconds) -> None:
         """Correct what is expected of the same parts by how long a phase took that nobody has hurried or held up."""
@@ -183,8 +158,8 @@ class Authority:
         if performer(chain.behavior) == "body":
             took = at - self.reached[chain.points[number - 1]]
             changed = self.experience.learn(point.behavior, chain.segments[number - 1].natural, took)
-            if self._forecast is not None:
-                self._forecast.relearn(changed)
+            if self.forecast is not None:
+                self.forecast.relearn(changed)
 
     def has_ended(self, behavior: str) -> bool:
         points = self._points.get(behavior)
@@ -200,7 +175,7 @@ class Authority:
         at, transition = self.reached[point], self.plan.at[point]
         late = (
             at - since - seconds
-            for other, seconds in self._latest[transition]
+            for other, seconds in self._wiring.not_after[transition]
             if (since := self._instants.get(other)) is not None
         )
         return max((0.0, *late))
@@ -240,7 +215,7 @@ class Authority:
 
     def _predict(self, now: Seconds) -> None:
         """Who is overdue is expected to be late by as much again. What that changes is decided anew."""
-        if self._forecast is None:
+        if self.forecast is None:
             return
         while self._arrivals and self._arrivals[0][0] < now - EPSILON:
             _, expected, behavior, number = heapq.heappop(self._arrivals)
@@ -248,13 +223,13 @@ class Authority:
             if self._next.get(behavior) != number or number >= len(points) or self.holds(points[number]):
                 continue
             until = self._not_before[behavior] = now + (now - expected)
-            self._forecast.overdue(self.plan.at[points[number]], until)
+            self.forecast.overdue(self.plan.at[points[number]], until)
             heapq.heappush(self._arrivals, (until, expected, behavior, number))
         self._conclude()
 
     def _conclude(self) -> None:
-        assert self._forecast is not None
-        for transition in self._forecast.update():
+        assert self.forecast is not None
+        for transition in self.forecast.update():
             if transition < len(self.plan.members):
                 if not self._unmet[transition]:
                     self._dirty.add(transition)
@@ -266,8 +241,10 @@ class Authority:
             return
         missing = [member for member in members if member.kind != "start" and not self._is_there(member)]
         may_pass = missing[0] if len(missing) == 1 and missing[0].kind == "hold" else None
-        ready = max((self._instants[source] + lag for source, lag in self._waits_for[transition]), default=self.began)
-        due = ready if self._forecast is None else max(ready, self._forecast.times[transition])
+        ready = max(
+            (self._instants[source] + lag for source, lag in self._wiring.waits_for[transition]), default=self.began
+        )
+        due = ready if self.forecast is None else max(ready, self.forecast.times[transition])
         if due > now + EPSILON:
             self._wake(transition, due)
             if may_pass is not None and (arrival := self._arrival(may_pass)) is not None and arrival >= due - EPSILON:
@@ -287,9 +264,9 @@ class Authority:
 
     def _follow(self, behavior: str) -> None:
         """It begins: when its points are to be matters from now on."""
-        if self._forecast is not None:
+        if self.forecast is not None:
             for point in self._points.get(behavior, ()):
-                self._forecast.require(self.plan.at[point])
+                self.forecast.require(self.plan.at[point])
             self._conclude()
 
     def _grant(self, transition: int, member: Member) -> None:
@@ -314,10 +291,10 @@ class Authority:
 
     def _phase(self, behavior: str, number: int) -> Seconds:
         """How long it is expected to take from the point before to the one of that number."""
-        if self._forecast is None:
+        if self.forecast is None:
             return self.plan.chains[behavior].segments[number - 1].natural * self.experience.factor(behavior)
         before, here = (self.plan.at[point] for point in self._points[behavior][number - 1 : number + 1])
-        return 0.0 if before == here else self._forecast.phase(behavior, here)
+        return 0.0 if before == here else self.forecast.phase(behavior, here)
 
     def _extension(self, behavior: str, now: Seconds) -> Iterable[Extend]:
         """Its new authority, if that is further than before or asks for another pace."""
@@ -345,7 +322,7 @@ class Authority:
 
     def may_pass(self, point: Point) -> bool:
         transition = self.plan.at[point]
-        if self._member_at[point.behavior, transition].kind != "hold" or point in self.reached:
+        if self.member(point).kind != "hold" or point in self.reached:
             return True
         return (transition, point.behavior) in self._granted
 
@@ -384,32 +361,28 @@ class Authority:
             if not self.may_pass(points[each]):
                 self._dirty.add(self.plan.at[points[each]])
                 break
-        if self._forecast is not None and 0 < number < len(points):
+        if self.forecast is not None and 0 < number < len(points):
             self._not_before.pop(behavior, None)
             expected = self.reached[points[number - 1]] + self._phase(behavior, number)
             heapq.heappush(self._arrivals, (expected, expected, behavior, number))
 
-    # -- what pacing asks ----------------------------------------------------------------------------------------
+    # -- what is told of it --------------------------------------------------------------------------------------
 
-    @property
-    def forecast(self) -> Forecast | None:
-        """None: nothing in this block needs one."""
-        return self._forecast
+    def expected(self, now: Seconds) -> dict[Point, Seconds]:
+        """When each point of the block that is still to come is expected, seconds from the block's start."""
+        forecast = full_forecast(self.plan, self.began, self.experience.factor, self.reached, self._instants)
+        coming = {point for points in self._points.values() for point in points} - self.reached.keys()
+        self._expected |= {point: max(now, forecast.times[self.plan.at[point]]) for point in coming}
+        self.is_surprised = False
+        return {point: self._expected[point] - self.began for point in coming}
+
+    # -- what pacing asks ----------------------------------------------------------------------------------------
 
     def next_number(self, behavior: str) -> int:
         """How many points of it are reached."""
         return self._next.get(behavior, 0)
 
     def member(self, point: Point) -> Member:
-        return self._member_at[point.behavior, self.plan.at[point]]
-
-
-def _is_predictive(plan: Plan) -> bool:
-    """Is anything constrained that cannot wait, or bounded from above? Else nothing need be predicted."""
-    if any(bound.kind != "phase" for bound in plan.bounds):
-        return True
-    constrained = {place.target for place in plan.net.places if place.kind in ("order", "delay", "series")}
-    return any(
-        any(member.kind == "passive" for member in members) and (len(members) > 1 or transition in constrained)
-        for transition, members in enumerate(plan.members)
-    )
+        member = self._wiring.member(point)
+        assert member is not None, f"{point} is in no instant"
+        return member

@@ -16,7 +16,7 @@ from services.realizer.relations import BlockRefused, Equal, Term
 from services.realizer.schedule import EPSILON
 
 
-class Instant(Struct, frozen=True):
+class Instant(Struct, frozen=True, gc=False):
     """Points that happen together. class_id, offset: its place within its class, lowest offset 0."""
 
     points: tuple[Point, ...]

@@ -4,10 +4,7 @@ Decides nothing: what was measured goes to the `Authority`, and what that says i
 """
 
 import asyncio
-from collections.abc import Callable, Iterable, MutableMapping
-from typing import Any, Literal
-
-from msgspec import Struct
+from typing import Any
 
 from schemas import keys
 from schemas.behaviors import BlockBehavior, Event, Speech, TurnSignal, Wait
@@ -17,45 +14,22 @@ from schemas.body import (
     BehaviorOutcome,
     GoHome,
     PerformBehavior,
+    PlannedInstant,
     SyncPointArrived,
     SyncPointReached,
 )
 from schemas.faults import EngageError, Fault, InputRefused
 from schemas.feedback import WarningKind
 from schemas.units import Seconds
-from services.bus import Bus
-from services.realizer.authority import Authority, Begin, Effect, Extend
-from services.realizer.config import RealizerConfig
+from services.realizer.authority import Authority
+from services.realizer.effects import Begin, Effect, Extend
 from services.realizer.patience import Late, Stalled
 from services.realizer.planner import Plan, plan_block
 from services.realizer.points import Point, performer, sync_points
 from services.realizer.recognition_link import RecognitionLink
 from services.realizer.reporting import Reporter
-from services.requests import Pending, Requester, RequestRefused
-
-Status = Literal["done", "failed", "interrupted"]
-
-
-class Ending(Struct, frozen=True):
-    """Why a block ends."""
-
-    status: Status
-    fault: Fault | None = None
-    replaced_by: str = ""
-
-
-class Surroundings(Struct, frozen=True):
-    """What performances of one realizer share.
-
-    is_there: is this participant alive? routes: whose body requests are whose. others: what else is performed.
-    """
-
-    bus: Bus
-    requests: Requester
-    config: RealizerConfig
-    is_there: Callable[[str], bool]
-    routes: MutableMapping[str, "Performance"]
-    others: Callable[[], Iterable["Performance"]]
+from services.realizer.surroundings import Ending, Surroundings
+from services.requests import Pending, RequestRefused
 
 
 class Performance:
@@ -76,7 +50,8 @@ class Performance:
         self.sync_points: dict[Point, asyncio.Future[Seconds]] = {
             point: loop.create_future() for chain in plan.chains.values() for point in chain.points
         }
-        self._through: dict[str, str] = {}
+        self._asked: dict[str, Begin | Extend] = {}
+        """Of each behavior, what it was last told."""
         self._pending: dict[str, Pending] = {}
         self._dropped: list[str] = list(plan.dropped)
         self._foreign = frozenset(point for point in plan.at if ":" in point.behavior)
@@ -140,6 +115,13 @@ class Performance:
             case SyncPointReached(at=at, arrived=arrived):
                 self._reach(point, self._bus.local(at), arrived=self._bus.local(arrived), by_body=True)
         self._advance()
+
+    def _tell_prediction(self) -> None:
+        """Say when the rest is expected, if something was not when it was expected."""
+        if self._authority.is_surprised and not self._ending.done():
+            self._report.expect(
+                self._authority.plan, self._authority.began, self._authority.expected(self._bus.now())
+            )
 
     # -- other blocks ------------------------------------------------------------------------------------------------
 
@@ -224,6 +206,7 @@ class Performance:
         while again and not self._ending.done():
             made_facts = [self._apply(effect) for effect in self._authority.advance(self._bus.now())]
             again = any(made_facts)
+        self._tell_prediction()
         if self._timer is not None:
             self._timer.cancel()
             self._timer = None
@@ -235,11 +218,11 @@ class Performance:
     def _apply(self, effect: Effect) -> bool:
         """Do what the authority says; whether that made new facts at once."""
         match effect:
-            case Extend(behavior=id, through=through):
-                self._through[id] = through
+            case Extend(behavior=id):
+                self._asked[id] = effect
                 return self._extend(id)
-            case Begin(behavior=id, through=through):
-                self._through[id] = through
+            case Begin(behavior=id):
+                self._asked[id] = effect
                 self._begun[id].set_result(None)
             case Late(behavior=id, sync=sync, overdue=overdue):
                 self._report.warn("LATE", f"{sync} is {overdue:.1f} s overdue", id)
@@ -263,9 +246,8 @@ class Performance:
         for each in self._authority.reach(point, at):
             came = arrived if each == point else None
             skew = self._report.reached(self.plan, self._authority, each, arrived=came, by_body=by_body)
-            if skew > self._config.skew:
-                message = f"{each.sync} came {skew:.2f} s after what it is synchronized with"
-                self._report.warn("LATE", message, each.behavior)
+            if (late := max(skew, self._authority.lateness(each))) > self._config.skew:
+                self._report.warn("LATE", f"{each.sync} came {late:.2f} s later than it should", each.behavior)
             if not (future := self.sync_points[each]).done():
                 future.set_result(at)
             self._tell_others(each.behavior, each.sync, at)
@@ -335,12 +317,14 @@ class Performance:
         self._advance()
 
     def _send(self, behavior: BlockBehavior) -> Pending:
+        asked = self._asked[behavior.id]
         perform = PerformBehavior(
             id=self._request_id(behavior.id),
             requester=self._bus.name,
             block=self.plan.block.id,
             behavior=behavior,
-            through=self._through[behavior.id],
+            through=asked.through,
+            pace=tuple(PlannedInstant(sync=sync, at=self._bus.stamp(at)) for sync, at in asked.pace),
         )
         pending = self._pending[behavior.id] = self._requests.send(keys.BEHAVIOR, perform)
         return pending
@@ -363,7 +347,7 @@ class Performance:
         self._advance()
         if duration:
             await asyncio.sleep(began + duration - self._bus.now())
-        if self._through[id] == "end":
+        if self._asked[id].through == "end":
             self._reach(Point(id, "end"), self._bus.now())
         else:
             self._authority.arrive(Point(id, "end"), self._bus.now())

@@ -4,46 +4,21 @@ Longest paths from what was measured, through phases at the pace measured so far
 (a phase within the body's shortest and longest time) gives way where a bound could not be kept otherwise.
 """
 
-import heapq
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from math import inf
 
-from msgspec import Struct
-
 from schemas.units import Seconds
+from services.realizer.longest_paths import FINEST, Arc, Circle, LongestPaths
 from services.realizer.net import order
 from services.realizer.planner import Plan
+from services.realizer.points import Point
 from services.realizer.schedule import EPSILON
 
-FINEST: Seconds = 1e-8
-"""Changes below are rounding."""
 REPAIRS = 200
 """Bounds that are made way for in one go, before those that are left are given up for this time."""
 
 
-class _Arc(Struct):
-    """`target` is no earlier than `source` + `seconds`.
-
-    asked: what `seconds` is when nothing gives way. least: what it may give way to. behavior: whose phase it is.
-    is_bound: may be broken if nothing else gives way. is_on: False once it says nothing any more.
-    """
-
-    source: int
-    target: int
-    asked: Seconds
-    least: Seconds
-    behavior: str = ""
-    is_bound: bool = False
-    seconds: Seconds = 0.0
-    is_on: bool = True
-
-
-class _Cycle(Exception):
-    def __init__(self, arcs: Sequence[int]) -> None:
-        self.arcs = tuple(arcs)
-
-
-class Forecast:
+class Forecast(LongestPaths):
     """times: of each transition that was measured, that is required, or that those depend on.
 
     factor: how much longer than estimated a behavior takes, by its id.
@@ -52,19 +27,10 @@ class Forecast:
     def __init__(self, plan: Plan, began: Seconds, factor: Callable[[str], float]) -> None:
         net = plan.net
         size = len(net.transitions)
-        self.times: list[Seconds] = [began] * size
+        super().__init__(size, began)
         self._there: list[Seconds] = [began] * size
         """When the last of those was there who are there."""
-        self._base: list[Seconds] = [began] * size
-        self._is_fact = [False] * size
-        self._is_known = [False] * size
-        """Is its time kept? What no decision depends on yet need not be known."""
-        self._cause: list[int] = [-1] * size
-        self._effects: list[set[int]] = [set() for _ in range(size)]
         self._factor = factor
-        self._arcs: list[_Arc] = []
-        self._out: list[list[int]] = [[] for _ in range(size)]
-        self._in: list[list[int]] = [[] for _ in range(size)]
         self._phase_to: dict[tuple[str, int], int] = {}
         self._phase_from: dict[tuple[str, int], int] = {}
         self._natural: dict[int, tuple[Seconds, Seconds]] = {}
@@ -72,10 +38,7 @@ class Forecast:
         self._of_behavior: dict[str, list[int]] = {}
         self._node_of: dict[str, int] = {}
         self._given_way: set[int] = set()
-        self._old: dict[int, Seconds] = {}
-        self._todo: list[tuple[int, int]] = []
         self._broken: set[int] = set()
-        self._rank = [0] * size
         for rank, transition in enumerate(order(net) or range(size)):
             self._rank[transition] = rank
         for place in net.places:
@@ -105,7 +68,7 @@ class Forecast:
             self._natural[number] = (asked, least)
             self._of_behavior.setdefault(behavior, []).append(number)
             factor = self._factor(behavior)
-        arc = _Arc(source, target, asked * factor, least * factor, behavior, is_bound)
+        arc = Arc(source, target, asked * factor, least * factor, behavior, is_bound)
         arc.seconds = arc.asked
         self._arcs.append(arc)
         self._out[source].append(number)
@@ -125,18 +88,6 @@ class Forecast:
                 if bound.is_on and bound.is_bound and bound.behavior == into[0].behavior != "":
                     bound.is_on = False
                     pending.add(bound.target)
-
-    def require(self, transition: int) -> None:
-        """Keep its time from now on, and all that it depends on."""
-        stack, found = [transition], []
-        while stack:
-            here = stack.pop()
-            if not self._is_known[here] and not self._is_fact[here]:
-                self._is_known[here] = True
-                found.append(here)
-                stack += [self._arcs[number].source for number in self._in[here] if self._arcs[number].is_on]
-        for here in sorted(found, key=self._rank.__getitem__):
-            self._recompute(here)
 
     # -- facts ---------------------------------------------------------------------------------------------------
 
@@ -184,16 +135,7 @@ class Forecast:
     def _whereabouts(self, behavior: str) -> int:
         """An instant of its own: when the behavior passed its latest point."""
         if (node := self._node_of.get(behavior)) is None:
-            node = self._node_of[behavior] = len(self.times)
-            self.times.append(0.0)
-            self._base.append(0.0)
-            self._is_fact.append(True)
-            self._is_known.append(True)
-            self._cause.append(-1)
-            self._effects.append(set())
-            self._out.append([])
-            self._in.append([])
-            self._rank.append(-1)
+            node = self._node_of[behavior] = self._new_node()
         return node
 
     def come(self, behavior: str, transition: int, at: Seconds) -> None:
@@ -255,7 +197,7 @@ class Forecast:
         for _ in range(REPAIRS):
             try:
                 excess = self._relax()
-            except _Cycle as cycle:
+            except Circle as cycle:
                 self._make_way(cycle.arcs, sum(self._arcs[each].seconds for each in cycle.arcs))
                 continue
             if excess is None:
@@ -268,130 +210,15 @@ class Forecast:
         self._old.clear()
         return changed
 
-    def _violation(self, arc: _Arc) -> Seconds:
+    def _violation(self, arc: Arc) -> Seconds:
         return self.times[arc.source] + arc.seconds - self.times[arc.target]
 
-    # -- propagation ---------------------------------------------------------------------------------------------
-
-    def _relax(self) -> int | None:
-        """Move what is too early; the bound on a fact that cannot be kept then, if any. Raises _Cycle."""
-        violated: int | None = None
-        moves = 0
-        while self._todo:
-            _, here = heapq.heappop(self._todo)
-            for number in self._out[here]:
-                arc = self._arcs[number]
-                at = self.times[here] + arc.seconds
-                if not arc.is_on or at <= self.times[arc.target] + FINEST:
-                    continue
-                if self._is_fact[arc.target]:
-                    is_late = arc.is_bound and not self._is_fact[here] and not arc.behavior
-                    if is_late and at > self.times[arc.target] + EPSILON:
-                        violated = number
-                    continue
-                if not self._is_known[arc.target]:
-                    continue
-                self._set(arc.target, at, number)
-                moves += 1
-                if moves & (moves - 1) == 0 and (cycle := self._circle(arc.target)):
-                    self._touch(here)
-                    raise _Cycle(cycle)
-        if violated is not None:
-            # Seen again when it has been made way for: there may be others.
-            self._touch(self._arcs[violated].source)
-        return violated
-
-    def _set(self, transition: int, at: Seconds, cause: int) -> None:
-        self._old.setdefault(transition, self.times[transition])
-        self._uncause(transition)
-        if cause >= 0:
-            self._effects[self._arcs[cause].source].add(transition)
-        self.times[transition], self._cause[transition] = at, cause
-        self._touch(transition)
-
-    def _touch(self, transition: int) -> None:
-        heapq.heappush(self._todo, (self._rank[transition], transition))
-
-    def _uncause(self, transition: int) -> None:
-        if (before := self._cause[transition]) >= 0:
-            self._effects[self._arcs[before].source].discard(transition)
-            self._cause[transition] = -1
-
-    def _invalidate(self, transition: int) -> None:
-        """Forget why `transition`, and all that follows from it, is as late as it is; and find out anew."""
-        stack, found = [transition], []
-        seen = {transition}
-        while stack:
-            found.append(here := stack.pop())
-            fresh = self._effects[here] - seen
-            seen |= fresh
-            stack += fresh
-        for here in found:
-            if not self._is_fact[here]:
-                self._set(here, self._base[here], -1)
-        for here in sorted(found, key=self._rank.__getitem__):
-            self._recompute(here)
-
-    def _recompute(self, transition: int) -> None:
-        if self._is_fact[transition] or not self._is_known[transition]:
-            return
-        for number in self._in[transition]:
-            arc = self._arcs[number]
-            at = self.times[arc.source] + arc.seconds
-            if arc.is_on and at > self.times[transition] + FINEST:
-                self._set(transition, at, number)
-        self._touch(transition)
-
-    def _raise_base(self, transition: int, at: Seconds) -> None:
-        if at > self._base[transition]:
-            self._base[transition] = at
-            if not self._is_fact[transition] and at > self.times[transition]:
-                self._set(transition, at, -1)
-
     def _switch_off(self, number: int) -> None:
-        arc = self._arcs[number]
-        if arc.is_on:
-            arc.is_on = False
-            self._given_way.discard(number)
-            self._broken.discard(number)
-            self._loosen(number)
-
-    def _loosen(self, number: int) -> None:
-        target = self._arcs[number].target
-        if self._cause[target] == number:
-            self._invalidate(target)
-
-    def _set_seconds(self, number: int, seconds: Seconds) -> None:
-        arc = self._arcs[number]
-        before, arc.seconds = arc.seconds, seconds
-        if seconds < before:
-            self._loosen(number)
-        elif seconds > before:
-            self._touch(arc.source)
+        self._given_way.discard(number)
+        self._broken.discard(number)
+        super()._switch_off(number)
 
     # -- making way ----------------------------------------------------------------------------------------------
-
-    def _circle(self, transition: int) -> list[int]:
-        """The circle of causes that leads to `transition`, if there is one."""
-        path: list[int] = []
-        seen: dict[int, int] = {}
-        here = transition
-        while (number := self._cause[here]) >= 0:
-            if here in seen:
-                return path[seen[here] :]
-            seen[here] = len(path)
-            path.append(number)
-            here = self._arcs[number].source
-        return []
-
-    def _reasons(self, transition: int) -> list[int]:
-        """The chain of arcs that makes `transition` as late as it is."""
-        path, seen = [], set()
-        while (number := self._cause[transition]) >= 0 and number not in seen:
-            seen.add(number)
-            path.append(number)
-            transition = self._arcs[number].source
-        return path
 
     def _make_way(self, numbers: Sequence[int], excess: Seconds) -> None:
         """Let the phases along the way take less, or bear more, by `excess` in all; if they cannot, break a bound."""
@@ -429,3 +256,23 @@ class Forecast:
             if arc.is_on and arc.is_bound and not self._is_fact[arc.source]:
                 self._break(number)
         self._relax()
+
+
+def full_forecast(
+    plan: Plan,
+    began: Seconds,
+    factor: Callable[[str], float],
+    reached: Mapping[Point, Seconds],
+    instants: Mapping[int, Seconds],
+) -> Forecast:
+    """Of every instant, from the same facts: the points that are reached and the instants that are over."""
+    forecast = Forecast(plan, began, factor)
+    for point, at in reached.items():
+        if point in plan.at:
+            forecast.passed(point.behavior, plan.at[point], at)
+    for transition, at in instants.items():
+        forecast.fix(transition, at)
+    for transition in range(len(plan.members)):
+        forecast.require(transition)
+    forecast.update()
+    return forecast

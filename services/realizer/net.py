@@ -26,14 +26,14 @@ Marking = bytes
 """Tokens in each place; a byte each, so that the next marking is a copy and not a walk."""
 
 
-class Transition(Struct, frozen=True):
+class Transition(Struct, frozen=True, gc=False):
     """One instant. name: its points, `gaze-1:stroke = point-1:start`."""
 
     name: str
     points: tuple[Point, ...]
 
 
-class Place(Struct, frozen=True):
+class Place(Struct, frozen=True, gc=False):
     """From transition `source` to `target`, taking at least `lag` seconds. lines: of the XML that asks for it.
 
     shortest: what the lag can be at the very least; differs from `lag` only for the phase of a behavior.
@@ -49,7 +49,7 @@ class Place(Struct, frozen=True):
     lines: tuple[int, ...] = ()
 
 
-class Bound(Struct, frozen=True):
+class Bound(Struct, frozen=True, gc=False):
     """`target` is no earlier than `source` + `lag`, and `lag` is negative: `source` is no later than ...
 
     kind phase: a behavior cannot wait in this phase, `stretch` seconds more than natural at most (None: any).

@@ -25,7 +25,7 @@ class BlockRefused(InputRefused):
         self.kind = kind
 
 
-class Term(Struct, frozen=True):
+class Term(Struct, frozen=True, gc=False):
     """A point and an offset: the instant `offset` seconds after the point. text: as its author wrote it.
 
     share: a later stroke of a repeated movement: how far it is from the first stroke to the end of the last.
@@ -38,13 +38,13 @@ class Term(Struct, frozen=True):
     share: float = 0.0
 
 
-class Equal(Struct, frozen=True):
+class Equal(Struct, frozen=True, gc=False):
     """All terms are one instant."""
 
     terms: tuple[Term, ...]
 
 
-class Order(Struct, frozen=True):
+class Order(Struct, frozen=True, gc=False):
     """`later` is no earlier than `earlier`."""
 
     earlier: Term
@@ -96,7 +96,7 @@ class _Reader:
         """The point and offset of a reference; a Problem if it names a sync point that its behavior lacks."""
         try:
             ref = SyncRef.parse(text)
-            if isinstance(speech := self.behaviors.get(ref.behavior), Speech):
+            if isinstance(speech := self.behaviors.get(ref.behavior), Speech) and speech.marks:
                 ref = SyncRef.parse(text, [mark.id for mark in speech.marks])
         except ValueError as error:
             raise self.refusal(str(error), where, line) from error

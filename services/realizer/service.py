@@ -22,10 +22,11 @@ from schemas.presence import PeerAlive, PeerGone
 from schemas.requests import Cancel
 from services.bus import Bus
 from services.realizer.config import RealizerConfig
-from services.realizer.executor import Ending, Performance, Surroundings
+from services.realizer.executor import Performance
 from services.realizer.planner import Plan, plan_block, poses_before
 from services.realizer.points import performer
 from services.realizer.relations import BlockRefused, relations
+from services.realizer.surroundings import Ending, Surroundings
 from services.requests import RequestDesk, Requester
 from services.runtime import Ready
 

@@ -1,0 +1,50 @@
+"""A plan, indexed by what decisions ask of it."""
+
+from schemas.units import Seconds
+from services.realizer.assembly import Member
+from services.realizer.planner import Plan
+from services.realizer.points import Point
+
+
+class Wiring:
+    """points: of each behavior, in order.
+
+    waits_for: of each transition, what must have been measured, and how many seconds before. awaited_by: those that
+    wait for it. not_after: those that it may be later than by no more than so many seconds.
+    """
+
+    def __init__(self, plan: Plan) -> None:
+        size = len(plan.net.transitions)
+        self.points = {id: chain.points for id, chain in plan.chains.items()}
+        self._at = plan.at
+        self._members = {
+            (member.behavior, transition): member
+            for transition, members in enumerate(plan.members)
+            for member in members
+        }
+        self.waits_for: list[list[tuple[int, Seconds]]] = [[] for _ in range(size)]
+        self.awaited_by: list[list[int]] = [[] for _ in range(size)]
+        self.not_after: list[list[tuple[int, Seconds]]] = [[] for _ in range(size)]
+        for place in plan.net.places:
+            if place.kind in ("order", "delay", "series"):
+                self.waits_for[place.target].append((place.source, place.lag))
+                self.awaited_by[place.source].append(place.target)
+        for bound in plan.net.bounds:
+            if bound.kind != "phase":
+                self.not_after[bound.source].append((bound.target, -bound.lag))
+        self.is_predictive = _is_predictive(plan)
+
+    def member(self, point: Point) -> Member | None:
+        """The part of its behavior in the point's instant."""
+        return self._members.get((point.behavior, self._at[point]))
+
+
+def _is_predictive(plan: Plan) -> bool:
+    """Is anything constrained that cannot wait, or bounded from above? Else nothing need be predicted."""
+    if any(bound.kind != "phase" for bound in plan.bounds):
+        return True
+    constrained = {place.target for place in plan.net.places if place.kind in ("order", "delay", "series")}
+    return any(
+        any(member.kind == "passive" for member in members) and (len(members) > 1 or transition in constrained)
+        for transition, members in enumerate(plan.members)
+    )
