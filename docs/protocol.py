@@ -26,6 +26,7 @@ from schemas import (
     presence,
     recognition,
     requests,
+    status,
     units,
     world,
 )
@@ -69,12 +70,13 @@ KEYS: tuple[tuple[str, str, str], ...] = (
     (keys.ROBOT_STATE, "control → all", "`RobotState`"),
     (keys.ESTIMATE, "generation, realizer ask control", "`EstimateBehaviors`, answered with `Estimates`"),
     (keys.DESCRIBE, "anyone asks control", "`DescribeBody`, answered with `Capabilities`"),
+    (keys.status("<participant>"), "anyone asks a service", "`AskStatus`, answered with `Status`"),
     (keys.alive("<participant>"), "the bus itself", "`PeerAlive`, `PeerGone`: made from liveliness, never sent"),
 )
 
 MODULES: tuple[ModuleType, ...] = (
     fragments, blocks, behaviors, feedback, recognition, attention, actions, world, body, requests, faults, presence,
-    units,
+    status, units,
 )  # fmt: skip
 
 HEAD = f"""\
@@ -174,7 +176,8 @@ query, as it was published: same encoding, attachment and timestamp.
 - To miss nothing, subscribe first and then ask; what comes twice has the same timestamp. Sort by timestamp for one order
   over all processes.
 - Short questions (`rpc`) are queries with a payload. Asked in JSON, or with `format=json`, they are answered in JSON. A
-  refusal is an error reply that holds a `Fault`.
+  refusal is an error reply that holds a `Fault`. `<robot>/{keys.status("*")}?format=json` needs no payload and asks all
+  services how they are.
 
 ```python
 for reply in session.get("robot/{keys.of_class("state")}?format=json"):
@@ -198,8 +201,11 @@ unknown key is refused. In XML:
   prosodic markup for the voice;
 - attributes and elements of other namespaces are ignored; there are no entities and no DTD; at most 4 MiB, 64 levels.
 
+Which elements and attributes of BML are understood in which dialect, and what becomes of the rest: docs/bml.md.
+
 Sync references: `[block:]behavior:sync[:n][±seconds]`, `[block:]seconds`, `bml:start`; details in `schemas/syncref.py`.
-Whatever is wrong is refused whole, before anything moves, with file, line (XML) or path (JSON), reason and advice.
+Whatever is wrong with a fragment refuses it whole, before anything moves, with file, line (XML) or path (JSON), reason
+and advice. Of a block, what cannot be realized is left out with a warning (docs/bml.md), the rest runs.
 
 ## JSON lines
 
