@@ -6,7 +6,7 @@ and `tests/control/contract.py` is the suite that it has to pass.
 
 import asyncio
 from abc import ABC, abstractmethod
-from collections.abc import AsyncGenerator, Callable
+from collections.abc import AsyncGenerator, Callable, Mapping
 from typing import Literal
 
 from msgspec import Struct
@@ -86,11 +86,15 @@ class Authority:
 
     A simple body awaits `granted(sync)` before it leaves a hold point. One that plans ahead asks `covers` and
     is told of changes through `watch`.
+
+    pace: loop times at which it is asked to come to its points, where its own pace would miss them. A body that can
+    be no faster or slower ignores it; its estimates say how far it can.
     """
 
-    def __init__(self, behavior: BlockBehavior, through: str) -> None:
+    def __init__(self, behavior: BlockBehavior, through: str, pace: Mapping[str, Seconds] | None = None) -> None:
         """Raises ValueError if the behavior has no sync point `through`."""
         self.points = sync_points(behavior)
+        self.pace: Mapping[str, Seconds] = dict(pace or {})
         self.revoked: How | None = None
         self._through = self._index(through)
         self._watchers: list[Callable[[], None]] = []
@@ -109,6 +113,12 @@ class Authority:
             self._through = index
             self._tell()
 
+    def set_pace(self, pace: Mapping[str, Seconds]) -> None:
+        """Ask for these instants from now on, and no others."""
+        if dict(pace) != self.pace:
+            self.pace = dict(pace)
+            self._tell()
+
     def revoke(self, how: How = "relax") -> None:
         """End the behavior now: go to the safe pose at once, or freeze, then go."""
         if self.revoked is None:
@@ -116,7 +126,7 @@ class Authority:
             self._tell()
 
     def watch(self, on_change: Callable[[], None]) -> Callable[[], None]:
-        """Call `on_change` after each extension and revocation, until the returned function is called."""
+        """Call `on_change` after each of these changes, until the returned function is called."""
         self._watchers.append(on_change)
         return lambda: self._watchers.remove(on_change)
 

@@ -8,7 +8,7 @@ from schemas.faults import Fault
 from schemas.units import Seconds
 from services.control.body import sync_points
 from services.control.choreography import Course, Point
-from services.control.motion import Path
+from services.control.motion import SLOWEST, Path
 
 
 def infeasible(behavior: BlockBehavior, warning: str, fault: Fault) -> Estimate:
@@ -33,7 +33,7 @@ def moved(behavior: BlockBehavior, course: Course, path: Path, pose: BodyPose) -
         behavior=behavior.id,
         feasible=True,
         parts=("head",) if course.parts == ("nod",) else course.parts,
-        phases=_phases(behavior, path.marks, course.points, path.fastest),
+        phases=_phases(behavior, path.marks, course.points, path.fastest, SLOWEST),
         head_degrees=course.degrees if is_gaze else 0.0,
         arm_degrees=course.degrees if is_arm else 0.0,
         ray=course.ray,
@@ -42,14 +42,18 @@ def moved(behavior: BlockBehavior, course: Course, path: Path, pose: BodyPose) -
 
 
 def _phases(
-    behavior: BlockBehavior, times: dict[str, Seconds], points: tuple[Point, ...] = (), fastest: float = 1.0
+    behavior: BlockBehavior,
+    times: dict[str, Seconds],
+    points: tuple[Point, ...] = (),
+    fastest: float = 1.0,
+    slowest: float = 1.0,
 ) -> tuple[Phase, ...]:
     """From each sync point to the next. A phase that ends where the body can hold has no upper limit."""
     held_with = {point.sync: point.held_with for point in points if point.held_with}
     phases = []
     for since, to in pairwise(sync_points(behavior)):
         natural = times[to] - times[since]
-        longest = None if to in held_with else natural
+        longest = None if to in held_with else natural / slowest
         is_hold = held_with.get(to) == to
         phases.append(
             Phase(since=since, to=to, shortest=natural / fastest, natural=natural, longest=longest, hold=is_hold)

@@ -27,6 +27,8 @@ SHARE = 0.6
 MARGIN = 0.97
 """Peaks are found by sampling; what lies between two samples gets this much room."""
 AT_REST = 1e-9
+SLOWEST = 0.25
+"""The least steady rate: slower than this looks like standing still."""
 SAMPLES = np.linspace(0.0, 1.0, 33)
 _STRETCHES = tuple(1.1**step for step in range(40)) + tuple(0.9**step for step in range(1, 12))
 
@@ -238,6 +240,30 @@ class Motion:
             s, rate = self.s(now), self.rate(now)
             self.limit = limit
             self._replan(now, s, rate)
+
+    def run_at(self, cruise: float, now: Seconds) -> None:
+        """Go on at another steady rate, as far as the limits permit."""
+        s, rate = self.s(now), self.rate(now)
+        self.cruise = min(cruise, self.path.fastest)
+        # Where nothing moves yet the rate may jump.
+        self._replan(now, s, self.cruise if self.path.at(s).at_rest else rate)
+
+    def come(self, s: Seconds, at: Seconds, now: Seconds, fastest: float) -> None:
+        """Change the rate such that `s` is reached at `at`, or as near to that as between `SLOWEST` and `fastest`."""
+        here, rate = self.s(now), self.rate(now)
+        left, time, change = s - here, at - now, self.path.gentlest_brake
+        fastest = min(fastest, self.path.fastest)
+        if time <= 0.0 or left >= fastest * time:
+            cruise = fastest
+        elif self.path.at(here).at_rest:
+            cruise = left / time
+        elif left >= rate * time:
+            reach = rate + change * time
+            cruise = reach - sqrt(max(0.0, reach * reach - rate * rate - 2 * change * left))
+        else:
+            reach = change * time - rate
+            cruise = sqrt(max(0.0, reach * reach - rate * rate + 2 * change * left)) - reach
+        self.run_at(min(max(cruise, SLOWEST), fastest), now)
 
     def brake(self, now: Seconds) -> None:
         """Stop as soon as the limits permit."""

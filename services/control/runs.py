@@ -32,6 +32,8 @@ class Run:
         self.holding = False
         self.cut_at: Seconds | None = None
         self.motion: Motion
+        self._aim: tuple[str, Seconds] | None = None
+        """The sync point for whose sake it is faster or slower than it would be, and its instant."""
         real = ("head",) if course.parts == ("nod",) else course.parts
         self.cruise = variability.rate(deviations, real, behavior.id, occasion)
         self.stall: Stall | None = variability.stall(deviations, real, behavior)
@@ -54,6 +56,23 @@ class Run:
 
     def play(self, motion: Motion) -> None:
         self.motion = motion
+        self._aim = None
+
+    def keep_pace(self, now: Seconds) -> bool:
+        """Run such that it comes to its next points when it is asked to; whether that changed anything."""
+        marks, here = self.motion.path.marks, self.motion.s(now)
+        planned = self.authority.pace
+        coming = (point.sync for point in self.pending if marks.get(point.sync, 0.0) > here + 1e-9)
+        aim = next(((sync, planned[sync]) for sync in coming if sync in planned), None)
+        if aim == self._aim:
+            return False
+        self._aim = aim
+        if aim is None:
+            self.motion.run_at(self.cruise, now)
+        else:
+            # A motor that is slow is so at its fastest, too; up to there the body sees to it that it is on time.
+            self.motion.come(marks[aim[0]], aim[1], now, self.cruise * self.motion.path.fastest)
+        return True
 
     def limit(self, path: Path) -> Seconds:
         """How far along `path` it may go now."""

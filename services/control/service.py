@@ -129,8 +129,8 @@ class _Control:
         """A request that is new, or that says something new about a live one."""
         live = self._live.get(request.id)
         match request:
-            case PerformBehavior(through=through) if live is not None:
-                self._extend(live, through)
+            case PerformBehavior() if live is not None:
+                self._extend(live, request)
             case PerformBehavior():
                 self._begin(request)
             case AbortBehavior(how=how) if live is not None:
@@ -145,16 +145,20 @@ class _Control:
 
     def _begin(self, request: PerformBehavior) -> None:
         try:
-            authority = Authority(request.behavior, request.through)
+            authority = Authority(request.behavior, request.through, self._pace(request))
         except ValueError as error:
             self.desk.refuse(request.id, Fault(reason=str(error), where=request.behavior.id, service="control"))
             return
         live = self._live[request.id] = _Performance(request, authority)
         self._tasks.create_task(self._perform(live), name=f"behavior {request.id}")
 
-    def _extend(self, live: _Performance, through: str) -> None:
+    def _pace(self, request: PerformBehavior) -> dict[str, Seconds]:
+        return {planned.sync: self._bus.local(planned.at) for planned in request.pace}
+
+    def _extend(self, live: _Performance, request: PerformBehavior) -> None:
+        live.authority.set_pace(self._pace(request))
         try:
-            live.authority.extend(through)
+            live.authority.extend(request.through)
         except ValueError as error:
             where = live.request.behavior.id
             self._bus.publish(keys.fault("control"), Fault(reason=str(error), where=where, service="control"))

@@ -245,8 +245,9 @@ class SimulatedBody(Body):
 
     def _extend(self, run: Run) -> None:
         limit, now = run.limit(run.motion.path), self._loop.time()
-        if limit > run.motion.limit:
-            run.motion.extend(limit, now)
+        is_extended = limit > run.motion.limit
+        run.motion.extend(limit, now)
+        if run.keep_pace(now) or is_extended:
             self._attention.follow_run(run, now)
 
     async def _fail_or_stall(self, run: Run, point: Point) -> None:
