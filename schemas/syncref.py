@@ -30,6 +30,8 @@ LONGEST = 1000
 _NUMBER = r"(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)"
 _SIGNED = re.compile(rf"([+-]?)\s*({_NUMBER})")
 _WITH_OFFSET = re.compile(rf"(.*?)\s*([+-])\s*({_NUMBER})")
+_PLAIN = re.compile(r"([^\s:+-][^\s:+]*):([A-Za-z_]+)")
+"""Most references: what else can be read need not be looked for."""
 _NAME = re.compile(r"[^\s:+-][^\s:+]*")
 
 
@@ -53,6 +55,8 @@ class SyncRef(Struct, frozen=True, omit_defaults=True):
         """
         if len(text) > LONGEST:
             raise _bad(text, f"longer than {LONGEST} characters")
+        if (plain := _PLAIN.fullmatch(text)) and plain[1] != BLOCK_ITSELF:
+            return cls("", plain[1], plain[2])
         # Collapsed, so that no run of spaces keeps the expressions below busy.
         *heads, tail = (" ".join(part.split()) for part in text.split(":"))
         if len(heads) > 3:

@@ -93,6 +93,8 @@ class Assembler:
         return self._in_firing_order()
 
     def _members(self, points: tuple[Point, ...]) -> tuple[Member, ...]:
+        if len(points) == 1 and (alone := self.chains.get(points[0].behavior)):
+            return (Member(alone.behavior.id, gate(alone.type, (points[0].sync,)), points[0]),)
         groups: dict[str, list[str]] = {}
         for behavior, sync in points:
             groups.setdefault(behavior, []).append(sync)

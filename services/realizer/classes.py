@@ -117,6 +117,9 @@ def instants(classes: Classes, points: Iterable[Point]) -> list[Instant]:
         members.setdefault(root, []).append((offset, number, point))
     found: list[Instant] = []
     for class_id, group in enumerate(members.values()):
+        if len(group) == 1:
+            found.append(Instant((group[0][2],), class_id, 0.0))
+            continue
         group.sort()
         lowest = group[0][0]
         together: list[tuple[Seconds, int, Point]] = []

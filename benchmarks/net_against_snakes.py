@@ -1,0 +1,195 @@
+"""Planning and firing the same nets, against SNAKES, at 100, 1000 and 10000 transitions: times and ratios.
+
+Both end with the same outcome, which is checked: every transition fires once, at the same second, and the initial
+marking is back. For SNAKES the tokens carry the seconds, as timed nets are written there: an arc into a place adds
+the place's lag to the latest input. It is given our net ready-made, so its planning is only the building of its own;
+ours goes all the way from the block: references, classes, places, order, schedule. Black tokens, which know no time,
+are shown too.
+
+    python benchmarks/net_against_snakes.py [--laps N] [--json]        needs: pip install -e .[bench]
+"""
+
+import argparse
+import gc
+import json
+import sys
+import time
+import warnings
+from collections.abc import Callable
+from pathlib import Path
+from statistics import median
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+with warnings.catch_warnings():
+    warnings.simplefilter("ignore", DeprecationWarning)  # it imports `imp`
+    import snakes.nets as snakes
+
+from schemas.behaviors import After, BlockBehavior, Constraint, Pointing, Speech, Synchronize
+from schemas.blocks import Block
+from services.realizer.net import PetriNet, enabled, fire, fire_once_each
+from services.realizer.planner import Plan, plan_block
+
+SIZES = (100, 1000, 10000)
+PER_PAIR = 8
+"""Transitions of a pointing gesture and the phrase that begins with its stroke."""
+
+
+def references(transitions: int) -> Block:
+    """One pointed reference after another, of about so many transitions."""
+    behaviors: list[BlockBehavior] = []
+    operators: list[Synchronize | After] = []
+    for number in range(transitions // PER_PAIR):
+        behaviors += (
+            Pointing(id=f"point-{number}", target="can"),
+            Speech(id=f"phrase-{number}", text="this one"),
+        )
+        operators.append(Synchronize(ref=f"point-{number}:stroke_start", syncs=(f"phrase-{number}:start",)))
+        if number:
+            operators.append(After(ref=f"phrase-{number - 1}:end", syncs=(f"point-{number}:start",)))
+            operators.append(After(ref=f"point-{number - 1}:end", syncs=(f"point-{number}:start",)))
+    return Block(id="b", behaviors=tuple(behaviors), constraints=(Constraint(operators=tuple(operators)),))
+
+
+class Timed:
+    """SNAKES with seconds for tokens."""
+
+    name = "SNAKES, timed tokens"
+
+    def build(self, net: PetriNet) -> snakes.PetriNet:
+        built = snakes.PetriNet("block")
+        for number in range(len(net.transitions)):
+            built.add_transition(snakes.Transition(f"t{number}"))
+        for number, place in enumerate(net.places):
+            built.add_place(snakes.Place(f"p{number}", [0.0] if net.initial[number] else []))
+            built.add_input(f"p{number}", f"t{place.target}", snakes.Variable(f"x{number}"))
+        for number, place in enumerate(net.places):
+            latest = ", ".join(f"x{each}" for each in net.inputs[place.source])
+            lag = repr(place.lag)
+            text = f"max({latest}) + {lag}" if len(net.inputs[place.source]) > 1 else f"{latest} + {lag}"
+            built.add_output(f"p{number}", f"t{place.source}", snakes.Expression(text))
+        return built
+
+    def run(self, net: PetriNet, built: snakes.PetriNet) -> dict[int, float]:
+        """Fire each transition once; when each does."""
+        seconds: dict[int, float] = {}
+        todo = [0]
+        while todo:
+            number = todo.pop()
+            if number in seconds:
+                continue
+            # Its own search for a binding (`modes`) is recursive and ends at a thousand inputs; ours is direct.
+            tokens = {f"x{place}": built.place(f"p{place}").tokens for place in net.inputs[number]}
+            if all(tokens.values()):
+                binding = snakes.Substitution({name: next(iter(those)) for name, those in tokens.items()})
+                seconds[number] = max(binding[name] for name in tokens)
+                built.transition(f"t{number}").fire(binding)
+                todo += [net.places[place].target for place in net.outputs[number]]
+        return seconds
+
+
+class Black:
+    """SNAKES with tokens that know no time."""
+
+    name = "SNAKES, black tokens"
+
+    def build(self, net: PetriNet) -> snakes.PetriNet:
+        built = snakes.PetriNet("block")
+        token = snakes.Value(snakes.dot)
+        for number in range(len(net.transitions)):
+            built.add_transition(snakes.Transition(f"t{number}"))
+        for number, place in enumerate(net.places):
+            built.add_place(snakes.Place(f"p{number}", [snakes.dot] if net.initial[number] else []))
+            built.add_output(f"p{number}", f"t{place.source}", token)
+            built.add_input(f"p{number}", f"t{place.target}", token)
+        return built
+
+    def run(self, net: PetriNet, built: snakes.PetriNet) -> dict[int, float]:
+        fired: dict[int, float] = {}
+        todo, nothing = [0], snakes.Substitution()
+        while todo:
+            number = todo.pop()
+            if number in fired:
+                continue
+            transition = built.transition(f"t{number}")
+            if transition.enabled(nothing):
+                transition.fire(nothing)
+                fired[number] = 0.0
+                todo += [net.places[place].target for place in net.outputs[number]]
+        return fired
+
+
+def step(net: PetriNet) -> set[int]:
+    """With `enabled` and `fire`, one marking after another."""
+    marking, fired, todo = net.initial, set(), [0]
+    while todo:
+        number = todo.pop()
+        if number not in fired and enabled(net, marking, (number,)):
+            marking = fire(net, marking, number)
+            fired.add(number)
+            todo += [net.places[place].target for place in net.outputs[number]]
+    assert marking == net.initial
+    return fired
+
+
+def measure(size: int, laps: int) -> dict[str, dict[str, float]]:
+    """Median seconds of planning and of firing, by contender."""
+    block = references(size)
+    taken: dict[str, dict[str, list[float]]] = {}
+
+    def clock(name: str, what: str, act: Callable[[], object]) -> object:
+        gc.collect()
+        began = time.perf_counter()
+        result = act()
+        taken.setdefault(name, {}).setdefault(what, []).append(time.perf_counter() - began)
+        return result
+
+    for _ in range(laps):
+        plan = clock("Engage", "plan", lambda: plan_block(block))
+        assert isinstance(plan, Plan)
+        net = PetriNet(plan.net.transitions, plan.net.places)  # nothing computed yet
+        run = clock("Engage", "fire", lambda net=net: fire_once_each(net, net.initial))
+        stepped = clock("Engage, marking by marking", "fire", lambda net=net: step(net))
+        assert run.marking == net.initial  # type: ignore[attr-defined]
+        everything = set(range(len(net.transitions)))
+        assert set(run.fired) == stepped == everything  # type: ignore[attr-defined]
+        for contender in (Timed(), Black()):
+            built = clock(contender.name, "plan", lambda it=contender, net=net: it.build(net))
+            seconds = clock(contender.name, "fire", lambda it=contender, net=net, built=built: it.run(net, built))
+            assert isinstance(seconds, dict)
+            assert set(seconds) == everything
+            assert {place.name for place in built.place() if place.tokens} == {  # type: ignore[attr-defined]
+                f"p{number}" for number, tokens in enumerate(net.initial) if tokens
+            }
+            if isinstance(contender, Timed):
+                late = {each: at for each, at in seconds.items() if abs(at - plan.schedule[each]) > 1e-6}
+                assert not late, late
+    return {name: {what: median(those) for what, those in each.items()} for name, each in taken.items()}
+
+
+def main() -> None:
+    options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    options.add_argument("--laps", type=int, default=3)
+    options.add_argument("--json", action="store_true")
+    chosen = options.parse_args()
+    rows = []
+    for size in SIZES:
+        results = measure(size, chosen.laps)
+        ours = results["Engage"]
+        for name, seconds in results.items():
+            row: dict[str, object] = {"transitions": size, "name": name}
+            for what in ("plan", "fire"):
+                if what in seconds:
+                    row[f"{what}_us"] = round(1e6 * seconds[what] / size, 2)
+                    row[f"{what}_ratio"] = round(seconds[what] / ours[what], 2)
+            rows.append(row)
+    if chosen.json:
+        print(json.dumps(rows))
+        return
+    print(f"{'transitions':>11}  {'':28}{'plan':>9}{'ratio':>8}{'fire':>9}{'ratio':>8}   microseconds per transition")
+    for row in rows:
+        cells = [row.get(key, "") for key in ("plan_us", "plan_ratio", "fire_us", "fire_ratio")]
+        print(f"{row['transitions']:>11}  {row['name']:28}" + "{:>9}{:>8}{:>9}{:>8}".format(*cells))
+
+
+if __name__ == "__main__":
+    main()
