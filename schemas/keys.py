@@ -73,6 +73,10 @@ def fault(service: str) -> str:
     return f"{PREFIX}/evt/{service}/fault"
 
 
+def status(participant: str) -> str:
+    return f"{PREFIX}/rpc/{participant}/status"
+
+
 def statistics(actor: str) -> str:
     """actor: a person's id, or `all`."""
     return f"{PREFIX}/state/recognition/statistics/{actor}"

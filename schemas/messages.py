@@ -35,6 +35,7 @@ from schemas.recognition import (
     TurnOutcome,
 )
 from schemas.requests import Accepted, Cancel, Refused
+from schemas.status import AskStatus, Status
 from schemas.world import World
 
 MAJOR = 1
@@ -48,7 +49,7 @@ Message = (
     | DescribeBody | Capabilities | EstimateBehaviors | Estimates
     | ActionBegan | ActionEnded | ActorFound | ActorLost | World
     | RequestEvent | EventOutcome | SignalTurn | TurnOutcome | ConnectionEvent | Statistics
-    | PeerAlive | PeerGone
+    | AskStatus | Status | PeerAlive | PeerGone
 )  # fmt: skip
 """What may travel. A union of tagged structs: the `type` field of the encoded form says which."""
 

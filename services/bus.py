@@ -18,6 +18,7 @@ from schemas import keys
 from schemas.blocks import Block, PerformBlock
 from schemas.fragments import PerformFragment
 from schemas.messages import Message, decode
+from schemas.status import BusHealth
 from schemas.units import Seconds, Stamp
 from schemas.xml_codec import decode_xml
 
@@ -141,11 +142,18 @@ class Bus(ABC):
 
     robot: the namespace. name: who this is; appears as `Received.source` and on its liveliness token.
     clock: the clock that `now` reads, the same for all processes that can compare their times directly.
+    run: which life of the participant this is.
     """
 
     robot: str
     name: str
     clock: str
+    run: str
+
+    @property
+    @abstractmethod
+    def health(self) -> BusHealth:
+        """How the connection is doing."""
 
     @abstractmethod
     def now(self) -> Seconds:
@@ -175,8 +183,11 @@ class Bus(ABC):
         """Ask the server of an `rpc` key. Raises NoReply (absent, late) or InputRefused (it answered a Fault)."""
 
     @abstractmethod
-    def answer(self, key: str, answer: Answer) -> None:
-        """Serve an `rpc` key for the life of this bus. `answer` is quick and pure; an EngageError becomes a Fault."""
+    def answer(self, key: str, answer: Answer, *, empty: Message | None = None) -> None:
+        """Serve an `rpc` key for the life of this bus. `answer` is quick and pure; an EngageError becomes a Fault.
+
+        empty: the question that a query without payload is, as programs that know only Zenoh send it.
+        """
 
     @abstractmethod
     def declare_alive(self) -> None:

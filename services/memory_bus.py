@@ -12,6 +12,7 @@ from schemas import keys
 from schemas.faults import EngageError, Fault, InputRefused, NoReply
 from schemas.messages import Message, decode, encode
 from schemas.presence import PeerAlive, PeerGone
+from schemas.status import BusHealth
 from schemas.units import Probability, Seconds, Stamp
 from services.bus import Answer, Bus, Hub, Keep, Received, Subscription, read_payload
 
@@ -40,7 +41,7 @@ class MemoryHub(Hub):
         self._chance = random.Random(seed)
         self._loop = asyncio.get_running_loop()
         self._buses: dict[str, MemoryBus] = {}
-        self._sent = 0
+        self.sent = 0
         self._lives = 0
         self._state: dict[str, _Past] = {}
         self._past: deque[_Past] = deque(maxlen=4096)
@@ -88,8 +89,8 @@ class MemoryHub(Hub):
             self._pass_on("", Received(key, message, "", self._loop.time()))
 
     def _pass_on(self, sender: str, received: Received) -> None:
-        self._sent += 1
-        past = _Past(self._sent, received)
+        self.sent += 1
+        past = _Past(self.sent, received)
         kind = keys.key_class(received.key)
         if kind == "state":
             self._state[received.key] = past
@@ -129,11 +130,15 @@ class MemoryHub(Hub):
             received = past.received
             if subscription.wants(received.key) and not self._is_cut(name, received.source):
                 subscription.offer(msgspec.structs.replace(received, at=now, past=True))
-        return self._sent
+        return self.sent
+
+    @property
+    def alive(self) -> tuple[str, ...]:
+        return tuple(sorted(bus.name for bus in self._buses.values() if bus.is_alive))
 
     def announce(self, name: str, message: PeerAlive | PeerGone) -> None:
         for bus in list(self._buses.values()):
-            bus.deliver(Received(keys.alive(name), message, name, self._loop.time()), self._sent + 1)
+            bus.deliver(Received(keys.alive(name), message, name, self._loop.time()), self.sent + 1)
 
     async def answerer(self, key: str, asker: str, deadline: Seconds) -> Answer | None:
         """Who serves the key, as soon as somebody does; None at the deadline."""
@@ -173,7 +178,13 @@ class MemoryBus(Bus):
         self._hub = hub
         self._loop = asyncio.get_running_loop()
         self._subscriptions: dict[Subscription, int] = {}
+        self._overflowed = 0
         self._gone = False
+
+    @property
+    def health(self) -> BusHealth:
+        overflowed = self._overflowed + sum(subscription.overflowed for subscription in self._subscriptions)
+        return BusHealth(peers=self._hub.alive, passed=self._hub.sent, overflowed=overflowed)
 
     def now(self) -> Seconds:
         return self._loop.time()
@@ -201,7 +212,8 @@ class MemoryBus(Bus):
         return subscription
 
     def _drop(self, subscription: Subscription) -> None:
-        self._subscriptions.pop(subscription, None)
+        if self._subscriptions.pop(subscription, None) is not None:
+            self._overflowed += subscription.overflowed
 
     async def query(self, key: str, message: Message, timeout: Seconds = 1.0) -> Message:
         await asyncio.sleep(0)
@@ -213,7 +225,7 @@ class MemoryBus(Bus):
         except EngageError as error:
             raise InputRefused(error.fault) from error
 
-    def answer(self, key: str, answer: Answer) -> None:
+    def answer(self, key: str, answer: Answer, *, empty: Message | None = None) -> None:
         self.answers[key] = answer
         self._hub.wake_askers()
 

@@ -1,13 +1,20 @@
 """How a service lives: joins the hub under its name, subscribes, shows its token, serves until cancelled.
 
 A service is one coroutine function of its bus, its configuration and `ready`, which it calls once its
-subscribers stand. A bug in a service ends its process, loudly; bad messages from others never do.
+subscribers stand. Each answers how it is (`keys.status`). A bug in a service ends its process, loudly; bad messages
+from others never do.
 """
 
 import asyncio
 from collections.abc import AsyncIterator, Awaitable, Callable, Mapping
 from contextlib import asynccontextmanager
+from functools import cache
+from importlib.metadata import PackageNotFoundError, version
 
+from schemas import keys
+from schemas.messages import Message
+from schemas.status import AskStatus, Status
+from schemas.units import Stamp
 from services.bus import Bus, Hub
 
 Ready = Callable[[], None]
@@ -18,15 +25,34 @@ Service = Callable[[Bus, Ready], Awaitable[None]]
 async def serve(hub: Hub, name: str, service: Service, ready: Ready = lambda: None) -> None:
     """Run one service on the hub until it is cancelled or fails."""
     bus = hub.join(name)
+    joined = bus.stamp()
+    since: Stamp | None = None
 
     def stands() -> None:
+        nonlocal since
+        since = bus.stamp()
         bus.declare_alive()
         ready()
 
+    def status(question: Message) -> Status:
+        return Status(
+            participant=name, run=bus.run, version=_version(),
+            at=bus.stamp(), joined=joined, stands=since, bus=bus.health,
+        )  # fmt: skip
+
+    bus.answer(keys.status(name), status, empty=AskStatus())
     try:
         await service(bus, stands)
     finally:
         await bus.leave()
+
+
+@cache
+def _version() -> str:
+    try:
+        return version("engage-hri")
+    except PackageNotFoundError:  # run from its sources
+        return "unknown"
 
 
 @asynccontextmanager

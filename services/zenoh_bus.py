@@ -10,19 +10,20 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+import msgspec
 import zenoh
-from msgspec import Struct
 
 from schemas import keys
 from schemas.faults import EngageError, Fault, InputRefused, NoReply
 from schemas.messages import Message, decode, encode, encoding_of
+from schemas.status import BusHealth
 from schemas.units import Seconds, Stamp
 from services.bus import Answer, Bus, Hub, Keep, Received, Subscription
 from services.zenoh_clocks import Clocks
 from services.zenoh_order import Envelope, Ledger, Pulse
 from services.zenoh_peers import Peers, finish, pack
 from services.zenoh_readers import Readers
-from services.zenoh_session import QOS, RENDEZVOUS, STREAM_QOS, Doorway, Traffic, open_session
+from services.zenoh_session import QOS, RENDEZVOUS, STREAM_QOS, Doorway, open_session
 from services.zenoh_visitors import Visitors, form_asked, in_form, refuse
 
 FIRST_PULSE: Seconds = 0.25
@@ -52,15 +53,6 @@ async def open_hub(
     return hub
 
 
-class Health(Struct, frozen=True):
-    """How the bus is doing. refused: bad payloads. lost: messages gone for good. peers: names of who is there."""
-
-    traffic: Traffic
-    refused: int
-    lost: int
-    peers: tuple[str, ...]
-
-
 class ZenohHub(Hub):
     def __init__(self, robot: str, session: zenoh.Session) -> None:
         self.robot = robot
@@ -80,9 +72,14 @@ class ZenohHub(Hub):
         self.peers.stand(self.readers.process_came, self.readers.participant_changed)
 
     @property
-    def health(self) -> Health:
-        names = tuple(sorted(self.peers.names))
-        return Health(self.doorway.traffic, self.readers.refused, self.readers.lost, names)
+    def health(self) -> BusHealth:
+        """Of the process, without what is each participant's own."""
+        traffic = self.doorway.traffic
+        return BusHealth(
+            peers=tuple(sorted(self.peers.names)), refused=self.readers.refused,
+            passed=traffic.passed, dropped=traffic.dropped, depth=traffic.depth, lag=traffic.lag,
+            waiting=self.doorway.waiting,
+        )  # fmt: skip
 
     def join(self, name: str) -> "ZenohBus":
         if name in self._buses:
@@ -151,12 +148,20 @@ class ZenohBus(Bus):
         self.robot = hub.robot
         self.name = name
         self.clock = hub.clocks.own
+        self.run = hub.run
         self._hub = hub
         self._loop = asyncio.get_running_loop()
         self._subscriptions: list[Subscription] = []
         self._answers: list[Any] = []
+        self._overflowed = 0
         self._token: Any = None
         self._gone = False
+
+    @property
+    def health(self) -> BusHealth:
+        overflowed = self._overflowed + sum(subscription.overflowed for subscription in self._subscriptions)
+        gaps, lost = self._hub.readers.missed(self)
+        return msgspec.structs.replace(self._hub.health, overflowed=overflowed, gaps=gaps, lost=lost)
 
     def now(self) -> Seconds:
         return self._loop.time()
@@ -177,6 +182,7 @@ class ZenohBus(Bus):
     def _drop(self, subscription: Subscription) -> None:
         if subscription in self._subscriptions:
             self._subscriptions.remove(subscription)
+            self._overflowed += subscription.overflowed
             self._hub.readers.detach(subscription)
 
     async def query(self, key: str, message: Message, timeout: Seconds = 1.0) -> Message:
@@ -204,12 +210,13 @@ class ZenohBus(Bus):
         self._hub.peers.ask(key, payload, settle, settle, timeout, encoding)
         return await answered
 
-    def answer(self, key: str, answer: Answer) -> None:
+    def answer(self, key: str, answer: Answer, *, empty: Message | None = None) -> None:
         def reply(query: zenoh.Query) -> None:
             form = "json"
             try:
                 form = form_asked(query)
-                question = decode(query.payload.to_bytes() if query.payload else b"", str(query.encoding))
+                asked = query.payload.to_bytes() if query.payload else b""
+                question = empty if empty is not None and not asked else decode(asked, str(query.encoding))
                 payload, encoding = in_form(answer(question), form)
                 query.reply(key, payload, encoding=encoding)
             except EngageError as error:

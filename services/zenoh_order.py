@@ -120,14 +120,15 @@ class Ledger:
 class Follower:
     """One publishing process as one subscription sees it.
 
-    behind: the past is needed; until `catch_up` nothing is delivered. lost: messages that were gone for good.
-    asking: for the shell: the question is on its way.
+    behind: the past is needed; until `catch_up` nothing is delivered. gaps: how often a message was missed.
+    lost: messages that were gone for good. asking: for the shell: the question is on its way.
     """
 
     def __init__(self, patterns: Iterable[str]) -> None:
         self.patterns = tuple(patterns)
         self.behind = True
         self.asking = False
+        self.gaps = 0
         self.lost = 0
         self._since = -1
         self._seen: dict[str, int] = {}
@@ -140,7 +141,7 @@ class Follower:
         if envelope.nth < expected:
             return []
         if envelope.nth > expected and not self._may_skip(written.key):
-            self.behind = True
+            self._fall_behind()
         if self.behind:
             self._held.append(written)
             return []
@@ -151,7 +152,11 @@ class Follower:
         """Compare counts; may set `behind`."""
         for key, nth in pulse.counts.items():
             if nth > self._seen.get(key, 0) and _wanted(self.patterns, key):
-                self.behind = True
+                self._fall_behind()
+
+    def _fall_behind(self) -> None:
+        self.gaps += not self.behind
+        self.behind = True
 
     def missing(self) -> Missing:
         return Missing(self.patterns, dict(self._seen), self._since)

@@ -49,9 +49,10 @@ class Readers:
             session.declare_subscriber(keys.ANY_PULSE, doorway.samples(self._pulse_heard)),
         )
 
-    @property
-    def lost(self) -> int:
-        return sum(follower.lost for reader in self._readers for follower in reader.followers.values())
+    def missed(self, bus: Bus) -> tuple[int, int]:
+        """Of one participant: how often it missed something, and how many messages were gone for good."""
+        followers = [one for reader in self._readers if reader.bus is bus for one in reader.followers.values()]
+        return sum(one.gaps for one in followers), sum(one.lost for one in followers)
 
     def close(self) -> None:
         for declared in self._declared:

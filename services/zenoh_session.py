@@ -137,6 +137,10 @@ class Doorway:
 
         return zenoh.handlers.Callback(sort, indirect=False)
 
+    @property
+    def waiting(self) -> int:
+        return len(self._ordered) + len(self._streams)
+
     def close(self) -> None:
         """Let nothing in any more."""
         self._open = False
@@ -163,7 +167,7 @@ class Doorway:
         # The flag first: what is appended from here on wakes again, so nothing is left behind.
         self._woken = False
         self.traffic.lag = max(self.traffic.lag, self._loop.time() - self._woken_at)
-        waiting = len(self._ordered) + len(self._streams)
+        waiting = self.waiting
         self.traffic.depth = max(self.traffic.depth, waiting)
         try:
             for _ in range(min(waiting, BATCH)):

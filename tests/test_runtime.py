@@ -1,12 +1,15 @@
 import asyncio
+from importlib.metadata import version
 
 import pytest
 
 from schemas import keys
 from schemas.presence import PeerAlive, PeerGone
+from schemas.requests import Accepted
+from schemas.status import AskStatus, Status
 from services.bus import Bus
 from services.memory_bus import MemoryHub
-from services.runtime import Ready, running
+from services.runtime import Ready, running, serve
 
 
 async def stand_late(bus: Bus, ready: Ready) -> None:
@@ -49,3 +52,29 @@ async def test_a_service_that_ends_before_it_stands_is_a_failure_and_not_a_wait_
             raise AssertionError("it never stood")
 
     assert failed.group_contains(RuntimeError, match="quitter ended before it stood")
+
+
+async def test_a_service_answers_how_it_is_before_and_after_it_stands(hub: MemoryHub):
+    async def work(bus: Bus, ready: Ready) -> None:
+        with bus.subscribe(keys.FEEDBACK, capacity=2):
+            await stand_late(bus, ready)
+
+    watch = hub.join("watch")
+    async with running(hub, {"other": stand_late}), asyncio.TaskGroup() as group:
+        working = group.create_task(serve(hub, "worker", work))
+        await asyncio.sleep(1.0)
+        early = await watch.query(keys.status("worker"), AskStatus())
+        for number in range(5):
+            watch.publish(keys.FEEDBACK, Accepted(id=str(number)))
+        await asyncio.sleep(9.0)
+        late = await watch.query(keys.status("worker"), AskStatus())
+        working.cancel()
+
+    assert isinstance(early, Status)
+    assert isinstance(late, Status)
+    assert (early.participant, early.run, early.version) == ("worker", "3", version("engage-hri"))
+    assert (early.joined.seconds, early.stands, early.at.seconds) == (2.0, None, 3.0)
+    assert (late.stands, late.at) == (watch.stamp(4.0), watch.stamp(12.0))
+    assert early.bus.peers == ("other",)
+    assert late.bus.peers == ("other", "worker")
+    assert (early.bus.overflowed, late.bus.overflowed) == (0, 3)

@@ -142,6 +142,9 @@ async def test_a_full_queue_drops_the_oldest_and_counts(place: Place):
 
     assert numbers(await messages(small, 3)) == [7, 8, 9]
     assert (small.overflowed, large.overflowed) == (7, 0)
+    assert (here.health.overflowed, there.health.overflowed) == (7, 0)
+    small.close()
+    assert here.health.overflowed == 7
 
 
 async def test_a_stream_reaches_those_who_listen_and_nobody_later(place: Place):
@@ -197,6 +200,7 @@ async def test_liveliness_tells_who_is_there_who_comes_and_who_goes(place: Place
     await late.leave()
     third = await messages(inbox)
 
+    assert here.health.peers == ("early",)
     assert [message.participant for message in first + second] == ["early", "late"]
     assert isinstance(first[0], PeerAlive)
     assert isinstance(second[0], PeerAlive)

@@ -13,6 +13,8 @@ import zenoh
 from schemas import keys
 from schemas.messages import decode, encode, encode_json
 from schemas.requests import Accepted
+from services.bus import Bus
+from services.runtime import Ready, running
 from services.zenoh_bus import ZenohHub, open_hub
 from services.zenoh_visitors import BATCH
 from tests.bus.places import PATIENCE, acquainted, echo, free_endpoint, state
@@ -201,3 +203,20 @@ async def test_a_long_history_is_handed_out_in_parts_so_that_the_loop_goes_on(to
 
     assert texts(await asking) == [str(number) for number in range(2000)]
     assert turns > 2000 / BATCH
+
+
+async def test_without_a_payload_a_visitor_asks_every_service_how_it_is(town: Town):
+    near, far, visitor = town
+
+    async def work(bus: Bus, ready: Ready) -> None:
+        ready()
+        await asyncio.Event().wait()
+
+    async with running(near, {"one": work, "two": work}), running(far, {"three": work}):
+        replies = await visitor.samples(f"{keys.status('*')}?format=json", target=zenoh.QueryTarget.ALL)
+
+    found = {status["participant"]: status for status in (json.loads(one.payload.to_bytes()) for one in replies)}
+    assert found.keys() == {"one", "two", "three"}
+    assert found["one"]["run"] == found["two"]["run"] == near.run
+    assert found["three"]["run"] == far.run
+    assert all(status["bus"]["passed"] > 0 and status["bus"]["lag"] > 0 for status in found.values())

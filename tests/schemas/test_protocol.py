@@ -53,7 +53,8 @@ def test_every_key_is_in_the_table(protocol: ModuleType) -> None:
         for name, value in vars(keys).items()
         if name.isupper() and isinstance(value, str) and value.startswith(keys.PREFIX) and not name.startswith("ANY_")
     }
-    made = {make("x") for make in (keys.cancel, keys.request_state, keys.fault, keys.statistics, keys.alive)}
+    makers = (keys.cancel, keys.request_state, keys.fault, keys.statistics, keys.status, keys.alive)
+    made = {make("x") for make in makers}
 
     assert table == (constants | made) - {keys.PREFIX, keys.EVERYTHING}
 
