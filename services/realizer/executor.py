@@ -188,7 +188,7 @@ class Performance:
         if moving:
             await asyncio.wait(moving, timeout=self._config.abort)
         if ending.status == "failed":
-            self._go_home({part for id in self._pending for part in self._parts(id)})
+            self._go_home(self.parts_used)
 
     def _close(self) -> None:
         if self._timer is not None:
@@ -336,6 +336,11 @@ class Performance:
         if parts:
             id = f"{self._request_id(name)}/home" if name else f"{self.request.id}/home"
             self._requests.send(keys.BEHAVIOR, GoHome(id=id, requester=self._bus.name, parts=tuple(sorted(parts))))
+
+    @property
+    def parts_used(self) -> set[str]:
+        """Of the body, by what has begun so far."""
+        return {part for id in self._authority.begun for part in self._parts(id)}
 
     def _parts(self, id: str) -> set[str]:
         estimate = self.plan.estimates.get(id)

@@ -13,6 +13,7 @@ from schemas.body import (
     EstimateBehaviors,
     EstimateItem,
     Estimates,
+    GoHome,
     SyncPointArrived,
     SyncPointReached,
 )
@@ -83,7 +84,9 @@ class _Realizer:
             self._refuse(live, error)
             return
         self.desk.accept(request.id)
-        await self._make_way(live)
+        if await self._make_way(live):
+            # The body is elsewhere by now.
+            plan = await self._anew(plan, live)
         if live.ending is not None:
             self._end(live, self._never_begun(request, live.ending))
             return
@@ -116,14 +119,32 @@ class _Realizer:
         assert isinstance(answer, Estimates)
         return answer.items
 
-    async def _make_way(self, live: _Live) -> None:
-        """What composition asks of the blocks that are already there."""
-        if live.request.block.composition == "REPLACE":
-            for other in live.earlier:
+    async def _make_way(self, live: _Live) -> bool:
+        """What composition asks of the blocks that are already there; whether it had to wait for them."""
+        earlier, replaces = live.earlier, live.request.block.composition == "REPLACE"
+        live.earlier = []
+        if live.request.block.composition == "MERGE" or not earlier:
+            return False
+        if replaces:
+            for other in earlier:
                 other.stop(Ending("interrupted", replaced_by=live.request.block.id))
-        if live.request.block.composition != "MERGE" and live.earlier:
-            await asyncio.wait([other.ended for other in live.earlier])
-        live.earlier.clear()
+        await asyncio.wait([other.ended for other in earlier])
+        parts = {part for other in earlier if other.performance is not None for part in other.performance.parts_used}
+        if replaces and parts:
+            home = GoHome(id=f"{live.request.id}/way", requester=self.bus.name, parts=tuple(sorted(parts)))
+            pending = self.requests.send(keys.BEHAVIOR, home)
+            await asyncio.wait([pending.outcome], timeout=self.config.abort)
+        return True
+
+    async def _anew(self, plan: Plan, live: _Live) -> Plan:
+        """The same plan from where the body is now; the block ends as failed if there is none."""
+        elsewhere = [point for point in plan.at if ":" in point.behavior]
+        try:
+            estimates = await self._estimates(live.request, poses_before(plan))
+            return plan_block(live.request.block, estimates, elsewhere=elsewhere)
+        except EngageError as error:
+            live.stop(Ending("failed", error.fault))
+            return plan
 
     def _never_begun(self, request: PerformBlock, ending: Ending) -> BlockOutcome:
         return BlockOutcome(

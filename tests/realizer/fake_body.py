@@ -6,6 +6,7 @@ when a later gaze or point comes, and ends every request exactly once.
 
 import asyncio
 from collections.abc import Mapping
+from contextlib import suppress
 from itertools import pairwise
 
 from msgspec import Struct, field
@@ -111,13 +112,20 @@ class Act(Struct, eq=False):
 
 
 class FakeBody:
-    """scripts: by behavior id. estimates: durations it expects, by behavior id, where not natural."""
+    """scripts: by behavior id. estimates: durations it expects, by behavior id, where not natural.
+
+    elastic: shortest and longest time of a phase, by its natural one. homing: seconds on the way home.
+    """
 
     def __init__(
         self,
         scripts: Mapping[str, Script] | None = None,
         estimates: Mapping[str, tuple[Seconds, ...]] | None = None,
+        elastic: tuple[float, float] = (1.0, 1.0),
+        homing: Seconds = 0.0,
     ) -> None:
+        self.elastic = elastic
+        self.homing = homing
         self.scripts = dict(scripts or {})
         self.estimates = dict(estimates or {})
         self.stops: list[str] = []
@@ -145,9 +153,13 @@ class FakeBody:
                             case GoHome(id=id, parts=parts):
                                 self.desk.accept(id)
                                 self.homes.append(parts)
-                                self.desk.end(HomeReached(id=id, at=bus.stamp()))
+                                self.tasks.create_task(self._home(id), name=f"fake home {id}")
         finally:
             self.desk.close()
+
+    async def _home(self, id: str) -> None:
+        await asyncio.sleep(self.homing)
+        self.desk.end(HomeReached(id=id, at=self.bus.stamp()))
 
     def _cancelled(self, cancel: Cancel) -> None:
         self._abort(cancel.id)
@@ -162,7 +174,14 @@ class FakeBody:
         durations = self.estimates.get(behavior.id, natural_durations(behavior))
         holds = HOLDS.get(type_of(behavior), ())
         phases = tuple(
-            Phase(since=since, to=to, shortest=seconds, natural=seconds, longest=seconds, hold=to in holds)
+            Phase(
+                since=since,
+                to=to,
+                shortest=seconds * self.elastic[0],
+                natural=seconds,
+                longest=seconds * self.elastic[1],
+                hold=to in holds,
+            )
             for (since, to), seconds in zip(pairwise(points_of(behavior)), durations, strict=True)
         )
         return Estimate(behavior=behavior.id, feasible=True, parts=parts_of(behavior), phases=phases)
@@ -207,8 +226,7 @@ class FakeBody:
         for seconds, sync in zip(durations, points[1:], strict=True):
             if sync == script.stall:
                 await asyncio.get_running_loop().create_future()
-            if seconds:
-                await asyncio.sleep(seconds * script.slow)
+            await self._phase(act, sync, seconds * script.slow)
             if sync == script.fail:
                 self._end(act, "failed", Fault(reason="overheated"))
                 return
@@ -228,6 +246,20 @@ class FakeBody:
                 position = next((mark.position for mark in behavior.marks if mark.id == sync), len(behavior.text))
                 act.spoken = behavior.text[:position]
         self._end(act, "done")
+
+    async def _phase(self, act: Act, sync: str, natural: Seconds) -> None:
+        """As long as is natural, or as near to the planned instant as it can."""
+        began = self.bus.now()
+        least, most = began + natural * self.elastic[0], began + natural * self.elastic[1]
+        while True:
+            planned = {each.sync: self.bus.local(each.at) for each in act.perform.pace}
+            until = min(max(planned[sync], least), most) if sync in planned else began + natural
+            if until <= self.bus.now():
+                return
+            act.changed.clear()
+            with suppress(TimeoutError):
+                async with asyncio.timeout_at(until):
+                    await act.changed.wait()
 
     def _arrived(self, act: Act, sync: str, at: Seconds) -> None:
         behavior = act.perform.behavior.id

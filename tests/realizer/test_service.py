@@ -66,6 +66,48 @@ async def test_replace_interrupts_the_blocks_before_it() -> None:
     assert second.status == "done"
 
 
+async def test_after_a_replace_the_parts_go_home_before_the_new_block_starts() -> None:
+    async with stage(FakeBody(homing=0.75)) as seen:
+        first = seen.ask(block((Pointing(id="p", target="a"), STORY), id="one"))
+        await seen.seen("p:ready", "one")
+        second = await seen.perform(block((STORY,), id="two", composition="REPLACE"))
+        await first.outcome
+
+    begins = {
+        each.block: each.at.seconds for each in seen.feedback if isinstance(each, BlockProgress) and each.time == 0
+    }
+    assert seen.body.homes == [("right_arm", "voice")]
+    assert [(each.block, each.at.seconds, each.status) for each in seen.ends()] == [
+        ("one", 0.5, "interrupted"), ("two", 3.25, "done")
+    ]  # fmt: skip
+    assert begins["two"] == 0.5 + 0.75
+    assert second.status == "done"
+
+
+async def test_an_empty_replace_starts_and_ends_when_all_is_home() -> None:
+    async with stage(FakeBody(homing=0.75)) as seen:
+        first = seen.ask(block((Pointing(id="p", target="a"),), id="one"))
+        await seen.seen("p:ready", "one")
+        await seen.perform(block((), id="two", composition="REPLACE"))
+        await first.outcome
+
+    progress = [(e.block, e.progress, e.at.seconds) for e in seen.feedback if isinstance(e, BlockProgress)]
+    assert progress == [("one", "start", 0.0), ("one", "end", 0.5), ("two", "start", 1.25), ("two", "end", 1.25)]
+
+
+async def test_an_appended_block_is_planned_from_where_the_body_is_then() -> None:
+    body = FakeBody()
+    async with stage(body) as seen:
+        first = seen.ask(block((STORY,), id="one"))
+        second = seen.ask(block((Gaze(id="g", target="a"), STORY), id="two", composition="APPEND"))
+        await second.accepted
+        body.estimates["g"] = (0.0, 0.0, 0.25, 0.0, 0.0, 0.25)
+        await asyncio.gather(first.outcome, second.outcome)
+
+    said = [each for each in seen.feedback if isinstance(each, PredictionFeedback) and each.block == "two"]
+    assert {(each.behavior, each.sync): each.time for each in said[0].points}["g", "stroke"] == 0.25
+
+
 async def test_an_id_in_use_is_refused_and_free_again_after_the_end() -> None:
     async with stage() as seen:
         first = seen.ask(block((STORY,)))
