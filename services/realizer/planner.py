@@ -206,7 +206,8 @@ class _Planner:
         if self.dropped:
             # What the points of a dropped behavior tied together stays tied, unless they could not have been.
             for equal in self.relations.equals:
-                if any(term.point.behavior in self.dropped for term in equal.terms):
+                is_gone = equal.behavior in self.dropped  # with the timing written on it
+                if not is_gone and any(term.point.behavior in self.dropped for term in equal.terms):
                     classes.tie_if_possible(Equal(tuple(map(self._timed, equal.terms))))
         return classes
 

@@ -39,9 +39,10 @@ class Term(Struct, frozen=True, gc=False):
 
 
 class Equal(Struct, frozen=True, gc=False):
-    """All terms are one instant."""
+    """All terms are one instant. behavior: whose own timing says so; empty: a constraint does."""
 
     terms: tuple[Term, ...]
+    behavior: str = ""
 
 
 class Order(Struct, frozen=True, gc=False):
@@ -185,7 +186,7 @@ class _Reader:
                         problem = other
                     else:
                         term = Term(Point(behavior.id, sync), 0.0, own, behavior.line)
-                        relations.append(Equal((term, other)))
+                        relations.append(Equal((term, other), behavior.id))
                 if problem is not None:
                     self.unusable.add(behavior.id)
                     message = f"{problem.message}; the behavior is dropped"

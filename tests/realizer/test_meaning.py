@@ -1,0 +1,405 @@
+"""What constraints and timing mean, rule by rule, beyond the plain cases of test_planner."""
+
+from itertools import pairwise
+
+import pytest
+from msgspec.structs import replace
+
+from schemas.behaviors import (
+    After,
+    BlockBehavior,
+    Constraint,
+    FaceLexeme,
+    Gaze,
+    Gesture,
+    Head,
+    Pointing,
+    Posture,
+    Speech,
+    Synchronize,
+    Timing,
+    Unknown,
+    Wait,
+)
+from schemas.blocks import Block
+from schemas.body import Estimate, Phase
+from services.realizer.net import is_live, is_safe
+from services.realizer.planner import Plan, plan_block
+from services.realizer.points import Point, sync_points
+from services.realizer.relations import BlockRefused
+from tests.realizer.fake_body import FakeBody, Script
+from tests.realizer.stage import after, before, block, together
+
+GAZE = Gaze(id="g", target="can")
+LEFT = Pointing(id="p", target="can", mode="LEFT_HAND")
+LEFT_TOO = Pointing(id="q", target="cup", mode="LEFT_HAND")
+SPEECH = Speech(id="s", text="This can?")
+OTHER = Speech(id="t", text="Or that?")
+
+
+def plan(example: Block, *estimates: Estimate, **scripts: Script) -> Plan:
+    body = FakeBody(scripts)
+    known = {each.behavior: each for each in estimates}
+    moved = [each for each in example.behaviors if not isinstance(each, Wait)]
+    return plan_block(example, [known.get(each.id) or body.estimate(each) for each in moved])
+
+
+def at(made: Plan, point: str) -> float:
+    behavior, sync = point.split(":")
+    return made.predicted(Point(behavior, sync))
+
+
+def timed(behavior: BlockBehavior, **refs: str) -> BlockBehavior:
+    return replace(behavior, timing=tuple(Timing(sync, ref) for sync, ref in refs.items()))
+
+
+def elastic(id: str, points: tuple[str, ...], shortest: float, natural: float, longest: float | None) -> Estimate:
+    """Every phase alike."""
+    phases = tuple(
+        Phase(since=since, to=to, shortest=shortest, natural=natural, longest=longest)
+        for since, to in pairwise(points)
+    )
+    return Estimate(behavior=id, feasible=True, parts=(f"part of {id}",), phases=phases)
+
+
+def warnings(made: Plan) -> list[tuple[str, str]]:
+    return [(each.kind, each.behavior) for each in made.problems]
+
+
+# -- instants ------------------------------------------------------------------------------------------------------
+
+
+def test_a_bare_number_may_be_a_member_and_ref_may_be_missing() -> None:
+    made = plan(block((GAZE, SPEECH), Synchronize(syncs=("s:start", "2.5", "g:stroke"))))
+
+    assert at(made, "s:start") == at(made, "g:stroke") == 2.5
+
+
+def test_many_constraints_on_one_point_all_count() -> None:
+    made = plan(
+        block(
+            (GAZE, LEFT, SPEECH, timed(OTHER, start="0.5")),
+            together("s:start", "p:stroke_start"),
+            after("g:stroke", "s:start"),
+            after("t:end", "s:start"),
+            before("3", "s:start"),
+        )
+    )
+
+    assert at(made, "s:start") == at(made, "p:stroke_start") == 1.5
+
+
+def test_classes_that_share_a_point_merge_with_their_offsets() -> None:
+    made = plan(
+        block(
+            (GAZE, LEFT, SPEECH, OTHER),
+            together("g:start", "p:start-1"),
+            together("s:start+2", "t:start"),
+            together("p:start", "s:start"),
+        )
+    )
+
+    assert [at(made, f"{id}:start") for id in "gpst"] == [0.0, 1.0, 1.0, 3.0]
+
+
+def test_a_class_that_nothing_ties_to_the_start_is_as_early_as_all_its_points_can_be() -> None:
+    made = plan(block((GAZE, SPEECH), together("g:stroke-3", "s:start")))
+
+    assert at(made, "s:start") == 0.0
+    assert at(made, "g:stroke") == 3.0
+    assert at(made, "g:start") == 2.5
+
+
+def test_own_block_and_no_block_name_the_same_point() -> None:
+    named = plan(block((GAZE, SPEECH), together("b:g:stroke", "b:s:start")))
+    bare = plan(block((GAZE, SPEECH), together("g:stroke", "s:start")))
+
+    assert named.net == bare.net
+
+
+def test_a_point_of_another_block_is_a_transition_of_its_own() -> None:
+    example = block((GAZE, SPEECH), after("other:x:end+1", "s:start"))
+    made = plan_block(
+        example, [FakeBody().estimate(each) for each in example.behaviors], elsewhere=[Point("other:x", "end")]
+    )
+
+    assert at(made, "s:start") == 1.0
+    assert is_live(made.net)
+    assert is_safe(made.net)
+
+
+def test_a_later_stroke_is_a_share_of_the_strokes_later() -> None:
+    nod = Head(id="n", lexeme="NOD", repetition=4)
+    estimate = elastic("n", sync_points(nod), 1.0, 1.0, None)
+    made = plan(block((nod, SPEECH), after("n:stroke:3", "s:start")), estimate)
+
+    assert at(made, "n:stroke") == 3.0
+    assert at(made, "s:start") == 3.5
+
+
+def test_a_stroke_that_is_not_repeated_so_often_is_no_sync_point() -> None:
+    made = plan(block((Head(id="n", lexeme="NOD", repetition=2), SPEECH), after("n:stroke:3", "s:start")))
+
+    assert warnings(made) == [("PARSING_FAILURE", "")]
+    assert at(made, "s:start") == 0.0
+
+
+def test_an_empty_block_is_over_at_once() -> None:
+    made = plan(block(()))
+
+    assert [transition.name for transition in made.net.transitions] == ["bml:start", "bml:end"]
+    assert made.schedule == (0.0, 0.0)
+
+
+# -- cycles --------------------------------------------------------------------------------------------------------
+
+
+def test_a_cycle_with_negative_lags_is_legal() -> None:
+    made = plan(
+        block(
+            (SPEECH, OTHER, GAZE),
+            after("s:start-1", "t:start"),
+            after("t:start-1", "s:start"),
+            together("g:stroke", "t:start"),
+        )
+    )
+
+    assert at(made, "t:start") == 0.5
+    assert at(made, "s:start") == 0.0
+
+
+def test_a_deadlock_through_shared_instants_names_the_lines_of_both_ties() -> None:
+    operators = (
+        Synchronize(ref="s:end", syncs=("t:start",), line=5),
+        Synchronize(ref="t:end", syncs=("s:start",), line=8),
+    )
+    behaviors = (replace(SPEECH, line=2), replace(OTHER, line=3))
+
+    with pytest.raises(BlockRefused, match=r"line 2: .*circle: .*s:start.*t:start.*see lines 2, 3, 5, 8"):
+        plan(block(behaviors, *operators))
+
+
+def test_a_deadlock_through_offsets_names_their_lines() -> None:
+    operators = (
+        Synchronize(ref="s:start+1", syncs=("t:start",), line=5),
+        After(ref="t:start", syncs=("s:start",), line=8),
+    )
+
+    with pytest.raises(BlockRefused, match="see lines 5, 8"):
+        plan(block((SPEECH, OTHER), *operators))
+
+
+# -- durations -----------------------------------------------------------------------------------------------------
+
+
+def test_a_duration_shorter_than_natural_is_shared_by_the_phases() -> None:
+    speech = Speech(id="s", text="a")
+    made = plan(block((timed(speech, start="1", end="1.75"),)), elastic("s", ("start", "end"), 0.5, 1.0, 1.5))
+
+    assert made.problems == ()
+    assert (at(made, "s:start"), at(made, "s:end")) == (1.0, 1.75)
+
+
+def test_a_duration_longer_than_natural_slows_down_what_cannot_hold() -> None:
+    speech = Speech(id="s", text="a")
+    made = plan(block((timed(speech, start="1", end="2.25"),)), elastic("s", ("start", "end"), 0.5, 1.0, 1.5))
+
+    assert made.problems == ()
+    assert at(made, "s:end") == 2.25
+
+
+@pytest.mark.parametrize("end", ["1.25", "9"])
+def test_a_duration_that_cannot_be_drops_the_behavior_with_one_warning(end: str) -> None:
+    speech = Speech(id="s", text="a")
+    made = plan(
+        block((timed(speech, start="1", end=end), GAZE), together("g:stroke", "s:end")),
+        elastic("s", ("start", "end"), 0.5, 1.0, 1.5),
+    )
+
+    assert warnings(made) == [("IMPOSSIBLE_TO_SCHEDULE", "s")]
+    assert at(made, "g:stroke") == 0.5
+
+
+@pytest.mark.parametrize(
+    "timing",
+    [{"start": "3", "end": "1"}, {"start": "-1"}, {"stroke": "0.25"}, {"end": "p:start"}, {"start": "p:start+1"}],
+)
+def test_a_time_that_cannot_be_costs_only_its_behavior(timing: dict[str, str]) -> None:
+    if timing == {"start": "p:start+1"}:
+        with pytest.raises(BlockRefused, match="cannot be one instant"):
+            plan(block((timed(LEFT, **timing), SPEECH)))
+        return
+    made = plan(block((timed(LEFT, **timing), SPEECH), together("p:stroke_start", "s:start")))
+
+    assert warnings(made) == [("IMPOSSIBLE_TO_SCHEDULE", "p")]
+    assert at(made, "s:start") == 0.0
+
+
+def test_of_two_that_cannot_both_be_the_too_long_one_goes() -> None:
+    word = Speech(id="s", text="a")
+    made = plan(
+        block((timed(LEFT, stroke_start="s:start", stroke_end="s:end"), word)),
+        elastic("s", ("start", "end"), 0.25, 0.25, 0.25),
+    )
+
+    assert warnings(made) == [("IMPOSSIBLE_TO_SCHEDULE", "p")]
+
+
+def test_required_wins_over_document_order() -> None:
+    word = Speech(id="s", text="a")
+    must = replace(timed(LEFT, stroke_start="s:start", stroke_end="s:end"), required=True)
+    made = plan(block((must, word)), elastic("s", ("start", "end"), 0.25, 0.25, 0.25))
+
+    assert made.dropped == ("s",)
+
+
+def test_two_that_are_required_and_cannot_both_be_refuse_the_block() -> None:
+    word = Speech(id="s", text="a", required=True)
+    must = replace(timed(LEFT, stroke_start="s:start", stroke_end="s:end"), required=True)
+
+    with pytest.raises(BlockRefused):
+        plan(block((must, word)), elastic("s", ("start", "end"), 0.25, 0.25, 0.25))
+
+
+# -- what is dropped -----------------------------------------------------------------------------------------------
+
+
+def test_what_is_dropped_takes_its_contradictions_with_it() -> None:
+    made = plan(
+        block((LEFT, SPEECH), together("p:start", "s:start"), together("p:start+1", "s:start")),
+        p=Script(infeasible="NO_SUCH_TARGET"),
+    )
+
+    assert warnings(made) == [("NO_SUCH_TARGET", "p")]
+
+
+def test_what_a_dropped_point_tied_together_stays_tied() -> None:
+    made = plan(
+        block((LEFT, SPEECH, GAZE), together("p:stroke", "s:start"), together("p:stroke", "g:stroke")),
+        p=Script(infeasible="NO_SUCH_TARGET"),
+    )
+
+    assert at(made, "s:start") == at(made, "g:stroke") == 0.5
+
+
+def test_dependents_of_what_is_dropped_are_not_warned_of() -> None:
+    made = plan(
+        block((LEFT, SPEECH, OTHER), after("p:end", "s:start"), before("p:end", "t:start"), together("p:start", "4")),
+        p=Script(infeasible="NO_SUCH_TARGET"),
+    )
+
+    assert warnings(made) == [("NO_SUCH_TARGET", "p")]
+    assert at(made, "s:start") == 0.0
+    assert at(made, "t:start") == at(made, "s:end"), "nothing is said of it any more: it follows its type"
+
+
+def test_an_unknown_element_is_dropped_and_any_point_may_be_its() -> None:
+    made = plan_block(block((Unknown(id="u", element="dance"), SPEECH), after("u:twirl", "s:start")))
+
+    assert warnings(made) == [("BEHAVIOR_TYPE_NOT_SUPPORTED", "u")]
+    assert at(made, "s:start") == 0.0
+
+
+def test_a_required_constraint_with_an_unknown_sync_point_refuses_the_block() -> None:
+    operator = Synchronize(ref="p:strok", syncs=("s:start",), line=4)
+    constraint = Constraint(operators=(operator,), id="c", required=True)
+
+    with pytest.raises(BlockRefused, match=r"b: c, line 4: .*'p:strok'.*required"):
+        plan(Block(id="b", behaviors=(LEFT, SPEECH), constraints=(constraint,)))
+
+
+# -- parts ---------------------------------------------------------------------------------------------------------
+
+
+def test_who_starts_later_takes_the_arm_over_and_the_earlier_ends_there() -> None:
+    made = plan(block((LEFT, LEFT_TOO), after("p:stroke_end", "q:start")))
+
+    assert made.problems == ()
+    assert at(made, "p:stroke_end") == at(made, "q:start") == 1.5
+    assert at(made, "p:relax") == at(made, "p:end") == 1.5
+
+
+def test_two_fixed_windows_on_one_arm_cost_the_later_in_the_document() -> None:
+    made = plan(block((timed(LEFT, start="0", end="5"), timed(LEFT_TOO, start="2", end="7"))))
+
+    assert warnings(made) == [("IMPOSSIBLE_TO_SCHEDULE", "q")]
+
+
+def test_of_two_fixed_windows_on_one_arm_the_required_stays() -> None:
+    must = replace(timed(LEFT_TOO, start="2", end="7"), required=True)
+    made = plan(block((timed(LEFT, start="0", end="5"), must)))
+
+    assert made.dropped == ("p",)
+
+
+def test_who_may_come_later_waits_until_the_arm_is_no_longer_asked_for() -> None:
+    made = plan(block((timed(LEFT, stroke_end="5"), LEFT_TOO, SPEECH), after("s:start", "q:start")))
+
+    assert made.problems == ()
+    assert at(made, "q:start") == at(made, "p:stroke_end") == 5.0
+
+
+def test_a_gesture_that_names_no_hand_takes_the_arm_that_is_free() -> None:
+    beat = timed(Gesture(id="q", lexeme="BEAT"), start="2", end="7")
+    right = replace(LEFT, mode="RIGHT_HAND")
+    made = plan(block((timed(right, start="0", end="5"), beat)))
+
+    assert made.problems == ()
+    assert [getattr(each, "mode", None) for each in made.behaviors] == ["RIGHT_HAND", "LEFT_HAND"]
+    assert made.block.behaviors == made.behaviors
+
+
+def test_a_gesture_that_names_no_hand_finds_none_free() -> None:
+    beat = timed(Gesture(id="q", lexeme="BEAT"), start="2", end="7")
+    both = timed(Gesture(id="p", lexeme="BEAT", mode="BOTH_HANDS"), start="0", end="5")
+    made = plan(block((both, beat)))
+
+    assert made.dropped == ("q",)
+
+
+def test_a_gesture_that_nobody_asked_for_now_waits_for_the_arm() -> None:
+    made = plan(block((LEFT, Gesture(id="q", lexeme="BEAT", mode="LEFT_HAND"))))
+
+    assert at(made, "q:start") == at(made, "p:end") == 2.25
+
+
+def test_a_nod_is_on_top_of_the_gaze() -> None:
+    made = plan(block((GAZE, Head(id="n", lexeme="NOD"))))
+
+    assert at(made, "n:start") == at(made, "g:start") == 0.0
+    assert at(made, "g:relax") == at(made, "n:end") == 1.0
+
+
+def test_a_gaze_that_must_last_is_not_taken_over_before() -> None:
+    made = plan(block((timed(GAZE, end="5"), Gaze(id="h", target="cup"), SPEECH), together("h:start", "s:start")))
+
+    assert at(made, "h:start") == at(made, "s:start") >= 4.5
+
+
+# -- customs -------------------------------------------------------------------------------------------------------
+
+
+def test_gaze_face_and_posture_last_until_all_else_has_ended() -> None:
+    lasting = (GAZE, FaceLexeme(id="f", lexeme="smile"), Posture(id="o", lexeme="LEAN"))
+    made = plan(block((*lasting, SPEECH, OTHER)))
+
+    assert made.natural == {"g", "f", "o"}
+    assert {at(made, f"{id}:relax") for id in "gfo"} == {at(made, "t:end")} == {2.0}
+
+
+def test_types_of_their_own_make_no_series() -> None:
+    made = plan(block((SPEECH, LEFT, GAZE, OTHER)))
+
+    assert [at(made, f"{id}:start") for id in "spgt"] == [0.0, 0.0, 0.0, 1.0]
+
+
+def test_waits_of_which_nothing_is_said_follow_each_other() -> None:
+    made = plan(block((Wait(id="v", duration=1.0), Wait(id="w", duration=2.0))))
+
+    assert at(made, "w:end") == 3.0
+
+
+def test_nothing_waits_for_what_is_only_in_a_series() -> None:
+    made = plan(block((SPEECH, OTHER, timed(Speech(id="u", text="now"), start="0.5"))))
+
+    assert [at(made, f"{id}:start") for id in "stu"] == [0.0, 1.0, 0.5]
