@@ -370,11 +370,21 @@ class Authority:
 
     def expected(self, now: Seconds) -> dict[Point, Seconds]:
         """When each point of the block that is still to come is expected, seconds from the block's start."""
-        forecast = full_forecast(self.plan, self.began, self.experience.factor, self.reached, self._instants)
+        forecast = self.from_scratch()
         coming = {point for points in self._points.values() for point in points} - self.reached.keys()
         self._expected |= {point: max(now, forecast.times[self.plan.at[point]]) for point in coming}
         self.is_surprised = False
         return {point: self._expected[point] - self.began for point in coming}
+
+    def from_scratch(self) -> Forecast:
+        """When each instant will be: what the forecast kept up to date says of those it keeps, and all others."""
+        facts = (self.reached, self.arrived, self._instants)
+        return full_forecast(self.plan, self.began, self.experience.factor, *facts)
+
+    @property
+    def has_overdue(self) -> bool:
+        """Is anybody expected later than facts alone would say?"""
+        return bool(self._not_before)
 
     # -- what pacing asks ----------------------------------------------------------------------------------------
 

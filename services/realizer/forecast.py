@@ -263,13 +263,17 @@ def full_forecast(
     began: Seconds,
     factor: Callable[[str], float],
     reached: Mapping[Point, Seconds],
+    arrived: Mapping[Point, Seconds],
     instants: Mapping[int, Seconds],
 ) -> Forecast:
-    """Of every instant, from the same facts: the points that are reached and the instants that are over."""
+    """Of every instant, from scratch: points that are reached or arrived at, and instants that are over."""
     forecast = Forecast(plan, began, factor)
     for point, at in reached.items():
         if point in plan.at:
             forecast.passed(point.behavior, plan.at[point], at)
+    for point in arrived.keys() - reached.keys():
+        if point in plan.at:
+            forecast.come(point.behavior, plan.at[point], arrived[point])
     for transition, at in instants.items():
         forecast.fix(transition, at)
     for transition in range(len(plan.members)):

@@ -56,6 +56,9 @@ class LongestPaths:
         self._old: dict[int, Seconds] = {}
         self._todo: list[tuple[int, int]] = []
 
+    def is_kept(self, transition: int) -> bool:
+        return self._is_known[transition]
+
     def require(self, transition: int) -> None:
         """Keep its time from now on, and all that it depends on."""
         stack, found = [transition], []

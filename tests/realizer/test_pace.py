@@ -1,0 +1,108 @@
+"""Fixed times and durations: holding, slower, faster, late; and estimates corrected by what was measured."""
+
+import pytest
+
+from schemas.behaviors import Gaze, GazeShift, Gesture, Mark, Pointing, Speech
+from schemas.feedback import PredictionFeedback
+from tests.realizer.fake_body import FakeBody, Script
+from tests.realizer.stage import after, block, stage, together
+
+BEAT = Gesture(id="beat", lexeme="BEAT", mode="RIGHT_HAND")
+"""Takes 2.25 s: 0.5, 0.25, 0.5, 0.25, 0.25, 0.5."""
+SHIFT = GazeShift(id="shift", target="a")
+"""Takes 1 s."""
+STORY = Speech(id="s", text="one two", marks=(Mark("m", 3),))
+ELASTIC = (0.5, 4.0)
+
+
+async def test_longer_than_natural_holds_at_the_last_hold_point() -> None:
+    async with stage(FakeBody(elastic=ELASTIC)) as seen:
+        await seen.perform(block((BEAT,), together("beat:start", "1"), together("beat:end", "10")))
+
+    assert (seen.times()["beat:start"], seen.times()["beat:end"]) == (1.0, 10.0)
+    assert seen.body.stops == ["beat:stroke_end"]
+    assert seen.warnings() == []
+
+
+async def test_longer_than_natural_is_slower_where_nothing_can_hold() -> None:
+    async with stage(FakeBody(elastic=ELASTIC)) as seen:
+        await seen.perform(block((SHIFT,), together("shift:start", "1"), together("shift:end", "4")))
+
+    assert seen.times() == {"shift:start": 1.0, "shift:end": 4.0}
+    assert seen.warnings() == []
+
+
+async def test_shorter_than_natural_is_faster_in_all_its_phases() -> None:
+    async with stage(FakeBody(elastic=ELASTIC)) as seen:
+        await seen.perform(block((BEAT,), together("beat:start", "1"), together("beat:end", "2.5")))
+
+    times = seen.times()
+    assert times["beat:start"] == 1.0
+    assert times["beat:ready"] == pytest.approx(1.0 + 0.5 * 1.5 / 2.25)
+    assert times["beat:end"] == pytest.approx(2.5)
+    assert seen.warnings() == []
+    assert seen.body.stops == []
+
+
+async def test_a_body_that_turns_out_slow_hurries_to_be_on_time() -> None:
+    """Half as fast as estimated in its first phase; what is left it does in half the time that it would take."""
+    slow = FakeBody({"beat": Script(slow=2.0)}, elastic=(0.25, 4.0))
+    async with stage(slow) as seen:
+        await seen.perform(block((BEAT,), together("beat:start", "0"), together("beat:end", "3")))
+
+    assert seen.times()["beat:ready"] == 1.0
+    assert seen.times()["beat:end"] == pytest.approx(3.0)
+    assert seen.warnings() == []
+
+
+async def test_what_turns_out_impossible_while_it_runs_is_late_and_says_so() -> None:
+    async with stage(FakeBody({"beat": Script(slow=2.0)})) as seen:
+        outcome = await seen.perform(block((BEAT, STORY), together("beat:start", "0"), together("beat:end", "3")))
+
+    assert outcome.status == "done"
+    assert seen.times()["beat:end"] == 4.5
+    assert [(each.kind, each.behavior) for each in seen.warnings()] == [("LATE", "beat")]
+    assert "1.50 s later" in seen.warnings()[0].message
+
+
+async def test_an_absolute_time_that_nobody_shares_is_kept_by_its_own_behavior_alone() -> None:
+    async with stage(FakeBody({"beat": Script(slow=1.25)}, elastic=ELASTIC)) as seen:
+        await seen.perform(block((BEAT, STORY), together("beat:stroke", "1.25"), together("s:end", "4")))
+
+    assert seen.times()["beat:stroke"] == pytest.approx(1.25)
+    assert seen.times()["s:end"] == 4.0
+
+
+async def test_a_slow_joint_is_expected_to_stay_slow() -> None:
+    """The second gesture of the arm begins so much earlier that its stroke comes with the word."""
+    first, second = Pointing(id="p1", target="a", mode="RIGHT_HAND"), Pointing(id="p2", target="b", mode="RIGHT_HAND")
+    example = block((first, second, STORY), after("p1:end+1", "p2:start"), together("p2:stroke", "s:m"))
+    async with stage(FakeBody({"p1": Script(slow=2.0), "p2": Script(slow=2.0)})) as seen:
+        await seen.perform(example)
+
+    assert seen.times()["p2:start"] == 5.5
+    assert seen.times()["p2:stroke"] == seen.times()["s:m"] == 5.5 + 2 * 1.25
+    assert seen.body.stops == []
+
+
+async def test_who_is_overdue_is_not_waited_for_by_waking_all_the_time() -> None:
+    """The speech is to begin a second before the stroke; each time it would, the arm is later still."""
+    stuck = FakeBody({"p": Script(durations=(3.0, 0.25, 0.5, 0.25, 0.25, 0.5))})
+    async with stage(stuck) as seen:
+        await seen.perform(block((Pointing(id="p", target="a"), STORY), together("p:stroke_start+1.5", "s:m")))
+
+    assert seen.times()["s:m"] - seen.times()["p:stroke_start"] == pytest.approx(1.5)
+    predictions = [each for each in seen.feedback if isinstance(each, PredictionFeedback)]
+    assert len(predictions) < 6
+
+
+async def test_a_gaze_lingers_on_its_way_to_meet_a_word_that_is_late() -> None:
+    """A second was planned from the first word to the second, on whose way the gaze begins."""
+    story = Speech(id="s", text="one two three", marks=(Mark("m1", 3), Mark("m2", 7)))
+    turning = (0.0, 0.0, 1.25, 0.0, 0.0, 0.5)
+    slow = FakeBody({"s": Script(slow=1.5), "g": Script(durations=turning)}, {"g": turning}, elastic=(1.0, 4.0))
+    async with stage(slow) as seen:
+        await seen.perform(block((Gaze(id="g", target="a"), story), together("g:stroke", "s:m2")))
+
+    assert seen.times()["g:start"] == 0.75
+    assert seen.times()["g:stroke"] == seen.times()["s:m2"] == 3.0
