@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from msgspec import Struct
 
 from schemas import keys
-from schemas.blocks import BlockOutcome, PerformBlock
+from schemas.blocks import Block, BlockOutcome, PerformBlock
 from schemas.body import (
     BodyPose,
     Estimate,
@@ -99,14 +99,15 @@ class _Realizer:
             raise BlockRefused(Fault(reason="a block of this id is still being performed", where=block.id))
         elsewhere = frozenset(point for other in self.performing() for point in other.elsewhere)
         relations(block, elsewhere)  # A bad reference is seen without asking the body.
-        plan = plan_block(block, await self._estimates(live.request, {}), elsewhere=elsewhere)
-        if before := poses_before(plan):
-            plan = plan_block(block, await self._estimates(live.request, before), elsewhere=elsewhere)
+        plan = plan_block(block, await self._estimates(block, {}), elsewhere=elsewhere)
+        if (before := poses_before(plan)) or plan.block is not block:
+            # The plan may have given a gesture the other hand.
+            plan = plan_block(plan.block, await self._estimates(plan.block, before), elsewhere=elsewhere)
         return plan
 
-    async def _estimates(self, request: PerformBlock, before: Mapping[str, BodyPose]) -> tuple[Estimate, ...]:
+    async def _estimates(self, block: Block, before: Mapping[str, BodyPose]) -> tuple[Estimate, ...]:
         """before: where the body will be when a behavior starts; the others are asked for from where it is now."""
-        behaviors = [behavior for behavior in request.block.behaviors if performer(behavior) == "body"]
+        behaviors = [behavior for behavior in block.behaviors if performer(behavior) == "body"]
         if not behaviors:
             return ()
         items = (EstimateItem(behavior=behavior, pose=before.get(behavior.id)) for behavior in behaviors)
@@ -114,7 +115,7 @@ class _Realizer:
         try:
             answer = await self.bus.query(keys.ESTIMATE, question, timeout=self.config.estimate)
         except NoReply as error:
-            fault = Fault(reason="there is no body to perform it", where=request.block.id, advice="start control")
+            fault = Fault(reason="there is no body to perform it", where=block.id, advice="start control")
             raise BlockRefused(fault, "CANNOT_CREATE_BEHAVIOR") from error
         assert isinstance(answer, Estimates)
         return answer.items
@@ -140,8 +141,8 @@ class _Realizer:
         """The same plan from where the body is now; the block ends as failed if there is none."""
         elsewhere = [point for point in plan.at if ":" in point.behavior]
         try:
-            estimates = await self._estimates(live.request, poses_before(plan))
-            return plan_block(live.request.block, estimates, elsewhere=elsewhere)
+            estimates = await self._estimates(plan.block, poses_before(plan))
+            return plan_block(plan.block, estimates, elsewhere=elsewhere)
         except EngageError as error:
             live.stop(Ending("failed", error.fault))
             return plan

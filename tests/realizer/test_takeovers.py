@@ -2,10 +2,11 @@
 
 from itertools import pairwise
 
-from schemas.behaviors import After, Constraint, Gaze, Pointing, Speech
+from schemas.behaviors import After, Constraint, Gaze, Gesture, Pointing, Speech, Timing
 from schemas.blocks import Block
 from schemas.body import BodyPose, Estimate, JointAngle, Phase
 from services.realizer.planner import plan_block, poses_before
+from tests.realizer.stage import block, stage
 
 
 def estimate(behavior: str, *points: str, pan: float = 0.0) -> Estimate:
@@ -21,7 +22,7 @@ ALL = ("start", "ready", "stroke_start", "stroke", "stroke_end", "relax", "end")
 
 
 def test_each_gaze_but_the_first_starts_from_the_one_before_it() -> None:
-    block = Block(
+    example = Block(
         id="b",
         behaviors=(
             Gaze(id="third", target="c"),
@@ -43,12 +44,25 @@ def test_each_gaze_but_the_first_starts_from_the_one_before_it() -> None:
         estimate("speech", "start", "end"),
     )
 
-    before = poses_before(plan_block(block, estimates))
+    before = poses_before(plan_block(example, estimates))
 
     assert {id: pose.joints[0].angle for id, pose in before.items()} == {"second": 1.0, "third": 2.0}
 
 
 def test_a_single_gaze_starts_from_where_the_body_is() -> None:
-    block = Block(id="b", behaviors=(Gaze(id="look", target="a"),))
+    example = Block(id="b", behaviors=(Gaze(id="look", target="a"),))
 
-    assert poses_before(plan_block(block, (estimate("look", *ALL),))) == {}
+    assert poses_before(plan_block(example, (estimate("look", *ALL),))) == {}
+
+
+async def test_a_gesture_that_names_no_hand_is_performed_with_the_free_one() -> None:
+    behaviors = (
+        Pointing(id="p", target="a", mode="RIGHT_HAND", timing=(Timing("start", "0"), Timing("end", "5"))),
+        Gesture(id="q", lexeme="BEAT", timing=(Timing("start", "2"), Timing("end", "7"))),
+    )
+    async with stage() as seen:
+        outcome = await seen.perform(block(behaviors))
+
+    times = seen.times()
+    assert outcome.dropped == ()
+    assert (times["p:start"], times["p:end"], times["q:start"], times["q:end"]) == (0.0, 5.0, 2.0, 7.0)

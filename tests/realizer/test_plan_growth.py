@@ -1,0 +1,115 @@
+"""Planning and firing grow with the size of the block, whatever its shape: counted in calls, not in seconds."""
+
+import sys
+from collections.abc import Callable
+from types import FrameType
+
+import pytest
+
+from schemas.behaviors import (
+    After,
+    BlockBehavior,
+    Constraint,
+    FaceLexeme,
+    Gaze,
+    Pointing,
+    Speech,
+    Synchronize,
+    Timing,
+)
+from schemas.blocks import Block
+from services.realizer.net import fire_once_each, is_live, is_safe
+from services.realizer.planner import plan_block
+
+Parts = tuple[list[BlockBehavior], list[Synchronize | After]]
+
+
+def references(size: int) -> Parts:
+    """Points with phrases, one after another."""
+    behaviors: list[BlockBehavior] = []
+    operators: list[Synchronize | After] = []
+    for number in range(size):
+        behaviors += (Pointing(id=f"p{number}", target="a"), Speech(id=f"s{number}", text="this one"))
+        operators.append(Synchronize(ref=f"p{number}:stroke_start", syncs=(f"s{number}:start",)))
+        if number:
+            operators.append(After(ref=f"s{number - 1}:end", syncs=(f"p{number}:start",)))
+    return behaviors, operators
+
+
+def looks(size: int) -> Parts:
+    """Gazes that hand over to each other, each with a phrase."""
+    behaviors: list[BlockBehavior] = []
+    operators: list[Synchronize | After] = []
+    for number in range(size):
+        behaviors += (Gaze(id=f"g{number}", target="a"), Speech(id=f"s{number}", text="this one"))
+        operators.append(Synchronize(ref=f"g{number}:stroke", syncs=(f"s{number}:start",)))
+        if number:
+            operators.append(After(ref=f"s{number - 1}:end", syncs=(f"g{number}:start",)))
+    return behaviors, operators
+
+
+def series(size: int) -> Parts:
+    """Nothing is said of anything."""
+    return [
+        each
+        for number in range(size)
+        for each in (Speech(id=f"s{number}", text="one"), FaceLexeme(id=f"f{number}", lexeme="smile"))
+    ], []
+
+
+def measured_words(size: int) -> Parts:
+    """Strokes, which cannot wait, after words."""
+    behaviors: list[BlockBehavior] = []
+    operators: list[Synchronize | After] = []
+    for number in range(size):
+        behaviors += (Speech(id=f"s{number}", text="one"), Pointing(id=f"p{number}", target="a"))
+        operators.append(After(ref=f"s{number}:end", syncs=(f"p{number}:stroke",)))
+        operators.append(After(ref=f"p{number - 1}:end" if number else "0", syncs=(f"s{number}:start",)))
+    return behaviors, operators
+
+
+def joined(size: int) -> Parts:
+    """All at once."""
+    speeches: list[BlockBehavior] = [Speech(id=f"s{number}", text="one") for number in range(2 * size)]
+    return speeches, [Synchronize(syncs=tuple(f"{each.id}:start" for each in speeches))]
+
+
+def fixed(size: int) -> Parts:
+    """Each at its time, longer or shorter than is natural."""
+    return [
+        Speech(
+            id=f"s{number}",
+            text="one two",
+            timing=(Timing("start", str(3 * number)), Timing("end", f"{3 * number}.4")),
+        )
+        for number in range(2 * size)
+    ], []
+
+
+def calls(size: int, shape: Callable[[int], Parts]) -> int:
+    """Python functions called, and list and dictionary methods, to plan a block, check its net and fire it."""
+    behaviors, operators = shape(size)
+    block = Block(id="b", behaviors=tuple(behaviors), constraints=(Constraint(operators=tuple(operators)),))
+    count = 0
+
+    def counted(frame: FrameType, event: str, argument: object) -> None:
+        nonlocal count
+        count += event in ("call", "c_call")
+
+    before = sys.getprofile()
+    sys.setprofile(counted)
+    try:
+        plan = plan_block(block)
+        assert is_live(plan.net)
+        assert is_safe(plan.net)
+        fire_once_each(plan.net, plan.net.initial)
+    finally:
+        sys.setprofile(before)
+    return count
+
+
+@pytest.mark.parametrize("shape", [references, looks, series, measured_words, joined, fixed])
+def test_twice_the_block_costs_twice_the_work(shape: Callable[[int], Parts]) -> None:
+    calls(20, shape)  # what is remembered from now on
+
+    assert calls(160, shape) < 2.2 * calls(80, shape)
