@@ -1,5 +1,20 @@
-"""`python -m services` is `engage`."""
+"""`engage`, and `python -m services`: the way in. It loads next to nothing before it has seen to signals."""
 
-from services.cli import main
+import os
+import signal
+import sys
 
-main()
+
+def main(arguments: list[str] | None = None) -> None:
+    """Run a command of `services.cli`."""
+    # Loading takes half a second. A KeyboardInterrupt in it is a traceback, or lost in somebody's callback; nothing
+    # has begun yet, so leaving at once is orderly. `services.commandline.process` takes over when something runs.
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda number, frame: os._exit(130))
+    from services import cli
+
+    cli.main(arguments)
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])

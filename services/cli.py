@@ -2,6 +2,7 @@
 
 import os
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Any, Literal, NoReturn
 
@@ -199,18 +200,14 @@ def main(arguments: list[str] | None = None) -> NoReturn:
         code = app(arguments, standalone_mode=False)
     except UsageError as error:
         code = _misused(error)
-    except EngageError as error:
-        code = _refuse([error])
+    except (EngageError, BrokenPipeError) as error:
+        code = _ended([error])
     except BaseExceptionGroup as group:
-        expected, bugs = group.split(EngageError)
+        expected, bugs = group.split((EngageError, BrokenPipeError))
         if expected is None or bugs is not None:
             raise
-        code = _refuse(_leaves(expected))
+        code = _ended(_leaves(expected))
     except KeyboardInterrupt:
-        code = INTERRUPTED
-    except BrokenPipeError:
-        # Whoever read our output (`| head`) has had enough; Python would complain again when it flushes at exit.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         code = INTERRUPTED
     sys.exit(code or 0)
 
@@ -223,18 +220,20 @@ def _misused(error: Any) -> int:
     return REFUSED
 
 
-def _leaves(group: BaseExceptionGroup[EngageError]) -> list[EngageError]:
-    found: list[EngageError] = []
+def _leaves(group: BaseExceptionGroup[Any]) -> list[BaseException]:
+    found: list[BaseException] = []
     for error in group.exceptions:
         found += _leaves(error) if isinstance(error, BaseExceptionGroup) else [error]
     return found
 
 
-def _refuse(errors: list[EngageError]) -> int:
-    for error in errors:
+def _ended(errors: Sequence[BaseException]) -> int:
+    """The exit code for what somebody else is to blame for, told if there is anything to tell."""
+    told = [error for error in errors if isinstance(error, EngageError)]
+    for error in told:
         print(readable(error.fault), file=sys.stderr)
-    return FAILED if any(not isinstance(error, InputRefused) for error in errors) else REFUSED
-
-
-if __name__ == "__main__":
-    main()
+    if told:
+        return FAILED if any(not isinstance(error, InputRefused) for error in told) else REFUSED
+    # Whoever read our output (`| head`) has had enough; Python would complain again when it flushes at exit.
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    return INTERRUPTED

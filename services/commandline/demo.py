@@ -58,7 +58,7 @@ class Tallying:
 def main(options: Options) -> int:
     config = options.where.load(defaults=DEFAULTS)
     with Outputs(options.events, options.feedback) as outputs:
-        console = Console(stderr=outputs.own_stdout, quiet=options.quiet)
+        console = outputs.console(quiet=options.quiet)
         live = console.is_terminal and not options.virtual_time and not options.quiet
         result = run(demonstrate(config, outputs, console, live), virtual_time=options.virtual_time)
     console.print(tally.render(result, config.robot))

@@ -7,8 +7,10 @@ from pathlib import Path
 from types import TracebackType
 from typing import Literal, Self, TextIO
 
+from rich.console import Console
+
 from schemas import lines
-from schemas.faults import Fault, InputRefused
+from schemas.faults import Fault, InputRefused, RunFailed
 from schemas.feedback import BlockProgress, PredictionFeedback, SyncPointProgress, WarningFeedback
 from schemas.feedback_xml import HEAD, TAIL, encode_feedback
 from schemas.messages import Message
@@ -17,6 +19,13 @@ from schemas.units import Seconds
 
 STDOUT = Path("-")
 FeedbackFormat = Literal["json", "xml"]
+
+
+class Terminal(Console):
+    """Rich's console, but it leaves it to `services.cli` what becomes of us when nobody reads on."""
+
+    def on_broken_pipe(self) -> None:
+        raise  # the BrokenPipeError; Rich would end the process here
 
 
 class Outputs:
@@ -40,13 +49,16 @@ class Outputs:
         self._events: TextIO | None = None
         self._feedback: TextIO | None = None
 
-    @property
-    def own_stdout(self) -> bool:
-        """Do the lines go to standard output, so that nothing else may?"""
-        return STDOUT in self._paths
+    def console(self, *, quiet: bool) -> Console:
+        """For everything else: standard error if the lines have standard output for themselves."""
+        return Terminal(stderr=STDOUT in self._paths, quiet=quiet)
 
     def __enter__(self) -> Self:
-        self._events, self._feedback = (self._open(path) for path in self._paths)
+        events, feedback = self._paths
+        if events is not None and events == feedback and self._is_xml:
+            raise InputRefused(Fault(reason="JSON lines and XML cannot share a file", where=str(events)))
+        self._events = self._open(events)
+        self._feedback = self._events if feedback == events else self._open(feedback)
         if self._is_xml and self._feedback is not None:
             self._feedback.write(HEAD)
         return self
@@ -54,10 +66,14 @@ class Outputs:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        if self._is_xml and self._feedback is not None:
-            self._feedback.write(TAIL)
-            self._feedback.flush()
-        self._files.close()
+        try:
+            if self._is_xml and self._feedback is not None:
+                self._feedback.write(TAIL)
+                self._feedback.flush()
+            self._files.close()
+        except OSError:
+            if error is None:  # else the same trouble once more
+                raise
 
     def _open(self, path: Path | None) -> TextIO | None:
         if path is None:
@@ -81,5 +97,11 @@ class Outputs:
                 self._write(self._feedback, message, encode_feedback(message, in_stream=True))
 
     def _write(self, file: TextIO | None, message: Message, text: str) -> None:
-        if file is not None and self.wanted(message):
+        if file is None or not self.wanted(message):
+            return
+        try:
             print(text, file=file, flush=True)
+        except BrokenPipeError:
+            raise
+        except OSError as error:
+            raise RunFailed(Fault(reason=f"cannot write: {error.strerror}", where=file.name)) from error

@@ -100,7 +100,7 @@ def main(options: Options) -> int:
         checking.check(sources, world if options.embedded else None, config.robot, outputs)
         played = Played(sources)
         outputs.wanted = played.concerns
-        console = Console(stderr=outputs.own_stdout, quiet=options.quiet)
+        console = outputs.console(quiet=options.quiet)
         job = Job(sources, times, played, outputs, console)
         performing = _embedded(job, config, world) if options.embedded else _remote(job, config, options.where)
         return run(performing, virtual_time=options.virtual_time)

@@ -7,19 +7,30 @@ from contextlib import suppress
 from importlib import import_module
 from typing import Any, TypeVar
 
-from services.virtual_time import run_virtual
+from services.virtual_time import VirtualTimeLoop
 
 T = TypeVar("T")
 DONE, REFUSED, FAILED, INTERRUPTED = 0, 2, 3, 130
-"""Exit codes: all done; input refused, nothing moved; failed while running; stopped by Ctrl-C."""
+"""Exit codes: all done; input refused, nothing moved; failed while running; stopped by Ctrl-C or SIGTERM."""
 
 
 def run(main: Coroutine[Any, Any, T], *, virtual_time: bool = False) -> T:
-    """Run to the end, on uvloop where it is installed (it measured a fifth faster on Zenoh), or in virtual time."""
-    if virtual_time:
-        return run_virtual(main)
-    with asyncio.Runner(loop_factory=_fastest_loop()) as runner:
+    """Run to the end, on uvloop where it is installed (it measured a fifth faster on Zenoh), or in virtual time.
+
+    Ctrl-C and SIGTERM cancel `main`; when it has ended KeyboardInterrupt is raised. The second Ctrl-C doesn't wait.
+    """
+    # asyncio.Runner cancels `main` only if it finds this handler. A shell that starts us in the background has had
+    # Ctrl-C ignored.
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+    signal.signal(signal.SIGTERM, lambda number, frame: signal.raise_signal(signal.SIGINT))
+    with asyncio.Runner(loop_factory=VirtualTimeLoop if virtual_time else _fastest_loop()) as runner:
         return runner.run(main)
+
+
+def run_until_signal(main: Coroutine[Any, Any, None]) -> None:
+    """Run what never ends by itself, or need not: Ctrl-C and SIGTERM are a good end."""
+    with suppress(KeyboardInterrupt):
+        run(main)
 
 
 def _fastest_loop() -> Any:
@@ -27,25 +38,3 @@ def _fastest_loop() -> Any:
         return import_module("uvloop").new_event_loop
     except ImportError:
         return asyncio.SelectorEventLoop
-
-
-async def until_signal(main: Coroutine[Any, Any, None]) -> None:
-    """Await `main`; SIGINT or SIGTERM cancel it, and that is a clean end. What it raises otherwise is raised."""
-    task = asyncio.ensure_future(main)
-    loop = asyncio.get_running_loop()
-    stopped = asyncio.Event()
-
-    def stop() -> None:
-        stopped.set()
-        task.cancel()
-
-    for number in (signal.SIGINT, signal.SIGTERM):
-        loop.add_signal_handler(number, stop)
-    try:
-        if stopped.is_set():
-            task.cancel()
-        with suppress(asyncio.CancelledError):
-            await task
-    finally:
-        for number in (signal.SIGINT, signal.SIGTERM):
-            loop.remove_signal_handler(number)

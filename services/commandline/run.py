@@ -11,7 +11,7 @@ from msgspec import json
 
 from services.bus import Hub
 from services.commandline import roster
-from services.commandline.process import DONE, run, until_signal
+from services.commandline.process import DONE, run_until_signal
 from services.config import Config, load
 from services.runtime import serve
 
@@ -54,7 +54,7 @@ async def forever() -> None:
 def main(name: str, where: Where, attended: bool) -> int:
     """Serve until a signal. attended: also until standard input closes, which is how a child sees its parent die."""
     config = where.load()
-    run(until_signal(_serve(name, where, config, attended)))
+    run_until_signal(_serve(name, where, config, attended))
     return DONE
 
 

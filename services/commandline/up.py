@@ -1,6 +1,5 @@
 """`engage up`: the services as processes of their own on this machine, watched over until Ctrl-C."""
 
-import asyncio
 import sys
 from collections.abc import Iterable
 from pathlib import Path
@@ -14,7 +13,7 @@ from schemas.presence import PeerAlive
 from schemas.units import Seconds
 from services.commandline.demo import DEFAULTS, Tallying, shown
 from services.commandline.outputs import Outputs
-from services.commandline.process import DONE, until_signal
+from services.commandline.process import DONE, run_until_signal
 from services.commandline.roster import ROBOT
 from services.commandline.run import Where, forever, unique
 from services.commandline.supervisor import Child, supervised
@@ -38,8 +37,8 @@ class Options(NamedTuple):
 def main(options: Options) -> int:
     config = options.where.load(defaults=DEFAULTS if options.task else ())  # refused here, not by every child
     with Outputs(options.events, options.feedback) as outputs:
-        console = Console(stderr=outputs.own_stdout, quiet=options.quiet)
-        asyncio.run(until_signal(_up(options, config, outputs, console)))
+        console = outputs.console(quiet=options.quiet)
+        run_until_signal(_up(options, config, outputs, console))
     return DONE
 
 
@@ -81,7 +80,7 @@ def command(name: str, where: Where, config: Config) -> list[str]:
     settings = (*where.settings, f"recognition.gaze_resolution={config.recognition.gaze_resolution}")
     endpoints = (*where.listen, *where.connect)
     return [
-        *(sys.executable, "-P", "-m", "services.cli", "run", name, "--attended", "--robot", config.robot),
+        *(sys.executable, "-P", "-m", "services", "run", name, "--attended", "--robot", config.robot),
         *(("--config", str(where.config)) if where.config else ()),
         *(part for setting in settings for part in ("--set", setting)),
         *(part for endpoint in endpoints for part in ("--connect", endpoint)),

@@ -1,7 +1,5 @@
 """`engage watch`: follow a running system, as text or as JSON lines."""
 
-from rich.console import Console
-
 from schemas import lines
 from schemas.attention import HeadOwner
 from schemas.faults import Fault
@@ -9,7 +7,8 @@ from schemas.feedback import BlockProgress, SyncPointProgress, WarningFeedback
 from schemas.messages import Message, encode_json
 from schemas.recognition import ConnectionEvent
 from schemas.units import Seconds
-from services.commandline.process import DONE, run, until_signal
+from services.commandline.outputs import Terminal
+from services.commandline.process import DONE, run_until_signal
 from services.commandline.run import Where, forever, unique
 from services.config import Config
 from services.console.follow import Sink, following
@@ -20,14 +19,14 @@ WATCHED = (ConnectionEvent, BlockProgress, SyncPointProgress, WarningFeedback, H
 
 def main(where: Where, json: bool) -> int:
     config = where.load()
-    run(until_signal(_watch(where, config, json)))
+    run_until_signal(_watch(where, config, json))
     return DONE
 
 
 async def _watch(where: Where, config: Config, json: bool) -> None:
     async with await where.open(config.robot) as hub:
         bus = hub.join(unique("watch"))
-        sink: Sink = as_json if json else Log(Console(), config.robot, bus.now())
+        sink: Sink = as_json if json else Log(Terminal(), config.robot, bus.now())
         async with following(bus, (sink,)):
             bus.declare_alive()
             await forever()

@@ -41,16 +41,16 @@ async def following(bus: Bus, sinks: Iterable[Sink], patterns: Iterable[str] = F
             async for received in inbox:
                 tell(received)
 
-        listening = asyncio.create_task(listen(), name="console")
-        try:
-            yield
-        finally:
-            listening.cancel()
-            await asyncio.wait([listening])
-            while len(inbox) and (received := await inbox.next()):
-                tell(received)
-    if not listening.cancelled() and (error := listening.exception()):
-        raise error
+        # In a group: a sink that fails ends the body, which might wait for ever.
+        async with asyncio.TaskGroup() as group:
+            listening = group.create_task(listen(), name="console")
+            try:
+                yield
+            finally:
+                listening.cancel()
+                await asyncio.wait([listening])
+                while listening.cancelled() and len(inbox) and (received := await inbox.next()):
+                    tell(received)
 
 
 def instant(bus: Bus, received: Received) -> Seconds:

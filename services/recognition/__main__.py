@@ -2,6 +2,6 @@
 
 import sys
 
-from services.cli import main
+from services.__main__ import main
 
 main(["run", "recognition", *sys.argv[1:]])

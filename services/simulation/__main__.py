@@ -2,7 +2,7 @@
 
 import sys
 
-from services.cli import main
+from services.__main__ import main
 
 if __name__ == "__main__":
     sys.argv[1:1] = ["run", "simulation"]

@@ -49,11 +49,11 @@ def engage(capsys: pytest.CaptureFixture[str]) -> Engage:
     return run
 
 
-async def start(*arguments: object, **settings: str) -> Process:
+async def start(*arguments: object, stdout: int = PIPE, **settings: str) -> Process:
     """A process of its own, with its log on stderr. settings: environment variables."""
     return await asyncio.create_subprocess_exec(
-        *(sys.executable, "-m", "services.cli", *map(str, arguments)),
-        stdin=PIPE, stdout=PIPE, stderr=PIPE, env={**os.environ, **settings},
+        *(sys.executable, "-m", "services", *map(str, arguments)),
+        stdin=PIPE, stdout=stdout, stderr=PIPE, env={**os.environ, **settings},
     )  # fmt: skip
 
 

@@ -173,3 +173,21 @@ def test_a_point_of_a_block_that_is_not_there_is_refused(engage: Engage, tmp_pat
     assert result.code == 2
     assert result.err.startswith(f"{path}:2: ")
     assert "long:s:end" in result.err
+
+
+def test_both_kinds_of_lines_may_share_a_file(engage: Engage, files: dict[str, Path], tmp_path: Path) -> None:
+    path = tmp_path / "lines.jsonl"
+
+    result = engage(*PLAY, "--quiet", "--events", path, "--feedback", path, files["ask"])
+
+    assert result == (0, "", "")
+    types = {json.loads(line)["type"] for line in path.read_text().splitlines()}
+    assert types == {"connection_event", "block_progress", "sync_point_progress"}
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="Linux has a file that is always full")
+def test_a_full_disk_ends_it_in_one_line(engage: Engage, files: dict[str, Path]) -> None:
+    result = engage(*PLAY, "--quiet", "--feedback", "/dev/full", files["hello"])
+
+    assert result.code == 3
+    assert result.err == "/dev/full: cannot write: No space left on device\n"

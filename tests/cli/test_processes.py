@@ -96,6 +96,51 @@ async def test_a_running_demo_has_one_thread() -> None:
     assert demo.returncode == 130
 
 
+@pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGTERM])
+async def test_a_signal_while_it_still_loads_ends_it_without_a_word(how: signal.Signals, tmp_path: Path) -> None:
+    (tmp_path / "typer.py").write_text("import sys\nprint('loading', flush=True)\nsys.stdin.read()\n")
+    demo = await start("demo", PYTHONPATH=str(tmp_path))
+    try:
+        await line(demo, "loading", log=False)
+        demo.send_signal(how)
+        async with asyncio.timeout(PATIENCE):
+            _, err = await demo.communicate()
+    finally:
+        await stopped(demo, signal.SIGKILL)
+
+    assert (demo.returncode, err) == (130, b"")
+
+
+@pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGTERM])
+async def test_a_signal_ends_what_was_started_with_ctrl_c_ignored(how: signal.Signals) -> None:
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)  # as a shell does to `engage demo &`
+    try:
+        demo = await start("demo", "--quiet", "--feedback", "-")
+    finally:
+        signal.signal(signal.SIGINT, before)
+    await line(demo, "block_progress", log=False)
+    demo.send_signal(how)
+    async with asyncio.timeout(PATIENCE):
+        _, err = await demo.communicate()
+
+    assert (demo.returncode, err) == (130, b"")
+
+
+@pytest.mark.parametrize(
+    "arguments", [("demo", "--virtual-time"), ("demo", "--virtual-time", "--quiet", "--feedback", "-")]
+)
+async def test_a_reader_who_has_had_enough_ends_it_without_a_word(arguments: tuple[str, ...]) -> None:
+    ours, theirs = os.pipe()
+    demo = await start(*arguments, stdout=theirs)
+    os.close(theirs)
+    with os.fdopen(ours) as reader:
+        assert reader.readline()
+    async with asyncio.timeout(PATIENCE):
+        _, err = await demo.communicate()
+
+    assert (demo.returncode, err) == (130, b"")
+
+
 async def test_each_service_runs_alone_with_only_zenohs_threads_and_stops_on_a_signal() -> None:
     arguments = ("--robot", "alone", "--listen", "tcp/127.0.0.1:0")
     services = {name: await start("run", name, *arguments) for name in NAMES}
