@@ -5,9 +5,9 @@ out on request. Every subscription follows each publishing process (`Follower`):
 holds what arrives meanwhile, and merges both by number; a gap in a key's count makes it ask again. So messages of
 one process arrive in its order across keys, each once, whether they came live, from history, or after a cut.
 
-Zenoh's own advanced subscribers do this per key: the first message of each new key waits for a query while those
-of other keys pass it, and a replayed history comes in no order across keys. Sync points and outcomes live on
-different keys and must not overtake one another, hence this file.
+Zenoh's own advanced subscribers do this per key: a replayed history and what is recovered after a cut come in no
+order across keys. Sync points and outcomes live on different keys and must not overtake one another, hence this file
+(measured in docs/decisions/0005).
 """
 
 from collections import deque
