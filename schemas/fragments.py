@@ -69,11 +69,15 @@ class ReferenceChoice(Struct, frozen=True, kw_only=True, omit_defaults=True):
 
 
 class FragmentOutcome(Outcome, frozen=True, kw_only=True, tag="fragment_outcome", omit_defaults=True):
-    """evt: generation -> requester. Sent when the block has ended and its DG and MFG are decided."""
+    """evt: generation -> requester. Sent when the block has ended and its DG and MFG are decided.
+
+    interrupted with `replaced_by` set: the REPLACE of this block ended it.
+    """
 
     fragment: str
     status: Literal["done", "failed", "interrupted"]
     spoken: tuple[SpokenText, ...] = ()
+    replaced_by: str = ""
     events: tuple[ConnectionEvent, ...] = ()
     """Each connection event of the turn in its last known state, by start."""
     choices: tuple[ReferenceChoice, ...] = ()

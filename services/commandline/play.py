@@ -54,6 +54,8 @@ class Played:
 
     def __init__(self, sources: Sequence[Source]) -> None:
         self.blocks = frozenset(thing.id for source in sources for thing in source.things)
+        self._events: set[str] = set()
+        """Ids of the connection events that have started."""
 
     def concerns(self, message: Message) -> bool:
         match message:
@@ -64,14 +66,17 @@ class Played:
                 | WarningFeedback(block=block)
             ):
                 return block is None or block in self.blocks
-            case ConnectionEvent(block=block):
-                return block in self.blocks
+            case ConnectionEvent(block=block, state="started", id=id) if block in self.blocks:
+                self._events.add(id)
+                return True
+            case ConnectionEvent(id=id):
+                # By block alone it could be of an earlier performance under the same id.
+                return id in self._events
         return True
 
     def exit_code(self, outcome: FragmentOutcome | BlockOutcome) -> int:
         """A block that another file's REPLACE ended counts as done."""
-        replaced = isinstance(outcome, BlockOutcome) and outcome.replaced_by in self.blocks
-        return DONE if outcome.status == "done" or replaced else FAILED
+        return DONE if outcome.status == "done" or outcome.replaced_by in self.blocks else FAILED
 
 
 class Job(NamedTuple):
@@ -162,7 +167,7 @@ async def _perform_all(job: Job, hub: Hub, patience: Seconds | None) -> int:
             log(message, at)
 
     sinks: tuple[Sink, ...] = (tell, job.outputs)
-    async with following(bus, sinks), connect(hub=hub) as robot:
+    async with following(bus, sinks, past=False), connect(hub=hub) as robot:
         if job.times is None:
             return max([await _perform(job, source, robot, patience) for source in job.sources])
         loop = asyncio.get_running_loop()

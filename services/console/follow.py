@@ -26,16 +26,21 @@ FOLLOWED = (
 
 
 @asynccontextmanager
-async def following(bus: Bus, sinks: Iterable[Sink], patterns: Iterable[str] = FOLLOWED) -> AsyncIterator[None]:
-    """Feed the sinks, in order, while the body of `async with` runs; what has arrived by its end is still fed."""
+async def following(bus: Bus, sinks: Iterable[Sink], *, past: bool = True) -> AsyncIterator[None]:
+    """Feed the sinks, in order, while the body of `async with` runs; what has arrived by its end is still fed.
+
+    past: also with what the bus still has from before.
+    """
     sinks = tuple(sinks)
 
     def tell(received: Received) -> None:
+        if received.past and not past:
+            return
         at = instant(bus, received)
         for sink in sinks:
             sink(received.message, at)
 
-    with bus.subscribe(*patterns) as inbox:
+    with bus.subscribe(*FOLLOWED) as inbox:
 
         async def listen() -> None:
             async for received in inbox:

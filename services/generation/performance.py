@@ -30,7 +30,8 @@ class TurnEvents:
         self._turn_of[block] = turn
 
     def feed(self, event: ConnectionEvent) -> None:
-        if event.block in self._turn_of:
+        # What is first heard of in a later state belongs to an earlier performance under the same id.
+        if event.block in self._turn_of and (event.state == "started" or event.id in self._events):
             self._events[event.id] = event
 
     def of(self, turn: str) -> tuple[ConnectionEvent, ...]:
@@ -53,6 +54,7 @@ class Ended(Struct, frozen=True):
     at: Seconds
     status: str
     spoken: tuple[SpokenText, ...] = ()
+    replaced_by: str = ""
     fault: Fault | None = None
 
 
@@ -125,11 +127,17 @@ class Performance:
         return tuple(ids)
 
     def end(
-        self, at: Seconds, status: str, *, spoken: tuple[SpokenText, ...] = (), fault: Fault | None = None
+        self,
+        at: Seconds,
+        status: str,
+        *,
+        spoken: tuple[SpokenText, ...] = (),
+        replaced_by: str = "",
+        fault: Fault | None = None,
     ) -> None:
         """The block is over, or will never be. Only the first end counts."""
         if self._ended is None:
-            self._ended = Ended(at, status, spoken, fault)
+            self._ended = Ended(at, status, spoken, replaced_by, fault)
             self._running.clear()
 
     def refuse(self, fault: Fault, at: Seconds) -> None:
@@ -140,7 +148,7 @@ class Performance:
     def end_with(self, outcome: BlockOutcome, at: Seconds) -> None:
         self._warnings += [f"{behavior} was dropped" for behavior in outcome.dropped]
         self._started -= set(outcome.dropped)
-        self.end(at, outcome.status, spoken=outcome.spoken, fault=outcome.fault)
+        self.end(at, outcome.status, spoken=outcome.spoken, replaced_by=outcome.replaced_by, fault=outcome.fault)
 
     @property
     def is_over(self) -> bool:
@@ -170,6 +178,7 @@ class Performance:
             fragment=self.fragment.id,
             status=status,  # type: ignore[arg-type]
             spoken=self._ended.spoken,
+            replaced_by=self._ended.replaced_by,
             events=events.of(self.turn.turn),
             choices=self.plan.choices if self.plan else (),
             warnings=(*self._warnings, *(f"{id} was never decided" for id in undecided)),

@@ -108,6 +108,13 @@ def test_a_block_that_another_file_replaces_counts_as_done(engage: Engage, files
     assert result.code == 0, result.err
 
 
+def test_a_fragment_that_another_file_replaces_counts_as_done(engage: Engage, files: dict[str, Path]) -> None:
+    result = engage(*PLAY, "--at", "0,1", "--feedback", "-", files["ask"], files["new"])
+
+    assert [line["status"] for line in lines(result.out, block="ask", progress="end")] == ["interrupted"]
+    assert result.code == 0, result.err
+
+
 def test_failing_at_run_time_is_exit_code_3(engage: Engage, files: dict[str, Path], tmp_path: Path) -> None:
     path = tmp_path / "must.xml"
     path.write_text('<bml id="must"><pointing id="p" target="rectangle" required="true"/></bml>')

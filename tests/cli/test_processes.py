@@ -166,14 +166,16 @@ async def test_up_performs_what_is_played_and_ctrl_c_ends_all_of_it(endpoint: st
         offspring = children(up.pid)
         where = ("--robot", "upright", "--connect", endpoint)
         codes = {}
-        for name in ("bad.xml", "block.xml"):
-            play = await start("play", *where, tmp_path / name)
+        for name in ("bad.xml", "block.xml", "block.xml"):
+            play = await start("play", *where, "--feedback", tmp_path / "feedback", tmp_path / name)
             async with asyncio.timeout(PATIENCE):
                 out, err = await play.communicate()
             codes[name] = play.returncode
 
         assert codes == {"bad.xml": 2, "block.xml": 0}, err
         assert b"block hello: done" in out
+        # The second time only the second performance is told, though the bus still has the first.
+        assert (tmp_path / "feedback").read_text().count('"progress":"end"') == 1
         assert len(offspring) == 5
         assert await strangers(up.pid) == []
     finally:

@@ -107,6 +107,30 @@ async def test_the_outcome_of_a_turn_tells_all_its_events(hub: MemoryHub) -> Non
         assert [(event.id, event.state) for event in outcome.events] == [("pair", "succeeded")]
 
 
+async def test_an_outcome_tells_nothing_of_an_earlier_fragment_of_the_same_id(hub: MemoryHub) -> None:
+    async with stage(hub) as partners:
+        outcomes = []
+        for event in ("first", "second"):
+            pending = partners.send(refers(), id=event)
+            await partners.fragment_block("show")
+            partners.reach("show", "ref-event", "start")
+            partners.event(event, "started", block="show", behavior="ref-event")
+            partners.event(
+                "first", "succeeded" if event == "first" else "completed", block="show", behavior="ref-event"
+            )
+            partners.end(partners.request("show"))
+            if event == "second":
+                await asyncio.sleep(1.0)
+                partners.event(event, "failed", block="show", behavior="ref-event")
+            outcomes.append(await pending.outcome)
+            partners.blocks.clear()
+
+        assert [[(event.id, event.state) for event in outcome.events] for outcome in outcomes] == [
+            [("first", "succeeded")],
+            [("second", "failed")],
+        ]
+
+
 async def test_fragments_are_performed_in_order_one_after_the_other(hub: MemoryHub) -> None:
     async with stage(hub) as partners:
         sent = [partners.send(says(id, status)) for id, status in [("a", "beginning"), ("b", "end")]]
