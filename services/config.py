@@ -35,7 +35,8 @@ class Config(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
 
     def __post_init__(self) -> None:
         if not self.robot or not set(self.robot).isdisjoint("/*$#?@ "):
-            raise ValueError(f"robot {self.robot!r} cannot be part of a key: it has one of / * $ # ? @ or a space")
+            reason = "it has one of / * $ # ? @ or a space" if self.robot else "it is empty"
+            raise ValueError(f"robot {self.robot!r} cannot be part of a key: {reason}")
 
 
 def load(path: Path | None = None, *, settings: Iterable[str] = (), defaults: Iterable[str] = ()) -> Config:

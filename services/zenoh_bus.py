@@ -43,7 +43,7 @@ async def open_hub(
     """Join the bus of `robot`. Processes may start in any order: waits for nobody for longer than `OPENING`.
 
     connect, listen: Zenoh endpoints (`tcp/HOST:PORT`). Without any, the processes of this machine find one another
-    at `rendezvous`. Raises RunFailed when an endpoint is wrong or taken.
+    at `rendezvous`. Raises InputRefused when an endpoint is misspelled, RunFailed when it is taken.
     """
     # Blocks the loop for milliseconds, before its work has started: Zenoh has no async API, and we start no thread.
     session, calls = open_session(robot, connect, listen, None if connect or listen else rendezvous, mode)

@@ -2,6 +2,7 @@
 
 import asyncio
 import json
+import re
 from collections import deque
 from collections.abc import Callable, Sequence
 from typing import Any
@@ -9,16 +10,21 @@ from typing import Any
 import zenoh
 from msgspec import Struct
 
-from schemas.faults import Fault, RunFailed
+from schemas.faults import Fault, InputRefused, RunFailed
 from schemas.units import Seconds
 
 RENDEZVOUS = "tcp/127.0.0.1:7447"
 """Where the processes of one machine find one another: the first listens there, all others connect."""
+ADVICE = "tcp/HOST:PORT or tls/HOST:PORT"
 LOOPBACK = "tcp/127.0.0.1:0"
 LEASE_MS = 2000
 """Shorter leases flap on cuts of 0.4 s."""
 STALL_US = 200_000
 """How long a full link may stall `put`, and so the loop, before it is closed. Zenoh's default is 5 s."""
+ENDPOINT = re.compile(r"(?:tcp|tls)/[^\s/]+:(\d{1,5})(?:[?#]\S*)?")
+"""Only what retransmits. Zenoh itself would go on calling a misspelled one in silence."""
+RUST_PLACE = re.compile(r" at /\S+\.rs:\d+\.?")
+"""Where in its source Zenoh failed: of no use to who reads the message."""
 RETRY_MS = {"period_init_ms": 100, "period_max_ms": 500, "period_increase_factor": 2}
 BATCH = 256
 CROWD = 65_536
@@ -44,9 +50,13 @@ def open_session(
 ) -> tuple[zenoh.Session, bool]:
     """A session in the robot's namespace, and whether it calls others. Blocks for some milliseconds.
 
-    An endpoint where nobody is costs nothing. rendezvous None: only the endpoints given. Raises RunFailed when one
-    is wrong or taken.
+    An endpoint where nobody is costs nothing. rendezvous None: only the endpoints given. Raises InputRefused when one
+    is misspelled, RunFailed when it is taken, or not ours.
     """
+    for endpoint in (*connect, *listen):
+        match = ENDPOINT.fullmatch(endpoint)
+        if match is None or int(match[1]) > 65535:
+            raise InputRefused(Fault(reason=f"{endpoint!r} is not an endpoint", advice=ADVICE))
     if rendezvous is not None:
         try:
             session = zenoh.open(_config(robot, connect, (*listen, LOOPBACK, rendezvous), mode))
@@ -58,8 +68,8 @@ def open_session(
         session = zenoh.open(_config(robot, connect, tuple(listen) or (LOOPBACK,), mode))
         return session, bool(connect)
     except zenoh.ZError as error:
-        where = ", ".join((*listen, *connect))
-        raise RunFailed(Fault(reason=f"cannot open the bus: {error}", where=where, advice="tcp/HOST:PORT")) from error
+        where, reason = ", ".join((*listen, *connect)), RUST_PLACE.sub("", str(error))
+        raise RunFailed(Fault(reason=f"cannot open the bus: {reason}", where=where, advice=ADVICE)) from error
 
 
 def _config(robot: str, connect: Sequence[str], listen: Sequence[str], mode: str) -> zenoh.Config:

@@ -172,11 +172,21 @@ def test_a_bad_configuration_is_refused_with_file_and_key(
         (["play", "--embedded", "--at", "soon", "x.xml"], "not a list of seconds"),
         (["play", "--embedded", "--at=-1", "x.xml"], "negative"),
         (["play", "--embedded", "--at", "nan", "x.xml"], "negative or endless"),
+        (["watch", "--connect", "here"], "'here' is not an endpoint"),
+        (["play", "--connect", "tcp/127.0.0.1", "hello.xml"], "'tcp/127.0.0.1' is not an endpoint"),
+        (["up", "--listen", "tcp/127.0.0.1:65536"], "'tcp/127.0.0.1:65536' is not an endpoint"),
+        (["run", "realizer", "--listen", "udp/127.0.0.1:7447"], "'udp/127.0.0.1:7447' is not an endpoint"),
+        (["watch", "--robot", ""], "it is empty"),
         (["demo", "--set", "recognition"], "section.key=value"),
         (["demo", "--set", "recognition.speed=1"], "speed"),
     ],
 )
-def test_a_misused_command_is_one_line(engage: Engage, arguments: list[str], reason: str) -> None:
+def test_a_misused_command_is_one_line(
+    engage: Engage, arguments: list[str], reason: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "hello.xml").write_text(GOOD_BLOCK)
+    monkeypatch.chdir(tmp_path)
+
     result = engage(*arguments)
 
     assert result.code == 2
