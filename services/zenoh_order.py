@@ -121,13 +121,15 @@ class Follower:
     """One publishing process as one subscription sees it.
 
     behind: the past is needed; until `catch_up` nothing is delivered. gaps: how often a message was missed.
-    lost: messages that were gone for good. asking: for the shell: the question is on its way.
+    lost: messages that were gone for good. asking, again: for the shell: the question is on its way, and is to be
+    asked once more after it.
     """
 
     def __init__(self, patterns: Iterable[str]) -> None:
         self.patterns = tuple(patterns)
         self.behind = True
         self.asking = False
+        self.again = False
         self.gaps = 0
         self.lost = 0
         self._since = -1

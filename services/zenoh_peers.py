@@ -15,8 +15,8 @@ from services.zenoh_session import QOS, Doorway
 
 CATCH_UP: Seconds = 1.0
 """How long a process may take to hand out its past."""
-FLUSH: Seconds = 0.5
-"""How long closing waits for the others to have everything."""
+FLUSH: Seconds = 2.0
+"""How long closing waits for the others to have everything: as long as a silent one counts as alive."""
 CLOCK_TRIPS = 5
 CLOCK_TIMEOUT: Seconds = 1.0
 

@@ -21,6 +21,10 @@ _pulses = msgspec.msgpack.Decoder(Pulse)
 _flushes = msgspec.msgpack.Decoder(tuple[str, Pulse])
 
 
+TRIES = 3
+"""How often a process that is there, but does not answer, is asked for its past."""
+
+
 class _Reader:
     """A subscription, whose it is, and how far it has followed each process."""
 
@@ -147,14 +151,22 @@ class Readers:
             self._ask_past(reader, run, follower)
         return follower
 
-    def _ask_past(self, reader: _Reader, run: str, follower: Follower) -> None:
+    def _ask_past(self, reader: _Reader, run: str, follower: Follower, tries: int = 1) -> None:
         if not follower.behind or follower.asking:
             return
 
         def caught_up(past: Past | None) -> None:
             follower.asking = False
+            if past is None and run in self._peers.processes and tries < TRIES:
+                # It is there, only slow, or the link was cut under the question: what it has is not lost yet.
+                self._ask_past(reader, run, follower, tries + 1)
+                return
+            again, follower.again = follower.again, False
             for written, is_past in follower.catch_up(past):
                 self._deliver(reader, written, past=is_past)
+            if again:
+                follower.behind = True
+                self._ask_past(reader, run, follower)
             self._answer_flushes()
 
         follower.asking = True
@@ -162,8 +174,12 @@ class Readers:
 
     def process_came(self, run: str) -> None:
         for reader in self._readers:
-            follower = self._follow(reader, run)
-            # It may be back after a cut in which messages were lost.
+            follower = reader.followers.get(run)
+            if follower is None:
+                self._follow(reader, run)
+                continue
+            # It may be back after a cut in which messages were lost, the answer to a question on its way among them.
+            follower.again = follower.asking
             follower.behind = True
             self._ask_past(reader, run, follower)
 

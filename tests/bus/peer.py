@@ -67,13 +67,27 @@ async def tell(bus: Bus, argument: str) -> None:
     bus.publish(keys.request_state("realizer"), BlockOutcome(id="last", block="last", status="done"))
 
 
+async def remark(bus: Bus, argument: str) -> None:
+    """Publish one event, with its instant, and stay."""
+    bus.publish(keys.FEEDBACK, BlockProgress(block="b", progress="start", at=bus.stamp()))
+    await idle(bus, argument)
+
+
 async def idle(bus: Bus, argument: str) -> None:
     bus.declare_alive()
     say("stands")
     await asyncio.Event().wait()
 
 
-ROLES = {"serve": (serve, "realizer"), "ask": (ask, "client"), "tell": (tell, "teller"), "idle": (idle, "idler")}
+ROLES = {
+    "serve": (serve, "realizer"),
+    "ask": (ask, "client"),
+    "tell": (tell, "teller"),
+    "remark": (remark, "remarker"),
+    "idle": (idle, "idler"),
+}
+FAR = 12345.0
+"""Seconds that another machine's clock is ahead."""
 
 
 async def main(role: str, robot: str, rendezvous: str, argument: str = "") -> None:
@@ -87,7 +101,7 @@ class FarLoop(asyncio.SelectorEventLoop):
     """The clock of another machine."""
 
     def time(self) -> float:
-        return super().time() + 12345.0
+        return super().time() + FAR
 
 
 if __name__ == "__main__":

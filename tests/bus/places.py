@@ -14,7 +14,7 @@ from services.bus import Bus, Hub, Received, Subscription
 from services.memory_bus import MemoryHub
 from services.zenoh_bus import ZenohHub, open_hub
 
-PATIENCE = 5.0
+PATIENCE = 60.0
 """Seconds until something that must come counts as lost. A limit of failure, never waited for."""
 
 

@@ -38,8 +38,8 @@ class Visitor:
         handler = zenoh.handlers.Callback(
             replies.append, lambda: loop.call_soon_threadsafe(ended.set), indirect=False
         )
-        self.session.get(f"{self.robot}/{selector}", handler, timeout=PATIENCE, **options)
-        await asyncio.wait_for(ended.wait(), 2 * PATIENCE)
+        self.session.get(f"{self.robot}/{selector}", handler, timeout=PATIENCE / 2, **options)
+        await asyncio.wait_for(ended.wait(), PATIENCE)
         return replies
 
     async def samples(self, selector: str, **options: Any) -> list[zenoh.Sample]:

@@ -1,0 +1,91 @@
+"""What a process asks another for its past, when the question or its answer gets lost."""
+
+import asyncio
+import os
+from collections.abc import AsyncIterator, Callable
+
+import pytest
+import pytest_asyncio
+
+from schemas import keys
+from services.zenoh_bus import ZenohHub, open_hub
+from services.zenoh_order import Missing, Past
+from services.zenoh_readers import TRIES
+from tests.bus.places import acquainted, free_endpoint, messages, numbers, state
+
+pytestmark = pytest.mark.real_time
+Then = Callable[[Past | None], None]
+
+
+@pytest_asyncio.fixture
+async def pair() -> AsyncIterator[tuple[ZenohHub, ZenohHub]]:
+    """Two processes; the second has something to tell, and no pulse that would betray that it was missed."""
+    robot, end = f"asked-{os.getpid()}", free_endpoint()
+    here, there = await open_hub(robot, listen=[end]), await open_hub(robot, connect=[end])
+    await acquainted(here, there)
+    there.join("there").publish(keys.WORLD, state(1))
+    assert there._pulse is not None
+    there._pulse.cancel()
+    yield here, there
+    await there.close()
+    await here.close()
+
+
+def unanswered(hub: ZenohHub, times: int) -> list[str]:
+    """Let the next questions of the hub for somebody's past die; the list tells how many were asked."""
+    ask, asked = hub.peers.ask_past, []
+
+    def ask_past(run: str, missing: Missing, then: Then) -> None:
+        asked.append(run)
+        if len(asked) <= times:
+            asyncio.get_running_loop().call_soon(then, None)
+        else:
+            ask(run, missing, then)
+
+    hub.peers.ask_past = ask_past  # type: ignore[method-assign]
+    return asked
+
+
+async def test_a_process_that_is_there_is_asked_again_when_it_has_not_answered(pair: tuple[ZenohHub, ZenohHub]):
+    here, there = pair
+    asked = unanswered(here, TRIES - 1)
+
+    inbox = here.join("here").subscribe(keys.WORLD)
+
+    assert numbers(await messages(inbox)) == [1]
+    assert asked == TRIES * [there.run]
+
+
+async def test_a_process_that_never_answers_holds_up_nobody_for_ever(pair: tuple[ZenohHub, ZenohHub]):
+    here, there = pair
+    asked = unanswered(here, 1000)
+
+    inbox = here.join("here").subscribe(keys.FEEDBACK)
+    there.join("another").publish(keys.FEEDBACK, state(2))
+
+    assert numbers(await messages(inbox)) == [2]
+    assert asked == TRIES * [there.run]
+
+
+async def test_who_comes_back_under_a_question_is_asked_once_more_after_it(pair: tuple[ZenohHub, ZenohHub]):
+    here, there = pair
+    inbox = here.join("here").subscribe(keys.WORLD)
+    waiting: asyncio.Queue[Then] = asyncio.Queue()
+    asked = unanswered(here, 0)
+    ask = here.peers.ask_past
+
+    def ask_late(run: str, missing: Missing, then: Then) -> None:
+        ask(run, missing, lambda past: waiting.put_nowait(then) if len(asked) == 1 else then(past))
+
+    assert numbers(await messages(inbox)) == [1]
+    here.peers.ask_past = ask_late  # type: ignore[method-assign]
+    here.readers.process_came(there.run)
+    here.readers.process_came(there.run)
+    there.join("another").publish(keys.WORLD, state(2))
+    then = await waiting.get()
+
+    # The answer to the first question is from before the cut: it has nothing new.
+    then(Past(1, {keys.WORLD: 1}, ()))
+
+    assert numbers(await messages(inbox)) == [2]
+    assert len(asked) == 2
