@@ -4,7 +4,7 @@ import asyncio
 from types import TracebackType
 from typing import Self
 
-from rich.console import Console
+from rich.console import Console, RenderableType
 from rich.live import Live
 
 from schemas.messages import Message
@@ -21,7 +21,8 @@ class LiveView:
 
     def __init__(self, console: Console, robot: str, began: Seconds) -> None:
         self.scene = view.empty(robot, began)
-        self._live = Live(render(self.scene), console=console, auto_refresh=False, vertical_overflow="crop")
+        self._console = console
+        self._live = Live(self._picture(), console=console, auto_refresh=False, vertical_overflow="crop")
         self._due: asyncio.TimerHandle | None = None
 
     def __call__(self, message: Message, at: Seconds) -> None:
@@ -29,9 +30,12 @@ class LiveView:
         if self._due is None:
             self._due = asyncio.get_running_loop().call_later(REDRAW, self._draw)
 
+    def _picture(self) -> RenderableType:
+        return render(self.scene, self._console.height)
+
     def _draw(self) -> None:
         self._due = None
-        self._live.update(render(self.scene), refresh=True)
+        self._live.update(self._picture(), refresh=True)
 
     def __enter__(self) -> Self:
         self._live.start()
@@ -42,7 +46,7 @@ class LiveView:
     ) -> None:
         if self._due is not None:
             self._due.cancel()
-        self._live.update(render(self.scene), refresh=True)
+        self._live.update(self._picture(), refresh=True)
         self._live.stop()
 
 

@@ -3,8 +3,9 @@
 from math import inf
 
 from rich import box
-from rich.console import Group, RenderableType
+from rich.console import Console, ConsoleOptions, Group, RenderableType, RenderResult
 from rich.panel import Panel
+from rich.segment import Segment
 from rich.table import Table
 from rich.text import Text
 
@@ -17,6 +18,10 @@ AHEAD = 4
 """At least so many of the planned points are among them."""
 UTTERANCES_SHOWN = 5
 EVENTS_SHOWN = 8
+UPPER = POINTS_SHOWN + 4
+"""How high what stands above the connection events is."""
+PEOPLE = 7
+EVENTS_FRAME = 3
 NOTICED: Seconds = 0.1
 """People notice when speech and gesture are further apart."""
 STATE_STYLES = {
@@ -30,13 +35,14 @@ STATE_STYLES = {
 }
 
 
-def render(scene: Scene) -> RenderableType:
-    """The whole live view, some 30 lines high."""
+def render(scene: Scene, height: int | None = None) -> RenderableType:
+    """The whole live view. height: of the terminal, 19 lines or more; without it some 30 are taken."""
     upper = Table.grid(expand=True)
     upper.add_column(ratio=4)
     upper.add_column(ratio=5)
     upper.add_row(Group(_people(scene), _said(scene)), _points(scene))
-    parts: list[RenderableType] = [upper, _events(scene)]
+    events = EVENTS_SHOWN if height is None else height - UPPER - EVENTS_FRAME - len(scene.notes)
+    parts: list[RenderableType] = [upper, _events(scene, max(1, min(events, EVENTS_SHOWN)))]
     parts += [Text(f"! {note}", style="yellow", no_wrap=True, overflow="ellipsis") for note in scene.notes]
     return Group(*parts)
 
@@ -49,7 +55,8 @@ def _people(scene: Scene) -> Panel:
             table.add_row(Text(actor.id, style=style), Text("has left", style="dim"))
             continue
         look = actor.look
-        doing = Text("looks ") + Text(wording.look(look.targets, scene.robot) if look else "around", style="bold")
+        doing = Text("looks at " if look and look.targets else "looks ")
+        doing += Text(wording.look(look.targets, scene.robot) if look else "around", style="bold")
         for action in actor.doing:
             if action.action == "point":
                 doing += Text("  points ") + Text(wording.names(action.targets), style="bold")
@@ -65,7 +72,7 @@ def _people(scene: Scene) -> Panel:
             table.add_row("", Text(f"waiting: {waiting}", style="dim"))
     mtbce = wording.seconds(scene.session.mtbce if scene.session else None)
     title = Text(f"engage {wording.clock(scene.now - scene.began)}  MTBCE {mtbce}", style="bold")
-    return Panel(table, title=title, title_align="left", box=box.ROUNDED, height=7)
+    return Panel(table, title=title, title_align="left", box=box.ROUNDED, height=PEOPLE)
 
 
 def _said(scene: Scene) -> Panel:
@@ -77,7 +84,22 @@ def _said(scene: Scene) -> Panel:
         if utterance.open:
             text.append("▌", style="blink")
         lines.append(text)
-    return Panel(Group(*lines), title="said", title_align="left", box=box.ROUNDED, height=POINTS_SHOWN - 3)
+    height = UPPER - PEOPLE
+    newest = _LastLines(Group(*lines), height - 2)
+    return Panel(newest, title="said", title_align="left", box=box.ROUNDED, height=height)
+
+
+class _LastLines:
+    """The end of what may be too high: a panel would cut that off, and the newest stands there."""
+
+    def __init__(self, whole: RenderableType, height: int) -> None:
+        self._whole = whole
+        self._height = height
+
+    def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
+        for line in console.render_lines(self._whole, options.update(height=None))[-self._height :]:
+            yield from line
+            yield Segment.line()
 
 
 def _points(scene: Scene) -> Panel:
@@ -99,7 +121,7 @@ def _points(scene: Scene) -> Panel:
         )
     # Ids are other people's: as Text, so that brackets in them are not read as markup.
     title = Text(f"block {block.id} {block.status or 'running'}" if block else "no block yet")
-    return Panel(table, title=title, title_align="left", box=box.ROUNDED, height=POINTS_SHOWN + 4)
+    return Panel(table, title=title, title_align="left", box=box.ROUNDED, height=UPPER)
 
 
 def _together(points: tuple[Point, ...]) -> list[list[Point]]:
@@ -130,14 +152,14 @@ def _window(rows: list[list[Point]]) -> list[list[Point]]:
     return [*(came[-behind:] if behind else ()), *to_come[:ahead]]
 
 
-def _events(scene: Scene) -> Panel:
+def _events(scene: Scene, shown: int) -> Panel:
     table = Table(box=None, expand=True, pad_edge=False, padding=(0, 1, 0, 0))
     for name, width in (("at", 6), ("connection event", 18), ("who", 11), ("about", 8), ("cause", 5)):
         table.add_column(name, no_wrap=True, overflow="ellipsis", min_width=width)
     table.add_column("outcome", no_wrap=True, ratio=1, min_width=16)
-    for row in scene.events[-EVENTS_SHOWN:]:
+    for row in scene.events[-shown:]:
         table.add_row(*_event(row, scene))
-    return Panel(table, title="connection events", title_align="left", box=box.ROUNDED, height=EVENTS_SHOWN + 3)
+    return Panel(table, title="connection events", title_align="left", box=box.ROUNDED, height=shown + EVENTS_FRAME)
 
 
 def _event(row: EventInView, scene: Scene) -> tuple[RenderableType, ...]:

@@ -17,9 +17,9 @@ def scene() -> view.Scene:
     return fed(view.feed, view.empty("robot", 10.0))
 
 
-def drawn(scene: view.Scene, width: int = 120) -> str:
+def drawn(scene: view.Scene, width: int = 120, height: int | None = None) -> str:
     console = Console(width=width, record=True, file=StringIO())
-    console.print(render(scene))
+    console.print(render(scene, height))
     return console.export_text()
 
 
@@ -108,7 +108,7 @@ def test_the_view_says_who_speaks_who_looks_where_and_who_owns_the_head(scene: v
     text = drawn(scene)
 
     for expected in (
-        "robot: a rectangle", "looks rectangle", "looks the robot", "fragment: rectangle", "MTBCE 4.20 s",
+        "robot: a rectangle", "looks at rectangle", "looks at the robot", "fragment: rectangle", "MTBCE 4.20 s",
         "s:start", "0.60", "+0.10", "directed gaze", "robot→human", "succeeded 0.90 s",
     ):  # fmt: skip
         assert expected in text
@@ -132,3 +132,30 @@ def test_brackets_in_ids_are_not_markup() -> None:
     scene = msgspec.structs.replace(scene, owner=Claim(kind="face", priority=6, target="[bold]"), notes=("[/x]",))
 
     assert "[red]" in drawn(scene)
+
+
+def test_the_newest_event_and_words_are_there_on_a_small_terminal() -> None:
+    scene = view.empty("robot", 0.0)
+    for number in range(9):
+        scene = view.feed(scene, *event(f"e{number}", "started", float(number), objects=(f"piece-{number}",)))
+    said = tuple(view.Utterance(actor="robot", began=0.0, text="so many words " * 6 + str(n)) for n in range(5))
+    scene = msgspec.structs.replace(scene, said=said, notes=("beware",))
+
+    text = drawn(scene, width=80, height=24)
+
+    assert len(text.rstrip("\n").splitlines()) == 24
+    assert "piece-8" in text
+    assert "words 4" in text
+    assert "! beware" in text
+    assert "piece-3" not in text
+
+
+def test_people_look_at_things_away_or_around(scene: view.Scene) -> None:
+    looks = []
+    for action in (ActionBegan(actor="human", action="look", at=at(12.0), targets=("table",)),
+                   ActionBegan(actor="human", action="look", at=at(13.0)),
+                   ActionEnded(actor="human", action="look", at=at(14.0))):  # fmt: skip
+        scene = view.feed(scene, action, 14.0)
+        looks.append(next(line for line in drawn(scene).splitlines() if "human" in line)[:40])
+
+    assert [("looks at table" in looks[0]), ("looks away" in looks[1]), ("looks around" in looks[2])] == [True] * 3
