@@ -56,18 +56,27 @@ def _parsed(data: bytes | str, source: str) -> Any:
     raw = data.encode() if isinstance(data, str) else data
     raw = raw.removeprefix(b"\xef\xbb\xbf")
     try:
+        raw.decode()  # msgspec, too, refuses what is not UTF-8, but counts from the start of the string it is in
         return msgspec.json.decode(raw)
     except RecursionError as error:
         raise InputRefused(Fault(reason="nested too deep", where=source)) from error
     except (msgspec.DecodeError, UnicodeDecodeError) as error:
-        line = _line(raw, str(error))
+        line = _line(raw, error)
         raise InputRefused(Fault(reason=str(error), where=source, line=line, advice="a JSON object")) from error
 
 
-def _line(raw: bytes, message: str) -> int:
-    """The line of `... (byte 17)`; that of the end where the document just stops."""
-    _, _, byte = message.rpartition("(byte ")
-    return raw.count(b"\n", 0, int(byte.rstrip(")"))) + 1 if byte.rstrip(")").isdigit() else raw.count(b"\n") + 1
+def _line(raw: bytes, error: msgspec.DecodeError | UnicodeDecodeError) -> int:
+    """Where it is: by its byte, or at the end where the document just stops; 0 where msgspec doesn't say."""
+    if isinstance(error, UnicodeDecodeError):
+        end = error.start
+    elif "truncated" in str(error):
+        end = len(raw)
+    else:
+        byte = str(error).rpartition("(byte ")[2].rstrip(")")
+        if not byte.isdigit():
+            return 0
+        end = int(byte)
+    return raw.count(b"\n", 0, end) + 1
 
 
 def _thing(parsed: Any, source: str, path: str) -> Block | TurnFragment:
