@@ -101,7 +101,7 @@ def retargeted(run: Run, course: Course, track: Track, now: Seconds) -> Path | N
     left = run.motion.path.after(run.motion.s(now))
     seconds = max(left[0].seconds if left else 0.0, SHORTEST)
     first = Leg(goal=legs[0].goal, velocity=legs[0].velocity, seconds=seconds, marks=legs[0].marks)
-    return Path(track.at(now), (first, *legs[1:]), tracks.LIMITS["head"])
+    return Path(track.at(now), run.with_faults((first, *legs[1:])), tracks.LIMITS["head"])
 
 
 def apart(one: tuple[float, ...], other: tuple[float, ...]) -> bool:

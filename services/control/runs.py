@@ -81,6 +81,15 @@ class Run:
                 return path.marks.get(point.sync, inf)
         return inf
 
+    def with_faults(self, legs: tuple[Leg, ...]) -> tuple[Leg, ...]:
+        """`legs` that were made anew, with the faults that are still due."""
+        marked = {sync for leg in legs for sync, _ in leg.marks}
+        for number, point in enumerate(self.pending):
+            if point.sync in (STALL, OVERHEAT) and point.sync not in marked:
+                following = next(each.sync for each in self.pending[number:] if each.sync not in (STALL, OVERHEAT))
+                legs = tuple(_marked(leg, point.sync, following) for leg in legs)
+        return legs
+
     def cut(self, now: Seconds) -> None:
         """A later behavior has taken over."""
         self.cut_at = now

@@ -233,11 +233,12 @@ class SimulatedBody(Body):
     def _leave_hold(self, run: Run, hold: str, arrived: Seconds) -> list[Progress]:
         """Go on from a standstill: what is left of the path is planned afresh from rest."""
         now = self._loop.time()
+        passed = [point.sync for point in run.pending if point.held_with == hold]
+        run.pending = [point for point in run.pending if point.held_with != hold]
         legs = run.motion.path.after(run.motion.path.marks[hold])
         if run.course.parts == ("head",):
             legs = (head.way_back(self._tracks["head"].angles(now), self._attention.angles),)
-        passed = [point.sync for point in run.pending if point.held_with == hold]
-        run.pending = [point for point in run.pending if point.held_with != hold]
+        legs = run.with_faults(legs)
         run.holding = False
         start = tracks.joined([self._tracks[part].at(now) for part in run.course.parts])
         self._play(run, Path(start, legs, tracks.limits_of(run.course.parts)))
