@@ -1,70 +1,27 @@
 """What constraints and timing mean, rule by rule, beyond the plain cases of test_planner."""
 
-from itertools import pairwise
-
 import pytest
 from msgspec.structs import replace
 
 from schemas.behaviors import (
     After,
-    BlockBehavior,
     Constraint,
     FaceLexeme,
-    Gaze,
-    Gesture,
     Head,
-    Pointing,
     Posture,
     Speech,
     Synchronize,
-    Timing,
     Unknown,
     Wait,
 )
 from schemas.blocks import Block
-from schemas.body import Estimate, Phase
 from services.realizer.net import is_live, is_safe
-from services.realizer.planner import Plan, plan_block
+from services.realizer.planner import plan_block
 from services.realizer.points import Point, sync_points
 from services.realizer.relations import BlockRefused
 from tests.realizer.fake_body import FakeBody, Script
+from tests.realizer.planning import GAZE, LEFT, OTHER, SPEECH, at, elastic, plan, timed, warnings
 from tests.realizer.stage import after, before, block, together
-
-GAZE = Gaze(id="g", target="can")
-LEFT = Pointing(id="p", target="can", mode="LEFT_HAND")
-LEFT_TOO = Pointing(id="q", target="cup", mode="LEFT_HAND")
-SPEECH = Speech(id="s", text="This can?")
-OTHER = Speech(id="t", text="Or that?")
-
-
-def plan(example: Block, *estimates: Estimate, **scripts: Script) -> Plan:
-    body = FakeBody(scripts)
-    known = {each.behavior: each for each in estimates}
-    moved = [each for each in example.behaviors if not isinstance(each, Wait)]
-    return plan_block(example, [known.get(each.id) or body.estimate(each) for each in moved])
-
-
-def at(made: Plan, point: str) -> float:
-    behavior, sync = point.split(":")
-    return made.predicted(Point(behavior, sync))
-
-
-def timed(behavior: BlockBehavior, **refs: str) -> BlockBehavior:
-    return replace(behavior, timing=tuple(Timing(sync, ref) for sync, ref in refs.items()))
-
-
-def elastic(id: str, points: tuple[str, ...], shortest: float, natural: float, longest: float | None) -> Estimate:
-    """Every phase alike."""
-    phases = tuple(
-        Phase(since=since, to=to, shortest=shortest, natural=natural, longest=longest)
-        for since, to in pairwise(points)
-    )
-    return Estimate(behavior=id, feasible=True, parts=(f"part of {id}",), phases=phases)
-
-
-def warnings(made: Plan) -> list[tuple[str, str]]:
-    return [(each.kind, each.behavior) for each in made.problems]
-
 
 # -- instants ------------------------------------------------------------------------------------------------------
 
@@ -306,74 +263,6 @@ def test_a_required_constraint_with_an_unknown_sync_point_refuses_the_block() ->
 
     with pytest.raises(BlockRefused, match=r"b: c, line 4: .*'p:strok'.*required"):
         plan(Block(id="b", behaviors=(LEFT, SPEECH), constraints=(constraint,)))
-
-
-# -- parts ---------------------------------------------------------------------------------------------------------
-
-
-def test_who_starts_later_takes_the_arm_over_and_the_earlier_ends_there() -> None:
-    made = plan(block((LEFT, LEFT_TOO), after("p:stroke_end", "q:start")))
-
-    assert made.problems == ()
-    assert at(made, "p:stroke_end") == at(made, "q:start") == 1.5
-    assert at(made, "p:relax") == at(made, "p:end") == 1.5
-
-
-def test_two_fixed_windows_on_one_arm_cost_the_later_in_the_document() -> None:
-    made = plan(block((timed(LEFT, start="0", end="5"), timed(LEFT_TOO, start="2", end="7"))))
-
-    assert warnings(made) == [("IMPOSSIBLE_TO_SCHEDULE", "q")]
-
-
-def test_of_two_fixed_windows_on_one_arm_the_required_stays() -> None:
-    must = replace(timed(LEFT_TOO, start="2", end="7"), required=True)
-    made = plan(block((timed(LEFT, start="0", end="5"), must)))
-
-    assert made.dropped == ("p",)
-
-
-def test_who_may_come_later_waits_until_the_arm_is_no_longer_asked_for() -> None:
-    made = plan(block((timed(LEFT, stroke_end="5"), LEFT_TOO, SPEECH), after("s:start", "q:start")))
-
-    assert made.problems == ()
-    assert at(made, "q:start") == at(made, "p:stroke_end") == 5.0
-
-
-def test_a_gesture_that_names_no_hand_takes_the_arm_that_is_free() -> None:
-    beat = timed(Gesture(id="q", lexeme="BEAT"), start="2", end="7")
-    right = replace(LEFT, mode="RIGHT_HAND")
-    made = plan(block((timed(right, start="0", end="5"), beat)))
-
-    assert made.problems == ()
-    assert [getattr(each, "mode", None) for each in made.behaviors] == ["RIGHT_HAND", "LEFT_HAND"]
-    assert made.block.behaviors == made.behaviors
-
-
-def test_a_gesture_that_names_no_hand_finds_none_free() -> None:
-    beat = timed(Gesture(id="q", lexeme="BEAT"), start="2", end="7")
-    both = timed(Gesture(id="p", lexeme="BEAT", mode="BOTH_HANDS"), start="0", end="5")
-    made = plan(block((both, beat)))
-
-    assert made.dropped == ("q",)
-
-
-def test_a_gesture_that_nobody_asked_for_now_waits_for_the_arm() -> None:
-    made = plan(block((LEFT, Gesture(id="q", lexeme="BEAT", mode="LEFT_HAND"))))
-
-    assert at(made, "q:start") == at(made, "p:end") == 2.25
-
-
-def test_a_nod_is_on_top_of_the_gaze() -> None:
-    made = plan(block((GAZE, Head(id="n", lexeme="NOD"))))
-
-    assert at(made, "n:start") == at(made, "g:start") == 0.0
-    assert at(made, "g:relax") == at(made, "n:end") == 1.0
-
-
-def test_a_gaze_that_must_last_is_not_taken_over_before() -> None:
-    made = plan(block((timed(GAZE, end="5"), Gaze(id="h", target="cup"), SPEECH), together("h:start", "s:start")))
-
-    assert at(made, "h:start") == at(made, "s:start") >= 4.5
 
 
 # -- customs -------------------------------------------------------------------------------------------------------
