@@ -9,15 +9,19 @@ from schemas.units import Seconds
 from services.control.body import sync_points
 from services.control.choreography import Course, Point
 from services.control.motion import SLOWEST, Path
+from services.control.voice import Utterance
 
 
 def infeasible(behavior: BlockBehavior, warning: str, fault: Fault) -> Estimate:
     return Estimate(behavior=behavior.id, feasible=False, fault=fault, warning=warning)
 
 
-def spoken(behavior: Speech, times: dict[str, Seconds], pose: BodyPose) -> Estimate:
-    """times: of each sync point, seconds from the start."""
-    phases = _phases(behavior, times)
+def spoken(behavior: Speech, utterance: Utterance, pose: BodyPose) -> Estimate:
+    """The voice can wait at the marks between two words."""
+    times = {"start": 0.0, **{mark.id: utterance.said_by(mark.position) for mark in behavior.marks}}
+    times["end"] = utterance.seconds
+    gaps = tuple(Point(mark.id, mark.id) for mark in behavior.marks if utterance.is_gap(mark.position))
+    phases = _phases(behavior, times, gaps)
     return Estimate(behavior=behavior.id, feasible=True, parts=("voice",), phases=phases, pose_after=pose)
 
 

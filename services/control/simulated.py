@@ -138,13 +138,10 @@ class SimulatedBody(Body):
 
     def _estimate(self, behavior: BlockBehavior, scene: Scene, *, moving: bool) -> Estimate:
         match behavior:
-            case Speech(text=text, marks=marks):
+            case Speech(text=text):
                 if self._deviations.mute == "refuse":
                     raise Impossible("CANNOT_CREATE_BEHAVIOR", "the voice is mute")
-                utterance = utter(text)
-                times = {"start": 0.0, **{mark.id: utterance.said_by(mark.position) for mark in marks}}
-                times["end"] = utterance.seconds
-                return spoken(behavior, times, kinematics.pose_message(scene.pose))
+                return spoken(behavior, utter(text), kinematics.pose_message(scene.pose))
             case Wait(duration=duration):
                 return waited(behavior, duration or 0.0, kinematics.pose_message(scene.pose))
         course = choreography.plan(behavior, scene)

@@ -11,18 +11,29 @@ from services.control.waiting import Bell
 
 
 async def speak(behavior: Speech, authority: Authority, pace: float = 1.0) -> AsyncGenerator[Progress, None]:
-    """Say it word by word. Revoked, it finishes the word that it is in. pace: 2 takes twice as long."""
+    """Say it word by word, with a pause at a mark between two words that it may not pass yet.
+
+    Revoked, it finishes the word that it is in. pace: 2 takes twice as long.
+    """
     bell = Bell()
     begin = bell.now()
     utterance = utter(behavior.text, pace)
+    gaps = {mark.id for mark in behavior.marks if utterance.is_gap(mark.position)}
     unwatch = authority.watch(bell.ring)
     try:
-        for progress in _score(behavior, utterance, begin):
-            while bell.now() < progress.at and authority.revoked is None:
-                await bell.heard(progress.at)
+        for progress in _score(behavior, utterance):
+            while bell.now() < begin + progress.at and authority.revoked is None:
+                await bell.heard(begin + progress.at)
+            arrived = at = begin + progress.at
+            if isinstance(progress, Reached) and progress.sync in gaps and not authority.covers(progress.sync):
+                yield Arrived(progress.sync, arrived)
+                while authority.revoked is None and not authority.covers(progress.sync):
+                    await bell.heard(inf)
+                at = bell.now()
+                begin += at - arrived
             if authority.revoked is not None:
                 break
-            yield progress
+            yield _at(progress, at, arrived)
         since = bell.now() - begin
         for word in utterance.words:
             if authority.revoked is not None and word.start < since < word.end:
@@ -31,6 +42,12 @@ async def speak(behavior: Speech, authority: Authority, pace: float = 1.0) -> As
                 yield Spoke(word.text, word.position, begin + word.end)
     finally:
         unwatch()
+
+
+def _at(progress: Reached | Spoke, at: Seconds, arrived: Seconds) -> Progress:
+    if isinstance(progress, Reached):
+        return Reached(progress.sync, at, arrived)
+    return Spoke(progress.word, progress.position, at)
 
 
 async def wait(behavior: Wait, authority: Authority) -> AsyncGenerator[Progress, None]:
@@ -55,13 +72,13 @@ async def wait(behavior: Wait, authority: Authority) -> AsyncGenerator[Progress,
         unwatch()
 
 
-def _score(behavior: Speech, utterance: Utterance, begin: Seconds) -> list[Reached | Spoke]:
-    """Everything the voice is going to report, in time order; at one instant the word before the mark after it."""
-    end = begin + utterance.seconds
-    score: list[Reached | Spoke] = [Reached("start", begin, begin)]
-    score += [Spoke(word.text, word.position, begin + word.end) for word in utterance.words]
+def _score(behavior: Speech, utterance: Utterance) -> list[Reached | Spoke]:
+    """Everything the voice is going to report, in time order, seconds from its start; at one instant the word before
+    the mark after it."""
+    score: list[Reached | Spoke] = [Reached("start", 0.0, 0.0)]
+    score += [Spoke(word.text, word.position, word.end) for word in utterance.words]
     for mark in sorted(behavior.marks, key=lambda mark: mark.position):
-        at = begin + utterance.said_by(mark.position)
+        at = utterance.said_by(mark.position)
         score.append(Reached(mark.id, at, at))
-    score.append(Reached("end", end, end))
+    score.append(Reached("end", utterance.seconds, utterance.seconds))
     return sorted(score, key=lambda progress: progress.at)

@@ -40,6 +40,10 @@ class Utterance(Struct, frozen=True):
             previous = word
         return self.seconds
 
+    def is_gap(self, position: int) -> bool:
+        """Is no word being said when `position` characters of the text have been?"""
+        return not any(word.position - len(word.text) < position < word.position for word in self.words)
+
 
 def utter(text: str, pace: float = 1.0) -> Utterance:
     """The time line of `text`; prosody is ignored. pace: 2 takes twice as long."""

@@ -16,31 +16,26 @@ from services.realizer.assembly import Member
 from services.realizer.config import RealizerConfig
 from services.realizer.effects import Begin, Effect, Extend
 from services.realizer.experience import Experience
+from services.realizer.facts import Facts
 from services.realizer.forecast import Forecast, full_forecast
 from services.realizer.pacing import Pace, differs, pace
 from services.realizer.patience import Patience
 from services.realizer.planner import Plan
 from services.realizer.points import Point, performer
 from services.realizer.schedule import EPSILON
-from services.realizer.wiring import Wiring
 
 SURPRISE: Seconds = 0.1
 """What comes as far from when it was expected as this moves what depends on it noticeably."""
 
 
-class Authority:
+class Authority(Facts):
     """The state of one performance. began: loop time of the block's start; all times are of that clock."""
 
     def __init__(self, plan: Plan, began: Seconds, config: RealizerConfig) -> None:
-        self.began = began
+        super().__init__(began)
         self.config = config
-        self.reached: dict[Point, Seconds] = {}
-        self.arrived: dict[Point, Seconds] = {}
-        self.begun: dict[str, Seconds] = {}
         self.experience = Experience(plan.estimates)
         self.patience = Patience(config)
-        self._next: dict[str, int] = {}
-        """Of each behavior, how many of its points are reached."""
         self._through: dict[str, int] = {}
         self._granted_at: dict[str, Seconds] = {}
         self._paces: dict[str, Pace] = {}
@@ -53,15 +48,11 @@ class Authority:
 
     def replan(self, plan: Plan) -> None:
         """Go on with another plan of the same block, from the same facts: something was dropped."""
-        self.plan = plan
+        self._set_plan(plan)
         self.is_surprised = True
         size = len(plan.net.transitions)
-        self._wiring = Wiring(plan)
-        self._points = self._wiring.points
         self._unmet = [len(sources) for sources in self._wiring.waits_for]
         self._unreached = [len(members) for members in plan.members]
-        self._instants: dict[int, Seconds] = {}
-        """When each transition fired that has."""
         self._granted: set[tuple[int, str]] = set()
         self._wakes: list[tuple[Seconds, int]] = []
         self._arrivals: list[tuple[Seconds, Seconds, str, int]] = []
@@ -161,24 +152,10 @@ class Authority:
             if self.forecast is not None:
                 self.forecast.relearn(changed)
 
-    def has_ended(self, behavior: str) -> bool:
-        points = self._points.get(behavior)
-        return points is None or points[-1] in self.reached
-
     @property
     def is_over(self) -> bool:
         """Has everything ended that the block waits for?"""
         return not self._unended
-
-    def lateness(self, point: Point) -> Seconds:
-        """How much later than its constraints allow a point was that is reached; 0 if it was not."""
-        at, transition = self.reached[point], self.plan.at[point]
-        late = (
-            at - since - seconds
-            for other, seconds in self._wiring.not_after[transition]
-            if (since := self._instants.get(other)) is not None
-        )
-        return max((0.0, *late))
 
     # -- decisions -----------------------------------------------------------------------------------------------
 
@@ -245,6 +222,9 @@ class Authority:
             (self._instants[source] + lag for source, lag in self._wiring.waits_for[transition]), default=self.began
         )
         due = ready if self.forecast is None else max(ready, self.forecast.times[transition])
+        for member in missing:
+            if self._wiring.pauses(member.point):
+                self._decide_pause(transition, member, due, now)
         if due > now + EPSILON:
             self._wake(transition, due)
             if may_pass is not None and (arrival := self._arrival(may_pass)) is not None and arrival >= due - EPSILON:
@@ -269,13 +249,20 @@ class Authority:
                 self.forecast.require(self.plan.at[point])
             self._conclude()
 
+    def _decide_pause(self, transition: int, member: Member, due: Seconds, now: Seconds) -> None:
+        """An utterance goes through a word gap unless it would be noticeably early; it is told just before."""
+        arrival = self._arrival(member)
+        if arrival is None or (transition, member.behavior) in self._granted:
+            return
+        if arrival - self.config.lead > now + EPSILON:
+            self._wake(transition, arrival - self.config.lead)
+        elif due <= arrival + self.config.skew:
+            self._grant(transition, member)
+
     def _grant(self, transition: int, member: Member) -> None:
         if (transition, member.behavior) not in self._granted:
             self._granted.add((transition, member.behavior))
             self._touched.add(member.behavior)
-
-    def _is_there(self, member: Member) -> bool:
-        return member.point in self.reached or (member.kind == "hold" and member.point in self.arrived)
 
     def _arrival(self, member: Member) -> Seconds | None:
         """When a behavior under way will come to its hold point; None if it has not begun."""
@@ -322,13 +309,10 @@ class Authority:
 
     def may_pass(self, point: Point) -> bool:
         transition = self.plan.at[point]
-        if self.member(point).kind != "hold" or point in self.reached:
+        can_wait = self.member(point).kind == "hold" or self._wiring.pauses(point)
+        if not can_wait or point in self.reached:
             return True
         return (transition, point.behavior) in self._granted
-
-    def holds(self, point: Point) -> bool:
-        """Has it come to that instant? A gaze holds at `relax`, where its `stroke_end` is reported too."""
-        return self.member(point).point in self.arrived
 
     def _wake(self, transition: int, at: Seconds) -> None:
         heapq.heappush(self._wakes, (at, transition))
@@ -385,14 +369,3 @@ class Authority:
     def has_overdue(self) -> bool:
         """Is anybody expected later than facts alone would say?"""
         return bool(self._not_before)
-
-    # -- what pacing asks ----------------------------------------------------------------------------------------
-
-    def next_number(self, behavior: str) -> int:
-        """How many points of it are reached."""
-        return self._next.get(behavior, 0)
-
-    def member(self, point: Point) -> Member:
-        member = self._wiring.member(point)
-        assert member is not None, f"{point} is in no instant"
-        return member

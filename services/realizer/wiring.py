@@ -1,5 +1,6 @@
 """A plan, indexed by what decisions ask of it."""
 
+from schemas.behaviors import Speech
 from schemas.units import Seconds
 from services.realizer.assembly import Member
 from services.realizer.planner import Plan
@@ -33,6 +34,11 @@ class Wiring:
             if bound.kind != "phase":
                 self.not_after[bound.source].append((bound.target, -bound.lag))
         self.is_predictive = _is_predictive(plan)
+        self._pauses = _pauses(plan)
+
+    def pauses(self, point: Point) -> bool:
+        """Can an utterance that has begun wait there, at a word gap, where it should not be too early?"""
+        return point in self._pauses
 
     def member(self, point: Point) -> Member | None:
         """The part of its behavior in the point's instant."""
@@ -43,8 +49,25 @@ def _is_predictive(plan: Plan) -> bool:
     """Is anything constrained that cannot wait, or bounded from above? Else nothing need be predicted."""
     if any(bound.kind != "phase" for bound in plan.bounds):
         return True
-    constrained = {place.target for place in plan.net.places if place.kind in ("order", "delay", "series")}
+    constrained = _constrained(plan)
     return any(
         any(member.kind == "passive" for member in members) and (len(members) > 1 or transition in constrained)
         for transition, members in enumerate(plan.members)
     )
+
+
+def _constrained(plan: Plan) -> set[int]:
+    """Transitions that must not be before something."""
+    return {place.target for place in plan.net.places if place.kind in ("order", "delay", "series")}
+
+
+def _pauses(plan: Plan) -> frozenset[Point]:
+    constrained = _constrained(plan)
+    found: set[Point] = set()
+    for id, chain in plan.chains.items():
+        if isinstance(chain.behavior, Speech) and (estimate := plan.estimates.get(id)) is not None:
+            gaps = (Point(id, phase.to) for phase in estimate.phases if phase.hold)
+            found.update(
+                point for point in gaps if plan.at[point] in constrained or len(plan.members[plan.at[point]]) > 1
+            )
+    return frozenset(found)

@@ -126,6 +126,12 @@ class BodyContract:
         body.see(self.world)
         return body
 
+    def holds(self, body: Body, behavior: BlockBehavior) -> tuple[str, ...]:
+        """Where it can wait; in a speech where the body says so, at marks between two words."""
+        if not isinstance(behavior, Speech):
+            return HOLDS.get(type_of(behavior), ())
+        return tuple(phase.to for phase in body.estimate(behavior, None, self.world).phases if phase.hold)
+
     def able(self, body: Body) -> list[BlockBehavior]:
         able = [behavior for behavior in self.behaviors if type_of(behavior) in body.capabilities.types]
         assert able, "a body that can do none of the suite's behaviors"
@@ -151,7 +157,7 @@ class BodyContract:
         for behavior in self.able(body):
             stage = Stage(body, behavior)
             points = sync_points(behavior)
-            for hold in HOLDS.get(type_of(behavior), ()):
+            for hold in self.holds(body, behavior):
                 await asyncio.sleep(10.0)
                 assert stage.waits_at[-1:] == [hold], behavior.id
                 assert not set(stage.passed) & set(points[points.index(hold) :]), behavior.id
@@ -159,7 +165,7 @@ class BodyContract:
             progress = await stage.over()
 
             assert tuple(stage.passed) == points
-            for hold in HOLDS.get(type_of(behavior), ()):
+            for hold in self.holds(body, behavior):
                 left = next(item for item in progress if isinstance(item, Reached) and item.sync == hold)
                 arrived = next(item for item in progress if isinstance(item, Arrived) and item.sync == hold)
                 assert left.arrived == arrived.at < left.at, behavior.id

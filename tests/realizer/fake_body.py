@@ -115,6 +115,7 @@ class FakeBody:
     """scripts: by behavior id. estimates: durations it expects, by behavior id, where not natural.
 
     elastic: shortest and longest time of a phase, by its natural one. homing: seconds on the way home.
+    pauses: the voice can wait at its marks.
     """
 
     def __init__(
@@ -123,7 +124,10 @@ class FakeBody:
         estimates: Mapping[str, tuple[Seconds, ...]] | None = None,
         elastic: tuple[float, float] = (1.0, 1.0),
         homing: Seconds = 0.0,
+        *,
+        pauses: bool = False,
     ) -> None:
+        self.pauses = pauses
         self.elastic = elastic
         self.homing = homing
         self.scripts = dict(scripts or {})
@@ -172,7 +176,7 @@ class FakeBody:
         if kind := self._script(behavior).infeasible:
             return Estimate(behavior=behavior.id, feasible=False, warning=kind, fault=Fault(reason="no way"))
         durations = self.estimates.get(behavior.id, natural_durations(behavior))
-        holds = HOLDS.get(type_of(behavior), ())
+        holds = self._holds(behavior)
         phases = tuple(
             Phase(
                 since=since,
@@ -185,6 +189,11 @@ class FakeBody:
             for (since, to), seconds in zip(pairwise(points_of(behavior)), durations, strict=True)
         )
         return Estimate(behavior=behavior.id, feasible=True, parts=parts_of(behavior), phases=phases)
+
+    def _holds(self, behavior: BlockBehavior) -> tuple[str, ...]:
+        if isinstance(behavior, Speech) and self.pauses:
+            return tuple(mark.id for mark in behavior.marks)
+        return HOLDS.get(type_of(behavior), ())
 
     def _estimate(self, question: Message) -> Message:
         assert isinstance(question, EstimateBehaviors)
@@ -220,7 +229,7 @@ class FakeBody:
         behavior = act.perform.behavior
         script = self._script(behavior)
         durations = script.durations or natural_durations(behavior)
-        points, holds = points_of(behavior), HOLDS.get(type_of(behavior), ())
+        points, holds = points_of(behavior), self._holds(behavior)
         self._reached(act, points[0], self.bus.now())
         pending: list[str] = []
         for seconds, sync in zip(durations, points[1:], strict=True):

@@ -106,3 +106,25 @@ async def test_a_gaze_lingers_on_its_way_to_meet_a_word_that_is_late() -> None:
 
     assert seen.times()["g:start"] == 0.75
     assert seen.times()["g:stroke"] == seen.times()["s:m2"] == 3.0
+
+
+async def test_an_utterance_under_way_pauses_at_a_word_gap_for_an_arm_that_is_late() -> None:
+    late = FakeBody({"p": Script(durations=(0.5, 1.5, 0.5, 0.25, 0.25, 0.5))}, pauses=True)
+    async with stage(late) as seen:
+        await seen.perform(block((Pointing(id="p", target="a"), STORY), together("p:stroke", "s:m")))
+
+    times = seen.times()
+    assert times["s:start"] == 0.25
+    assert times["p:stroke"] == times["s:m"] == 2.5
+    assert seen.body.stops == ["s:m"]
+    assert times["s:end"] == 3.5
+
+
+async def test_an_utterance_on_time_never_pauses_and_one_that_has_not_begun_is_delayed() -> None:
+    body = FakeBody(pauses=True)
+    async with stage(body) as seen:
+        await seen.perform(block((Pointing(id="p", target="a"), STORY), together("p:stroke", "s:m")))
+
+    assert seen.times()["s:start"] == 0.25
+    assert seen.times()["p:stroke"] == seen.times()["s:m"] == 1.25
+    assert body.stops == []

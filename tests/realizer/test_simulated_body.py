@@ -7,6 +7,8 @@ import asyncio
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from functools import partial
+from itertools import groupby
+from operator import itemgetter
 
 import numpy as np
 from hypothesis import given, settings
@@ -39,8 +41,6 @@ WORLD = World(
     )
 )
 STEP = 0.01
-EDGE = 0.08
-"""Around a hold, the start and the end a motion is slow: it brakes and sets off again."""
 
 
 class Robot(Struct):
@@ -103,16 +103,15 @@ class Robot(Struct):
             peak = max(speed for _, speed in samples)
             if peak < 1e-3:
                 continue
-            moving = [
-                (at, speed >= 0.01 * peak)
-                for at, speed in samples
-                if began["start"] + EDGE < at < began["end"] - EDGE
-            ]
-            found += [
-                f"{behavior} at {at:.2f}"
-                for at, is_moving in moving
-                if not is_moving and not any(since - EDGE <= at <= until + EDGE for since, until in holds)
-            ]
+            inside = [each for each in samples if began["start"] <= each[0] <= began["end"]]
+            marked = [(at, speed < 0.01 * peak) for at, speed in inside]
+            moving = [number for number, (_, is_slow) in enumerate(marked) if not is_slow]
+            # It sets off from rest and comes to rest in the end: what counts is in between.
+            for is_slow, group in groupby(marked[moving[0] : moving[-1]], itemgetter(1)):
+                times_slow = [at for at, _ in group]
+                first, last = times_slow[0] - STEP, times_slow[-1] + STEP
+                if is_slow and not any(since <= last and first <= until for since, until in holds):
+                    found.append(f"{behavior} at {times_slow[0]:.2f}")
         return found
 
 
