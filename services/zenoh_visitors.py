@@ -1,6 +1,6 @@
 """What programs that know only Zenoh may ask: the last states, and what was said lately.
 
-`session.get("<robot>/engage/v1/state/**")` brings them as they were published: encoding, attachment, Zenoh's
+A `session.get` of all states (`keys.of_class`) brings them as they were published: encoding, attachment, Zenoh's
 timestamp. Parameters of the selector, joined by `;` as Zenoh has it: `format=json`, and `age=SECONDS`, how far back
 commands and events go.
 """

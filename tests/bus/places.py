@@ -19,9 +19,20 @@ PATIENCE = 60.0
 
 
 def free_endpoint() -> str:
+    """Where nobody listens yet, and nobody else will: each process of tests has a loopback address of its own.
+
+    Ports of 127.0.0.1 are shared with all that runs here, other runs of these tests among them.
+    """
     with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return f"tcp/127.0.0.1:{probe.getsockname()[1]}"
+        try:
+            probe.bind((OWN_ADDRESS, 0))
+        except OSError:  # only Linux has them all without being asked
+            probe.bind(("127.0.0.1", 0))
+        host, port = probe.getsockname()
+        return f"tcp/{host}:{port}"
+
+
+OWN_ADDRESS = f"127.{64 + (os.getpid() >> 16) % 128}.{os.getpid() >> 8 & 255}.{os.getpid() & 255}"
 
 
 class MemoryPlace:

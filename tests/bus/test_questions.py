@@ -58,10 +58,12 @@ async def test_a_process_that_is_there_is_asked_again_when_it_has_not_answered(p
 
 async def test_a_process_that_never_answers_holds_up_nobody_for_ever(pair: tuple[ZenohHub, ZenohHub]):
     here, there = pair
+    inbox = here.join("here").subscribe(keys.WORLD)
+    assert numbers(await messages(inbox)) == [1]
     asked = unanswered(here, 1000)
 
-    inbox = here.join("here").subscribe(keys.FEEDBACK)
-    there.join("another").publish(keys.FEEDBACK, state(2))
+    here.readers.process_came(there.run)
+    there.join("another").publish(keys.WORLD, state(2))
 
     assert numbers(await messages(inbox)) == [2]
     assert asked == TRIES * [there.run]

@@ -13,6 +13,7 @@ import zenoh
 from schemas import keys
 from schemas.messages import decode, encode, encode_json
 from schemas.requests import Accepted
+from schemas.status import AskStatus
 from services.bus import Bus
 from services.runtime import Ready, running
 from services.zenoh_bus import ZenohHub, open_hub
@@ -165,8 +166,9 @@ async def test_json_comes_when_the_selector_asks_for_it(town: Town):
 
 
 async def test_a_question_in_json_is_answered_in_json(town: Town):
-    _, far, visitor = town
+    near, far, visitor = town
     far.join("there").answer(keys.DESCRIBE, echo)
+    await near.join("here").query(keys.DESCRIBE, Accepted(id="a"), PATIENCE)  # the visitor's door knows who answers
     good, bad = ({"payload": encode_json(Accepted(id=id)), "encoding": "application/json"} for id in ("a", "bad"))
 
     [answer] = await visitor.get(keys.DESCRIBE, **good)
@@ -213,6 +215,7 @@ async def test_without_a_payload_a_visitor_asks_every_service_how_it_is(town: To
         await asyncio.Event().wait()
 
     async with running(near, {"one": work, "two": work}), running(far, {"three": work}):
+        await near.join("here").query(keys.status("three"), AskStatus(), PATIENCE)
         replies = await visitor.samples(f"{keys.status('*')}?format=json", target=zenoh.QueryTarget.ALL)
 
     found = {status["participant"]: status for status in (json.loads(one.payload.to_bytes()) for one in replies)}

@@ -4,7 +4,6 @@ import asyncio
 import os
 import re
 import signal
-import socket
 from asyncio.subprocess import Process
 from contextlib import suppress
 from pathlib import Path
@@ -12,6 +11,7 @@ from pathlib import Path
 import pytest
 
 from services.commandline.roster import NAMES
+from tests.bus.places import free_endpoint
 from tests.cli.command import FRAGMENT, GOOD_BLOCK, start, threads
 
 pytestmark = pytest.mark.real_time
@@ -24,9 +24,7 @@ ZENOH = re.compile(r"(acc|app|net|rx|tx)-\d+")
 @pytest.fixture
 def endpoint() -> str:
     """Where nobody listens yet."""
-    with socket.socket() as free:
-        free.bind(("127.0.0.1", 0))
-        return f"tcp/127.0.0.1:{free.getsockname()[1]}"
+    return free_endpoint()
 
 
 async def line(process: Process, text: str, *, log: bool = True) -> str:

@@ -3,7 +3,6 @@
 import asyncio
 import importlib.util
 import re
-import socket
 import sys
 from contextlib import suppress
 from pathlib import Path
@@ -20,6 +19,7 @@ from schemas.requests import Accepted
 from schemas.units import Stamp
 from schemas.world import World
 from services.zenoh_bus import open_hub
+from tests.bus.places import free_endpoint
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"
 PAGE = (DOCS / "protocol.md").read_text(encoding="utf-8")
@@ -75,9 +75,7 @@ def test_every_key_of_the_json_lines_is_described(name: str) -> None:
 
 @pytest.mark.real_time
 async def test_the_example_in_plain_zenoh_reaches_every_process() -> None:
-    with socket.socket() as free:
-        free.bind(("127.0.0.1", 0))
-        endpoint = f"tcp/127.0.0.1:{free.getsockname()[1]}"
+    endpoint = free_endpoint()
     example, _ = re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL)
     program = example.replace("tcp/127.0.0.1:7447", endpoint).replace("to_bytes())", "to_bytes(), flush=True)")
     assert endpoint in program
@@ -108,9 +106,7 @@ async def test_the_example_in_plain_zenoh_reaches_every_process() -> None:
 
 @pytest.mark.real_time
 async def test_the_example_of_a_query_brings_the_last_states_as_json() -> None:
-    with socket.socket() as free:
-        free.bind(("127.0.0.1", 0))
-        endpoint = f"tcp/127.0.0.1:{free.getsockname()[1]}"
+    endpoint = free_endpoint()
     opening, query = re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL)
     head = opening.replace("tcp/127.0.0.1:7447", endpoint).partition("    states = ")[0]
     program = head + indent(query, "    ")
