@@ -177,18 +177,26 @@ class Assembler:
         for later, earlier in self.arrangement.turns:
             self._follow(earlier, Point(later, "start"), behavior=later)
         for id, (successor, point) in self.arrangement.successors.items():
-            self._follow(Point(successor, "start"), point, behavior=id)
+            kind: PlaceKind = "series" if id in self.arrangement.natural else "handover"
+            self._follow(Point(successor, "start"), point, behavior=id, kind=kind)
         others = [id for id in self.chains if id in self.waited_for and id not in self.arrangement.natural]
         for id in self.arrangement.lasting:
             for other in others:
                 self._follow(self.chains[other].points[-1], Point(id, "relax"), behavior=id)
 
     def _follow(
-        self, before: Point, point: Point, seconds: Seconds = 0.0, *, behavior: str = "", lines: tuple[int, ...] = ()
+        self,
+        before: Point,
+        point: Point,
+        seconds: Seconds = 0.0,
+        *,
+        behavior: str = "",
+        lines: tuple[int, ...] = (),
+        kind: PlaceKind = "series",
     ) -> None:
         source, target = self.at[before], self.at[point]
         if source != target:
-            self.places.append(Place("series", source, target, seconds, seconds, behavior, lines))
+            self.places.append(Place(kind, source, target, seconds, seconds, behavior, lines))
 
     def _never_too_soon(self) -> None:
         """An order on a point that cannot wait is kept for certain by where its behavior can: it waits there.

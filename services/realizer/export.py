@@ -25,7 +25,7 @@ def as_text(plan: Plan) -> str:
         f"{'*' if each in critical else ' '}{plan.schedule[each]:8.3f} s  {net.transitions[each].name}"
         for each in by_time
     ]
-    ties = [_tie(plan, place) for place in net.places if place.kind in ("order", "delay", "series") and place.source]
+    ties = [_tie(plan, place) for place in net.places if place.kind not in ("phase", "idle") and place.source]
     ties += [_tie(plan, bound) for bound in plan.bounds if bound.kind != "phase"]
     lines += ["", *ties] if ties else []
     lines += [f"ends when something takes its place, or with the block: {id}" for id in sorted(plan.natural)]

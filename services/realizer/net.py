@@ -21,7 +21,8 @@ from msgspec import Struct
 from schemas.units import Seconds
 from services.realizer.points import Point
 
-PlaceKind = Literal["phase", "delay", "order", "series", "idle"]
+PlaceKind = Literal["phase", "delay", "order", "series", "handover", "idle"]
+"""handover: where the start of its successor cuts a behavior short. Nobody waits for it: who is early goes home."""
 Marking = bytes
 """Tokens in each place; a byte each, so that the next marking is a copy and not a walk."""
 
