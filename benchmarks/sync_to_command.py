@@ -1,17 +1,23 @@
 """From a sync point to the command it releases: body -> bus -> realizer -> bus -> body, beside raw Zenoh.
 
-    python benchmarks/sync_to_command.py [--laps 10] [--trips 100] [--chain 10] [--json]
+    python benchmarks/sync_to_command.py [--laps 10] [--trips 100] [--chain 10] [--inside] [--json]
 
 This process plays the body, another one is the realizer. A block is a chain of speeches, each synchronized with
 the end of the one before. A trip begins when the body publishes `SyncPointReached` of an end, and is over when the
 next `PerformBehavior` has come. It contains, at the realizer: the Petri net's step, the feedback about it, and the
 new request. The first row is a raw Zenoh ping-pong of the same payload between two processes, in the same run.
+
+With `--inside` there is one process and a bus in memory: what is left is the realizer. And the memory that it keeps
+for each of 100 live blocks, as `tracemalloc` counts it.
 """
 
 import argparse
 import asyncio
+import gc
 import itertools
+import json
 import sys
+import tracemalloc
 from functools import partial
 from pathlib import Path
 from time import perf_counter
@@ -35,10 +41,11 @@ from schemas.body import (
 from schemas.messages import Message
 from schemas.units import Seconds
 from services.bus import Bus
+from services.memory_bus import MemoryHub
 from services.realizer.config import RealizerConfig
 from services.realizer.service import realize
 from services.requests import RequestDesk, Requester
-from services.runtime import serve
+from services.runtime import running, serve
 from services.zenoh_bus import open_hub
 
 ROBOT = "benchmark"
@@ -156,17 +163,62 @@ async def measure(laps: int, trips: int, links: int, as_json: bool) -> None:
         session.close()  # type: ignore[no-untyped-call]
 
 
+async def measure_inside(laps: int, trips: int, links: int, as_json: bool) -> None:
+    async with MemoryHub() as hub, running(hub, {"realizer": partial(realize, config=RealizerConfig())}):
+        report(await compare([Body(hub.join("control"), links)], laps, trips), as_json)
+    for behaviors in (3, links):
+        size = await memory_per_block(behaviors)
+        print(json.dumps({"live_block_kB": size, "behaviors": behaviors}) if as_json else
+              f"a live block of {behaviors} behaviors keeps {size:.1f} kB")  # fmt: skip
+
+
+async def memory_per_block(behaviors: int, blocks: int = 100) -> float:
+    """kB that a realizer keeps for a block whose first behavior runs: plan, authority, tasks, requests."""
+    async with MemoryHub() as hub, running(hub, {"realizer": partial(realize, config=RealizerConfig())}):
+        bus = hub.join("control")
+        desk, requests = RequestDesk(bus, "control", lambda cancel: None), Requester(bus)
+        bus.answer(keys.ESTIMATE, estimate)
+        bus.declare_alive()
+        with bus.subscribe(*RequestDesk.patterns("control")) as inbox:
+            sizes = []
+            for lap in range(2):  # The first one pays for what all blocks share.
+                gc.collect()
+                tracemalloc.start()
+                for number in range(blocks):
+                    block = chain(f"block-{lap}-{number}", behaviors)
+                    requests.send(keys.BLOCK, PerformBlock(id=block.id, requester=bus.name, block=block))
+                begun = 0
+                while begun < blocks:
+                    received = await inbox.next()
+                    assert received is not None
+                    if isinstance(command := desk.take(received), PerformBehavior):
+                        desk.accept(command.id)
+                        begun += 1
+                await asyncio.sleep(0.1)
+                gc.collect()
+                ours = [tracemalloc.Filter(True, "*/services/realizer/*"), tracemalloc.Filter(True, "*/asyncio/*")]
+                kept = tracemalloc.take_snapshot().filter_traces(ours)
+                sizes.append(sum(each.size for each in kept.statistics("filename")))
+                tracemalloc.stop()
+        requests.close()
+        desk.close()
+    return sizes[-1] / blocks / 1000
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--laps", type=int, default=10)
     parser.add_argument("--trips", type=int, default=100)
     parser.add_argument("--chain", type=int, default=10, help="trips in a block")
+    parser.add_argument("--inside", action="store_true", help="one process, a bus in memory")
     parser.add_argument("--json", action="store_true")
     parser.add_argument("--serve", nargs=2, metavar=("ROLE", "ENDPOINT"), help=argparse.SUPPRESS)
     options = parser.parse_args()
     if options.serve:
         role, endpoint = options.serve
         asyncio.run(SERVERS[role](endpoint))
+    elif options.inside:
+        asyncio.run(measure_inside(options.laps, options.trips, options.chain, options.json))
     else:
         asyncio.run(measure(options.laps, options.trips, options.chain, options.json))
 

@@ -52,6 +52,9 @@ class Authority(Facts):
         self.is_surprised = True
         size = len(plan.net.transitions)
         self._unmet = [len(sources) for sources in self._wiring.waits_for]
+        """Of each transition: what has not been measured that it waits for, and who has not begun that is to come."""
+        for transition, members in enumerate(plan.members):
+            self._unmet[transition] += sum(self._is_to_come(member) for member in members)
         self._unreached = [len(members) for members in plan.members]
         self._granted: set[tuple[int, str]] = set()
         self._wakes: list[tuple[Seconds, int]] = []
@@ -69,7 +72,9 @@ class Authority(Facts):
             if point in plan.at:
                 self._note(point)
         for behavior in self.begun:
-            self._follow(behavior)
+            if self.forecast is not None:
+                for point in self._points.get(behavior, ()):
+                    self.forecast.require(plan.at[point])
             if behavior not in plan.chains:
                 self.patience.forget(behavior)
             elif not self.has_ended(behavior):
@@ -164,25 +169,34 @@ class Authority(Facts):
         self._predict(now)
         while self._wakes and self._wakes[0][0] <= now + EPSILON:
             self._dirty.add(heapq.heappop(self._wakes)[1])
-        beginning: list[str] = []
-        for transition in sorted(self._dirty):
-            self._decide(transition, now, beginning)
-        self._dirty.clear()
+        beginning = self._decide_all(now)
         effects: list[Effect] = []
-        for behavior in sorted(self._touched):
+        for behavior in sorted(self._touched - set(beginning)):
             if behavior in self.begun and not self.has_ended(behavior):
                 effects += self._extension(behavior, now)
         self._touched.clear()
         # Of two that begin together on one part, the later in the document takes it over.
         for behavior in sorted(beginning, key=list(self.plan.chains).index) if len(beginning) > 1 else beginning:
-            self.begun[behavior] = now
-            self._follow(behavior)
             through = self._furthest(behavior, now)
             self._paces[behavior] = pace(behavior, self, now)
             effects.append(Begin(behavior, self._points[behavior][through].sync, self._paces[behavior]))
             self._watch(behavior)
         effects += self.patience.overdue(now)
         return effects
+
+    def _decide_all(self, now: Seconds) -> list[str]:
+        """Decide what is to be, until nothing follows from it; who begins."""
+        beginning: list[str] = []
+        count = 0
+        while self._dirty:
+            dirty, self._dirty = sorted(self._dirty), set()
+            for transition in dirty:
+                self._decide(transition, now, beginning)
+            for behavior in beginning[count:]:
+                self.begun[behavior] = now
+                self._follow(behavior)
+            count = len(beginning)
+        return beginning
 
     @property
     def deadline(self) -> Seconds | None:
@@ -242,11 +256,21 @@ class Authority(Facts):
                 if member.kind == "start" and member.behavior not in self.begun:
                     beginning.append(member.behavior)
 
+    def _is_to_come(self, member: Member) -> bool:
+        """Is it of a behavior that has not even begun, and later than its start?"""
+        return member.kind != "start" and member.behavior in self._points and member.behavior not in self.begun
+
     def _follow(self, behavior: str) -> None:
         """It begins: when its points are to be matters from now on."""
+        for transition in {self.plan.at[point] for point in self._points.get(behavior, ())}:
+            member = next(each for each in self.plan.members[transition] if each.behavior == behavior)
+            if member.kind != "start":
+                self._unmet[transition] -= 1
+                if not self._unmet[transition]:
+                    self._open(transition)
+            if self.forecast is not None:
+                self.forecast.require(transition)
         if self.forecast is not None:
-            for point in self._points.get(behavior, ()):
-                self.forecast.require(self.plan.at[point])
             self._conclude()
 
     def _decide_pause(self, transition: int, member: Member, due: Seconds, now: Seconds) -> None:

@@ -42,7 +42,8 @@ class Forecast(LongestPaths):
         for rank, transition in enumerate(order(net) or range(size)):
             self._rank[transition] = rank
         for place in net.places:
-            if place.kind != "idle":
+            # Nothing is earlier than the block's start anyway.
+            if place.kind != "idle" and (place.source or place.lag > 0.0):
                 behavior = place.behavior if place.kind == "phase" else ""
                 arc = self._add(place.source, place.target, place.lag, min(place.shortest, place.lag), behavior)
                 if behavior:
