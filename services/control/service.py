@@ -99,6 +99,7 @@ class _Control:
         self._loop = asyncio.get_running_loop()
         self._silence: dict[str, asyncio.TimerHandle] = {}
         self._next_state: asyncio.TimerHandle | None = None
+        self._next_state_at = inf
         self._published: Seconds = -inf
 
     # -- reads --------------------------------------------------------------------------------------------------
@@ -263,12 +264,13 @@ class _Control:
     def _keep_publishing(self) -> None:
         """Something has begun to move."""
         due = self._published + 1.0 / self._config.state_rate
-        if self._next_state is None or self._next_state.when() > due:
+        if self._next_state_at > due:
             self._schedule_state(due)
 
     def _schedule_state(self, at: Seconds) -> None:
         if self._next_state is not None:
             self._next_state.cancel()
+        self._next_state_at = at  # uvloop's handles do not tell their time when it has passed
         self._next_state = self._loop.call_at(at, self.publish_state)
 
     # -- dead man -----------------------------------------------------------------------------------------------

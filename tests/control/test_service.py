@@ -2,6 +2,7 @@
 
 import asyncio
 from itertools import pairwise
+from typing import Any
 
 import pytest
 
@@ -29,6 +30,7 @@ from schemas.requests import Outcome
 from services.control.config import Displaced, Slow, Variability
 from services.memory_bus import MemoryHub
 from services.requests import RequestRefused
+from services.virtual_time import VirtualTimeLoop
 from tests.control.directing import robot, tip
 from tests.control.motions import STEP
 
@@ -323,3 +325,23 @@ async def ready_after(hub: MemoryHub, variability: Variability) -> float:
         await client.outcome(client.perform(POINT))
     at = client.reached("point-1")
     return at["ready"] - at["start"]
+
+
+class SparseLoop(VirtualTimeLoop):
+    """As uvloop does it: what is due already becomes a plain handle, which knows no time."""
+
+    def call_at(self, when: float, callback: Any, *args: Any, context: Any = None) -> Any:
+        if when <= self.time():
+            return self.call_soon(callback, *args, context=context)
+        return super().call_at(when, callback, *args, context=context)
+
+
+def test_it_serves_on_a_loop_whose_overdue_timers_know_no_time():
+    async def main() -> str:
+        async with MemoryHub() as hub, robot(hub) as client:
+            await asyncio.sleep(1.5)
+            outcome = await client.outcome(client.perform(Gaze(id="gaze-1", target="near-right")))
+            return str(outcome.status)
+
+    with asyncio.Runner(loop_factory=SparseLoop) as runner:
+        assert runner.run(main()) == "done"
