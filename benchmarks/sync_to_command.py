@@ -41,6 +41,7 @@ from schemas.body import (
 from schemas.messages import Message
 from schemas.units import Seconds
 from services.bus import Bus
+from services.commandline.process import run, run_until_signal
 from services.memory_bus import MemoryHub
 from services.realizer.config import RealizerConfig
 from services.realizer.service import realize
@@ -166,7 +167,7 @@ async def measure(laps: int, trips: int, links: int, as_json: bool) -> None:
 async def measure_inside(laps: int, trips: int, links: int, as_json: bool) -> None:
     async with MemoryHub() as hub, running(hub, {"realizer": partial(realize, config=RealizerConfig())}):
         report(await compare([Body(hub.join("control"), links)], laps, trips), as_json)
-    for behaviors in (3, links):
+    for behaviors in (3, 50):
         size = await memory_per_block(behaviors)
         print(json.dumps({"live_block_kB": size, "behaviors": behaviors}) if as_json else
               f"a live block of {behaviors} behaviors keeps {size:.1f} kB")  # fmt: skip
@@ -216,11 +217,11 @@ def main() -> None:
     options = parser.parse_args()
     if options.serve:
         role, endpoint = options.serve
-        asyncio.run(SERVERS[role](endpoint))
+        run_until_signal(SERVERS[role](endpoint))
     elif options.inside:
-        asyncio.run(measure_inside(options.laps, options.trips, options.chain, options.json))
+        run(measure_inside(options.laps, options.trips, options.chain, options.json))
     else:
-        asyncio.run(measure(options.laps, options.trips, options.chain, options.json))
+        run(measure(options.laps, options.trips, options.chain, options.json))
 
 
 if __name__ == "__main__":
