@@ -24,6 +24,7 @@ from schemas.body import SyncPointReached
 from schemas.messages import encode
 from schemas.units import Seconds, Stamp
 from services.bus import Bus
+from services.commandline.process import run, run_until_signal
 from services.zenoh_bus import open_hub
 from services.zenoh_session import QOS, open_session
 
@@ -179,10 +180,9 @@ def main() -> None:
     options = parser.parse_args()
     if options.serve:
         role, endpoint = options.serve
-        work = SERVERS[role](endpoint)
+        run_until_signal(SERVERS[role](endpoint))
     else:
-        work = measure(options.laps, options.trips, options.json)
-    asyncio.run(work)
+        run(measure(options.laps, options.trips, options.json))
 
 
 if __name__ == "__main__":

@@ -12,6 +12,7 @@
 | alive  | who is there | liveliness; delivered as `PeerAlive` and `PeerGone` |
 """
 
+from functools import lru_cache
 from typing import Literal, get_args
 
 PREFIX = "engage/v1"
@@ -102,6 +103,7 @@ def run_of(key: str) -> str:
     return key.split("/")[3]
 
 
+@lru_cache(4096)  # asked several times for every message
 def key_class(key: str) -> KeyClass:
     """Raises ValueError for a key outside the table, or one whose class is a wildcard."""
     chunks = key.split("/")
