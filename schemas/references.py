@@ -24,9 +24,9 @@ class Site(NamedTuple):
     line: int
 
 
-def type_name(behavior: Behavior) -> str:
+def type_name(behavior: Behavior | type[Behavior]) -> str:
     """The BML element name: `gazeShift`. The `type` of the JSON form."""
-    return str(type(behavior).__struct_config__.tag)
+    return str(behavior.__struct_config__.tag)
 
 
 def marks(thing: Input) -> dict[str, frozenset[str]]:

@@ -12,6 +12,7 @@ from math import inf, radians
 from schemas.behaviors import BlockBehavior, Gaze, GazeShift, HeadDirectionShift, Speech, Wait
 from schemas.body import BodyPose, Capabilities, Estimate, NoPointZone
 from schemas.faults import Fault
+from schemas.references import type_name
 from schemas.units import Seconds
 from schemas.world import World
 from services.control import choreography, head, kinematics, speaking, tracks, variability
@@ -45,7 +46,7 @@ class SimulatedBody(Body):
 
     def __init__(self, zones: tuple[NoPointZone, ...] = (), deviations: Variability | None = None) -> None:
         self.capabilities = Capabilities(
-            body="simulated", types=tuple(TYPES.values()), parts=(*kinematics.PARTS, "voice"),
+            body="simulated", types=tuple(map(type_name, TYPES)), parts=(*kinematics.PARTS, "voice"),
             joints=kinematics.JOINTS, reach=kinematics.REACH, no_point_zones=zones,
         )  # fmt: skip
         self._deviations = deviations or Variability()

@@ -1,4 +1,4 @@
-"""What the simulated torso knows by name: types of behavior, gestures, faces and postures."""
+"""What the simulated torso knows: types of behavior, gestures, faces and postures."""
 
 from collections.abc import Mapping
 
@@ -21,13 +21,11 @@ from schemas.behaviors import (
     Wait,
 )
 
-TYPES: Mapping[type[BlockBehavior], str] = {
-    Gaze: "gaze", GazeShift: "gazeShift", HeadDirectionShift: "headDirectionShift", Pointing: "pointing",
-    Gesture: "gesture", Head: "head", Face: "face", FaceLexeme: "faceLexeme", FaceFacs: "faceFacs",
-    FaceShift: "faceShift", Posture: "posture", PostureShift: "postureShift", Pose: "pose", Speech: "speech",
-    Wait: "wait",
-}  # fmt: skip
-"""What this body performs, by BML name."""
+TYPES: tuple[type[BlockBehavior], ...] = (
+    Gaze, GazeShift, HeadDirectionShift, Pointing, Gesture, Head, Face, FaceLexeme, FaceFacs, FaceShift, Posture,
+    PostureShift, Pose, Speech, Wait,
+)  # fmt: skip
+"""What this body performs."""
 
 GESTURES: Mapping[str, tuple[tuple[float, float, float], ...]] = {
     "BEAT": ((0, 22, 112), (4, 16, 82), (8, 2, 92)),

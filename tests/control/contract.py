@@ -29,6 +29,7 @@ from schemas.behaviors import (
     Speech,
     Wait,
 )
+from schemas.references import type_name
 from schemas.world import Entity, World
 from services.control.body import (
     Arrived,
@@ -68,10 +69,6 @@ HOLDS = {
 }  # fmt: skip
 """Where each type can wait, as the realizer knows it."""
 PATIENCE = 30.0
-
-
-def type_of(behavior: BlockBehavior) -> str:
-    return str(behavior.__struct_config__.tag)
 
 
 def times(progress: Sequence[Progress]) -> dict[str, float]:
@@ -129,11 +126,11 @@ class BodyContract:
     def holds(self, body: Body, behavior: BlockBehavior) -> tuple[str, ...]:
         """Where it can wait; in a speech where the body says so, at marks between two words."""
         if not isinstance(behavior, Speech):
-            return HOLDS.get(type_of(behavior), ())
+            return HOLDS.get(type_name(behavior), ())
         return tuple(phase.to for phase in body.estimate(behavior, None, self.world).phases if phase.hold)
 
     def able(self, body: Body) -> list[BlockBehavior]:
-        able = [behavior for behavior in self.behaviors if type_of(behavior) in body.capabilities.types]
+        able = [behavior for behavior in self.behaviors if type_name(behavior) in body.capabilities.types]
         assert able, "a body that can do none of the suite's behaviors"
         return able
 
@@ -172,7 +169,7 @@ class BodyContract:
 
     async def test_stands_still_while_it_holds(self, body: Body):
         for behavior in self.able(body):
-            if type_of(behavior) not in HOLDS:
+            if type_name(behavior) not in HOLDS:
                 continue
             stage = Stage(body, behavior)
             await asyncio.sleep(10.0)
@@ -222,7 +219,7 @@ class BodyContract:
         await body.home()
         home = body.state().pose
         for behavior in self.able(body):
-            if type_of(behavior).endswith("Shift"):
+            if type_name(behavior).endswith("Shift"):
                 continue
             for how in ("relax", "freeze"):
                 stage = Stage(body, behavior, "end")
@@ -240,7 +237,7 @@ class BodyContract:
         await body.home()
         home = body.state().pose
         for behavior in self.able(body):
-            if type_of(behavior) in HOLDS:
+            if type_name(behavior) in HOLDS:
                 stage = Stage(body, behavior)
                 await asyncio.sleep(5.0)
                 stage.authority.revoke()
@@ -280,7 +277,7 @@ class BodyContract:
              Pointing(id="other", target="far-left", mode="RIGHT_HAND")),
         )  # fmt: skip
         for first, later in pairs:
-            if type_of(first) not in body.capabilities.types:
+            if type_name(first) not in body.capabilities.types:
                 continue
             one = Stage(body, first)
             await asyncio.sleep(5.0)
