@@ -13,6 +13,7 @@ from services.recognition.limits import LimitClock
 from services.recognition.machine import IDLE, Ledger, UnderWay
 from services.recognition.mutual_facial_gaze import HUMAN_WAITING, MutualFacialGaze
 from services.recognition.scene import Gaze, Scene
+from services.recognition.shared_gaze import SharedGaze
 
 
 class Due(NamedTuple):
@@ -163,17 +164,18 @@ class Person:
                 one.step("fragment_takes_head", at)
         self.forget_idle(at)
 
-    def gaze_machines(self) -> Iterator[DirectedGaze | MutualFacialGaze]:
+    def gaze_machines(self) -> Iterator[SharedGaze]:
         yield self.facial
         yield from self.directed
 
     def _human_looks_at_face(self, at: Seconds) -> None:
         limit = self._config.mutual_facial_gaze_limit
         event = self._by_human("mutual_facial_gaze", at, limit)
-        self.facial.human_looks(
+        self.facial.human_begins(
             event,
             LimitClock(at, limit),
-            robot_on=self._scene.robot_looks_at((self.id,)),
+            robot_since=self._scene.robot_since((self.id,)),
+            human_on=True,
             in_vain=self._scene.fragment_looks_elsewhere((self.id,)),
             at=at,
         )
@@ -197,14 +199,14 @@ class Person:
         limit = self._config.directed_gaze_limit
         event = self._by_human("directed_gaze", since, limit, objects)
         in_vain = self._scene.fragment_looks_elsewhere(objects)
-        robot_since = self._scene.gaze.since if self._scene.robot_looks_at(objects) else None
+        robot_since = self._scene.robot_since(objects)
         if robot_since is not None or not in_vain:
             self.facial.directed_gaze_begins(at, by_robot=False)
         human_on = self._scene.person_looks_at(self.gaze, objects)
         one = DirectedGaze(self._ledger, objects, strict=self._strict)
         self.directed.append(one)
         clock = LimitClock(since, limit)
-        one.human_directs(event, clock, robot_since=robot_since, human_on=human_on, in_vain=in_vain, at=at)
+        one.human_begins(event, clock, robot_since=robot_since, human_on=human_on, in_vain=in_vain, at=at)
         self.gaze.spent = self.gaze.spent or human_on
         self.forget_idle(at)
 
@@ -219,7 +221,7 @@ class Person:
         there = self._scene.person_looks_at(self.gaze, event.objects)
         self.gaze.spent = self.gaze.spent or there
         robot_on = self._scene.robot_looks_at(event.objects)
-        one.robot_directs(event, clock, robot_on=robot_on, human_since=self.gaze.since if there else None)
+        one.robot_begins(event, clock, robot_on=robot_on, human_since=self.gaze.since if there else None)
         self.forget_idle(event.started)
         return one
 
@@ -241,7 +243,7 @@ class Person:
     def robot_looks_at_face(self, event: UnderWay, clock: LimitClock) -> None:
         self.facial.supersede(event.started)
         robot_on = self._scene.robot_looks_at((self.id,))
-        self.facial.robot_looks(event, clock, robot_on=robot_on, human_since=self.on_face_since)
+        self.facial.robot_begins(event, clock, robot_on=robot_on, human_since=self.on_face_since)
 
     # -- speech and gestures ------------------------------------------------------------------------------------
 

@@ -91,6 +91,10 @@ class Scene:
     def robot_looks_at(self, entities: tuple[str, ...]) -> bool:
         return any(target in entities for target in self.gaze.targets)
 
+    def robot_since(self, entities: tuple[str, ...]) -> Seconds | None:
+        """Since when the robot looks at one of these; None if it does not."""
+        return self.gaze.since if self.robot_looks_at(entities) else None
+
     def fragment_looks_elsewhere(self, entities: tuple[str, ...]) -> bool:
         """A fragment's own gaze holds the head, and not for one of these."""
         return self.head_owner.kind == "fragment" and self.head_owner.target not in entities

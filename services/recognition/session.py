@@ -21,12 +21,11 @@ from schemas.requests import Accepted, Cancel, Refused
 from schemas.units import Seconds
 from schemas.world import World
 from services.recognition.config import RecognitionConfig
-from services.recognition.directed_gaze import DirectedGaze
 from services.recognition.limits import Blocks, LimitClock
 from services.recognition.machine import Effect, Ledger, Machine, UnderWay
-from services.recognition.mutual_facial_gaze import MutualFacialGaze
 from services.recognition.person import Due, Person
 from services.recognition.scene import Scene
+from services.recognition.shared_gaze import SharedGaze
 
 Observation = (
     ActionBegan | ActionEnded | ActorFound | ActorLost | RequestEvent | SignalTurn | Cancel
@@ -380,6 +379,6 @@ class Session:
             self.persons[id] = person
         return self.persons[id]
 
-    def _gaze_machines(self) -> Iterator[DirectedGaze | MutualFacialGaze]:
+    def _gaze_machines(self) -> Iterator[SharedGaze]:
         for person in self.persons.values():
             yield from person.gaze_machines()

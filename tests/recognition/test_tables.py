@@ -18,6 +18,7 @@ from services.recognition.machine import (
     diagram,
     table,
 )
+from services.recognition.shared_gaze import SharedGaze
 
 TABLES = {
     "directed gaze": directed_gaze.TABLE, "mutual facial gaze": mutual_facial_gaze.TABLE,
@@ -82,6 +83,19 @@ def test_the_documentation_shows_the_tables_as_they_are(rows):
 def test_two_rows_for_one_input_are_a_mistake():
     with pytest.raises(ValueError, match="two rows"):
         table(Row(IDLE, "speaks", "a"), Row(IDLE, "speaks", "b"))
+
+
+@pytest.mark.parametrize("gaze", [directed_gaze.DirectedGaze, mutual_facial_gaze.MutualFacialGaze])
+def test_every_name_that_a_shared_gaze_gives_stands_in_its_table(gaze: type[SharedGaze]):
+    robot, human, together = gaze.ROBOT_WAITS, gaze.HUMAN_WAITS, gaze.TOGETHER
+    ways = {(row.state, row.given): row.next for row in gaze.TABLE.values()}
+
+    assert ways[IDLE, gaze.ROBOT_BEGINS] == robot
+    assert ways[IDLE, gaze.HUMAN_BEGINS] == human
+    assert ways[IDLE, f"{gaze.ROBOT_BEGINS}_{together}"] == ways[IDLE, f"{gaze.HUMAN_BEGINS}_{together}"] == together
+    assert ways[IDLE, f"{gaze.HUMAN_BEGINS}_in_vain"] == IDLE
+    assert ways[robot, gaze.HUMAN_JOINS] == ways[human, gaze.ROBOT_JOINS] == together
+    assert {state for state, _ in ways} == {IDLE, robot, human, together}
 
 
 def gaze(strict: bool) -> mutual_facial_gaze.MutualFacialGaze:
