@@ -2,7 +2,7 @@
 
 import asyncio
 import sys
-from collections.abc import AsyncIterator, Sequence
+from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager, suppress
 from pathlib import Path
 from typing import NamedTuple
@@ -11,10 +11,8 @@ from rich.console import Console
 
 from schemas.blocks import Block, BlockOutcome
 from schemas.faults import EngageError, Fault, InputRefused, NoReply
-from schemas.feedback import BlockProgress, PredictionFeedback, SyncPointProgress, WarningFeedback
 from schemas.fragments import FragmentOutcome, TurnFragment
 from schemas.messages import Message
-from schemas.recognition import ConnectionEvent
 from schemas.units import Seconds
 from schemas.world import World
 from services.bus import Hub
@@ -22,6 +20,7 @@ from services.client import Robot, connect
 from services.commandline import checking, roster
 from services.commandline.errors import readable
 from services.commandline.outputs import FeedbackFormat, Outputs
+from services.commandline.played import Played
 from services.commandline.process import DONE, FAILED, REFUSED, run
 from services.commandline.run import Where, unique
 from services.commandline.sources import Source, Thing, read_world, still
@@ -49,36 +48,6 @@ class Options(NamedTuple):
     feedback_format: FeedbackFormat | None = None
 
 
-class Played:
-    """Which blocks are ours: the filter of what is written and told, and the judge of interruptions."""
-
-    def __init__(self, sources: Sequence[Source]) -> None:
-        self.blocks = frozenset(thing.id for source in sources for thing in source.things)
-        self._events: set[str] = set()
-        """Ids of the connection events that have started."""
-
-    def concerns(self, message: Message) -> bool:
-        match message:
-            case (
-                BlockProgress(block=block)
-                | SyncPointProgress(block=block)
-                | PredictionFeedback(block=block)
-                | WarningFeedback(block=block)
-            ):
-                return block is None or block in self.blocks
-            case ConnectionEvent(block=block, state="started", id=id) if block in self.blocks:
-                self._events.add(id)
-                return True
-            case ConnectionEvent(id=id):
-                # By block alone it could be of an earlier performance under the same id.
-                return id in self._events
-        return True
-
-    def exit_code(self, outcome: FragmentOutcome | BlockOutcome) -> int:
-        """A block that another file's REPLACE ended counts as done."""
-        return DONE if outcome.status == "done" or outcome.replaced_by in self.blocks else FAILED
-
-
 class Job(NamedTuple):
     """times: when to submit each source, seconds from the start; None: one after the other."""
 
@@ -103,7 +72,7 @@ def main(options: Options) -> int:
         world = read_world(options.world)
         sources = checking.read_all(options.files, outputs)
         checking.check(sources, world if options.embedded else None, config.robot, outputs)
-        played = Played(sources)
+        played = Played(thing for source in sources for thing in source.things)
         outputs.wanted = played.concerns
         console = outputs.console(quiet=options.quiet)
         job = Job(sources, times, played, outputs, console)
@@ -166,21 +135,27 @@ async def _perform_all(job: Job, hub: Hub, patience: Seconds | None) -> int:
         if job.played.concerns(message):
             log(message, at)
 
-    sinks: tuple[Sink, ...] = (tell, job.outputs)
+    sinks: tuple[Sink, ...] = (job.played, tell, job.outputs)
     async with following(bus, sinks, past=False), connect(hub=hub) as robot:
-        if job.times is None:
-            return max([await _perform(job, source, robot, patience) for source in job.sources])
-        loop = asyncio.get_running_loop()
-        began = loop.time()
+        code = await _perform_each(job, robot, patience)
+        await job.played.settle()
+    return code
 
-        async def later(source: Source, time: Seconds) -> int:
-            await asyncio.sleep(began + time - loop.time())
-            return await _perform(job, source, robot, patience)
 
-        async with asyncio.TaskGroup() as group:
-            pairs = zip(job.sources, job.times, strict=True)
-            tasks = [group.create_task(later(source, time), name=str(source.path)) for source, time in pairs]
-        return max(task.result() for task in tasks)
+async def _perform_each(job: Job, robot: Robot, patience: Seconds | None) -> int:
+    if job.times is None:
+        return max([await _perform(job, source, robot, patience) for source in job.sources])
+    loop = asyncio.get_running_loop()
+    began = loop.time()
+
+    async def later(source: Source, time: Seconds) -> int:
+        await asyncio.sleep(began + time - loop.time())
+        return await _perform(job, source, robot, patience)
+
+    async with asyncio.TaskGroup() as group:
+        pairs = zip(job.sources, job.times, strict=True)
+        tasks = [group.create_task(later(source, time), name=str(source.path)) for source, time in pairs]
+    return max(task.result() for task in tasks)
 
 
 async def _perform(job: Job, source: Source, robot: Robot, patience: Seconds | None) -> int:

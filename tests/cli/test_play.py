@@ -10,6 +10,9 @@ from tests.cli.command import FRAGMENT, GOOD_BLOCK, Engage
 
 PLAY = ("play", "--embedded", "--virtual-time")
 LONG = '<bml id="long"><speech id="s"><text>One two three four five six seven eight nine ten.</text></speech></bml>'
+QUESTION = """\
+<ebml:ebml xmlns:ebml="edu.wpi.ebml" xmlns="org.mindmakers.bml" id="ask" turnIndex="1" turnStatus="full">
+<speech id="s"><text>Are you ready?</text></speech></ebml:ebml>"""
 REPLACE = '<bml id="new" composition="REPLACE"><gaze id="g" target="trapezoid"/></bml>'
 
 
@@ -70,6 +73,49 @@ def test_a_fragment_starts_its_connection_events(engage: Engage, files: dict[str
     assert result.code == 0, result.err
     kinds = [line["kind"] for line in lines(result.out, state="started", initiator="robot")]
     assert kinds == ["adjacency_pair", "directed_gaze", "mutual_facial_gaze"]
+
+
+def test_the_events_of_a_fragment_are_followed_to_their_ends(engage: Engage, tmp_path: Path) -> None:
+    path = tmp_path / "ready.xml"
+    path.write_text(QUESTION)
+
+    result = engage(*PLAY, "--events", "-", path)
+
+    assert result.code == 0, result.err
+    states = [(line["kind"], line["state"]) for line in map(json.loads, result.out.splitlines())]
+    assert states == [
+        ("adjacency_pair", "started"),
+        ("mutual_facial_gaze", "started"),
+        ("adjacency_pair", "failed"),
+        ("mutual_facial_gaze", "failed"),
+    ]
+
+
+def test_the_events_of_a_block_are_followed_to_their_ends(engage: Engage, tmp_path: Path) -> None:
+    path = tmp_path / "look.json"
+    path.write_text(
+        """{"type": "block", "id": "look", "behaviors": [
+          {"type": "gaze", "id": "g", "target": "rectangle"},
+          {"type": "event", "id": "e", "kind": "directed_gaze", "responder": "human", "objects": ["rectangle"],
+           "timing": [{"sync": "start", "ref": "g:end"}]}]}"""
+    )
+
+    result = engage(*PLAY, "--events", "-", path)
+
+    assert result.code == 0, result.err
+    (started,) = lines(result.out, type="connection_event", state="started")
+    (failed,) = lines(result.out, type="connection_event", state="failed", id=started["id"])
+    assert failed["time"] - started["time"] == pytest.approx(2.5)
+
+
+def test_a_turn_that_goes_on_is_not_held_up_by_its_pair(engage: Engage, tmp_path: Path) -> None:
+    path = tmp_path / "begin.xml"
+    path.write_text(QUESTION.replace("full", "beginning"))
+
+    result = engage(*PLAY, "--events", "-", path)
+
+    assert result.code == 0, result.err
+    assert [line["state"] for line in map(json.loads, result.out.splitlines())] == ["started"]
 
 
 def test_a_reference_that_is_less_reliable_than_asked_is_a_warning(engage: Engage, tmp_path: Path) -> None:

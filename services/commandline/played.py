@@ -1,0 +1,98 @@
+"""What is played here: which messages concern it, what of it is still open, and what its end is worth."""
+
+import asyncio
+from collections.abc import Iterable
+
+from schemas.behaviors import Event
+from schemas.blocks import Block, BlockOutcome
+from schemas.feedback import BlockProgress, PredictionFeedback, SyncPointProgress, WarningFeedback
+from schemas.fragments import FragmentOutcome, TurnFragment
+from schemas.messages import Message
+from schemas.recognition import ConnectionEvent
+from schemas.units import Seconds
+from services.commandline.process import DONE, FAILED
+from services.commandline.sources import Thing
+from services.recognition.machine import ENDINGS
+
+GRACE: Seconds = 0.5
+"""How long after its limit the end of an event may take to get here."""
+
+
+class Played:
+    """A sink that follows the played things and the connection events that they begin."""
+
+    def __init__(self, things: Iterable[Thing]) -> None:
+        things = tuple(things)
+        self.blocks = frozenset(thing.id for thing in things)
+        self._announced = frozenset(
+            (thing.id, behavior.id)
+            for thing in things
+            if isinstance(thing, Block)
+            for behavior in thing.behaviors
+            if isinstance(behavior, Event)
+        )
+        self._events: set[str] = set()
+        """Ids of the connection events that have started."""
+        self._open: dict[tuple[str, str], ConnectionEvent | None] = {}
+        """By block and behavior, what has begun and not ended; None until recognition has said that it started."""
+        fragments = [thing for thing in things if isinstance(thing, TurnFragment)]
+        self._holds_turn = bool(fragments) and fragments[-1].turn_status in ("beginning", "middle")
+        self._changed = asyncio.Event()
+
+    def __call__(self, message: Message, at: Seconds) -> None:
+        match message:
+            case SyncPointProgress(block=block, behavior=behavior, sync="start"):
+                # A block may end before recognition has said that the event has started.
+                if (block, behavior) in self._announced:
+                    self._open.setdefault((block, behavior), None)
+            case ConnectionEvent(block=block, state="started") if block in self.blocks:
+                self._events.add(message.id)
+                self._open[block, message.behavior] = message
+            case ConnectionEvent(id=id) if id in self._events and message.state in ENDINGS:
+                self._open.pop((message.block, message.behavior), None)
+            case _:
+                return
+        self._changed.set()
+
+    def concerns(self, message: Message) -> bool:
+        """Is it to be written and told?"""
+        match message:
+            case (
+                BlockProgress(block=block)
+                | SyncPointProgress(block=block)
+                | PredictionFeedback(block=block)
+                | WarningFeedback(block=block)
+            ):
+                return block is None or block in self.blocks
+            case ConnectionEvent(id=id):
+                # By block alone it could be of an earlier performance under the same id.
+                return id in self._events
+        return True
+
+    async def settle(self) -> None:
+        """Wait for the ends of the events that have begun, no longer than their limits from now.
+
+        An adjacency pair of a turn that goes on is not waited for: the next fragment would come too late.
+        """
+        loop = asyncio.get_running_loop()
+        began = loop.time()
+        while (limit := self._longest_limit()) is not None:
+            self._changed.clear()
+            try:
+                async with asyncio.timeout_at(began + limit + GRACE):
+                    await self._changed.wait()
+            except TimeoutError:
+                return
+
+    def _longest_limit(self) -> Seconds | None:
+        """Of what is waited for; None if there is nothing."""
+        limits = [
+            event.limit or 0.0 if event else 0.0
+            for event in self._open.values()
+            if not (self._holds_turn and event and event.kind == "adjacency_pair")
+        ]
+        return max(limits, default=None)
+
+    def exit_code(self, outcome: FragmentOutcome | BlockOutcome) -> int:
+        """A block that another file's REPLACE ended counts as done."""
+        return DONE if outcome.status == "done" or outcome.replaced_by in self.blocks else FAILED
