@@ -10,6 +10,7 @@ from itertools import pairwise
 from math import radians
 
 from msgspec import Struct
+from msgspec.structs import replace
 
 from schemas.behaviors import (
     BlockBehavior,
@@ -73,6 +74,8 @@ class Course(Struct, frozen=True, kw_only=True):
     degrees: Degrees = 0.0
     """Of joint motion from the start to there."""
     ray: Ray | None = None
+    is_resizable: bool = False
+    """May it be smaller, for want of time? Not where it has a target."""
 
 
 class Scene(Struct, frozen=True):
@@ -264,7 +267,8 @@ def _gesture(lexeme: str, mode: str | None, scene: Scene) -> Course:
         Leg(goal=home, seconds=seconds[3], marks=(("relax", 0.1 / seconds[3]), ("end", 1.0))),
     )  # fmt: skip
     parts = tuple(f"{side}_arm" for side in sides)
-    return _course(parts, joints, legs, _held_around_stroke(), stroke, scene, None)
+    course = _course(parts, joints, legs, _held_around_stroke(), stroke, scene, None)
+    return replace(course, is_resizable=True)
 
 
 def _nod(lexeme: str, repetition: int, amount: float) -> Course:
@@ -290,7 +294,7 @@ def _nod(lexeme: str, repetition: int, amount: float) -> Course:
     legs.append(Leg(goal=(0.0, 0.0), seconds=0.3, marks=(("relax", 0.15), ("end", 1.0))))
     return Course(
         parts=("nod",), joints=("neck_yaw", "neck_pitch"), legs=tuple(legs), points=_held_around_stroke(),
-        on_target={}, degrees=math.degrees(size),
+        on_target={}, degrees=math.degrees(size), is_resizable=True,
     )  # fmt: skip
 
 

@@ -1,5 +1,6 @@
 """Estimates of the simulated body, from the paths that it then moves along: without deviations they are exact."""
 
+from collections.abc import Mapping, Sequence
 from itertools import pairwise
 
 from schemas.behaviors import BlockBehavior, Speech, Wait
@@ -9,6 +10,7 @@ from schemas.units import Seconds
 from services.control.body import sync_points
 from services.control.choreography import Course, Point
 from services.control.motion import SLOWEST, Path
+from services.control.sizing import quickest
 from services.control.voice import Utterance
 
 
@@ -20,13 +22,13 @@ def spoken(behavior: Speech, utterance: Utterance, pose: BodyPose) -> Estimate:
     """The voice can wait at the marks between two words."""
     times = {"start": 0.0, **{mark.id: utterance.said_by(mark.position) for mark in behavior.marks}}
     times["end"] = utterance.seconds
-    gaps = tuple(Point(mark.id, mark.id) for mark in behavior.marks if utterance.is_gap(mark.position))
-    phases = _phases(behavior, times, gaps)
+    gaps = {mark.id for mark in behavior.marks if utterance.is_gap(mark.position)}
+    phases = _phases([Point(sync, sync if sync in gaps else "") for sync in sync_points(behavior)], times)
     return Estimate(behavior=behavior.id, feasible=True, parts=("voice",), phases=phases, pose_after=pose)
 
 
 def waited(behavior: Wait, duration: Seconds, pose: BodyPose) -> Estimate:
-    phases = _phases(behavior, {"start": 0.0, "end": duration}, (Point("end", "end"),))
+    phases = _phases((Point("start"), Point("end", "end")), {"start": 0.0, "end": duration})
     return Estimate(behavior=behavior.id, feasible=True, phases=phases, pose_after=pose)
 
 
@@ -37,7 +39,7 @@ def moved(behavior: BlockBehavior, course: Course, path: Path, pose: BodyPose) -
         behavior=behavior.id,
         feasible=True,
         parts=("head",) if course.parts == ("nod",) else course.parts,
-        phases=_phases(behavior, path.marks, course.points, path.fastest, SLOWEST),
+        phases=_phases(course.points, path.marks, quickest(course, path), SLOWEST),
         head_degrees=course.degrees if is_gaze else 0.0,
         arm_degrees=course.degrees if is_arm else 0.0,
         ray=course.ray,
@@ -46,20 +48,24 @@ def moved(behavior: BlockBehavior, course: Course, path: Path, pose: BodyPose) -
 
 
 def _phases(
-    behavior: BlockBehavior,
-    times: dict[str, Seconds],
-    points: tuple[Point, ...] = (),
-    fastest: float = 1.0,
+    points: Sequence[Point],
+    times: Mapping[str, Seconds],
+    quickest: Mapping[str, Seconds] | None = None,
     slowest: float = 1.0,
 ) -> tuple[Phase, ...]:
-    """From each sync point to the next. A phase that ends where the body can hold has no upper limit."""
-    held_with = {point.sync: point.held_with for point in points if point.held_with}
-    phases = []
-    for since, to in pairwise(sync_points(behavior)):
-        natural = times[to] - times[since]
-        longest = None if to in held_with else natural / slowest
-        is_hold = held_with.get(to) == to
-        phases.append(
-            Phase(since=since, to=to, shortest=natural / fastest, natural=natural, longest=longest, hold=is_hold)
+    """From each sync point to the next. A phase that ends where the body can hold has no upper limit.
+
+    times: of the points, at natural pace. quickest: in the greatest hurry.
+    """
+    least = times if quickest is None else quickest
+    return tuple(
+        Phase(
+            since=since.sync,
+            to=to.sync,
+            shortest=min(least[to.sync] - least[since.sync], natural := times[to.sync] - times[since.sync]),
+            natural=natural,
+            longest=None if to.held_with else natural / slowest,
+            hold=to.held_with == to.sync,
         )
-    return tuple(phases)
+        for since, to in pairwise(points)
+    )

@@ -2,6 +2,8 @@
 
 from math import inf
 
+from msgspec.structs import replace
+
 from schemas.behaviors import BlockBehavior
 from schemas.units import Seconds
 from services.control import variability
@@ -9,6 +11,7 @@ from services.control.body import Authority
 from services.control.choreography import Course, Point
 from services.control.config import Stall, Variability
 from services.control.motion import Leg, Motion, Path
+from services.control.sizing import hurried
 from services.control.waiting import Bell
 
 STALL, OVERHEAT = "(stall)", "(overheat)"
@@ -32,8 +35,12 @@ class Run:
         self.holding = False
         self.cut_at: Seconds | None = None
         self.motion: Motion
+        self.size = 1.0
+        """Of its full amplitude."""
         self._aim: tuple[str, Seconds] | None = None
         """The sync point for whose sake it is faster or slower than it would be, and its instant."""
+        self._tried: list[tuple[str, Seconds]] = []
+        """The instants for which it has been made as small as it takes."""
         real = ("head",) if course.parts == ("nod",) else course.parts
         self.cruise = variability.rate(deviations, real, behavior.id, occasion)
         self.stall: Stall | None = variability.stall(deviations, real, behavior)
@@ -58,21 +65,38 @@ class Run:
         self.motion = motion
         self._aim = None
 
+    def hurry(self, now: Seconds) -> Path | None:
+        """A smaller way to go on, if it could not come to its points when it is asked to; None: stay on this one."""
+        aims, here = self._aims(now), self.motion.s(now)
+        # What it is just passing is told first: no other path has it.
+        is_passing = 0.0 < here >= self.motion.path.marks[self.pending[0].sync] - 1e-9
+        if is_passing or aims == self._tried:
+            return None
+        self._tried = aims
+        if (reduced := hurried(self.course, self.motion, self.size, aims, now, self.cruise)) is None:
+            return None
+        self.size = reduced.size
+        return reduced.path
+
     def keep_pace(self, now: Seconds) -> bool:
-        """Run such that it comes to its next points when it is asked to; whether that changed anything."""
-        marks, here = self.motion.path.marks, self.motion.s(now)
-        planned = self.authority.pace
-        coming = (point.sync for point in self.pending if marks.get(point.sync, 0.0) > here + 1e-9)
-        aim = next(((sync, planned[sync]) for sync in coming if sync in planned), None)
+        """Run such that it comes to its next point when it is asked to; whether that changed anything."""
+        aim = next(iter(self._aims(now)), None)
         if aim == self._aim:
             return False
         self._aim = aim
+        marks = self.motion.path.marks
         if aim is None:
             self.motion.run_at(self.cruise, now)
         else:
             # A motor that is slow is so at its fastest, too; up to there the body sees to it that it is on time.
             self.motion.come(marks[aim[0]], aim[1], now, self.cruise * self.motion.path.fastest)
         return True
+
+    def _aims(self, now: Seconds) -> list[tuple[str, Seconds]]:
+        """Sync points ahead for which it has been given an instant."""
+        marks, here, planned = self.motion.path.marks, self.motion.s(now), self.authority.pace
+        coming = (point.sync for point in self.pending if marks.get(point.sync, 0.0) > here + 1e-9)
+        return [(sync, planned[sync]) for sync in coming if sync in planned]
 
     def limit(self, path: Path) -> Seconds:
         """How far along `path` it may go now."""
@@ -101,7 +125,7 @@ class Run:
         if index is None:
             return
         legs = tuple(_marked(leg, fault, before) for leg in self.course.legs)
-        self.course = _with_legs(self.course, legs)
+        self.course = replace(self.course, legs=legs)
         self.pending.insert(index, Point(fault))
 
 
@@ -112,10 +136,3 @@ def _marked(leg: Leg, fault: str, before: str) -> Leg:
     earlier = max((fraction for fraction in fractions.values() if fraction < fractions[before]), default=0.0)
     marks = (*leg.marks, (fault, (earlier + fractions[before]) / 2))
     return Leg(goal=leg.goal, velocity=leg.velocity, seconds=leg.seconds, marks=marks)
-
-
-def _with_legs(course: Course, legs: tuple[Leg, ...]) -> Course:
-    return Course(
-        parts=course.parts, joints=course.joints, legs=legs, points=course.points, on_target=course.on_target,
-        degrees=course.degrees, ray=course.ray,
-    )  # fmt: skip

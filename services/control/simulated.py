@@ -243,7 +243,10 @@ class SimulatedBody(Body):
         return [Reached(sync, now, arrived) for sync in passed]
 
     def _extend(self, run: Run) -> None:
-        limit, now = run.limit(run.motion.path), self._loop.time()
+        now = self._loop.time()
+        if (path := run.hurry(now)) is not None:
+            self._play(run, path)
+        limit = run.limit(run.motion.path)
         is_extended = limit > run.motion.limit
         run.motion.extend(limit, now)
         if run.keep_pace(now) or is_extended:
