@@ -15,7 +15,6 @@ from services.commandline.roster import ServiceName
 
 app = typer.Typer(
     name="engage",
-    help="The engagement layer for robots that talk with people.",
     no_args_is_help=True,
     add_completion=False,
     pretty_exceptions_enable=False,
@@ -65,6 +64,23 @@ Seed = Annotated[int | None, typer.Option(metavar="N", help="Of all chance in th
 WorldFile = Annotated[
     Path | None, typer.Option("--world", metavar="FILE", help="JSON of the entities; without it the tangram table.")
 ]
+
+
+def _print_version(asked: bool) -> None:
+    if asked:
+        from services.runtime import installed_version
+
+        print(f"engage {installed_version()}")
+        raise typer.Exit
+
+
+@app.callback()
+def engage(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_print_version, is_eager=True, help="Print the version.")
+    ] = False,
+) -> None:
+    """The engagement layer for robots that talk with people."""
 
 
 @app.command()

@@ -36,7 +36,7 @@ async def serve(hub: Hub, name: str, service: Service, ready: Ready = lambda: No
 
     def status(question: Message) -> Status:
         return Status(
-            participant=name, run=bus.run, version=_version(),
+            participant=name, run=bus.run, version=installed_version(),
             at=bus.stamp(), joined=joined, stands=since, bus=bus.health,
         )  # fmt: skip
 
@@ -48,7 +48,8 @@ async def serve(hub: Hub, name: str, service: Service, ready: Ready = lambda: No
 
 
 @cache
-def _version() -> str:
+def installed_version() -> str:
+    """Of Engage, as its package says; `unknown` without one."""
     try:
         return version("engage-hri")
     except PackageNotFoundError:  # run from its sources

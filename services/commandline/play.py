@@ -9,10 +9,12 @@ from typing import NamedTuple
 
 from rich.console import Console
 
+from schemas import keys
 from schemas.blocks import Block, BlockOutcome
-from schemas.faults import EngageError, Fault, InputRefused, NoReply
+from schemas.faults import EngageError, Fault, InputRefused, NoReply, RunFailed
 from schemas.fragments import FragmentOutcome, TurnFragment
 from schemas.messages import Message
+from schemas.status import AskStatus
 from schemas.units import Seconds
 from schemas.world import World
 from services.bus import Hub
@@ -33,6 +35,8 @@ from services.runtime import Service, running
 
 PATIENCE: Seconds = 5.0
 """How long a running system may take to answer at all."""
+A_DAY: Seconds = 86_400.0
+"""The latest time of `--at`. Even on a clock that jumps every second of a robot's life costs something."""
 
 
 class Options(NamedTuple):
@@ -58,14 +62,22 @@ class Job(NamedTuple):
     console: Console
 
     @property
+    def servers(self) -> frozenset[str]:
+        """Who performs what the sources hold."""
+        things = [thing for source in self.sources for thing in source.things]
+        return frozenset("generation" if isinstance(thing, TurnFragment) else "realizer" for thing in things)
+
+    @property
     def has_fragments(self) -> bool:
-        return any(isinstance(thing, TurnFragment) for source in self.sources for thing in source.things)
+        return "generation" in self.servers
 
 
 def main(options: Options) -> int:
     for given, option in ((options.world, "--world"), (options.virtual_time, "--virtual-time")):
         if given and not options.embedded:
             raise InputRefused(Fault(reason=f"{option} is for a private system", advice="add --embedded"))
+    if options.where.connect and options.embedded:
+        raise InputRefused(Fault(reason="--connect is for a running system", advice="leave out --embedded"))
     config = options.where.load()
     times = submission_times(options.at, len(options.files))
     with Outputs(options.events, options.feedback, format=options.feedback_format) as outputs:
@@ -92,8 +104,8 @@ def submission_times(text: str | None, files: int) -> tuple[Seconds, ...] | None
         raise InputRefused(
             Fault(reason=f"--at gives {len(times)} times for {files} files", advice="one for each file")
         )
-    if not all(0 <= time < float("inf") for time in times):
-        raise InputRefused(Fault(reason=f"--at {text!r}: a time is negative or endless", advice="seconds from now"))
+    if not all(0 <= time <= A_DAY for time in times):
+        raise InputRefused(Fault(reason=f"--at {text!r}: not from 0 to {A_DAY:g} seconds", advice="seconds from now"))
     return times
 
 
@@ -118,12 +130,25 @@ async def _embedded(job: Job, config: Config, world: World) -> int:
 
 async def _remote(job: Job, config: Config, where: Where) -> int:
     async with await where.open(config.robot) as hub:
+        await _somebody_there(hub, job.servers)
         if job.has_fragments:
             async with connect(hub=hub) as robot:
                 # Without perception generation waits or refuses by itself.
                 with suppress(NoReply):
                     checking.check(job.sources, await robot.world(PATIENCE), config.robot, job.outputs)
         return await _perform_all(job, hub, PATIENCE)
+
+
+async def _somebody_there(hub: Hub, servers: frozenset[str]) -> None:
+    """Wait for the servers, at most `PATIENCE` for all of them. Raises RunFailed for the first that is missing."""
+    bus = hub.join(unique("play-asks"))
+    deadline = bus.now() + PATIENCE
+    for server in sorted(servers):
+        try:
+            await bus.query(keys.status(server), AskStatus(), max(0.0, deadline - bus.now()))
+        except NoReply as error:
+            advice = f"is {server} running? `engage up` starts everything"
+            raise RunFailed(Fault(reason=f"no answer within {PATIENCE:g} s", where=server, advice=advice)) from error
 
 
 async def _perform_all(job: Job, hub: Hub, patience: Seconds | None) -> int:

@@ -196,15 +196,19 @@ async def test_services_do_not_outlive_a_killed_supervisor(endpoint: str) -> Non
         await gone(pid)
 
 
-async def test_playing_to_nobody_fails_readably(endpoint: str, tmp_path: Path) -> None:
-    (tmp_path / "block.xml").write_text(GOOD_BLOCK)
-    play = await start("play", "--robot", "nobody", "--connect", endpoint, tmp_path / "block.xml")
+@pytest.mark.parametrize(("text", "server"), [(GOOD_BLOCK, b"realizer"), (FRAGMENT, b"generation")])
+async def test_playing_to_nobody_fails_readably(endpoint: str, tmp_path: Path, text: str, server: bytes) -> None:
+    (tmp_path / "it.xml").write_text(text)
+    (tmp_path / "it-again.xml").write_text(text)
+    files = (tmp_path / "it.xml", tmp_path / "it-again.xml")
+    play = await start("play", "--robot", "nobody", "--connect", endpoint, *files)
     async with asyncio.timeout(PATIENCE):
         _, err = await play.communicate()
 
     assert play.returncode == 3
-    assert b"is realizer running?" in err
-    assert err.count(b"\n") == 1
+    assert b"is %s running?" % server in err
+    assert b"no answer within 5 s" in err
+    assert err.count(b"\n") == 1  # one patience for all
 
 
 async def test_watch_prints_json_lines_of_a_running_system(endpoint: str, tmp_path: Path) -> None:

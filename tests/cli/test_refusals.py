@@ -1,6 +1,7 @@
 """Bad input: one line on standard error, `file:line: reason (advice)`, exit code 2, and nothing has moved."""
 
 import json
+from importlib import metadata
 from pathlib import Path
 
 import pytest
@@ -170,8 +171,10 @@ def test_a_bad_configuration_is_refused_with_file_and_key(
         (["play", "--virtual-time", "x.xml"], "add --embedded"),
         (["play", "--embedded", "--at", "1,2", "x.xml"], "2 times for 1 files"),
         (["play", "--embedded", "--at", "soon", "x.xml"], "not a list of seconds"),
-        (["play", "--embedded", "--at=-1", "x.xml"], "negative"),
-        (["play", "--embedded", "--at", "nan", "x.xml"], "negative or endless"),
+        (["play", "--embedded", "--at=-1", "x.xml"], "not from 0 to 86400 seconds"),
+        (["play", "--embedded", "--at", "nan", "x.xml"], "not from 0 to 86400 seconds"),
+        (["play", "--embedded", "--virtual-time", "--at", "1e9", "x.xml"], "not from 0 to 86400 seconds"),
+        (["play", "--embedded", "--connect", "tcp/127.0.0.1:7447", "x.xml"], "leave out --embedded"),
         (["watch", "--connect", "here"], "'here' is not an endpoint"),
         (["play", "--connect", "tcp/127.0.0.1", "hello.xml"], "'tcp/127.0.0.1' is not an endpoint"),
         (["up", "--listen", "tcp/127.0.0.1:65536"], "'tcp/127.0.0.1:65536' is not an endpoint"),
@@ -192,3 +195,9 @@ def test_a_misused_command_is_one_line(
     assert result.code == 2
     assert reason in result.err
     assert result.err.count("\n") == 1
+
+
+def test_the_version_is_told(engage: Engage) -> None:
+    result = engage("--version")
+
+    assert (result.code, result.out) == (0, f"engage {metadata.version('engage-hri')}\n")
