@@ -30,7 +30,6 @@ def check(sources: Sequence[Source], world: World | None, robot: str, outputs: O
     """Contradictions in blocks; in fragments what the world does not know, if it is known. Raises InputRefused."""
     from services.generation.fragment_check import checked
     from services.realizer.planner import plan_block
-    from services.realizer.points import Point
     from services.realizer.relations import BlockRefused
 
     for source in sources:
@@ -39,9 +38,7 @@ def check(sources: Sequence[Source], world: World | None, robot: str, outputs: O
                 with source.blamed():
                     if isinstance(thing, Block):
                         # Whether other blocks will be alive when this one comes is for the realizer to say.
-                        plan_block(
-                            thing, elsewhere=[Point(f"{block}:{id}", sync) for block, id, sync in _foreign(thing)]
-                        )
+                        plan_block(thing, elsewhere=dict.fromkeys(_others(thing)))
                     elif world is not None:
                         checked(thing, world, robot)
             except InputRefused as error:
@@ -51,14 +48,9 @@ def check(sources: Sequence[Source], world: World | None, robot: str, outputs: O
                 raise
 
 
-def _foreign(block: Block) -> list[tuple[str, str, str]]:
-    """Block, behavior and sync point of each reference to another block."""
-    references = [SyncRef.parse(site.text) for site in sites(block)]
-    return [
-        (reference.block, reference.behavior or "bml", reference.sync or "start")
-        for reference in references
-        if reference.block not in ("", block.id)
-    ]
+def _others(block: Block) -> set[str]:
+    """The blocks whose points it names."""
+    return {SyncRef.parse(site.text).block for site in sites(block)} - {"", block.id}
 
 
 def _warn(outputs: Outputs, block: str | None, fault: Fault, kind: WarningKind = "PARSING_FAILURE") -> None:

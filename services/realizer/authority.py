@@ -379,6 +379,9 @@ class Authority(Facts):
     def expected(self, now: Seconds) -> dict[Point, Seconds]:
         """When each point of the block that is still to come is expected, seconds from the block's start."""
         forecast = self.from_scratch()
+        for transition in range(len(self.plan.members)):
+            forecast.overdue(transition, now)
+        forecast.update()
         coming = {point for points in self._points.values() for point in points} - self.reached.keys()
         self._expected |= {point: max(now, forecast.times[self.plan.at[point]]) for point in coming}
         self.is_surprised = False

@@ -4,11 +4,12 @@ Decides nothing: what was measured goes to the `Authority`, and what that says i
 """
 
 import asyncio
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 from schemas import keys
-from schemas.behaviors import BlockBehavior, Event, Speech, TurnSignal, Wait
-from schemas.blocks import BlockOutcome, PerformBlock, SpokenText
+from schemas.behaviors import BlockBehavior, Event, TurnSignal, Wait
+from schemas.blocks import Block, BlockOutcome, PerformBlock
 from schemas.body import (
     AbortBehavior,
     BehaviorOutcome,
@@ -20,6 +21,7 @@ from schemas.body import (
 )
 from schemas.faults import EngageError, Fault, InputRefused
 from schemas.feedback import WarningKind
+from schemas.syncref import BLOCK_ITSELF
 from schemas.units import Seconds
 from services.realizer.authority import Authority
 from services.realizer.effects import Begin, Effect, Extend
@@ -28,6 +30,7 @@ from services.realizer.planner import Plan, plan_block
 from services.realizer.points import Point, performer, sync_points
 from services.realizer.recognition_link import RecognitionLink
 from services.realizer.reporting import Reporter
+from services.realizer.spoken import Spoken
 from services.realizer.surroundings import Ending, Surroundings
 from services.requests import Pending, RequestRefused
 
@@ -35,7 +38,10 @@ from services.requests import Pending, RequestRefused
 class Performance:
     """A block being performed."""
 
-    def __init__(self, request: PerformBlock, plan: Plan, around: Surroundings) -> None:
+    def __init__(
+        self, request: PerformBlock, plan: Plan, around: Surroundings, elsewhere: Mapping[str, Block]
+    ) -> None:
+        """elsewhere: the blocks whose points the plan may name."""
         loop = asyncio.get_running_loop()
         self.request = request
         self.plan = plan
@@ -43,7 +49,7 @@ class Performance:
         self._bus = around.bus
         self._requests = around.requests
         self._config = around.config
-        self._recognition = RecognitionLink(around.bus, around.requests, around.config, around.is_there)
+        self._recognition = RecognitionLink(around.bus, around.requests, around.config, around.peers)
         self._loop = loop
         self._report = Reporter(around.bus, plan.block.id)
         self._begun: dict[str, asyncio.Future[None]] = {id: loop.create_future() for id in plan.chains}
@@ -54,11 +60,16 @@ class Performance:
         """Of each behavior, what it was last told."""
         self._pending: dict[str, Pending] = {}
         self._dropped: list[str] = list(plan.dropped)
+        self._elsewhere = elsewhere
         self._foreign = frozenset(point for point in plan.at if ":" in point.behavior)
         """Points of other blocks that this one is tied to."""
         self._vanished: set[str] = set()
         """Behaviors of other blocks, of which some point will never be."""
-        self._spoken: dict[str, SpokenText] = {}
+        self._performed: dict[str, BlockBehavior] = {}
+        """As they were begun: a later plan may have chosen another hand."""
+        self.spoken = Spoken(plan.block.behaviors)
+        self._late: set[Point] = set()
+        """Of which it has been said."""
         self._ending: asyncio.Future[Ending] = loop.create_future()
         self._timer: asyncio.TimerHandle | None = None
 
@@ -71,6 +82,9 @@ class Performance:
         self._report.started(self.plan, began)
         for problem in self.plan.problems:
             self._report.warn(problem.kind, problem.message, problem.behavior)
+        for behavior in self.plan.dropped:
+            self._around.ledger.lose(self.plan.block.id, behavior)
+        self._around.ledger.reach(self.plan.block.id, Point(BLOCK_ITSELF, "start"), began)
         try:
             async with asyncio.TaskGroup() as tasks:
                 running = {
@@ -79,23 +93,21 @@ class Performance:
                     )
                     for behavior in self.plan.behaviors
                 }
-                self._catch_up()
-                self._advance()
-                ending = await self._ending
-                await self._end_what_moves(ending, running)
+                with self._around.ledger.followed(self, self._foreign):
+                    self._advance()
+                    ending = await self._ending
+                    await self._end_what_moves(ending, running)
                 for task in running.values():
                     task.cancel()
         finally:
             self._close()
         self._report.ended(ending.status, began)
-        self._tell_others("bml", "end", self._bus.now())
-        for other in self._around.others():
-            other.miss(self.plan.block.id)
+        self._around.ledger.reach(self.plan.block.id, Point(BLOCK_ITSELF, "end"), self._bus.now())
         return BlockOutcome(
             id=self.request.id,
             block=self.plan.block.id,
             status=ending.status,
-            spoken=tuple(self._spoken[each.id] for each in self.plan.block.behaviors if each.id in self._spoken),
+            spoken=self.spoken.texts,
             dropped=tuple(self._dropped),
             replaced_by=ending.replaced_by,
             fault=ending.fault,
@@ -108,6 +120,8 @@ class Performance:
 
     def feed(self, message: SyncPointArrived | SyncPointReached) -> None:
         """A body's report about a behavior of this block."""
+        if message.behavior not in self._performed:
+            return
         point = Point(message.behavior, message.sync)
         match message:
             case SyncPointArrived(at=at):
@@ -125,52 +139,19 @@ class Performance:
 
     # -- other blocks ------------------------------------------------------------------------------------------------
 
-    @property
-    def elsewhere(self) -> frozenset[Point]:
-        """This block's points, as other blocks name them."""
-        own = [Point(f"{self.plan.block.id}:bml", sync) for sync in ("start", "end")]
-        return frozenset((*own, *(Point(f"{self.plan.block.id}:{id}", sync) for id, sync in self.sync_points)))
-
     def hear(self, point: Point, at: Seconds) -> None:
         """A point of another block is reached."""
         if point in self._foreign and not self._ending.done():
             self._authority.reach(point, at)
             self._advance()
 
-    def miss(self, block: str) -> None:
-        """Another block is over: what has not been reached of it never will be."""
-        lost = {
-            point.behavior
-            for point in self._foreign - self._authority.reached.keys()
-            if point.behavior.rpartition(":")[0] == block
-        }
+    def miss(self, behaviors: Iterable[str]) -> None:
+        """What has not been reached of these, in other blocks, never will be."""
+        lost = {point.behavior for point in self._foreign - self._authority.reached.keys()}.intersection(behaviors)
         if lost and not self._ending.done():
             self._vanished |= lost
             self._replan()
             self._advance()
-
-    def _catch_up(self) -> None:
-        """What was reached in other blocks before this one began, and who is gone by now."""
-        there = {other.plan.block.id: other for other in self._around.others() if other is not self}
-        for point in self._foreign:
-            block, _, behavior = point.behavior.rpartition(":")
-            if (other := there.get(block)) is None:
-                self._vanished.add(point.behavior)
-            elif (at := other.when(Point(behavior, point.sync))) is not None:
-                self._authority.reach(point, at)
-        if self._vanished:
-            self._replan()
-
-    def when(self, point: Point) -> Seconds | None:
-        """When a point of this block was reached, if it was."""
-        if point.behavior == "bml":
-            return self._authority.began if point.sync == "start" else None
-        return self._authority.reached.get(point)
-
-    def _tell_others(self, behavior: str, sync: str, at: Seconds) -> None:
-        for other in self._around.others():
-            if other is not self:
-                other.hear(Point(f"{self.plan.block.id}:{behavior}", sync), at)
 
     async def _end_what_moves(self, ending: Ending, running: dict[str, "asyncio.Task[None]"]) -> None:
         """Abort what still runs, and wait until all has ended, or for as long as the body is given."""
@@ -225,7 +206,8 @@ class Performance:
                 self._asked[id] = effect
                 self._begun[id].set_result(None)
             case Late(behavior=id, sync=sync, overdue=overdue):
-                self._report.warn("LATE", f"{sync} is {overdue:.1f} s overdue", id)
+                self._warn_late(Point(id, sync), f"{sync} is {overdue:.1f} s overdue")
+                self._authority.is_surprised = True
             case Stalled(behavior=id, sync=sync, overdue=overdue):
                 self._abort(id)
                 self._lose(id, Fault(reason=f"stalled before {sync}, {overdue:.1f} s overdue"))
@@ -233,12 +215,11 @@ class Performance:
         return False
 
     def _extend(self, id: str) -> bool:
-        behavior = self._authority.plan.chains[id].behavior
-        end = Point(id, "end")
+        behavior, end = self._performed.get(id), Point(id, "end")
         if isinstance(behavior, Wait) and end in self._authority.arrived:
             self._reach(end, self._bus.now(), arrived=self._authority.arrived[end])
             return True
-        if id in self._pending and performer(behavior) == "body":
+        if behavior is not None and id in self._pending and performer(behavior) == "body":
             self._send(behavior)
         return False
 
@@ -247,10 +228,18 @@ class Performance:
             came = arrived if each == point else None
             skew = self._report.reached(self.plan, self._authority, each, arrived=came, by_body=by_body)
             if (late := max(skew, self._authority.lateness(each))) > self._config.skew:
-                self._report.warn("LATE", f"{each.sync} came {late:.2f} s later than it should", each.behavior)
+                self._warn_late(each, f"{each.sync} came {late:.2f} s later than it should")
             if not (future := self.sync_points[each]).done():
                 future.set_result(at)
-            self._tell_others(each.behavior, each.sync, at)
+            self.spoken.reach(each)
+            self._around.ledger.reach(self.plan.block.id, each, at)
+
+    def _warn_late(self, point: Point, message: str) -> None:
+        """Once for each instant of a behavior."""
+        instant = self._authority.member(point).point
+        if instant not in self._late:
+            self._late.add(instant)
+            self._report.warn("LATE", message, point.behavior)
 
     def _lose(self, id: str, fault: Fault, kind: WarningKind = "EXECUTION_FAILURE") -> None:
         """A behavior cannot be finished: the block fails if it is required, else goes on as if it had not been."""
@@ -258,6 +247,7 @@ class Performance:
             return
         self._dropped.append(id)
         self._report.warn(kind, str(fault), id)
+        self._around.ledger.lose(self.plan.block.id, id)
         if id in self._authority.begun:
             self._go_home(self._parts(id), id)
         if id in self.plan.required:
@@ -269,16 +259,23 @@ class Performance:
         """Go on as if what was dropped, or vanished elsewhere, had never been written."""
         gone = (*self._dropped, *self._vanished)
         try:
-            plan = plan_block(self.plan.block, self.plan.estimates.values(), dropped=gone, elsewhere=self._foreign)
+            plan = plan_block(self.plan.block, self.plan.estimates.values(), dropped=gone, elsewhere=self._elsewhere)
         except InputRefused as error:
             self.stop(Ending("failed", error.fault))
-        else:
-            self._authority.replan(plan)
+            return
+        self._authority.replan(plan)
+        for problem in plan.problems:
+            # What is too late now that something else is gone.
+            if problem.behavior in plan.dropped and problem.behavior not in gone:
+                if problem.behavior in self._pending:
+                    self._abort(problem.behavior)
+                self._lose(problem.behavior, Fault(reason=problem.message), problem.kind)
 
     # -- performers --------------------------------------------------------------------------------------------------
 
     async def _perform(self, behavior: BlockBehavior) -> None:
         await self._begun[behavior.id]
+        behavior = self._performed[behavior.id] = self._authority.plan.chains[behavior.id].behavior
         match behavior:
             case Wait(duration=duration):
                 await self._wait(behavior.id, duration or 0.0)
@@ -303,13 +300,16 @@ class Performance:
             return
         except EngageError as error:
             self._pending.pop(behavior.id)
+            if not self._ending.done():
+                self._report.warn("EXECUTION_FAILURE", str(error.fault))
             self.stop(Ending("failed", error.fault))
             return
-        assert isinstance(outcome, BehaviorOutcome)
+        if not isinstance(outcome, BehaviorOutcome):
+            self._lose(behavior.id, Fault(reason=f"control ended it with a {type(outcome).__name__}"))
+            self._advance()
+            return
         is_done = outcome.status == "done"
-        if isinstance(behavior, Speech):
-            text = behavior.text if is_done else outcome.spoken
-            self._spoken[behavior.id] = SpokenText(behavior=behavior.id, text=text, complete=is_done)
+        self.spoken.end(outcome)
         if is_done:
             self._reach(Point(behavior.id, sync_points(behavior)[-1]), self._bus.local(outcome.at), by_body=True)
         else:
@@ -333,14 +333,23 @@ class Performance:
         self._requests.send(keys.BEHAVIOR, AbortBehavior(id=self._request_id(id), requester=self._bus.name))
 
     def _go_home(self, parts: set[str], name: str = "") -> None:
-        if parts:
-            id = f"{self._request_id(name)}/home" if name else f"{self.request.id}/home"
+        """But not what another behavior moves by now."""
+        others = (other for other in self._around.others() if name or other is not self)
+        if parts := parts.difference(*(other.parts_moving for other in others)):
+            # No id of a behavior holds a colon.
+            id = f"{self._request_id(name)}:home"
             self._requests.send(keys.BEHAVIOR, GoHome(id=id, requester=self._bus.name, parts=tuple(sorted(parts))))
 
     @property
     def parts_used(self) -> set[str]:
         """Of the body, by what has begun so far."""
         return {part for id in self._authority.begun for part in self._parts(id)}
+
+    @property
+    def parts_moving(self) -> set[str]:
+        """By what has begun and not ended."""
+        moving = self._performed.keys() - set(self._dropped)
+        return {part for id in moving if not self._authority.has_ended(id) for part in self._parts(id)}
 
     def _parts(self, id: str) -> set[str]:
         estimate = self.plan.estimates.get(id)

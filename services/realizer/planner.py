@@ -24,7 +24,7 @@ from services.realizer.handover import Arrangement, Conflict, arrange, free_hand
 from services.realizer.net import Bound, PetriNet
 from services.realizer.points import Point, one_instant
 from services.realizer.prediction import Impossible, predict
-from services.realizer.relations import BlockRefused, Equal, Order, Problem, Relations, Term, relations
+from services.realizer.relations import BlockRefused, Elsewhere, Equal, Order, Problem, Relations, Term, relations
 from services.realizer.schedule import Solution
 from services.realizer.verdict import Loss, judge
 
@@ -67,19 +67,23 @@ def plan_block(
     estimates: Estimates | Iterable[Estimate] = (),
     *,
     dropped: Iterable[str] = (),
-    elsewhere: Iterable[Point] = (),
+    elsewhere: Elsewhere | None = None,
 ) -> Plan:
     """Plan `block`; durations that no estimate gives are nominal. Raises BlockRefused, with place and line.
 
-    dropped: behaviors to leave out as if never written. elsewhere: points of other live blocks.
+    dropped: behaviors to leave out as if never written. elsewhere: other live blocks, by id.
     """
     items = estimates.items if isinstance(estimates, Estimates) else tuple(estimates)
-    return _Planner(block, {each.behavior: each for each in items}, dropped, frozenset(elsewhere)).plan()
+    return _Planner(block, {each.behavior: each for each in items}, dropped, elsewhere).plan()
 
 
 class _Planner:
     def __init__(
-        self, block: Block, estimates: Mapping[str, Estimate], dropped: Iterable[str], elsewhere: frozenset[Point]
+        self,
+        block: Block,
+        estimates: Mapping[str, Estimate],
+        dropped: Iterable[str],
+        elsewhere: Elsewhere | None,
     ) -> None:
         self.block = block
         self.estimates = estimates

@@ -1,7 +1,8 @@
 """Connection events and turn signals: the behaviors that recognition realizes, and the clock if it is not there."""
 
 import asyncio
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
+from typing import Any
 
 from msgspec import Struct
 
@@ -16,6 +17,7 @@ from services.realizer.config import RealizerConfig
 from services.realizer.patience import event_deadline
 from services.realizer.points import Point
 from services.realizer.schedule import EPSILON
+from services.realizer.surroundings import Presence
 from services.requests import Pending, Requester, RequestRefused
 
 
@@ -29,25 +31,23 @@ class Decision(Struct, frozen=True):
 class RecognitionLink:
     """Asks recognition for the events of one block."""
 
-    def __init__(
-        self, bus: Bus, requests: Requester, config: RealizerConfig, is_there: Callable[[str], bool]
-    ) -> None:
+    def __init__(self, bus: Bus, requests: Requester, config: RealizerConfig, peers: Presence) -> None:
         self._bus = bus
         self._requests = requests
         self._config = config
-        self._is_there = is_there
+        self._peers = peers
 
     def signal(self, id: str, block: str, signal: TurnSignal) -> None:
         """Tell it what became of a turn. Nobody waits for the answer."""
         message = SignalTurn(id=id, requester=self._bus.name, signal=signal, at=self._bus.stamp(), block=block)
-        if self._is_there("recognition"):
+        if "recognition" in self._peers:
             self._requests.send(keys.TURN, message)
         else:
             self._bus.publish(keys.TURN, message)
 
     def ask(self, id: str, block: str, event: Event, began: Seconds) -> Pending | None:
         """Request the event; None if nobody is there to decide it."""
-        if not self._is_there("recognition"):
+        if "recognition" not in self._peers:
             return None
         request = RequestEvent(id=id, requester=self._bus.name, block=block, event=event, at=self._bus.stamp(began))
         return self._requests.send(keys.EVENT, request)
@@ -57,15 +57,7 @@ class RecognitionLink:
     ) -> Decision:
         """Wait for it, however it comes about. reached: the facts so far, as they grow. Raises RequestRefused."""
         while True:
-            deadline = event_deadline(event, block, reached, self._config, is_heard=pending is not None)
-            remaining = deadline - self._bus.now()
-            if pending is None:
-                if remaining <= EPSILON:
-                    return Decision(self._bus.now(), False)
-                await asyncio.sleep(remaining)
-                continue  # An anchor may have been realised meanwhile, and the limit runs from there.
-            await asyncio.wait([pending.outcome], timeout=max(0.0, remaining))
-            if pending.outcome.done():
+            if pending is not None and pending.outcome.done():
                 try:
                     decided = await pending.outcome
                 except RequestRefused:
@@ -73,7 +65,17 @@ class RecognitionLink:
                 except EngageError:
                     pending = None  # It died.
                     continue
-                assert isinstance(decided, EventOutcome)
-                return Decision(self._bus.local(decided.at), True)
+                at = self._bus.local(decided.at) if isinstance(decided, EventOutcome) else self._bus.now()
+                return Decision(at, True)
+            is_heard = pending is not None and "recognition" in self._peers
+            deadline = event_deadline(event, block, reached, self._config, is_heard=is_heard)
+            remaining = deadline - self._bus.now()
             if remaining <= EPSILON:
-                pending = None
+                if pending is not None:
+                    self._requests.cancel(pending.request.id, "no decision in time")
+                return Decision(self._bus.now(), False)
+            # Asked again then: an anchor may have been realised meanwhile, and the limit runs from there.
+            news: list[asyncio.Future[Any]] = [self._peers.changed]
+            if pending is not None:
+                news.append(pending.outcome)
+            await asyncio.wait(news, timeout=remaining, return_when=asyncio.FIRST_COMPLETED)

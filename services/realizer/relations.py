@@ -3,7 +3,7 @@
 Constraints and inline timing mean the same thing and become the same relations; so do `before` and `after`.
 """
 
-from collections.abc import Collection, Mapping
+from collections.abc import Mapping
 
 from msgspec import Struct
 from msgspec.structs import replace
@@ -23,6 +23,10 @@ class BlockRefused(InputRefused):
     def __init__(self, fault: Fault, kind: WarningKind = "PARSING_FAILURE") -> None:
         super().__init__(fault)
         self.kind = kind
+
+
+Elsewhere = Mapping[str, Block | None]
+"""Other live blocks, by id. None: it is not known what is in it, so any point may be."""
 
 
 class Term(Struct, frozen=True, gc=False):
@@ -82,7 +86,7 @@ class Relations(Struct, frozen=True):
 
 
 class _Reader:
-    def __init__(self, block: Block, elsewhere: Collection[Point]) -> None:
+    def __init__(self, block: Block, elsewhere: Elsewhere) -> None:
         self.block = block
         self.elsewhere = elsewhere
         self.behaviors: Mapping[str, Behavior] = {behavior.id: behavior for behavior in block.behaviors}
@@ -105,10 +109,9 @@ class _Reader:
         if not ref.behavior or ref.behavior == BLOCK_ITSELF:
             if ref.sync == "end" and here:
                 raise self.refusal(f"{text!r}: nothing in a block can wait for its own end", where, line)
-            point = ORIGIN if here else Point(f"{ref.block}:{BLOCK_ITSELF}", ref.sync or "start")
-            return self._elsewhere(point, ref, text, where, line) if not here else Term(point, ref.offset, text, line)
+            return Term(ORIGIN, ref.offset, text, line) if here else self._elsewhere(ref, text, where, line)
         if not here:
-            return self._elsewhere(Point(f"{ref.block}:{ref.behavior}", ref.sync), ref, text, where, line)
+            return self._elsewhere(ref, text, where, line)
         behavior = self.behaviors.get(ref.behavior)
         if behavior is None:
             raise self.refusal(f"unknown behavior {ref.behavior!r}", where, line, self._advice())
@@ -127,10 +130,20 @@ class _Reader:
         is_known = spelled is not None and sync in self.points[behavior.id]
         return is_known or isinstance(behavior, Unknown)
 
-    def _elsewhere(self, point: Point, ref: SyncRef, text: str, where: str, line: int) -> Term:
-        if point not in self.elsewhere:
+    def _elsewhere(self, ref: SyncRef, text: str, where: str, line: int) -> Term:
+        """A point of another block, spelled as in this one."""
+        other = self.elsewhere.get(ref.block)
+        known = {each.id: each for each in other.behaviors} if other else {}
+        if isinstance(behavior := known.get(ref.behavior), Speech):
+            ref = SyncRef.parse(text, [mark.id for mark in behavior.marks])
+        sync = canonical_sync(ref.sync, type_of(behavior) if behavior else "", self.block.dialect)
+        if other is None or ref.behavior in ("", BLOCK_ITSELF):
+            is_there = ref.block in self.elsewhere
+        else:
+            is_there = behavior is not None and sync in sync_points(behavior) and ref.repetition < 2
+        if not is_there:
             raise self.refusal(f"{text!r} is not a point of a live block", where, line)
-        return Term(point, ref.offset, text, line)
+        return Term(Point(f"{ref.block}:{ref.behavior or BLOCK_ITSELF}", sync or "start"), ref.offset, text, line)
 
     def refusal(self, reason: str, where: str, line: int, advice: str = "") -> BlockRefused:
         return BlockRefused(Fault(reason=reason, where=f"{self.block.id}: {where}", line=line, advice=advice))
@@ -213,12 +226,12 @@ class _Reader:
         return replace(found, problems=found.problems + endless)
 
 
-def relations(block: Block, elsewhere: Collection[Point] = ()) -> Relations:
+def relations(block: Block, elsewhere: Elsewhere | None = None) -> Relations:
     """Everything `block` says about its points. Raises InputRefused: a malformed or dangling reference.
 
-    elsewhere: points of other live blocks, as `Point("block:behavior", sync)`.
+    elsewhere: other live blocks, by id. Their points become `Point("block:behavior", sync)`.
     """
-    reader = _Reader(block, elsewhere)
+    reader = _Reader(block, elsewhere or {})
     reader.read_constraints()
     reader.read_timing()
     return reader.result()

@@ -1,9 +1,8 @@
 """The realizer on the bus: takes blocks, answers each exactly once, and performs any number of them at a time."""
 
 import asyncio
-from collections.abc import Mapping
-
-from msgspec import Struct
+from collections.abc import Coroutine, Mapping
+from typing import Any, TypeVar
 
 from schemas import keys
 from schemas.blocks import Block, BlockOutcome, PerformBlock
@@ -16,6 +15,7 @@ from schemas.body import (
     GoHome,
     SyncPointArrived,
     SyncPointReached,
+    WordSpoken,
 )
 from schemas.faults import EngageError, Fault, NoReply
 from schemas.feedback import WarningFeedback
@@ -24,29 +24,35 @@ from schemas.requests import Cancel
 from services.bus import Bus
 from services.realizer.config import RealizerConfig
 from services.realizer.executor import Performance
+from services.realizer.ledger import Ledger
 from services.realizer.planner import Plan, plan_block, poses_before
 from services.realizer.points import performer
 from services.realizer.relations import BlockRefused, relations
-from services.realizer.surroundings import Ending, Surroundings
+from services.realizer.surroundings import Ending, Presence, Surroundings
 from services.requests import RequestDesk, Requester
 from services.runtime import Ready
 
+Result = TypeVar("Result")
 
-class _Live(Struct, eq=False):
+
+class _Live:
     """A block from its request to its outcome.
 
-    earlier: those that were there when it came. ended: resolved when its outcome is out.
+    earlier: those that were there when it came. ended: resolved when its outcome is out. stopped: how it is to end.
     """
 
-    request: PerformBlock
-    earlier: list["_Live"]
-    ended: asyncio.Future[None]
-    performance: Performance | None = None
-    ending: Ending | None = None
-    """How it is to end, if that was decided before it began."""
+    def __init__(self, request: PerformBlock, earlier: list["_Live"]) -> None:
+        loop = asyncio.get_running_loop()
+        self.request = request
+        self.earlier = earlier
+        self.ended: asyncio.Future[None] = loop.create_future()
+        self.stopped: asyncio.Future[Ending] = loop.create_future()
+        self.performance: Performance | None = None
 
     def stop(self, ending: Ending) -> None:
-        self.ending = self.ending or ending
+        """The first who stops it says how it ends."""
+        if not self.stopped.done():
+            self.stopped.set_result(ending)
         if self.performance is not None:
             self.performance.stop(ending)
 
@@ -59,8 +65,9 @@ class _Realizer:
         self.desk = RequestDesk(bus, "realizer", self.cancel)
         self.live: dict[str, _Live] = {}
         self.routes: dict[str, Performance] = {}
-        self.peers: set[str] = set()
-        self.around = Surroundings(bus, self.requests, config, self.peers.__contains__, self.routes, self.performing)
+        self.peers = Presence()
+        self.ledger = Ledger()
+        self.around = Surroundings(bus, self.requests, config, self.peers, self.routes, self.performing, self.ledger)
 
     def performing(self) -> list[Performance]:
         return [live.performance for live in self.live.values() if live.performance is not None]
@@ -70,34 +77,42 @@ class _Realizer:
             reason = cancel.reason or "cancelled"
             live.stop(Ending("interrupted", Fault(reason=reason, where=live.request.block.id)))
 
+    def hear_word(self, word: WordSpoken) -> None:
+        for performance in self.performing():
+            if performance.plan.block.id == word.block:
+                performance.spoken.hear(word.behavior, word.position)
+
     def admit(self, request: PerformBlock) -> _Live:
-        live = _Live(request, list(self.live.values()), asyncio.get_running_loop().create_future())
+        live = _Live(request, list(self.live.values()))
         self.live[request.id] = live
         return live
 
     async def perform(self, live: _Live) -> None:
         """A block from request to outcome."""
-        request = live.request
-        try:
-            plan = await self._plan(live)
-        except EngageError as error:
-            self._refuse(live, error)
-            return
-        self.desk.accept(request.id)
-        if await self._make_way(live):
-            # The body is elsewhere by now.
-            plan = await self._anew(plan, live)
-        if live.ending is not None:
-            self._end(live, self._never_begun(request, live.ending))
-            return
-        live.performance = Performance(request, plan, self.around)
-        self._end(live, await live.performance.run())
-
-    async def _plan(self, live: _Live) -> Plan:
         block = live.request.block
-        if any(other.request.block.id == block.id and not other.ended.done() for other in live.earlier):
-            raise BlockRefused(Fault(reason="a block of this id is still being performed", where=block.id))
-        elsewhere = frozenset(point for other in self.performing() for point in other.elsewhere)
+        elsewhere = self.ledger.blocks
+        if block.id in elsewhere:
+            fault = Fault(reason="a block of this id is still being performed", where=block.id)
+            self._refuse(live, BlockRefused(fault))
+            return
+        with self.ledger.opened(block):
+            try:
+                plan = await _unless(live.stopped, self._plan(block, elsewhere))
+            except EngageError as error:
+                self._refuse(live, error)
+                return
+            if plan is not None:
+                self.desk.accept(live.request.id)
+                plan = await _unless(live.stopped, self._await_turn(live, plan, elsewhere))
+            if plan is None:
+                self._end(live, _never_begun(live.request, live.stopped.result()))
+                return
+            named = {point.behavior.partition(":")[0] for point in plan.at if ":" in point.behavior}
+            tied_to = {id: elsewhere[id] for id in named}
+            live.performance = Performance(live.request, plan, self.around, tied_to)
+            self._end(live, await live.performance.run())
+
+    async def _plan(self, block: Block, elsewhere: Mapping[str, Block]) -> Plan:
         relations(block, elsewhere)  # A bad reference is seen without asking the body.
         plan = plan_block(block, await self._estimates(block, {}), elsewhere=elsewhere)
         if (before := poses_before(plan)) or plan.block is not block:
@@ -117,51 +132,55 @@ class _Realizer:
         except NoReply as error:
             fault = Fault(reason="there is no body to perform it", where=block.id, advice="start control")
             raise BlockRefused(fault, "CANNOT_CREATE_BEHAVIOR") from error
-        assert isinstance(answer, Estimates)
+        except EngageError as error:
+            raise BlockRefused(error.fault, "CANNOT_CREATE_BEHAVIOR") from error
+        if not isinstance(answer, Estimates):
+            fault = Fault(
+                reason=f"control answered with a {type(answer).__name__}, not with estimates", where=block.id
+            )
+            raise BlockRefused(fault, "CANNOT_CREATE_BEHAVIOR")
         return answer.items
 
-    async def _make_way(self, live: _Live) -> bool:
-        """What composition asks of the blocks that are already there; whether it had to wait for them."""
-        earlier, replaces = live.earlier, live.request.block.composition == "REPLACE"
-        live.earlier = []
-        if live.request.block.composition == "MERGE" or not earlier:
-            return False
-        if replaces:
+    async def _await_turn(self, live: _Live, plan: Plan, elsewhere: Mapping[str, Block]) -> Plan:
+        """What composition asks of the blocks that are already there; the plan, anew if that took its time."""
+        earlier, live.earlier = live.earlier, []
+        composition, block = live.request.block.composition, live.request.block.id
+        if composition == "MERGE" or not earlier:
+            return plan
+        if composition == "REPLACE":
             for other in earlier:
-                other.stop(Ending("interrupted", replaced_by=live.request.block.id))
+                other.stop(Ending("interrupted", replaced_by=block))
         await asyncio.wait([other.ended for other in earlier])
-        parts = {part for other in earlier if other.performance is not None for part in other.performance.parts_used}
-        if replaces and parts:
-            home = GoHome(id=f"{live.request.id}/way", requester=self.bus.name, parts=tuple(sorted(parts)))
-            pending = self.requests.send(keys.BEHAVIOR, home)
-            await asyncio.wait([pending.outcome], timeout=self.config.abort)
-        return True
-
-    async def _anew(self, plan: Plan, live: _Live) -> Plan:
-        """The same plan from where the body is now; the block ends as failed if there is none."""
-        elsewhere = [point for point in plan.at if ":" in point.behavior]
+        if composition == "REPLACE":
+            await self._send_home(live, [other.performance for other in earlier if other.performance is not None])
         try:
+            # The body is elsewhere by now.
             estimates = await self._estimates(plan.block, poses_before(plan))
             return plan_block(plan.block, estimates, elsewhere=elsewhere)
         except EngageError as error:
+            self._warn(live, error)
             live.stop(Ending("failed", error.fault))
             return plan
 
-    def _never_begun(self, request: PerformBlock, ending: Ending) -> BlockOutcome:
-        return BlockOutcome(
-            id=request.id,
-            block=request.block.id,
-            status=ending.status,
-            replaced_by=ending.replaced_by,
-            fault=ending.fault,
+    async def _send_home(self, live: _Live, replaced: list[Performance]) -> None:
+        parts = {part for other in replaced for part in other.parts_used}
+        parts = parts.difference(*(other.parts_moving for other in self.performing() if other not in replaced))
+        if parts:
+            home = GoHome(id=f"{live.request.id}/:way", requester=self.bus.name, parts=tuple(sorted(parts)))
+            pending = self.requests.send(keys.BEHAVIOR, home)
+            await asyncio.wait([pending.outcome], timeout=self.config.abort)
+
+    def _warn(self, live: _Live, error: EngageError) -> None:
+        kind = error.kind if isinstance(error, BlockRefused) else "PARSING_FAILURE"
+        block = live.request.block
+        warning = WarningFeedback(
+            block=block.id or None, kind=kind, message=str(error.fault), character_id=block.character_id
         )
+        self.bus.publish(keys.FEEDBACK, warning)
 
     def _refuse(self, live: _Live, error: EngageError) -> None:
-        fault = error.fault
-        kind = error.kind if isinstance(error, BlockRefused) else "PARSING_FAILURE"
-        warning = WarningFeedback(block=live.request.block.id or None, kind=kind, message=str(fault))
-        self.bus.publish(keys.FEEDBACK, warning)
-        self.desk.refuse(live.request.id, fault)
+        self._warn(live, error)
+        self.desk.refuse(live.request.id, error.fault)
         self._forget(live)
 
     def _end(self, live: _Live, outcome: BlockOutcome) -> None:
@@ -171,6 +190,28 @@ class _Realizer:
     def _forget(self, live: _Live) -> None:
         del self.live[live.request.id]
         live.ended.set_result(None)
+
+
+def _never_begun(request: PerformBlock, ending: Ending) -> BlockOutcome:
+    return BlockOutcome(
+        id=request.id,
+        block=request.block.id,
+        status=ending.status,
+        replaced_by=ending.replaced_by,
+        fault=ending.fault,
+    )
+
+
+async def _unless(stopped: asyncio.Future[Ending], work: Coroutine[Any, Any, Result]) -> Result | None:
+    """What comes of `work`; None, and it is given up, once `stopped`."""
+    task = asyncio.ensure_future(work)
+    try:
+        either: list[asyncio.Future[Any]] = [task, stopped]
+        await asyncio.wait(either, return_when=asyncio.FIRST_COMPLETED)
+        return None if stopped.done() else task.result()
+    finally:
+        task.cancel()
+        await asyncio.gather(task, return_exceptions=True)
 
 
 async def realize(bus: Bus, ready: Ready, config: RealizerConfig) -> None:
@@ -185,10 +226,10 @@ async def realize(bus: Bus, ready: Ready, config: RealizerConfig) -> None:
                     match received.message:
                         case SyncPointArrived(id=id) | SyncPointReached(id=id) as report if id in realizer.routes:
                             realizer.routes[id].feed(report)
-                        case PeerAlive(participant=peer):
-                            realizer.peers.add(peer)
-                        case PeerGone(participant=peer):
-                            realizer.peers.discard(peer)
+                        case WordSpoken() as word:
+                            realizer.hear_word(word)
+                        case PeerAlive() | PeerGone() as change:
+                            realizer.peers.feed(change)
                     realizer.requests.feed(received)
                     match realizer.desk.take(received):
                         case PerformBlock(id=id) as request if id not in realizer.live:

@@ -1,13 +1,16 @@
 """What a performance has around it, and how it ends."""
 
+import asyncio
 from collections.abc import Callable, Iterable, MutableMapping
 from typing import TYPE_CHECKING, Literal
 
 from msgspec import Struct
 
 from schemas.faults import Fault
+from schemas.presence import PeerAlive, PeerGone
 from services.bus import Bus
 from services.realizer.config import RealizerConfig
+from services.realizer.ledger import Ledger
 from services.requests import Requester
 
 if TYPE_CHECKING:
@@ -24,15 +27,34 @@ class Ending(Struct, frozen=True):
     replaced_by: str = ""
 
 
+class Presence:
+    """Who is on the bus. changed: resolved when that changes next."""
+
+    def __init__(self) -> None:
+        self._there: set[str] = set()
+        self._loop = asyncio.get_running_loop()
+        self.changed: asyncio.Future[None] = self._loop.create_future()
+
+    def feed(self, message: PeerAlive | PeerGone) -> None:
+        update = self._there.add if isinstance(message, PeerAlive) else self._there.discard
+        update(message.participant)
+        self.changed.set_result(None)
+        self.changed = self._loop.create_future()
+
+    def __contains__(self, participant: str) -> bool:
+        return participant in self._there
+
+
 class Surroundings(Struct, frozen=True):
     """What performances of one realizer share.
 
-    is_there: is this participant alive? routes: whose body requests are whose. others: what else is performed.
+    routes: whose body requests are whose. others: all that are performed. ledger: what they may be tied to.
     """
 
     bus: Bus
     requests: Requester
     config: RealizerConfig
-    is_there: Callable[[str], bool]
+    peers: Presence
     routes: MutableMapping[str, "Performance"]
     others: Callable[[], Iterable["Performance"]]
+    ledger: Ledger

@@ -17,7 +17,7 @@ from schemas.behaviors import (
 from schemas.blocks import Block
 from services.realizer.net import is_live, is_safe
 from services.realizer.planner import plan_block
-from services.realizer.points import Point, sync_points
+from services.realizer.points import sync_points
 from services.realizer.relations import BlockRefused
 from tests.realizer.fake_body import FakeBody, Script
 from tests.realizer.planning import GAZE, LEFT, OTHER, SPEECH, at, elastic, plan, timed, warnings
@@ -76,8 +76,9 @@ def test_own_block_and_no_block_name_the_same_point() -> None:
 
 def test_a_point_of_another_block_is_a_transition_of_its_own() -> None:
     example = block((GAZE, SPEECH), after("other:x:end+1", "s:start"))
+    other = block((Speech(id="x", text="so"),), id="other")
     made = plan_block(
-        example, [FakeBody().estimate(each) for each in example.behaviors], elsewhere=[Point("other:x", "end")]
+        example, [FakeBody().estimate(each) for each in example.behaviors], elsewhere={"other": other}
     )
 
     assert at(made, "s:start") == 1.0
@@ -114,7 +115,7 @@ def test_an_empty_block_is_over_at_once() -> None:
 def test_a_cycle_with_negative_lags_is_legal() -> None:
     made = plan(
         block(
-            (SPEECH, OTHER, GAZE),
+            (Wait(id="s", duration=1.0), Wait(id="t", duration=1.0), GAZE),
             after("s:start-1", "t:start"),
             after("t:start-1", "s:start"),
             together("g:stroke", "t:start"),
@@ -289,6 +290,7 @@ def test_waits_of_which_nothing_is_said_follow_each_other() -> None:
 
 
 def test_nothing_waits_for_what_is_only_in_a_series() -> None:
-    made = plan(block((SPEECH, OTHER, timed(Speech(id="u", text="now"), start="0.5"))))
+    waits = tuple(Wait(id=id, duration=1.0) for id in "stu")
+    made = plan(block((*waits[:2], timed(waits[2], start="0.5"))))
 
     assert [at(made, f"{id}:start") for id in "stu"] == [0.0, 1.0, 0.5]

@@ -1,0 +1,98 @@
+"""What live blocks may be to one another: whose points others can name, when each was, and which will never be."""
+
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from typing import Protocol
+
+from schemas.blocks import Block
+from schemas.syncref import BLOCK_ITSELF
+from schemas.units import Seconds
+from services.realizer.points import Point
+
+
+class Follower(Protocol):
+    """A block that is tied to points of others. Their behaviors are named `block:behavior`."""
+
+    def hear(self, point: Point, at: Seconds) -> None:
+        """A point of another block is reached."""
+
+    def miss(self, behaviors: Iterable[str]) -> None:
+        """What has not been reached of these never will be."""
+
+
+class _Page:
+    """Of one live block. lost: behaviors that were dropped."""
+
+    def __init__(self, block: Block) -> None:
+        self.block = block
+        self.reached: dict[Point, Seconds] = {}
+        self.lost: set[str] = set()
+        self.followers: list[Follower] = []
+
+
+class Ledger:
+    """All live blocks, from their request to their end. Ids are free again after that."""
+
+    def __init__(self) -> None:
+        self._pages: dict[str, _Page] = {}
+
+    @contextmanager
+    def opened(self, block: Block) -> Iterator[None]:
+        """The block lives inside."""
+        page = self._pages[block.id] = _Page(block)
+        try:
+            yield
+        finally:
+            del self._pages[block.id]
+            ends = (BLOCK_ITSELF, *(behavior.id for behavior in block.behaviors))
+            for follower in list(page.followers):
+                follower.miss(f"{block.id}:{id}" for id in ends)
+
+    @property
+    def blocks(self) -> Mapping[str, Block]:
+        return {id: page.block for id, page in self._pages.items()}
+
+    def reach(self, block: str, point: Point, at: Seconds) -> None:
+        """A point of a live block is reached. The block itself is the behavior `bml`."""
+        page = self._pages[block]
+        page.reached[point] = at
+        for follower in list(page.followers):
+            follower.hear(_abroad(block, point), at)
+
+    def lose(self, block: str, behavior: str) -> None:
+        """A behavior of a live block is dropped."""
+        page = self._pages[block]
+        page.lost.add(behavior)
+        for follower in list(page.followers):
+            follower.miss((f"{block}:{behavior}",))
+
+    @contextmanager
+    def followed(self, follower: Follower, points: Iterable[Point]) -> Iterator[None]:
+        """Tell `follower` what becomes of these points of other blocks, and what already has."""
+        wanted = sorted(points)
+        pages = {block: self._pages[block] for block in map(_home, wanted) if block in self._pages}
+        for page in pages.values():
+            page.followers.append(follower)
+        for point in wanted:
+            block = _home(point)
+            behavior = point.behavior.removeprefix(f"{block}:")
+            page_or_none = pages.get(block)
+            if page_or_none is None or behavior in page_or_none.lost:
+                follower.miss((point.behavior,))
+            elif (at := page_or_none.reached.get(Point(behavior, point.sync))) is not None:
+                follower.hear(point, at)
+        try:
+            yield
+        finally:
+            for page in pages.values():
+                page.followers.remove(follower)
+
+
+def _abroad(block: str, point: Point) -> Point:
+    """As other blocks name it."""
+    return Point(f"{block}:{point.behavior}", point.sync)
+
+
+def _home(point: Point) -> str:
+    """The block of a point that is named from elsewhere."""
+    return point.behavior.partition(":")[0]
