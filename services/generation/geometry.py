@@ -4,6 +4,7 @@ import math
 from collections.abc import Iterable, Sequence
 
 import numpy as np
+from msgspec import Struct
 from numpy.typing import NDArray
 
 from schemas.body import NoPointZone, Ray
@@ -14,38 +15,63 @@ TOLERANCE = 1e-9
 """On an angle or distance: an object exactly on the edge is inside, whatever the rounding."""
 
 
-def in_gaze_cone(gaze: Ray, half_angle: Radians, objects: Sequence[Entity]) -> frozenset[str]:
+class Layout(Struct, frozen=True):
+    """Objects as arrays, made once for all the rays they are tested against."""
+
+    ids: tuple[str, ...]
+    places: NDArray[np.float64]
+    """Centres and footprint corners of all objects, (m, 3)."""
+    owner: NDArray[np.intp]
+    """Which object each of the `places` belongs to, (m,)."""
+    centres: NDArray[np.float64]
+    """(n, 3)"""
+    radii: NDArray[np.float64]
+    """(n,)"""
+
+
+def laid_out(objects: Sequence[Entity]) -> Layout:
+    places: list[Vector] = []
+    owner: list[int] = []
+    for index, entity in enumerate(objects):
+        x, y, z = entity.position
+        cos, sin = math.cos(entity.yaw), math.sin(entity.yaw)
+        places.append(entity.position)
+        places.extend((x + cos * u - sin * v, y + sin * u + cos * v, z) for u, v in entity.footprint)
+        owner.extend([index] * (1 + len(entity.footprint)))
+    return Layout(
+        ids=tuple(entity.id for entity in objects),
+        places=_vectors(places),
+        owner=np.array(owner, dtype=np.intp),
+        centres=_vectors([entity.position for entity in objects]),
+        radii=np.array([extent(entity) for entity in objects]),
+    )
+
+
+def in_gaze_cone(gaze: Ray, half_angle: Radians, layout: Layout) -> frozenset[str]:
     """Ids of the objects whose centre or any footprint corner lies in the cone around the gaze axis.
 
     The angle between axis and eye-to-point decides: the same set as the ellipse the cone cuts from the table
     (decision B4).
     """
-    if not objects:
-        return frozenset()
-    places, owner = _places(objects)
-    reach = places - np.asarray(gaze.origin)
+    reach = layout.places - np.asarray(gaze.origin)
     along = reach @ _unit(gaze.axis)
     distance = np.linalg.norm(reach, axis=1)
     angle_rad = np.arccos(np.clip(along / np.maximum(distance, TOLERANCE), -1.0, 1.0))
     inside = (angle_rad <= half_angle + TOLERANCE) | (distance <= TOLERANCE)
-    return frozenset(objects[int(index)].id for index in np.unique(owner[inside]))
+    return frozenset(layout.ids[index] for index in np.unique(layout.owner[inside]))
 
 
-def in_pointing_cylinder(forearm: Ray, radius: Meters, objects: Sequence[Entity]) -> frozenset[str]:
+def in_pointing_cylinder(forearm: Ray, radius: Meters, layout: Layout) -> frozenset[str]:
     """Ids of the objects in the half-cylinder ahead of the hand, around the axis from elbow to hand (decision B5).
 
     An object of radius r counts when its centre is within `radius` + r of the axis.
     """
-    if not objects:
-        return frozenset()
-    centres = np.array([entity.position for entity in objects])
-    radii = np.array([radius + extent(entity) for entity in objects])
-    reach = centres - np.asarray(forearm.tip if forearm.tip is not None else forearm.origin)
+    reach = layout.centres - np.asarray(forearm.tip if forearm.tip is not None else forearm.origin)
     axis = _unit(forearm.axis)
     along = reach @ axis
     off_axis = np.linalg.norm(reach - np.outer(along, axis), axis=1)
-    inside = (along >= -TOLERANCE) & (off_axis <= radii + TOLERANCE)
-    return frozenset(objects[int(index)].id for index in np.flatnonzero(inside))
+    inside = (along >= -TOLERANCE) & (off_axis <= radius + layout.radii + TOLERANCE)
+    return frozenset(layout.ids[index] for index in np.flatnonzero(inside))
 
 
 def extent(entity: Entity) -> Meters:
@@ -69,17 +95,8 @@ def angle_off_axis(gaze: Ray, place: Vector) -> Radians:
     return math.acos(max(-1.0, min(1.0, float(reach @ _unit(gaze.axis)) / distance)))
 
 
-def _places(objects: Sequence[Entity]) -> tuple[NDArray[np.float64], NDArray[np.intp]]:
-    """Centres and footprint corners of all objects, (n, 3), and the index of the object each belongs to."""
-    places: list[Vector] = []
-    owner: list[int] = []
-    for index, entity in enumerate(objects):
-        x, y, z = entity.position
-        cos, sin = math.cos(entity.yaw), math.sin(entity.yaw)
-        places.append(entity.position)
-        places.extend((x + cos * u - sin * v, y + sin * u + cos * v, z) for u, v in entity.footprint)
-        owner.extend([index] * (1 + len(entity.footprint)))
-    return np.array(places), np.array(owner)
+def _vectors(vectors: Sequence[Vector]) -> NDArray[np.float64]:
+    return np.array(vectors, dtype=np.float64).reshape(-1, 3)
 
 
 def _unit(axis: Vector) -> NDArray[np.float64]:

@@ -56,8 +56,10 @@ def from_each_other(
     items = []
     for since, target in _steps(sequence):
         head, arm = first.gaze(HERE, since).pose_after, first.point(HERE, since).pose_after
+        # The block will name this hand: no other may be asked about, whichever is nearer from there.
+        named = hand_of(first.point(HERE, target)) or hand
         items.append(EstimateItem(behavior=Gaze(id=f"gaze at {target}", target=target), pose=head))
-        items.append(EstimateItem(behavior=Pointing(id=f"point at {target}", target=target, mode=hand), pose=arm))
+        items.append(EstimateItem(behavior=Pointing(id=f"point at {target}", target=target, mode=named), pose=arm))
     return tuple(items)
 
 

@@ -5,19 +5,20 @@ chosen as a whole: a dynamic program over what head and arms point at. Reliabili
 so pairs that are not understood go first, and per gesture only the best phrase can win.
 """
 
-from collections.abc import Sequence
+from collections.abc import Collection, Mapping, Sequence
+from functools import cached_property
 from typing import get_args
 
 from msgspec import Struct
 
 from schemas.behaviors import Hand, Reference, SpeechOption
-from schemas.body import NoPointZone
+from schemas.body import Estimate, NoPointZone
 from schemas.faults import Fault, RunFailed
 from schemas.fragments import GestureChoice, PairConsidered, ReferenceChoice
 from schemas.units import Meters, Probability, Radians, Seconds
 from schemas.world import World
 from services.generation.config import GenerationConfig
-from services.generation.geometry import in_gaze_cone, in_pointing_cylinder, in_zone
+from services.generation.geometry import Layout, in_gaze_cone, in_pointing_cylinder, in_zone, laid_out
 from services.generation.motions import HERE, Motions, arm_of, hand_of
 from services.generation.reliability import channel_reliability, reliability
 
@@ -25,9 +26,10 @@ GESTURES: tuple[GestureChoice, ...] = get_args(GestureChoice)
 """J, from fewer gestures to more."""
 ROUNDING = 9
 """Decimals of costs and reliabilities that count: sums in another order are still ties."""
+FROM_NOWHERE = "cannot be done from where the references before it leave the body"
 
 
-class Scene(Struct, frozen=True, kw_only=True):
+class Scene(Struct, frozen=True, kw_only=True, dict=True):
     """Where references are made. no_gaze, no_point: why the robot may not look or point; empty when it may."""
 
     world: World
@@ -36,6 +38,14 @@ class Scene(Struct, frozen=True, kw_only=True):
     zones: tuple[NoPointZone, ...] = ()
     no_gaze: str = ""
     no_point: str = ""
+
+    @cached_property
+    def layout(self) -> Layout:
+        return laid_out(self.world.objects)
+
+    @cached_property
+    def universe(self) -> frozenset[str]:
+        return frozenset(self.layout.ids)
 
 
 class Pair(Struct, frozen=True, kw_only=True):
@@ -94,7 +104,11 @@ class _Way(Struct, frozen=True):
     preferences: tuple[tuple[bool, float, int, int], ...]
     pairs: tuple[Pair, ...]
     postures: tuple[Posture, ...]
-    """Before each pair."""
+    """Before each pair, and after the last."""
+
+    @property
+    def posture(self) -> Posture:
+        return self.postures[-1]
 
     @property
     def rank(self) -> tuple[float, tuple[tuple[bool, float, int, int], ...]]:
@@ -108,15 +122,13 @@ def choose(references: Sequence[Reference], scene: Scene, motions: Motions, conf
     Raises RunFailed where a reference cannot be made at all.
     """
     warnings: list[str] = []
-    tables = [considered(reference, scene, motions, config) for reference in references]
-    candidates = []
-    for reference, table in zip(references, tables, strict=True):
-        candidates.append(_candidates(reference, table))
+    for reference in references:
         warnings += _doubts(reference, scene)
-    best = _cheapest_way(references, candidates, motions, config)
+    tables = [considered(reference, scene, motions, config) for reference in references]
+    best = _cheapest_way(references, tables, motions, config)
     choices: list[ReferenceChoice] = []
     hands: dict[str, Hand] = {}
-    for reference, table, pair, posture in zip(references, tables, best.pairs, best.postures, strict=True):
+    for reference, table, pair, posture in zip(references, tables, best.pairs, best.postures[:-1], strict=True):
         choice = _explain(reference, table, pair, posture, motions, config)
         if _below(pair.reliability, reference.minimum_reliability):
             warnings.append(
@@ -132,13 +144,13 @@ def choose(references: Sequence[Reference], scene: Scene, motions: Motions, conf
 def considered(reference: Reference, scene: Scene, motions: Motions, config: GenerationConfig) -> tuple[Pair, ...]:
     """Every pair of J x S with its distractors and reliability."""
     target = reference.target
-    universe = frozenset(entity.id for entity in scene.world.objects) - {target}
+    universe = scene.universe - {target}
     gaze, point = motions.gaze(HERE, target), motions.point(HERE, target)
     gazed, pointed = universe, universe
     if gaze.ray is not None:
-        gazed = in_gaze_cone(gaze.ray, scene.half_angle, scene.world.objects) - {target}
+        gazed = in_gaze_cone(gaze.ray, scene.half_angle, scene.layout) - {target}
     if point.ray is not None:
-        pointed = in_pointing_cylinder(point.ray, scene.pointing_radius, scene.world.objects) - {target}
+        pointed = in_pointing_cylinder(point.ray, scene.pointing_radius, scene.layout) - {target}
     no_gaze, no_point = _obstacles(target, scene, motions)
     pairs = []
     for gesture in GESTURES:
@@ -170,7 +182,7 @@ def considered(reference: Reference, scene: Scene, motions: Motions, config: Gen
 
 def cost(pair: Pair, target: str, posture: Posture, motions: Motions, config: GenerationConfig) -> Seconds:
     """C(j, s) in seconds, from `posture`: head, wait for shared gaze (decision B7), arm, words."""
-    seconds = config.seconds_per_word * pair.option.cost if pair.option.text else 0.0
+    seconds = _speaking(pair, config)
     if pair.gesture != "none":
         seconds += config.head_cost(motions.gaze(posture.head, target).head_degrees)
     if pair.gesture in ("directed_gaze", "directed_gaze_with_pointing"):
@@ -181,63 +193,101 @@ def cost(pair: Pair, target: str, posture: Posture, motions: Motions, config: Ge
     return seconds
 
 
+def _speaking(pair: Pair, config: GenerationConfig) -> Seconds:
+    return config.seconds_per_word * pair.option.cost if pair.option.text else 0.0
+
+
 def _obstacles(target: str, scene: Scene, motions: Motions) -> tuple[str, str]:
     """Why the robot cannot look, or point, at `target` (decision B9)."""
     gaze, point = motions.gaze(HERE, target), motions.point(HERE, target)
-    no_gaze, no_point = scene.no_gaze, scene.no_point
-    if not no_gaze and not gaze.feasible:
-        no_gaze = f"cannot look: {gaze.fault.reason if gaze.fault else 'the body refuses'}"
-    if not no_point and not point.feasible:
-        no_point = f"cannot point: {point.fault.reason if point.fault else 'the body refuses'}"
+    no_gaze = scene.no_gaze or _refusal("look", gaze)
+    no_point = scene.no_point or _refusal("point", point)
     entity = scene.world.entity(target)
     if not no_point and entity is not None and in_zone(entity.position, scene.zones):
         no_point = "cannot point: in a no-point zone"
     return no_gaze, no_point
 
 
-def _candidates(reference: Reference, table: tuple[Pair, ...]) -> tuple[Pair, ...]:
-    """The pairs that may win whatever the posture: per gesture the best phrase."""
-    possible = [pair for pair in table if not pair.ruled_out]
-    if not possible:
-        reasons = "; ".join(dict.fromkeys(f"{_name(pair)}: {pair.ruled_out}" for pair in table))
-        raise RunFailed(Fault(reason=f"no way to refer to {reference.target}: {reasons}", where=reference.id))
-    feasible = [pair for pair in possible if not _below(pair.reliability, reference.minimum_reliability)]
-    if not feasible:
+def _hindrance(gesture: GestureChoice, target: str, posture: Posture, motions: Motions) -> str:
+    """Why the body cannot make `gesture` from `posture`; empty if it can."""
+    if gesture == "none":
+        return ""
+    no_gaze = _refusal("look from there", motions.gaze(posture.head, target))
+    if no_gaze or gesture != "directed_gaze_with_pointing":
+        return no_gaze
+    arm = arm_of(motions.point(HERE, target))
+    return _refusal("point from there", motions.point(posture.arm(arm), target))
+
+
+def _refusal(verb: str, motion: Estimate) -> str:
+    if motion.feasible:
+        return ""
+    return f"cannot {verb}: {motion.fault.reason if motion.fault else 'the body refuses'}"
+
+
+def _candidates(
+    possible: Sequence[Pair], minimum: Probability, config: GenerationConfig
+) -> Mapping[GestureChoice, Pair]:
+    """By gesture the one pair that may win whatever the posture: of those that reach `minimum`, or else of the
+    most reliable (decision B10), that with the best phrase."""
+    good = [pair for pair in possible if not _below(pair.reliability, minimum)]
+    if not good:
         most = max(round(pair.reliability, ROUNDING) for pair in possible)
-        feasible = [pair for pair in possible if round(pair.reliability, ROUNDING) == most]
-
-    def rank(pair: Pair) -> tuple[float, tuple[bool, float, int, int]]:
-        return (round(pair.option.cost if pair.option.text else 0.0, ROUNDING), pair.preference)
-
-    best = [
-        min((pair for pair in feasible if pair.gesture == gesture), key=rank, default=None) for gesture in GESTURES
-    ]
-    return tuple(pair for pair in best if pair is not None)
+        good = [pair for pair in possible if round(pair.reliability, ROUNDING) == most]
+    best: dict[GestureChoice, Pair] = {}
+    for pair in sorted(good, key=lambda pair: (round(_speaking(pair, config), ROUNDING), pair.preference)):
+        best.setdefault(pair.gesture, pair)
+    return best
 
 
 def _cheapest_way(
     references: Sequence[Reference],
-    candidates: Sequence[tuple[Pair, ...]],
+    tables: Sequence[tuple[Pair, ...]],
     motions: Motions,
     config: GenerationConfig,
 ) -> _Way:
-    """argmin of the summed cost over all sequences of candidates, the posture carried along (decision B11)."""
-    ways: dict[Posture, _Way] = {Posture(): _Way(0.0, (), (), ())}
-    for reference, pairs in zip(references, candidates, strict=True):
-        onward: dict[Posture, _Way] = {}
-        for posture, way in ways.items():
-            for pair in pairs:
-                reached = posture.after(pair.gesture, reference.target, motions)
-                longer = _Way(
-                    way.cost + cost(pair, reference.target, posture, motions, config),
-                    (*way.preferences, pair.preference),
-                    (*way.pairs, pair),
-                    (*way.postures, posture),
+    """argmin of the summed cost over all sequences of pairs, the posture carried along (decision B11)."""
+    ways = [_Way(0.0, (), (), (Posture(),))]
+    for reference, table in zip(references, tables, strict=True):
+        possible = [pair for pair in table if not pair.ruled_out]
+        onward: list[_Way] = []
+        while not onward:
+            if not possible:
+                reasons = "; ".join(
+                    dict.fromkeys(f"{_name(pair)}: {pair.ruled_out or FROM_NOWHERE}" for pair in table)
                 )
-                if reached not in onward or longer.rank < onward[reached].rank:
-                    onward[reached] = longer
+                raise RunFailed(Fault(reason=f"no way to refer to {reference.target}: {reasons}", where=reference.id))
+            candidates = _candidates(possible, reference.minimum_reliability, config)
+            onward = _continued(ways, candidates.values(), reference.target, motions, config)
+            possible = [pair for pair in possible if pair.gesture not in candidates]
         ways = onward
-    return min(ways.values(), key=lambda way: way.rank)
+    return min(ways, key=lambda way: way.rank)
+
+
+def _impossible(reference: Reference, table: Sequence[Pair]) -> RunFailed:
+    reasons = "; ".join(dict.fromkeys(f"{_name(pair)}: {pair.ruled_out or FROM_NOWHERE}" for pair in table))
+    return RunFailed(Fault(reason=f"no way to refer to {reference.target}: {reasons}", where=reference.id))
+
+
+def _continued(
+    ways: Sequence[_Way], pairs: Collection[Pair], target: str, motions: Motions, config: GenerationConfig
+) -> list[_Way]:
+    """The best way to each posture that one of `pairs` leads to from one of `ways`; none where the body cannot."""
+    best: dict[Posture, _Way] = {}
+    for way in ways:
+        for pair in pairs:
+            if _hindrance(pair.gesture, target, way.posture, motions):
+                continue
+            reached = way.posture.after(pair.gesture, target, motions)
+            longer = _Way(
+                way.cost + cost(pair, target, way.posture, motions, config),
+                (*way.preferences, pair.preference),
+                (*way.pairs, pair),
+                (*way.postures, reached),
+            )
+            if reached not in best or longer.rank < best[reached].rank:
+                best[reached] = longer
+    return list(best.values())
 
 
 def _explain(
@@ -254,10 +304,11 @@ def _explain(
     for pair in table:
         seconds = cost(pair, reference.target, posture, motions, config)
         short = _below(pair.reliability, reference.minimum_reliability)
+        hindrance = pair.ruled_out or _hindrance(pair.gesture, reference.target, posture, motions)
         if pair is chosen:
             reason = "most reliable: nothing reaches the minimum" if fallback else "least cost"
-        elif pair.ruled_out:
-            reason = pair.ruled_out
+        elif hindrance:
+            reason = hindrance
         elif short:
             reason = f"R {pair.reliability:.4g} below {reference.minimum_reliability:g}"
         elif round(seconds - least, ROUNDING) == 0:
@@ -275,7 +326,7 @@ def _explain(
                 reliability=pair.reliability,
                 minimum=reference.minimum_reliability,
                 cost=seconds,
-                feasible=not pair.ruled_out and not short,
+                feasible=not hindrance and not short,
                 chosen=pair is chosen,
                 reason=reason,
             )
@@ -293,7 +344,7 @@ def _explain(
 
 def _doubts(reference: Reference, scene: Scene) -> list[str]:
     """Warn of deictic phrases whose listed distractors are not everything else (decision B8)."""
-    universe = {entity.id for entity in scene.world.objects} - {reference.target}
+    universe = scene.universe - {reference.target}
     return [
         f"{reference.id}: the distractors of the deictic {option.text!r} are everything else, not those listed"
         for option in reference.options

@@ -8,7 +8,14 @@ from hypothesis import strategies as st
 
 from schemas.body import NoPointZone, Ray
 from schemas.world import Entity
-from services.generation.geometry import angle_off_axis, extent, in_gaze_cone, in_pointing_cylinder, in_zone
+from services.generation.geometry import (
+    angle_off_axis,
+    extent,
+    in_gaze_cone,
+    in_pointing_cylinder,
+    in_zone,
+    laid_out,
+)
 
 DOWN = Ray(origin=(0.0, 0.0, 1.0), axis=(0.0, 0.0, -1.0))
 """Straight down on a table at height 0: the cone cuts a circle of radius tan(half-angle)."""
@@ -21,7 +28,7 @@ def thing(id: str, x: float, y: float, **fields: object) -> Entity:
 def test_an_object_is_in_the_cone_when_its_centre_is() -> None:
     objects = [thing("in", 0.09, 0.0), thing("out", 0.11, 0.0)]
 
-    assert in_gaze_cone(DOWN, math.atan(0.1), objects) == {"in"}
+    assert in_gaze_cone(DOWN, math.atan(0.1), laid_out(objects)) == {"in"}
 
 
 def test_an_object_is_in_the_cone_when_one_corner_is() -> None:
@@ -30,13 +37,16 @@ def test_an_object_is_in_the_cone_when_one_corner_is() -> None:
     corner_first = thing("turned", 0.0, 0.135, footprint=square, yaw=math.pi / 4)
     edge_first = thing("not-turned", 0.0, -0.135, footprint=square)
 
-    assert in_gaze_cone(DOWN, math.atan(0.1), [straight, corner_first, edge_first]) == {"straight", "turned"}
+    assert in_gaze_cone(DOWN, math.atan(0.1), laid_out([straight, corner_first, edge_first])) == {
+        "straight",
+        "turned",
+    }
 
 
 def test_what_lies_behind_the_eyes_is_outside() -> None:
     above = Entity(id="lamp", kind="object", position=(0.0, 0.0, 2.0))
 
-    assert in_gaze_cone(DOWN, 0.5, [above]) == frozenset()
+    assert in_gaze_cone(DOWN, 0.5, laid_out([above])) == frozenset()
 
 
 @given(
@@ -53,7 +63,7 @@ def test_the_cone_test_is_the_conic_section(
     if abs(conic) < 1e-6:  # on the edge itself either is right
         return
 
-    assert bool(in_gaze_cone(eyes, half_angle, [thing("o", x, y)])) == (along > 0 and conic > 0)
+    assert bool(in_gaze_cone(eyes, half_angle, laid_out([thing("o", x, y)]))) == (along > 0 and conic > 0)
 
 
 def test_the_cylinder_begins_at_the_hand_and_grows_by_the_object() -> None:
@@ -66,7 +76,7 @@ def test_the_cylinder_begins_at_the_hand_and_grows_by_the_object() -> None:
         thing("far ahead", 3.0, 0.0),
     ]
 
-    assert in_pointing_cylinder(forearm, 0.05, objects) == {"ahead", "large", "far ahead"}
+    assert in_pointing_cylinder(forearm, 0.05, laid_out(objects)) == {"ahead", "large", "far ahead"}
 
 
 def test_without_a_radius_the_footprint_tells_how_large_an_object_is() -> None:
@@ -75,7 +85,7 @@ def test_without_a_radius_the_footprint_tells_how_large_an_object_is() -> None:
 
 
 def test_no_objects_no_distractors() -> None:
-    assert in_gaze_cone(DOWN, 0.1, []) == in_pointing_cylinder(DOWN, 0.1, []) == frozenset()
+    assert in_gaze_cone(DOWN, 0.1, laid_out([])) == in_pointing_cylinder(DOWN, 0.1, laid_out([])) == frozenset()
 
 
 def test_a_zone_ends_at_its_radius() -> None:
