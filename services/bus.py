@@ -208,6 +208,13 @@ class Hub(ABC):
         """A participant's own view. Names are unique on a robot's bus; a client makes its own unique."""
 
     @abstractmethod
+    async def vacant(self, *names: str) -> None:
+        """Wait until nobody else is there under these names, for one who has died may still seem to be.
+
+        Raises InputRefused for those who stay.
+        """
+
+    @abstractmethod
     async def close(self) -> None: ...
 
     async def __aenter__(self) -> Self:

@@ -56,6 +56,9 @@ class MemoryHub(Hub):
         self._buses[name] = bus = MemoryBus(self, name, run=str(self._lives))
         return bus
 
+    async def vacant(self, *names: str) -> None:
+        """Whoever has died is gone at once; `join` refuses a name that is taken."""
+
     async def close(self) -> None:
         for bus in list(self._buses.values()):
             await bus.leave()

@@ -23,7 +23,8 @@ Service = Callable[[Bus, Ready], Awaitable[None]]
 
 
 async def serve(hub: Hub, name: str, service: Service, ready: Ready = lambda: None) -> None:
-    """Run one service on the hub until it is cancelled or fails."""
+    """Run one service on the hub until it is cancelled or fails. Raises InputRefused if another one is there."""
+    await hub.vacant(name)
     bus = hub.join(name)
     joined = bus.stamp()
     since: Stamp | None = None

@@ -32,6 +32,12 @@ OPENING: Seconds = 0.5
 """How long `open_hub` waits for the first acquaintance: who leaves before anybody knows him is heard by nobody."""
 
 
+VACANCY: Seconds = 4.0
+"""How long one who is dead may seem to be there: the lease of a silent link, and as long again."""
+QUIET: Seconds = 0.25
+"""Who is found through others has been found when nobody has come for so long."""
+
+
 async def open_hub(
     robot: str,
     *,
@@ -86,6 +92,15 @@ class ZenohHub(Hub):
             raise ValueError(f"participant {name!r} is on the bus already")
         self._buses[name] = bus = ZenohBus(self, name)
         return bus
+
+    async def vacant(self, *names: str) -> None:
+        await self.peers.rest(QUIET)
+        deadline = self._loop.time() + VACANCY
+        while taken := sorted(set(names) & set(self.peers.names)):
+            if not await self.peers.change(deadline):
+                reason = f"robot {self.robot!r} has {'this' if len(taken) == 1 else 'these'} on the bus already"
+                advice = "stop what runs there, or give this one another --robot or another endpoint"
+                raise InputRefused(Fault(reason=reason, where=", ".join(taken), advice=advice))
 
     def forget(self, name: str) -> None:
         self._buses.pop(name, None)

@@ -72,6 +72,11 @@ class Peers:
         while not self.processes and await self.change(deadline):
             pass
 
+    async def rest(self, pause: Seconds) -> None:
+        """Wait until nobody has come or gone for this long; with no other process there is nobody to wait for."""
+        while self.processes and await self.change(self._loop.time() + pause):
+            pass
+
     def close(self) -> None:
         for declared in reversed(self._declared):
             declared.undeclare()

@@ -45,6 +45,7 @@ def main(options: Options) -> int:
 async def _up(options: Options, config: Config, outputs: Outputs, console: Console) -> None:
     # Our own session comes first and stays: children may crash, the place where all find one another does not.
     async with await options.where.open(config.robot) as hub:
+        await hub.vacant(*_names(options))
         bus = hub.join(unique("up"))
         tallying = Tallying(bus.now())
         live = options.task and console.is_terminal and not options.quiet
@@ -61,8 +62,12 @@ async def _up(options: Options, config: Config, outputs: Outputs, console: Conso
         console.print(tally.render(tallying.tally, config.robot))
 
 
+def _names(options: Options) -> tuple[str, ...]:
+    return (*ROBOT, "simulation", "collaboration") if options.task else (*ROBOT, "simulation")
+
+
 def _children(options: Options, config: Config, console: Console) -> dict[str, Child]:
-    names = (*ROBOT, "simulation", "collaboration") if options.task else (*ROBOT, "simulation")
+    names = _names(options)
     width = max(map(len, names))
     styles = dict(zip(names, STYLES, strict=False))
 

@@ -184,6 +184,47 @@ async def test_up_performs_what_is_played_and_ctrl_c_ends_all_of_it(endpoint: st
         await gone(pid)
 
 
+async def test_a_second_one_of_a_robot_is_refused_and_the_first_goes_on(endpoint: str, tmp_path: Path) -> None:
+    (tmp_path / "wait.xml").write_text('<bml id="w"><wait id="p" duration="6"/></bml>')
+    where = ("--robot", "only", "--connect", endpoint)
+    up = await start("up", "--robot", "only", "--listen", endpoint)
+    try:
+        await line(up, "all services are up", log=False)
+        play = await start("play", *where, tmp_path / "wait.xml")
+        await line(play, "w:p:start", log=False)
+        second = [await start("up", *where), await start("run", "realizer", *where)]
+        async with asyncio.timeout(PATIENCE):
+            told = [(await process.communicate())[1].decode() for process in second]
+            _, err = await play.communicate()
+
+        assert [process.returncode for process in second] == [2, 2]
+        assert told[0].startswith("control, generation, realizer, recognition, simulation: robot 'only' has these")
+        assert told[1].startswith("realizer: robot 'only' has this on the bus already (stop what runs there")
+        assert [text.count("\n") for text in told] == [1, 1]
+        assert (play.returncode, err) == (0, b"")
+    finally:
+        await stopped(up)
+
+
+async def test_a_killed_service_may_come_back_at_once(endpoint: str) -> None:
+    where = ("--robot", "phoenix", "--connect", endpoint)
+    realizer = await start("run", "realizer", "--robot", "phoenix", "--listen", endpoint)
+    control = await start("run", "control", *where)
+    try:
+        await line(realizer, "realizer is ready")
+        await line(control, "control is ready")
+        for how in (signal.SIGKILL, signal.SIGSTOP):
+            # Who is stopped seems to be there until its lease is over.
+            control.send_signal(how)
+            former, control = control, await start("run", "control", *where)
+            await line(control, "control is ready")
+            await stopped(former, signal.SIGKILL)
+    finally:
+        codes = [await stopped(process) for process in (control, realizer)]
+
+    assert codes == [0, 0]
+
+
 async def test_services_do_not_outlive_a_killed_supervisor(endpoint: str) -> None:
     up = await start("up", "--robot", "orphans", "--listen", endpoint)
     try:
