@@ -143,7 +143,7 @@ class _Emitter:
         self.figure = config.profile == "figure-3.3"
         self.dropped = [behavior for behavior in fragment.behaviors if not permits.allows(behavior)]
         kept = [behavior for behavior in fragment.behaviors if permits.allows(behavior)]
-        self.order = ordered(kept, fragment.constraints)
+        self.order = ordered(kept, fragment.constraints, fragment.id)
         chosen = {choice.reference: choice for choice in choices}
         self.parts = {
             behavior.id: _Parts(

@@ -1,69 +1,160 @@
-"""The order of a fragment's behaviors: topological in its constraints, document order for ties (decision B12)."""
+"""The order of a fragment's behaviors: topological in its constraints, document order for ties (decision B12).
+
+Constraints speak of sync points, so it is instants that are ordered: a gaze that ends after a speech has begun may
+well come before that speech. Points of one instant, or a fixed time apart, are told apart by their offsets.
+"""
 
 import heapq
-from collections.abc import Iterator, Sequence
-from itertools import combinations
+from collections import Counter, defaultdict
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from itertools import pairwise
 
-from schemas.behaviors import After, Before, Constraint, FragmentBehavior
-from schemas.syncref import SyncRef
+from msgspec import Struct
 
-START = "start"
+from schemas.behaviors import After, Before, Constraint, FragmentBehavior, Reference, Speech
+from schemas.syncref import SYNC_POINTS, SyncRef, canonical_sync
+from schemas.units import Seconds
 
-
-def ordered(behaviors: Sequence[FragmentBehavior], constraints: Sequence[Constraint]) -> tuple[FragmentBehavior, ...]:
-    """The behaviors, each after those that its constraints put before it. A cycle is left in document order."""
-    index = {behavior.id: place for place, behavior in enumerate(behaviors)}
-    later: list[set[int]] = [set() for _ in behaviors]
-    earlier = [0] * len(behaviors)
-    for one, other in _precedences(behaviors, constraints):
-        first, second = index.get(one), index.get(other)
-        if first is not None and second is not None and first != second and second not in later[first]:
-            later[first].add(second)
-            earlier[second] += 1
-    free = [place for place, count in enumerate(earlier) if count == 0]
-    placed: list[int] = []
-    left = set(range(len(behaviors)))
-    while left:
-        if not free:  # a cycle; whether it can be performed is the realizer's to say
-            free = [min(left)]
-        place = heapq.heappop(free)
-        if place not in left:
-            continue
-        left.remove(place)
-        placed.append(place)
-        for follower in later[place]:
-            earlier[follower] -= 1
-            if earlier[follower] == 0 and follower in left:
-                heapq.heappush(free, follower)
-    return tuple(behaviors[place] for place in placed)
+Sync = tuple[str, str, str]
+"""Block ("" for this one), behavior ("" for the block itself), sync point."""
+Instant = tuple[int, Seconds]
+"""Sync points a fixed time apart share the first number; among them the second tells when."""
+START, END = "start", "end"
+ROUNDING = 6
+"""Decimals of seconds that count."""
 
 
-def _precedences(
-    behaviors: Sequence[FragmentBehavior], constraints: Sequence[Constraint]
-) -> Iterator[tuple[str, str]]:
-    """(earlier, later) ids. Two points of one instant order their behaviors when only one of them is a start."""
+class _Relations(Struct):
+    """ties: the second point comes so many seconds after the first. orders: it comes no earlier than the first."""
+
+    ties: list[tuple[Sync, Sync, Seconds]] = []
+    orders: list[tuple[Sync, Sync]] = []
+
+
+def ordered(
+    behaviors: Sequence[FragmentBehavior], constraints: Sequence[Constraint], fragment: str = ""
+) -> tuple[FragmentBehavior, ...]:
+    """The behaviors, each after those that its constraints put before it. A cycle is left in document order.
+
+    fragment: its id, by which sync references may name it.
+    """
+    relations = _relations(behaviors, constraints, fragment)
+    begins = [("", behavior.id, START) for behavior in behaviors]
+    instants = _instants(begins, relations)
+    orders = [(instants[one], instants[other]) for one, other in relations.orders]
+    starts = [instants[sync] for sync in begins]
+    return tuple(behaviors[place] for place in _sorted(starts, [*orders, *_passing_of_time(instants)]))
+
+
+def _relations(behaviors: Sequence[FragmentBehavior], constraints: Sequence[Constraint], fragment: str) -> _Relations:
+    relations = _Relations()
+    # The voice says one thing at a time: whatever is said of two speeches' points holds of their starts.
+    spoken = {("", behavior.id) for behavior in behaviors if isinstance(behavior, Speech | Reference)}
+
+    def no_later(one: tuple[Sync, Seconds], other: tuple[Sync, Seconds]) -> None:
+        (earlier, before), (later, after) = one, other
+        if before >= after:
+            relations.orders.append((earlier, later))
+            if {earlier[:2], later[:2]} <= spoken:
+                relations.orders.append(((*earlier[:2], START), (*later[:2], START)))
+
     for behavior in behaviors:
         for timing in behavior.timing:
-            yield from _same_instant(SyncRef(behavior=behavior.id, sync=timing.sync), _read(timing.ref))
+            sync, offset = _read(timing.ref, fragment)
+            relations.ties.append((sync, ("", behavior.id, canonical_sync(timing.sync)), offset))
     for constraint in constraints:
         for operator in constraint.operators:
-            reference = _read(operator.ref)
-            syncs = [_read(sync) for sync in operator.syncs]
-            if isinstance(operator, After):
-                yield from ((reference.behavior, sync.behavior) for sync in syncs)
-            elif isinstance(operator, Before):
-                yield from ((sync.behavior, reference.behavior) for sync in syncs)
+            syncs = [_read(text, fragment) for text in operator.syncs]
+            reference = _read(operator.ref, fragment) if operator.ref else None
+            if isinstance(operator, After | Before):
+                assert reference is not None
+                for each in syncs:
+                    no_later(*((reference, each) if isinstance(operator, After) else (each, reference)))
             else:
-                for one, other in combinations([reference, *syncs], 2):
-                    yield from _same_instant(one, other)
+                together = [*([reference] if reference else []), *syncs]
+                relations.ties += [(one, other, a - b) for (one, a), (other, b) in pairwise(together)]
+    return relations
 
 
-def _same_instant(one: SyncRef, other: SyncRef) -> Iterator[tuple[str, str]]:
-    if one.sync == START != other.sync:
-        yield other.behavior, one.behavior
-    elif other.sync == START != one.sync:
-        yield one.behavior, other.behavior
+def _instants(begins: Sequence[Sync], relations: _Relations) -> dict[Sync, Instant]:
+    """When each sync point is, as far as fixed distances tell. Where those contradict one another the first holds."""
+    apart: dict[Sync, list[tuple[Sync, Seconds]]] = defaultdict(list)
+    for one, other, seconds in relations.ties:
+        apart[one].append((other, seconds))
+        apart[other].append((one, -seconds))
+    ordered = [sync for order in relations.orders for sync in order]
+    instants: dict[Sync, Instant] = {}
+    for number, root in enumerate([*begins, *apart, *ordered]):
+        if root in instants:
+            continue
+        instants[root] = (number, 0.0)
+        reached = [root]
+        for sync in reached:
+            for other, seconds in apart[sync]:
+                if other not in instants:
+                    instants[other] = (number, round(instants[sync][1] + seconds, ROUNDING))
+                    reached.append(other)
+    return instants
 
 
-def _read(text: str) -> SyncRef:
-    return SyncRef.parse(text) if text else SyncRef()
+def _passing_of_time(instants: Mapping[Sync, Instant]) -> Iterator[tuple[Instant, Instant]]:
+    """Earlier and later: among points a fixed time apart, and among those of one behavior."""
+    for one, other in pairwise(sorted(set(instants.values()))):
+        if one[0] == other[0]:
+            yield one, other
+    points: dict[tuple[str, str], dict[str, Instant]] = defaultdict(dict)
+    for (block, behavior, sync), instant in instants.items():
+        points[block, behavior][sync] = instant
+    for named in points.values():
+        yield from pairwise([named[sync] for sync in SYNC_POINTS if sync in named])
+        for mark in named.keys() - set(SYNC_POINTS):
+            yield from ((named[START], named[mark]) for _ in named.keys() & {START})
+            yield from ((named[mark], named[END]) for _ in named.keys() & {END})
+
+
+def _sorted(starts: Sequence[Instant], orders: Iterable[tuple[Instant, Instant]]) -> Iterator[int]:
+    """Places in `starts`: an instant is over once all that starts in it is listed, and opens the next ones."""
+    later: dict[Instant, list[Instant]] = defaultdict(list)
+    waits: Counter[Instant] = Counter()
+    for one, other in set(orders):
+        if one != other:
+            later[one].append(other)
+            waits[other] += 1
+    starting: dict[Instant, set[int]] = defaultdict(set)
+    for place, instant in enumerate(starts):
+        starting[instant].add(place)
+    free: list[int] = []
+    opened: set[Instant] = set()
+    left = dict.fromkeys(range(len(starts)))
+    opening = [instant for instant in {*later, *starting} if not waits[instant]]
+    while left:
+        if not opening and not free:  # a cycle; whether it can be performed is the realizer's to say
+            opening.append(starts[next(iter(left))])
+        while opening:
+            instant = opening.pop()
+            opened.add(instant)
+            for place in starting[instant]:
+                heapq.heappush(free, place)
+            if not starting[instant]:
+                opening += _freed(later[instant], waits, opened)
+        if free:
+            place = heapq.heappop(free)
+            del left[place]
+            yield place
+            instant = starts[place]
+            starting[instant].remove(place)
+            if not starting[instant]:
+                opening += _freed(later[instant], waits, opened)
+
+
+def _freed(followers: Iterable[Instant], waits: Counter[Instant], opened: set[Instant]) -> Iterator[Instant]:
+    for follower in followers:
+        waits[follower] -= 1
+        if not waits[follower] and follower not in opened:
+            yield follower
+
+
+def _read(text: str, fragment: str) -> tuple[Sync, Seconds]:
+    ref = SyncRef.parse(text)
+    block = "" if ref.block == fragment else ref.block
+    return (block, ref.behavior, ref.sync or START), ref.offset

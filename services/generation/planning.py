@@ -26,7 +26,7 @@ class Plan(Struct, frozen=True, kw_only=True):
 
 def references(fragment: TurnFragment) -> tuple[Reference, ...]:
     """In the order in which they are made (decision B12)."""
-    order = ordered(fragment.behaviors, fragment.constraints)
+    order = ordered(fragment.behaviors, fragment.constraints, fragment.id)
     return tuple(behavior for behavior in order if isinstance(behavior, Reference))
 
 
