@@ -66,6 +66,7 @@ class SyncPointArrived(Struct, frozen=True, kw_only=True, tag="sync_point_arrive
 class SyncPointReached(Struct, frozen=True, kw_only=True, tag="sync_point_reached", omit_defaults=True):
     """evt: the body has passed a sync point, at `at`. Each point of a behavior once, in order.
 
+    sync: of a repeated movement also `stroke:2`, `stroke:3` ... if the estimate has phases to them.
     arrived: when it came to the point; earlier than `at` if it had to hold there.
     """
 
@@ -141,7 +142,8 @@ class Estimate(Struct, frozen=True, kw_only=True, omit_defaults=True):
     """NO_SUCH_TARGET, BEHAVIOR_TYPE_NOT_SUPPORTED, CANNOT_CREATE_BEHAVIOR ... when not feasible."""
     parts: tuple[str, ...] = ()
     phases: tuple[Phase, ...] = ()
-    """From `start` to `end`, without gaps; sync points in the draft's spelling."""
+    """From `start` to `end`, without gaps; sync points in the draft's spelling, and `stroke:2` and on of a repeated
+    movement if the body reports them: what it does not, is expected in equal parts from `stroke` to `stroke_end`."""
     head_degrees: Degrees = 0.0
     """Sum over the head's joints of the rotation from the starting pose to the target. Cg of thesis 3.3.2."""
     arm_degrees: Degrees = 0.0

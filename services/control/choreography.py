@@ -5,11 +5,10 @@ passes through no zero and a gesture that nobody holds is one fluid motion.
 """
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from itertools import pairwise
 from math import radians
 
-from msgspec import Struct
 from msgspec.structs import replace
 
 from schemas.behaviors import (
@@ -28,12 +27,12 @@ from schemas.behaviors import (
     Posture,
     PostureShift,
 )
-from schemas.body import NoPointZone, Ray
-from schemas.feedback import WarningKind
+from schemas.body import Ray
 from schemas.units import Degrees, Seconds
 from schemas.world import Entity, World
 from services.control import kinematics
 from services.control.body import SEVEN
+from services.control.course import Course, Impossible, Point, Scene
 from services.control.kinematics import Side, Unreachable
 from services.control.motion import Leg
 from services.control.vocabulary import ACTION_UNITS, FACES, GESTURES, POSTURES
@@ -44,49 +43,6 @@ SAME = 0.3
 """Degrees: a gaze that would turn less does not move."""
 SETTLE: Seconds = 0.08
 SLIDE: Seconds = 0.2
-
-
-class Impossible(Exception):
-    """The body cannot do a behavior: the warning it deserves and the reason."""
-
-    def __init__(self, kind: WarningKind, reason: str) -> None:
-        super().__init__(reason)
-        self.kind = kind
-        self.reason = reason
-
-
-class Point(Struct, frozen=True):
-    """A sync point. held_with: the hold point at which this one waits; its own name for a hold point itself."""
-
-    sync: str
-    held_with: str = ""
-
-
-class Course(Struct, frozen=True, kw_only=True):
-    """A behavior worked out: `legs` for `joints` from where they are, and its sync points in order."""
-
-    parts: tuple[str, ...]
-    joints: tuple[str, ...]
-    legs: tuple[Leg, ...]
-    points: tuple[Point, ...]
-    on_target: Mapping[str, float] = {}
-    """Joint angles at the stroke, or at the end of a shift."""
-    degrees: Degrees = 0.0
-    """Of joint motion from the start to there."""
-    ray: Ray | None = None
-    is_resizable: bool = False
-    """May it be smaller, for want of time? Not where it has a target."""
-
-
-class Scene(Struct, frozen=True):
-    """What a course depends on besides the behavior. pose: where the joints are. rest: where each goes home to."""
-
-    pose: Mapping[str, float]
-    rest: Mapping[str, float]
-    world: World
-    zones: tuple[NoPointZone, ...] = ()
-    busy: tuple[str, ...] = ()
-    """Parts in use: a pointing without mode takes another arm."""
 
 
 def plan(behavior: BlockBehavior, scene: Scene) -> Course:
@@ -286,14 +242,16 @@ def _nod(lexeme: str, repetition: int, amount: float) -> Course:
         Leg(goal=lift, velocity=turned(0.0, aside), seconds=0.2, marks=(("start", 0.0), ("ready", 1.0))),
         Leg(goal=low, velocity=turned(0.0, -aside), seconds=half, marks=(("stroke_start", 0.1), ("stroke", 1.0))),
     ]
-    for _ in range(1, max(1, repetition)):
-        legs.append(Leg(goal=high, velocity=turned(0.0, aside), seconds=half * (1.0 if lexeme == "NOD" else 1.5)))
-        legs.append(Leg(goal=low, velocity=turned(0.0, -aside), seconds=half * (1.0 if lexeme == "NOD" else 1.5)))
+    again = half * (1.0 if lexeme == "NOD" else 1.5)
+    strokes = [f"stroke:{number}" for number in range(2, repetition + 1)]
+    for stroke in strokes:
+        legs.append(Leg(goal=high, velocity=turned(0.0, aside), seconds=again))
+        legs.append(Leg(goal=low, velocity=turned(0.0, -aside), seconds=again, marks=_at(1.0, stroke)))
     legs.append(Leg(goal=turned(-0.25 * size, 0.0), velocity=turned(2.0 * size, aside / 2), seconds=0.25,
                     marks=_at(1.0, "stroke_end")))  # fmt: skip
     legs.append(Leg(goal=(0.0, 0.0), seconds=0.3, marks=(("relax", 0.15), ("end", 1.0))))
     return Course(
-        parts=("nod",), joints=("neck_yaw", "neck_pitch"), legs=tuple(legs), points=_held_around_stroke(),
+        parts=("nod",), joints=("neck_yaw", "neck_pitch"), legs=tuple(legs), points=_held_around_stroke(strokes),
         on_target={}, degrees=math.degrees(size), is_resizable=True,
     )  # fmt: skip
 
@@ -373,8 +331,11 @@ def _held_on_target() -> tuple[Point, ...]:
     return tuple(Point(sync, "relax" if sync in ("stroke_end", "relax") else "") for sync in SEVEN)
 
 
-def _held_around_stroke() -> tuple[Point, ...]:
-    return tuple(Point(sync, sync if sync in ("stroke_start", "stroke_end") else "") for sync in SEVEN)
+def _held_around_stroke(strokes: Sequence[str] = ()) -> tuple[Point, ...]:
+    """strokes: the repetitions of the first."""
+    number = SEVEN.index("stroke_end")
+    syncs = (*SEVEN[:number], *strokes, *SEVEN[number:])
+    return tuple(Point(sync, sync if sync in ("stroke_start", "stroke_end") else "") for sync in syncs)
 
 
 def _at(fraction: float, *syncs: str) -> tuple[tuple[str, float], ...]:

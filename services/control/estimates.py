@@ -8,7 +8,7 @@ from schemas.body import BodyPose, Estimate, Phase
 from schemas.faults import Fault
 from schemas.units import Seconds
 from services.control.body import sync_points
-from services.control.choreography import Course, Point
+from services.control.course import Course, Point
 from services.control.motion import SLOWEST, Path
 from services.control.sizing import quickest
 from services.control.voice import Utterance

@@ -6,7 +6,7 @@ from math import inf, radians
 from schemas.behaviors import BlockBehavior, Gaze, GazeShift, HeadDirectionShift
 from schemas.units import Seconds
 from services.control import choreography, tracks
-from services.control.choreography import Course, Impossible, Scene
+from services.control.course import Course, Impossible, Scene
 from services.control.motion import Leg, Motion, Path
 from services.control.runs import Run
 from services.control.tracks import Track
@@ -19,6 +19,13 @@ SHORTEST: Seconds = 0.1
 
 def is_shift(behavior: BlockBehavior) -> bool:
     return isinstance(behavior, GazeShift | HeadDirectionShift)
+
+
+def eyes_on(behavior: BlockBehavior | None) -> str:
+    """The entity on the gaze axis once the motion is done: none with an offset."""
+    if isinstance(behavior, Gaze | GazeShift) and behavior.offset_angle and behavior.offset_direction:
+        return ""
+    return behavior.target if isinstance(behavior, Gaze | GazeShift | HeadDirectionShift) else ""
 
 
 class Attention:
@@ -35,8 +42,8 @@ class Attention:
 
     @property
     def entity(self) -> str:
-        """Target of the base gaze."""
-        return self.base.target if isinstance(self.base, GazeShift | HeadDirectionShift) else ""
+        """What the base gaze rests on."""
+        return eyes_on(self.base)
 
     def shift(self, behavior: BlockBehavior, course: Course) -> None:
         self.base, self.angles = behavior, (course.legs[-1].goal[0], course.legs[-1].goal[1])
@@ -69,11 +76,11 @@ class Attention:
         marks, motion = run.motion.path.marks, run.motion
         if isinstance(run.behavior, Gaze):
             if run.awaits("stroke"):
-                self.expect(run.behavior.target, motion.crossing(marks["stroke"]), now)
+                self.expect(eyes_on(run.behavior), motion.crossing(marks["stroke"]), now)
             elif not run.awaits("relax"):
                 self.expect(self.entity, motion.crossing(marks["end"]), now)
         elif isinstance(run.behavior, GazeShift | HeadDirectionShift) and run.awaits("end"):
-            self.expect(run.behavior.target, motion.crossing(marks["end"]), now)
+            self.expect(eyes_on(run.behavior), motion.crossing(marks["end"]), now)
 
 
 def turn(track: Track, goal: tuple[float, ...], now: Seconds) -> None:

@@ -8,8 +8,8 @@ from schemas.behaviors import BlockBehavior
 from schemas.units import Seconds
 from services.control import variability
 from services.control.body import Authority
-from services.control.choreography import Course, Point
 from services.control.config import Stall, Variability
+from services.control.course import Course, Point
 from services.control.motion import Leg, Motion, Path
 from services.control.sizing import hurried
 from services.control.waiting import Bell

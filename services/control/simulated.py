@@ -26,8 +26,8 @@ from services.control.body import (
     Progress,
     Reached,
 )
-from services.control.choreography import Course, Impossible, Point, Scene
 from services.control.config import Variability
+from services.control.course import Course, Impossible, Point, Scene
 from services.control.estimates import infeasible, moved, spoken, waited
 from services.control.head import Attention
 from services.control.motion import Motion, Path, resting

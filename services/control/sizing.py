@@ -8,7 +8,7 @@ from msgspec import Struct
 
 from schemas.units import Seconds
 from services.control import tracks
-from services.control.choreography import Course
+from services.control.course import Course
 from services.control.motion import Leg, Motion, Path
 
 SIZES = (0.9, 0.8, 0.7, 0.6, 0.5, 0.4)

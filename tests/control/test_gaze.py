@@ -136,3 +136,15 @@ async def test_eyes_stay_on_target_while_the_torso_leans():
     await asyncio.sleep(1.0)
 
     assert misses_by(body, (1.3, 0.0, 1.2)) < 0.1
+
+
+async def test_with_an_offset_the_eyes_are_beside_the_target_and_on_nothing():
+    body = body_in(WORLD)
+    straight = body_in(WORLD)
+    await performed(straight, GazeShift(id="base", target="human"))
+    await performed(body, GazeShift(id="base", target="human", offset_direction="UPRIGHT", offset_angle=20))
+    axis, on_target = body.state().gaze.axis, straight.state().gaze.axis
+
+    assert (body.state().looking_at, straight.state().looking_at) == ("", "human")
+    assert axis[1] < on_target[1]  # right
+    assert axis[2] > on_target[2]  # up

@@ -4,6 +4,7 @@ import asyncio
 import math
 
 import msgspec
+import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -28,7 +29,7 @@ from schemas.world import Entity, World
 from services.control.body import Arrived, BehaviorRefused, sync_points
 from services.control.simulated import SimulatedBody
 from services.virtual_time import run_virtual
-from tests.control.contract import WORLD, Stage, performed, times
+from tests.control.contract import WORLD, Stage, default, performed, times
 from tests.control.motions import recorded, stops, violations
 
 ARMS = ("LEFT_HAND", "RIGHT_HAND")
@@ -79,13 +80,29 @@ FREE: list[BlockBehavior] = [
 @pytest.mark.parametrize("behavior", FREE, ids=lambda behavior: behavior.id)
 async def test_what_nobody_holds_is_one_fluid_motion_within_its_limits(behavior: BlockBehavior):
     middle = Entity(id="middle", kind="object", position=(0.55, 0.0, 0.73), radius=0.03)
-    body = body_in(World(entities=(*WORLD.entities, middle)))
+    world = World(entities=(*WORLD.entities, middle))
+    body = body_in(world)
+    phases = body.estimate(behavior, None, world).phases
     async with recorded(body) as recording:
         at = times(await performed(body, behavior))
 
-    assert tuple(at) == sync_points(behavior)
+    assert tuple(at) == ("start", *(phase.to for phase in phases))
+    assert default(tuple(at)) == sync_points(behavior)
     assert stops(recording, at["start"], at["end"]) == 0
     assert violations(recording, body.capabilities.joints) == []
+
+
+async def test_each_stroke_of_a_repeated_movement_is_told_when_it_is():
+    body = body_in()
+    nod = Head(id="nod", lexeme="NOD", repetition=3)
+    async with recorded(body, ("neck_pitch",)) as recording:
+        at = times(await performed(body, nod))
+
+    assert list(at)[3:7] == ["stroke", "stroke:2", "stroke:3", "stroke_end"]
+    for stroke in ("stroke", "stroke:2", "stroke:3"):
+        pitch = recording.angles[:, 0]
+        lowest = pitch[np.abs(np.array(recording.times) - at[stroke]) < 0.1].min()
+        assert np.interp(at[stroke], recording.times, pitch) == pytest.approx(lowest, abs=1e-3)
 
 
 async def test_authority_that_comes_in_time_costs_no_stop():
