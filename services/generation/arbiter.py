@@ -14,28 +14,36 @@ from schemas.behaviors import Event, GazeShift, Timing
 from schemas.blocks import Block
 from schemas.body import RobotState
 from schemas.recognition import ConnectionEvent, Statistics
-from schemas.units import Radians, Seconds
+from schemas.units import Degrees, Radians, Seconds
 from schemas.world import World
 from services.generation.config import GenerationConfig
 from services.generation.response_policy import ResponsePolicy
 from services.generation.watches import FaceWatch, GlanceWatch, HandWatch
 
 NOBODY = Claim(kind="none", priority=0)
+UP_RIGHT: Degrees = 60.0
+"""From the table: at nothing that anybody could mean, as far as the neck turns. Thesis 5.3."""
 Observation = (
     World | RobotState | Statistics | ConnectionEvent | ActionBegan | ActionEnded | ActorFound | ActorLost
 )  # fmt: skip
 
 
 class Shift(Struct, frozen=True):
-    """Move the base gaze to `target`. glance: announce an optional mutual facial gaze with it."""
+    """Move the base gaze to `target`. glance: announce an optional mutual facial gaze with it.
+
+    beside: look past it, to the upper right.
+    """
 
     id: str
     target: str
     glance: bool = False
+    beside: bool = False
 
     @property
     def block(self) -> Block:
         shift = GazeShift(id="shift", target=self.target)
+        if self.beside:
+            shift = GazeShift(id="shift", target=self.target, offset_direction="UPRIGHT", offset_angle=UP_RIGHT)
         if not self.glance:
             return Block(id=self.id, behaviors=(shift,))
         event = Event(
@@ -208,11 +216,19 @@ class Arbiter:
         owner = self._owner
         if self._retry is not None and now >= self._retry:
             self._retry = None
-        if not owner.target or owner.target == self._base or self._retry is not None or self._lapsed is not None:
+        target = self._surface() if self._config.speech_only else owner.target
+        if not target or target == self._base or self._retry is not None or self._lapsed is not None:
             return None
-        if self._fragment is not None and not self._faces.is_face(owner.target):
+        if self._fragment is not None and not self._faces.is_face(target):
             return None
-        self._base = owner.target
+        self._base = target
         self._shifts += 1
         cause = "response" if owner.kind == "response" else "maintenance"
-        return Shift(f"{cause}-{self._shifts}", owner.target, glance=owner.kind == "glance")
+        return Shift(
+            f"{cause}-{self._shifts}", target, glance=owner.kind == "glance", beside=self._config.speech_only
+        )
+
+    def _surface(self) -> str:
+        """The first in the world: what the head stares past in the study's condition without gaze."""
+        entities = self._world.entities if self._world else ()
+        return next((entity.id for entity in entities if entity.kind == "surface"), "")

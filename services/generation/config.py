@@ -15,7 +15,7 @@ class GenerationConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=
     """Raises ValueError when a value is outside its range or the reliabilities leave (0, 1) (decision B1)."""
 
     condition: Condition = "operational"
-    """Of the study, thesis chapter 5. degraded-generation: the task's own speech, nothing else moves."""
+    """Of the study, thesis chapter 5. degraded-generation: the task's own speech, the head to the upper right."""
     profile: Profile = "check-back"
     """How a chosen gesture and phrase are synchronized: as in Appendix B, or as in Fig. 3.3."""
 

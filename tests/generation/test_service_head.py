@@ -6,7 +6,7 @@ import pytest
 
 from schemas import keys
 from schemas.attention import Inhibit, InhibitionEnded
-from schemas.behaviors import Gaze, Speech
+from schemas.behaviors import Gaze, GazeShift, Speech
 from schemas.fragments import FragmentOutcome, TurnFragment
 from services.generation.config import GenerationConfig
 from services.memory_bus import MemoryHub
@@ -156,7 +156,7 @@ async def test_a_lease_ends_with_its_owners_life(hub: MemoryHub) -> None:
         assert owners(partners)[-1] == (1.0 + GRACE + 0.3, "face", "human")
 
 
-async def test_in_degraded_generation_the_head_is_nobodys(hub: MemoryHub) -> None:
+async def test_in_degraded_generation_the_head_stares_to_the_upper_right(hub: MemoryHub) -> None:
     async with stage(hub, GenerationConfig(condition="degraded-generation")) as partners:
         partners.event("e", "started", initiator="human", responder="robot", objects=("left",))
         pending = partners.send(looks())
@@ -165,7 +165,10 @@ async def test_in_degraded_generation_the_head_is_nobodys(hub: MemoryHub) -> Non
         await pending.outcome
 
         assert [behavior.id for behavior in block.behaviors] == ["turn-pair", "s", "turn-ended"]
-        assert partners.shifts == []
+        assert owners(partners) == [(0.0, "inhibition", "")]
+        assert partners.shifts == [("maintenance", "table")]
+        (shift,) = (each for request in partners.blocks for each in request.block.behaviors if each.id == "shift")
+        assert shift == GazeShift(id="shift", target="table", offset_direction="UPRIGHT", offset_angle=60.0)
 
 
 async def test_the_gaze_cannot_be_held_on_what_nobody_knows(hub: MemoryHub) -> None:
