@@ -116,12 +116,21 @@ class Assembler:
                 seconds = round(high - low, 9)
                 self.places.append(Place("delay", source, target, seconds, seconds))
                 self.bounds.append(Bound("delay", target, source, -seconds))
+        for number, instant in enumerate(found):
+            if instant.at is not None and instant.offset == 0.0 and number:
+                self._clock(number, round(instant.at, 9))
 
     def _phases(self, chain: Chain) -> None:
         id, lines, at = chain.behavior.id, _lines(chain.behavior.line), self.at
         always = {pair for group in one_instant(chain.type) for pair in pairwise(group)}
         cut = self.arrangement.cuts.get(id)
         if (start := at[chain.points[0]]) != 0:
+    def _clock(self, number: int, at: Seconds) -> None:
+        """Each time is counted from the block's start, whatever else was late."""
+        if at >= 0.0:
+            self.places.append(Place("delay", 0, number, at, at))
+        self.bounds.append(Bound("delay", number, 0, -at))
+
             self.places.append(Place("order", 0, start, behavior=id, lines=lines))
         lag, shortest, longest = 0.0, 0.0, 0.0
         unlimited = False
@@ -151,7 +160,7 @@ class Assembler:
         lines = _lines(earlier.line, later.line)
         if source == target and seconds <= EPSILON:
             return
-        if seconds >= 0:
+        if seconds >= 0 and target:
             self.places.append(Place("order", source, target, seconds, seconds, lines=lines))
         else:
             self.bounds.append(Bound("order", source, target, seconds, lines=lines))

@@ -4,15 +4,15 @@ from collections.abc import Mapping
 
 from msgspec import Struct
 
-from schemas.behaviors import BlockBehavior, Gesture, Pointing
+from schemas.behaviors import BlockBehavior, Gesture, Head, Pointing
 from schemas.body import Estimate
 from schemas.units import Seconds
-from services.realizer.points import ON_TARGET, Point, Segment, family, segments, sync_points, type_of
+from services.realizer.points import ON_TARGET, Point, Segment, family, segments, type_of
 from services.realizer.relations import Relations
 
 _ARMS = {"LEFT_HAND": ("left_arm",), "RIGHT_HAND": ("right_arm",), "BOTH_HANDS": ("left_arm", "right_arm")}
-_HANDED_OVER = ON_TARGET | {"pointing", "gesture"}
-"""Types that another behavior of the same part cuts short. A nod is on top of whatever the head does."""
+_SHARED = ON_TARGET | {"pointing", "gesture", "head", "speech", "faceShift", "postureShift", "pose"}
+"""Types of which another behavior of the same part takes the place. A gazeShift is beneath any gaze."""
 
 
 class Chain(Struct, frozen=True):
@@ -33,29 +33,49 @@ def chain(behavior: BlockBehavior, estimate: Estimate | None) -> Chain:
     """`behavior` as the body estimates it; nominal where it does not."""
     longest = {(phase.since, phase.to): phase.longest for phase in estimate.phases} if estimate else {}
     parts = segments(behavior, estimate)
+    if isinstance(behavior, Head) and estimate is not None:
+        parts = _stroke_by_stroke(parts, estimate)
     return Chain(
         behavior,
         type_of(behavior),
-        tuple([Point(behavior.id, sync) for sync in sync_points(behavior)]),
+        tuple([Point(behavior.id, sync) for sync in ("start", *(part.to for part in parts))]),
         parts,
         tuple([longest.get((part.since, part.to)) for part in parts]) if longest else (None,) * len(parts),
         _parts(behavior, estimate),
     )
 
 
+def _stroke_by_stroke(parts: tuple[Segment, ...], estimate: Estimate) -> tuple[Segment, ...]:
+    """With each repetition of a movement, if the body says that it will tell of them: `stroke:2` and on."""
+    syncs = [phase.since for phase in estimate.phases]
+    if "stroke" not in syncs or "stroke_end" not in syncs:
+        return parts
+    first, last = syncs.index("stroke"), syncs.index("stroke_end")
+    strokes = [
+        Segment(phase.since, phase.to, min(phase.shortest, phase.natural), phase.natural, phase.to == "stroke_end")
+        for phase in estimate.phases[first:last]
+    ]
+    number = next(number for number, part in enumerate(parts) if part.since == "stroke")
+    return (*parts[:number], *strokes, *parts[number + 1 :])
+
+
 def _parts(behavior: BlockBehavior, estimate: Estimate | None) -> tuple[str, ...]:
-    if type_of(behavior) not in _HANDED_OVER:
+    type = type_of(behavior)
+    if type not in _SHARED:
         return ()
     if isinstance(behavior, Pointing | Gesture) and behavior.mode is not None:
         return _ARMS[behavior.mode]
-    return estimate.parts if estimate and estimate.parts else (family(type_of(behavior)),)
+    parts = estimate.parts if estimate and estimate.parts else (family(type),)
+    # A nod is on top of whatever else the head does.
+    return tuple([f"nod of {part}" for part in parts]) if type == "head" else parts
 
 
 def natural_ends(chains: Mapping[str, Chain], relations: Relations) -> frozenset[str]:
     """Behaviors that last until something else takes their place or all ends: nobody has said when they end."""
-    named = relations.named
+    constrained = relations.constrained
     return frozenset(
         id
         for id, each in chains.items()
-        if each.type in ON_TARGET and not any(Point(id, sync) in named for sync in ("stroke_end", "relax", "end"))
+        if each.type in ON_TARGET
+        and not any(Point(id, sync) in constrained for sync in ("stroke_end", "relax", "end"))
     )

@@ -5,29 +5,38 @@ Synchronizations that share a point merge, whatever their number, direction and 
 
 from collections import defaultdict, deque
 from collections.abc import Iterable
-from contextlib import suppress
 
 from msgspec import Struct
 
 from schemas.faults import Fault
 from schemas.units import Seconds
-from services.realizer.points import Point
+from services.realizer.points import ORIGIN, Point
 from services.realizer.relations import BlockRefused, Equal, Term
 from services.realizer.schedule import EPSILON
 
 
 class Instant(Struct, frozen=True, gc=False):
-    """Points that happen together. class_id, offset: its place within its class, lowest offset 0."""
+    """Points that happen together. class_id, offset: its place within its class, lowest offset 0.
+
+    at: seconds from the block's start, if that is what is asked for.
+    """
 
     points: tuple[Point, ...]
     class_id: int
     offset: Seconds
+    at: Seconds | None = None
 
 
 class Classes:
-    """Which points are tied together, and by how many seconds."""
+    """Which points are tied together, and by how many seconds.
+
+    Times of the clock contradict each other as well, but make no class: two behaviors that are both to end at 10 s
+    do not wait for each other.
+    """
 
     def __init__(self) -> None:
+        self._clock: dict[Point, Seconds] = {}
+        """When a representative is to happen, seconds from the block's start, if that is said."""
         self._parent: dict[Point, Point] = {}
         self._offset: dict[Point, Seconds] = {}
         """Of a point to its parent: when it happens, counted from the parent."""
@@ -49,15 +58,26 @@ class Classes:
             self._parent[each], self._offset[each] = point, offset
         return point, offset
 
+    def at(self, point: Point) -> Seconds | None:
+        """When it is to happen, seconds from the block's start, if that is said."""
+        if point == ORIGIN:
+            return 0.0
+        root, offset = self.find(point)
+        clock = self._clock.get(root)
+        return None if clock is None else clock + offset
+
     def offset_between(self, one: Point, other: Point) -> Seconds | None:
         """Seconds from `one` to `other`; None if nothing ties them."""
         (root, start), (other_root, end) = self.find(one), self.find(other)
-        return end - start if root == other_root else None
+        if root == other_root:
+            return end - start
+        since, to = self.at(one), self.at(other)
+        return None if since is None or to is None else to - since
 
     def tie(self, equal: Equal, block: str) -> None:
         """Merge. Raises BlockRefused if that contradicts what is known, naming points and lines."""
-        first = equal.terms[0]
-        for term in equal.terms[1:]:
+        first, *others = sorted(equal.terms, key=lambda term: term.point == ORIGIN)
+        for term in others:
             self.add(first.point)
             self.add(term.point)
             apart = first.offset - term.offset  # first + first.offset = term + term.offset
@@ -66,15 +86,27 @@ class Classes:
                 raise self._contradiction(first, term, known, block)
             self._links[first.point].append((term.point, term))
             self._links[term.point].append((first.point, first))
-            if known is None:
-                (root, start), (other, end) = self.find(first.point), self.find(term.point)
-                self._parent[other], self._offset[other] = root, start + apart - end
+            self._merge(first.point, term.point, apart)
 
-    def tie_if_possible(self, equal: Equal) -> None:
-        """Merge what does not contradict what is known."""
-        for term in equal.terms[1:]:
-            with suppress(BlockRefused):
-                self.tie(Equal((equal.terms[0], term)), "")
+    def _merge(self, one: Point, other: Point, apart: Seconds) -> None:
+        root, start = self.find(one)
+        if other == ORIGIN:
+            self._clock[root] = -apart - start
+            return
+        joined, end = self.find(other)
+        if joined == root:
+            return
+        self._parent[joined], self._offset[joined] = root, start + apart - end
+        if (clock := self._clock.pop(joined, None)) is not None:
+            self._clock[root] = clock - self._offset[joined]
+
+    def tie_if_possible(self, equal: Equal) -> bool:
+        """Merge, unless that contradicts what is known."""
+        try:
+            self.tie(equal, "")
+        except BlockRefused:
+            return False
+        return True
 
     def lines(self, *points: Point) -> set[int]:
         """Where it is written that the first of `points` and the last are tied, if they are."""
@@ -118,20 +150,23 @@ def instants(classes: Classes, points: Iterable[Point]) -> list[Instant]:
     found: list[Instant] = []
     for class_id, group in enumerate(members.values()):
         if len(group) == 1:
-            found.append(Instant((group[0][2],), class_id, 0.0))
+            alone = group[0][2]
+            found.append(Instant((alone,), class_id, 0.0, classes.at(alone)))
             continue
         group.sort()
         lowest = group[0][0]
         together: list[tuple[Seconds, int, Point]] = []
         for member in group:
             if together and member[0] - together[0][0] > EPSILON:
-                found.append(_instant(together, class_id, lowest))
+                found.append(_instant(classes, together, class_id, lowest))
                 together = []
             together.append(member)
-        found.append(_instant(together, class_id, lowest))
+        found.append(_instant(classes, together, class_id, lowest))
     return found
 
 
-def _instant(together: list[tuple[Seconds, int, Point]], class_id: int, lowest: Seconds) -> Instant:
+def _instant(
+    classes: Classes, together: list[tuple[Seconds, int, Point]], class_id: int, lowest: Seconds
+) -> Instant:
     points = tuple(point for _, _, point in sorted(together, key=lambda member: member[1]))
-    return Instant(points, class_id, round(together[0][0] - lowest, 9))
+    return Instant(points, class_id, round(together[0][0] - lowest, 9), classes.at(points[0]))

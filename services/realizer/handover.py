@@ -10,6 +10,7 @@ from schemas.behaviors import Gesture, Hand, Pointing
 from schemas.syncref import SYNC_POINTS
 from schemas.units import Seconds
 from services.realizer.chains import Chain
+from services.realizer.classes import Classes
 from services.realizer.points import WITH_STROKE, Point
 from services.realizer.relations import Relations
 from services.realizer.schedule import EPSILON
@@ -38,22 +39,25 @@ class Arrangement(Struct, frozen=True):
 
 
 class Conflict(NamedTuple):
-    """`later` would take the part from `earlier` before the latter's `point`, which is not to be given up."""
+    """Two that would have the same part at the same time.
 
-    earlier: str
-    later: str
-    point: Point
+    turn: the later, and the point of the earlier that it has to wait for. hand: who can use which other arm instead.
+    """
+
+    turn: tuple[str, Point] | None
+    hand: tuple[str, Hand] | None
 
 
 def arrange(
     chains: Mapping[str, Chain],
     relations: Relations,
+    classes: Classes,
     before: Arrangement,
     times: Mapping[Point, Seconds],
 ) -> tuple[Arrangement, list[Conflict]]:
     """Who else takes whose place in a schedule made with `before` and where that would break what was asked for."""
     held = relations.held
-    mentioned = {point.behavior for point in relations.named}
+    mentioned = {point.behavior for point in relations.constrained}
     successors, cuts = dict(before.successors), dict(before.cuts)
     conflicts = []
     for id, successor in _successors(chains, mentioned, times).items():
@@ -61,8 +65,13 @@ def arrange(
         taken = times[Point(successor, "start")]
         first = next((number for number, point in enumerate(chain.points) if times[point] > taken + EPSILON), 0)
         is_natural = id in before.natural
-        if first and (last := _not_given_up(chain, first, held, is_natural, is_asked=successor in mentioned)):
-            conflicts.append(Conflict(id, successor, chain.points[last]))
+        if first and not (chain.type == "speech" and _is_tied(chains[successor], chain, classes)):
+            last = _not_given_up(chain, first, held, is_natural, is_asked=successor in mentioned)
+            turn = (successor, chain.points[last]) if last is not None else None
+            # Who has made his stroke hands over; else the other arm is better, if that is free.
+            hand = _free_hand((successor, id), chains, times) if turn or first <= _STROKE_END else None
+            if turn or hand:
+                conflicts.append(Conflict(turn, hand))
         if id in successors:
             continue
         if is_natural:
@@ -80,13 +89,20 @@ def _not_given_up(
     """The last of its points from number `first` on that a successor must wait for.
 
     What shares an instant with others or waits for them; and all of it, if nobody has asked for the successor now.
+    Words are never given up.
     """
     broken = [number for number in range(first, len(chain.points)) if chain.points[number] in held]
-    if not is_asked:
+    if not is_asked or chain.type == "speech":
         broken.append(_STROKE if is_natural else len(chain.points) - 1)
     if not broken or broken[-1] < first:
         return None
     return max(broken[-1], _STROKE_END) if chain.type in WITH_STROKE else broken[-1]
+
+
+def _is_tied(later: Chain, speech: Chain, classes: Classes) -> bool:
+    """Is it said in so many words that one begins while the other speaks? It is for the voice to say no."""
+    begins = classes.find(later.points[0])[0]
+    return any(classes.find(point)[0] == begins for point in speech.points)
 
 
 def _successors(
@@ -109,11 +125,11 @@ def _successors(
     return found
 
 
-def free_hand(
-    conflict: Conflict, chains: Mapping[str, Chain], times: Mapping[Point, Seconds]
+def _free_hand(
+    rivals: tuple[str, str], chains: Mapping[str, Chain], times: Mapping[Point, Seconds]
 ) -> tuple[str, Hand] | None:
     """Which of the two can use the other arm instead, since it names none and the arm is free all the while."""
-    for id in (conflict.later, conflict.earlier):
+    for id in rivals:
         chain = chains[id]
         other = _OTHER.get(chain.parts[0]) if len(chain.parts) == 1 else None
         if other is None or not isinstance(chain.behavior, Pointing | Gesture) or chain.behavior.mode is not None:

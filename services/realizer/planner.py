@@ -11,7 +11,7 @@ from typing import get_args
 from msgspec import Struct
 from msgspec.structs import replace
 
-from schemas.behaviors import BlockBehavior, Event, Hand, Unknown
+from schemas.behaviors import BlockBehavior, Event, Hand, Head, Unknown
 from schemas.blocks import Block
 from schemas.body import BodyPose, Estimate, Estimates
 from schemas.faults import Fault
@@ -20,13 +20,13 @@ from schemas.units import Seconds
 from services.realizer.assembly import Assembler, Assembly, Member
 from services.realizer.chains import Chain, chain, natural_ends
 from services.realizer.classes import Classes
-from services.realizer.handover import Arrangement, Conflict, arrange, free_hand
+from services.realizer.handover import Arrangement, Conflict, arrange
 from services.realizer.net import Bound, PetriNet
-from services.realizer.points import Point, one_instant
+from services.realizer.points import ORIGIN, Point, one_instant
 from services.realizer.prediction import Impossible, predict
-from services.realizer.relations import BlockRefused, Elsewhere, Equal, Order, Problem, Relations, Term, relations
+from services.realizer.relations import BlockRefused, Elsewhere, Equal, Order, Problem, Relations, Term, at_line, relations
 from services.realizer.schedule import Solution
-from services.realizer.verdict import Loss, judge
+from services.realizer.verdict import Losses, judge
 
 
 class Plan(Struct, frozen=True, kw_only=True):
@@ -93,6 +93,8 @@ class _Planner:
         self.dropped = dict.fromkeys(dropped)
         """In the order in which they were; the values say nothing."""
         self.turns: frozenset[tuple[str, Point]] = frozenset()
+        self.overlaps: set[tuple[str, Point]] = set()
+        """Turns that there is no time to wait for."""
         self.hands: dict[str, Hand] = {}
         self.chains: dict[str, Chain] = {}
         for behavior in block.behaviors:
@@ -122,29 +124,35 @@ class _Planner:
 
     def _refuse_if_required(self, id: str, reason: str, kind: WarningKind) -> None:
         if id in self.relations.required:
-            line = next(behavior.line for behavior in self.block.behaviors if behavior.id == id)
             advice = "it is required; without `required` it would be dropped"
-            raise BlockRefused(Fault(reason=reason, where=f"{self.block.id}: {id}", line=line, advice=advice), kind)
+            fault = Fault(reason=reason, where=f"{self.block.id}: {id}", line=self._line(id), advice=advice)
+            raise BlockRefused(fault, kind)
 
     def _drop(self, id: str, kind: WarningKind, reason: str) -> None:
         self._refuse_if_required(id, reason, kind)
         self.chains.pop(id, None)
         self.dropped[id] = None
-        self.problems.append(Problem(kind, reason, id))
+        self.problems.append(Problem(kind, at_line(self._line(id), f"{reason}; the behavior is dropped"), id))
+
+    def _line(self, id: str) -> int:
+        return next(behavior.line for behavior in self.block.behaviors if behavior.id == id)
 
     def plan(self) -> Plan:
         """What cannot be on time is dropped, until the rest can be."""
         while True:
-            present = self._present()
-            classes = self._classes(present)
+            present, classes = self._present()
             try:
                 return self._plan(present, classes)
-            except Loss as loss:
+            except Losses as found:
                 self.turns = frozenset()
-                self._drop(loss.behavior, "IMPOSSIBLE_TO_SCHEDULE", str(loss))
+                for loss in found.losses:
+                    if loss.turn is not None and self._may_speak_at_once(loss.turn[1].behavior, present):
+                        self.overlaps.add(loss.turn)
+                    else:
+                        self._drop(loss.behavior, "IMPOSSIBLE_TO_SCHEDULE", loss.reason)
 
     def _plan(self, present: Relations, classes: Classes) -> Plan:
-        """Raises Loss: a behavior that cannot be on time."""
+        """Raises Losses: what cannot be on time."""
         natural = natural_ends(self.chains, present)
         waited_for = frozenset(self.chains) - self._unawaited_events(present)
         arrangement = Arrangement(natural=natural)
@@ -152,9 +160,10 @@ class _Planner:
         while True:
             assembler, assembly, solution = self._solved(assembler, arrangement, classes)
             times = {point: solution.times[transition] for point, transition in assembly.at.items()}
-            arranged, conflicts = arrange(self.chains, present, arrangement, times)
+            arranged, conflicts = arrange(self.chains, present, classes, arrangement, times)
+            conflicts = [each for each in conflicts if each.hand or each.turn not in self.overlaps]
             for conflict in conflicts:
-                self._resolve(conflict, times)
+                self._resolve(conflict)
             if conflicts:
                 arrangement = Arrangement(natural=natural, turns=self.turns)
             elif arranged == arrangement:
@@ -178,73 +187,115 @@ class _Planner:
             problems=tuple(self.problems),
         )
 
-    def _present(self) -> Relations:
-        """What is said about the points of those that are performed."""
+    def _present(self) -> tuple[Relations, Classes]:
+        """What is said about the points of those that are performed, and which of them are one instant."""
 
         def there(term: Term) -> bool:
             return term.point.behavior not in self.dropped
 
         shown = self._timed
-        equals = [tuple(map(shown, filter(there, equal.terms))) for equal in self.relations.equals]
+        equals = [
+            Equal(tuple(map(shown, kept)))
+            for equal in self.relations.equals
+            if (kept := tuple(filter(there, equal.terms))) and (len(kept) > 1 or len(equal.terms) == 1)
+        ]
+        classes = self._classes(equals)
+        equals += [equal for equal in self._left_over() if classes.tie_if_possible(equal)]
         orders = [each for each in self.relations.orders if there(each.earlier) and there(each.later)]
-        return Relations(
-            tuple([Equal(terms) for terms in equals if len(terms) > 1]),
+        present = Relations(
+            tuple(equals),
             tuple([Order(shown(each.earlier), shown(each.later)) for each in orders]),
             self.relations.required - self.dropped.keys(),
         )
+        return present, classes
+
+    def _left_over(self) -> list[Equal]:
+        """What the points of a dropped behavior tied together stays tied, unless they could not have been."""
+        torn = [
+            Equal(tuple(map(self._timed, equal.terms)))
+            for equal in self.relations.equals
+            if equal.behavior not in self.dropped  # else it goes with the timing written on it
+            and any(term.point.behavior in self.dropped for term in equal.terms)
+        ]
+        through = Classes()
+        for equal in sorted(torn, key=lambda equal: [term.text for term in equal.terms]):
+            through.tie_if_possible(equal)
+        survivors = {
+            term.point: term
+            for equal in torn
+            for term in equal.terms
+            if term.point != ORIGIN and term.point.behavior not in self.dropped
+        }
+        first: dict[Point, Term] = {}
+        found = []
+        for point, term in sorted(survivors.items()):
+            root, offset = through.find(point)
+            here = replace(term, offset=-offset, stroke=0)
+            if root in first:
+                found.append(Equal((first[root], here)))
+                continue
+            first[root] = here
+            if (at := through.at(point)) is not None:
+                found.append(Equal((here, Term(ORIGIN, at - offset, term.text, term.line))))
+        return found
 
     def _timed(self, term: Term) -> Term:
-        """A later stroke as so much later than the first: bodies report only that."""
-        if not term.share or (movement := self.chains.get(term.point.behavior)) is None:
+        """A later stroke as a point of its own, if the body tells of it; else as so much later than the first."""
+        if term.stroke < 2 or (movement := self.chains.get(term.point.behavior)) is None:
             return term
+        later = Point(term.point.behavior, f"{term.point.sync}:{term.stroke}")
+        if later in movement.points:
+            return replace(term, point=later, stroke=0)
+        assert isinstance(movement.behavior, Head)
         strokes = next(each.natural for each in movement.segments if each.since == "stroke")
-        return replace(term, offset=term.offset + term.share * strokes, share=0.0)
+        share = (term.stroke - 1) / movement.behavior.repetition
+        return replace(term, offset=term.offset + share * strokes, stroke=0)
 
-    def _classes(self, present: Relations) -> Classes:
+    def _classes(self, equals: Iterable[Equal]) -> Classes:
         classes = Classes()
         for each in self.chains.values():
             for syncs in one_instant(each.type):
                 classes.tie(Equal(tuple([Term(Point(each.behavior.id, sync), 0.0, sync) for sync in syncs])), "")
-        for equal in present.equals:
+        for equal in equals:
             classes.tie(equal, self.block.id)
-        if self.dropped:
-            # What the points of a dropped behavior tied together stays tied, unless they could not have been.
-            for equal in self.relations.equals:
-                is_gone = equal.behavior in self.dropped  # with the timing written on it
-                if not is_gone and any(term.point.behavior in self.dropped for term in equal.terms):
-                    classes.tie_if_possible(Equal(tuple(map(self._timed, equal.terms))))
         return classes
 
     def _unawaited_events(self, present: Relations) -> frozenset[str]:
         """Events whose decision nothing in the block waits for."""
         events = {id for id, each in self.chains.items() if isinstance(each.behavior, Event)}
-        awaited = {point.behavior for point in present.named if point.sync == "end"} if events else ()
+        awaited = {point.behavior for point in present.constrained if point.sync == "end"} if events else ()
         return frozenset(events.difference(awaited))
 
     def _solved(
         self, assembler: Assembler, arrangement: Arrangement, classes: Classes
     ) -> tuple[Assembler, Assembly, Solution]:
-        """What waits for each other without delay is made one instant. Raises Loss, or BlockRefused: a deadlock."""
+        """What waits for each other without delay is made one instant. Raises Losses, or BlockRefused: a deadlock."""
         while not (assembly := assembler.assemble(arrangement)).is_ordered and (circles := assembler.circles()):
             for points in circles:
                 terms = tuple([Term(point, 0.0, str(point)) for point in points])
                 classes.tie(Equal(terms), self.block.id)
             assembler = Assembler(self.chains, assembler.relations, classes, assembler.waited_for)
         try:
-            return assembler, assembly, predict(assembly.net)
-        except Impossible as circle:
-            if waits := assembly.waits(tie for tie, _ in circle.ties):
+            return assembler, assembly, predict(assembly.net, lambda ties: bool(assembly.waits(ties)))
+        except Impossible as impossible:
+            if waits := assembly.waits(tie for circle in impossible.circles for tie, _ in circle):
                 assembler.waive(waits)
                 return self._solved(assembler, arrangement, classes)
             required = self.relations.required
-            raise judge(circle, assembly, self.chains, required, classes, self.block.id, self.turns) from None
+            raise judge(impossible, assembly, self.chains, required, classes, self.block.id, self.turns) from None
 
-    def _resolve(self, conflict: Conflict, times: Mapping[Point, Seconds]) -> None:
+    def _may_speak_at_once(self, id: str, present: Relations) -> bool:
+        """Of an utterance that only begins the block nobody has said that it must be over by then: the voice will."""
+        is_asked = any(point.behavior == id for point in present.constrained)
+        return self.chains[id].type == "speech" and not is_asked
+
+    def _resolve(self, conflict: Conflict) -> None:
         """Use the other arm, or wait for one's turn."""
-        if (choice := free_hand(conflict, self.chains, times)) is None:
-            self.turns |= {(conflict.later, conflict.point)}
+        if conflict.hand is None:
+            assert conflict.turn is not None
+            self.turns |= {conflict.turn}
             return
-        id, hand = choice
+        id, hand = conflict.hand
         self.hands[id] = hand
         behavior = replace(self.chains[id].behavior, mode=hand)
         self.chains[id] = chain(behavior, self.estimates.get(id))

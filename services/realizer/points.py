@@ -33,7 +33,9 @@ Gate = Literal["start", "hold", "passive"]
 WITH_STROKE = frozenset({"gesture", "pointing", "head"})
 ON_TARGET = frozenset({"gaze", "face", "faceLexeme", "faceFacs", "posture"})
 """They last: having arrived, they stay until something ends them."""
-_FAMILY = {"faceLexeme": "face", "faceFacs": "face"}
+_FAMILY = {
+    "faceLexeme": "face", "faceFacs": "face", "faceShift": "face", "postureShift": "posture", "pose": "posture"
+}  # fmt: skip
 _PERFORMERS: dict[str, Performer] = {
     "event": "recognition", "turn": "recognition", "wait": "clock", "emit": "clock", "unknown": "clock"
 }  # fmt: skip

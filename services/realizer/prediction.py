@@ -1,47 +1,60 @@
 """The predicted schedule of a net: phases last as long as is natural, faster or slower only where they must be."""
 
+from collections.abc import Callable, Iterable, Sequence
 from math import inf
 
 from schemas.units import Seconds
 from services.realizer.net import Bound, PetriNet, Place
 from services.realizer.schedule import EPSILON, Lag, PositiveCycle, Solution, solve
 
+Circle = tuple[tuple[Place | Bound, Seconds], ...]
+"""Ties that lead back to their start, in order, each with the seconds it asks for: more than none in all."""
+
 
 class Impossible(Exception):
-    """No schedule, with every phase of these ties as short or long as can be: they lead back to their start.
+    """No schedule, with every phase of these circles as short or long as can be.
 
-    ties: in order around the circle, each with the seconds it asks for.
+    circles: all that were found, no two of which share an instant other than the start of the block.
     """
 
-    def __init__(self, ties: tuple[tuple[Place | Bound, Seconds], ...]) -> None:
-        self.ties = ties
-        super().__init__(f"a cycle of {sum(seconds for _, seconds in ties):+g} s")
+    def __init__(self, circles: Sequence[Circle]) -> None:
+        self.circles = tuple(circles)
+        super().__init__(f"a cycle of {sum(seconds for _, seconds in self.circles[0]):+g} s")
 
 
-def predict(net: PetriNet) -> Solution:
+def predict(
+    net: PetriNet, is_dispensable: Callable[[Iterable[Place | Bound]], bool] = lambda ties: False
+) -> Solution:
     """The earliest schedule; `reason` of a cause is the number of the place or, after them, of the bound.
 
-    What a cycle takes too long is shared by its phases, each according to the room it has. Raises Impossible.
+    What a cycle takes too long is shared by its phases, each according to the room it has. Raises Impossible; also
+    for a cycle with a tie that nobody insists on: no phase is hurried for its sake.
     """
     ties: tuple[Place | Bound, ...] = (*net.places, *net.bounds)
     lags = [Lag(tie.source, tie.target, tie.lag, number) for number, tie in enumerate(ties) if tie.kind != "idle"]
     index: dict[int, int] = {}
     while True:
         try:
-            return solve([0.0] * len(net.transitions), (), lags)
+            return solve(len(net.transitions), lags)
         except PositiveCycle as found:
             index = index or {lag.reason: number for number, lag in enumerate(lags)}
+            hopeless = []
             for cycle in found.cycles:
-                for lag in _with_room(cycle, ties):
+                circle = tuple([(ties[lag.reason], lag.seconds) for lag in cycle])
+                room = [seconds - _least(tie) for tie, seconds in circle]
+                excess = sum(lag.seconds for lag in cycle)
+                if sum(room) < excess - EPSILON or is_dispensable([tie for tie, _ in circle]):
+                    hopeless.append(circle)
+                    continue
+                for lag in _shortened(cycle, room, excess):
                     lags[index[lag.reason]] = lag
+            if hopeless:
+                raise Impossible(hopeless) from None
 
 
-def _with_room(cycle: tuple[Lag, ...], ties: tuple[Place | Bound, ...]) -> list[Lag]:
-    """The lags of the cycle that give way, so that it is no longer positive."""
-    excess = sum(lag.seconds for lag in cycle)
-    room = [lag.seconds - _least(ties[lag.reason]) for lag in cycle]
-    if (total := sum(room)) < excess - EPSILON:
-        raise Impossible(tuple((ties[lag.reason], lag.seconds) for lag in cycle))
+def _shortened(cycle: tuple[Lag, ...], room: list[Seconds], excess: Seconds) -> list[Lag]:
+    """The lags of the cycle that give way, by `excess` in all, each according to its `room`."""
+    total = sum(room)
     if total == inf:
         shares = [float(each == inf) for each in room]
         shares = [share / sum(shares) for share in shares]

@@ -32,18 +32,18 @@ Elsewhere = Mapping[str, Block | None]
 class Term(Struct, frozen=True, gc=False):
     """A point and an offset: the instant `offset` seconds after the point. text: as its author wrote it.
 
-    share: a later stroke of a repeated movement: how far it is from the first stroke to the end of the last.
+    stroke: of a repeated movement, which of its strokes is meant, from 1; 0 of anything else.
     """
 
     point: Point
     offset: Seconds
     text: str
     line: int = 0
-    share: float = 0.0
+    stroke: int = 0
 
 
 class Equal(Struct, frozen=True, gc=False):
-    """All terms are one instant. behavior: whose own timing says so; empty: a constraint does."""
+    """All terms are one instant; a single one is only named. behavior: whose own timing says so, if any does."""
 
     terms: tuple[Term, ...]
     behavior: str = ""
@@ -64,6 +64,11 @@ class Problem(Struct, frozen=True):
     behavior: str = ""
 
 
+def at_line(line: int, reason: str) -> str:
+    """The reason with its place in the XML, if it came from there."""
+    return f"line {line}: {reason}" if line else reason
+
+
 class Relations(Struct, frozen=True):
     """unusable: behaviors that cannot be performed as written. required: those whose loss fails the block."""
 
@@ -75,14 +80,20 @@ class Relations(Struct, frozen=True):
 
     @property
     def named(self) -> frozenset[Point]:
-        """Every point that something is said about."""
+        """Every point that is written anywhere."""
+        return self.constrained | {term.point for equal in self.equals for term in equal.terms}
+
+    @property
+    def constrained(self) -> frozenset[Point]:
+        """Every point that has to do with another."""
         return self.held | {order.earlier.point for order in self.orders}
 
     @property
     def held(self) -> frozenset[Point]:
         """Every point that must share an instant or wait for one: it cannot come at any earlier time."""
-        points = {term.point for equal in self.equals for term in equal.terms}
-        return frozenset(points | {order.later.point for order in self.orders})
+        instants = ({term.point for term in equal.terms} for equal in self.equals)
+        shared = {point for points in instants if len(points) > 1 for point in points}
+        return frozenset(shared | {order.later.point for order in self.orders})
 
 
 class _Reader:
@@ -121,8 +132,7 @@ class _Reader:
         strokes = behavior.repetition if isinstance(behavior, Head) else 1
         if not self._has(behavior, sync) or ref.repetition > strokes:
             return Problem("PARSING_FAILURE", f"{where}: {type_of(behavior)} has no sync point {text!r}", behavior.id)
-        share = (ref.repetition - 1) / strokes if ref.repetition else 0.0
-        return Term(Point(behavior.id, sync), ref.offset, text, line, share)
+        return Term(Point(behavior.id, sync), ref.offset, text, line, ref.repetition)
 
     def _has(self, behavior: Behavior, sync: str) -> bool:
         """BML 1.0 knows fewer points than the drafts. Of an unknown element any may be."""
@@ -142,7 +152,8 @@ class _Reader:
         else:
             is_there = behavior is not None and sync in sync_points(behavior) and ref.repetition < 2
         if not is_there:
-            raise self.refusal(f"{text!r} is not a point of a live block", where, line)
+            advice = "the block it names must be running when this one comes"
+            raise self.refusal(f"{text!r} is not a point of a live block", where, line, advice)
         return Term(Point(f"{ref.block}:{ref.behavior or BLOCK_ITSELF}", sync or "start"), ref.offset, text, line)
 
     def refusal(self, reason: str, where: str, line: int, advice: str = "") -> BlockRefused:
@@ -171,12 +182,13 @@ class _Reader:
                 case Problem(message=message) if required:
                     raise self.refusal(message.removeprefix(f"{where}: "), where, line, "the constraint is required")
                 case Problem(message=message):
-                    self.problems.append(Problem("PARSING_FAILURE", f"{message}; the line is ignored"))
+                    told = at_line(line, f"{message}; it is ignored")
+                    self.problems.append(Problem("PARSING_FAILURE", told))
         return terms
 
     def _relate(self, operator: Synchronize | Before | After, terms: dict[str, Term]) -> None:
         if isinstance(operator, Synchronize):
-            if len(terms) > 1:
+            if terms:
                 self.equals.append(Equal(tuple(terms.values())))
             return
         ref = terms.get(operator.ref)
@@ -202,7 +214,7 @@ class _Reader:
                         relations.append(Equal((term, other), behavior.id))
                 if problem is not None:
                     self.unusable.add(behavior.id)
-                    message = f"{problem.message}; the behavior is dropped"
+                    message = at_line(behavior.line, f"{problem.message}; the behavior is dropped")
                     self.problems.append(Problem("PARSING_FAILURE", message, behavior.id))
                     break
             else:
@@ -217,7 +229,11 @@ class _Reader:
             frozenset(self.unusable),
         )
         endless = tuple(
-            Problem("PARSING_FAILURE", "wait has neither a duration nor an end; it ends at once", behavior.id)
+            Problem(
+                "PARSING_FAILURE",
+                at_line(behavior.line, "wait has neither a duration nor an end; it ends at once"),
+                behavior.id,
+            )
             for behavior in self.block.behaviors
             if isinstance(behavior, Wait)
             and behavior.duration is None

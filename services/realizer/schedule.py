@@ -1,6 +1,6 @@
 """The earliest instants that satisfy lower and upper bounds: longest paths, and the cycles that forbid them."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import NamedTuple
 
 from schemas.units import Seconds
@@ -21,7 +21,7 @@ class Lag(NamedTuple):
 class PositiveCycle(Exception):
     """No schedule: these lags lead back to their start and take longer than no time at all.
 
-    cycles: all that were found, no two of which share an instant. lags: of the first.
+    cycles: all that were found, no two of which share an instant other than the first. lags: of the first.
     """
 
     def __init__(self, cycles: Sequence[Sequence[Lag]]) -> None:
@@ -37,19 +37,19 @@ class Solution(NamedTuple):
     causes: dict[int, Lag]
 
 
-def solve(start: Sequence[Seconds], fixed: Iterable[int], lags: Sequence[Lag]) -> Solution:
-    """Least instants, each no earlier than its `start`, that satisfy `lags`. Raises PositiveCycle.
+def solve(size: int, lags: Sequence[Lag]) -> Solution:
+    """Least instants, none before 0, that satisfy `lags`. Raises PositiveCycle.
 
-    fixed: instants that are facts and never move; a bound that they break is ignored.
     Sweeps go to and fro over the lags. Where these are in an order in which they can be met, forward lags need one
     sweep, what backward ones push back another; only what is pushed to and fro costs more (Yen's Bellman-Ford).
+    Instant 0 stays where it is, so that every bound on a time of the clock that cannot be kept is found in one go.
     """
-    times = list(start)
-    facts = frozenset(fixed)
-    live = [lag for lag in lags if lag.target not in facts] if facts else list(lags)
+    times = [0.0] * size
     causes: dict[int, Lag] = {}
-    sweeps = (live, live[::-1])
-    for number in range(len(times) + 2):
+    inner = [lag for lag in lags if lag.target]
+    clock = [lag for lag in lags if not lag.target]
+    sweeps = (inner, inner[::-1])
+    for number in range(2 * size + 4):
         moved = None
         for lag in sweeps[number % 2]:
             source, target, seconds, _ = lag
@@ -58,16 +58,33 @@ def solve(start: Sequence[Seconds], fixed: Iterable[int], lags: Sequence[Lag]) -
                 times[target] = at
                 causes[target] = lag
                 moved = target
-        if moved is None:
-            return Solution(times, causes)
-        if number and (cycles := _cycles(causes)):
+        if number and moved is not None and (cycles := _cycles(causes)):
             raise PositiveCycle(cycles)
+        if moved is None:
+            late = [lag for lag in clock if times[lag.source] + lag.seconds > times[0] + EPSILON / 100]
+            if not late:
+                return Solution(times, causes)
+            late.sort(key=lambda lag: times[lag.source] + lag.seconds, reverse=True)
+            if cycles := _round_trips(late, causes, {lag.target: lag for lag in inner if lag[::2] == (0, 0.0)}):
+                raise PositiveCycle(cycles)
+            times[0], causes[0] = times[late[0].source] + late[0].seconds, late[0]
     raise AssertionError("every transition moved once too often, yet no cycle of causes")  # pragma: no cover
 
 
-def earliest(start: Sequence[Seconds], fixed: Iterable[int], lags: Sequence[Lag]) -> list[Seconds]:
-    """The times of `solve`."""
-    return solve(start, fixed, lags).times
+def _round_trips(late: Iterable[Lag], causes: Mapping[int, Lag], at_once: Mapping[int, Lag]) -> list[list[Lag]]:
+    """From instant 0 along what makes each of `late` too late, and by that back. at_once: lags of no time from 0."""
+    found = []
+    visited: set[int] = set()
+    for last in late:
+        trip = [last]
+        while (here := trip[-1].source) and here not in visited:
+            visited.add(here)
+            if (before := causes.get(here) or at_once.get(here)) is None:
+                break
+            trip.append(before)
+        if not here:
+            found.append(trip[::-1])
+    return found
 
 
 def _cycles(causes: dict[int, Lag]) -> list[list[Lag]]:

@@ -1,6 +1,7 @@
 """Who is to blame for points that wait for each other in a circle: a behavior that is dropped, or the whole block."""
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Container, Mapping, Sequence
+from typing import NamedTuple
 
 from schemas.faults import Fault
 from services.realizer.assembly import Assembly
@@ -8,50 +9,89 @@ from services.realizer.chains import Chain
 from services.realizer.classes import Classes
 from services.realizer.net import Bound, PetriNet, Place
 from services.realizer.points import Point
-from services.realizer.prediction import Impossible
+from services.realizer.prediction import Circle, Impossible
 from services.realizer.relations import BlockRefused
 
+Turn = tuple[str, Point]
+"""Who waits for which point of another before it takes its part."""
 
-class Loss(Exception):
-    """A behavior that cannot be on time, and why."""
 
-    def __init__(self, behavior: str, reason: str) -> None:
-        self.behavior = behavior
-        super().__init__(reason)
+class Loss(NamedTuple):
+    """A behavior that cannot be on time, and why. turn: that it, or another, would have to wait for."""
+
+    behavior: str
+    reason: str
+    turn: Turn | None = None
+
+
+class Losses(Exception):
+    """What cannot be on time, in document order."""
+
+    def __init__(self, losses: Sequence[Loss]) -> None:
+        self.losses = tuple(losses)
+        super().__init__("; ".join(f"{loss.behavior} {loss.reason}" for loss in losses))
 
 
 def judge(
-    circle: Impossible,
+    impossible: Impossible,
     assembly: Assembly,
     chains: Mapping[str, Chain],
     required: Collection[str],
     classes: Classes,
     block: str,
-    turns: Collection[tuple[str, Point]],
-) -> Loss | BlockRefused:
+    turns: Collection[Turn],
+) -> Losses | BlockRefused:
     """A time that cannot be met costs a behavior, the later in the document; waiting for each other costs the block.
+
+    Each circle costs a behavior, unless one that is lost already was part of it.
+    """
+    net = assembly.net
+    rank = {id: number for number, id in enumerate(chains) if id not in required}
+    ends = {(assembly.at[turn[1]], assembly.at[Point(turn[0], "start")]): turn for turn in sorted(turns)}
+    found = [(_loss(circle, net, rank, chains, ends), circle) for circle in impossible.circles]
+    losses: dict[str, Loss] = {}
+    for loss, circle in sorted(found, key=lambda each: rank[each[0].behavior] if each[0] else -1):
+        if loss is not None and not _touched(circle, net) & losses.keys():
+            losses[loss.behavior] = loss
+    return Losses(tuple(losses.values())) if losses else _deadlock(impossible.circles[0], net, classes, block)
+
+
+def _loss(
+    circle: Circle,
+    net: PetriNet,
+    rank: Mapping[str, int],
+    chains: Container[str],
+    turns: Mapping[tuple[int, int], Turn],
+) -> Loss | None:
+    """Who is to blame for a circle, if not the block. rank: in the document, of those that may be dropped.
 
     Two that must have the same part at the same time: the later of them. A phase that is too long for the time it
     is given: whose phase it is; else whose phase would have to be longer than it can be.
     """
-    net = assembly.net
-    ties = [tie for tie, _ in circle.ties]
-    route = _route(net, circle)
-    rivals = _rivals(ties, assembly, turns)
+    ties = [tie for tie, _ in circle]
+    series = ((tie.source, tie.target) for tie in ties if tie.kind == "series")
+    turn = next((turns[ends] for ends in series if ends in turns), None)
     slow = {tie.behavior for tie in ties if isinstance(tie, Place) and tie.kind == "phase"}
     quick = {tie.behavior for tie in ties if isinstance(tie, Bound) and tie.kind == "phase"}
-    touched = {point.behavior for tie in ties for point in net.transitions[tie.source].points}
-    involved = slow | quick or touched
+    touched = _touched(circle, net)
     is_timed = any(tie.source == 0 for tie in ties)
-    if rivals or quick or is_timed or len(involved & chains.keys()) == 1:
-        for group in (rivals,) if rivals else (slow, quick, touched):
-            candidates = [id for id in chains if id in group]
-            free = [id for id in candidates if id not in required]
-            if free:
-                return Loss(free[-1], f"cannot be on time: {route}")
+    if turn or quick or is_timed or len([id for id in slow or touched if id in chains]) == 1:
+        for group in ({turn[0], turn[1].behavior},) if turn else (slow, quick, touched):
+            if free := group & rank.keys():
+                return Loss(max(free, key=rank.__getitem__), f"cannot be on time: {_route(net, circle)}", turn)
+    return None
+
+
+def _touched(circle: Circle, net: PetriNet) -> set[str]:
+    """Behaviors with a point in an instant of the circle."""
+    return {point.behavior for tie, _ in circle for point in net.transitions[tie.source].points}
+
+
+def _deadlock(circle: Circle, net: PetriNet, classes: Classes, block: str) -> BlockRefused:
+    ties = [tie for tie, _ in circle]
     lines = sorted({line for tie in ties for line in tie.lines} | _lines_of_instants(ties, net, classes))
     fault = Fault(
-        reason=f"these points wait for each other in a circle: {route}",
+        reason=f"these points wait for each other in a circle: {_route(net, circle)}",
         where=block,
         line=lines[0] if lines else 0,
         advice=f"see lines {', '.join(map(str, lines))}" if len(lines) > 1 else "",
@@ -59,18 +99,9 @@ def judge(
     return BlockRefused(fault, "IMPOSSIBLE_TO_SCHEDULE")
 
 
-def _rivals(ties: list[Place | Bound], assembly: Assembly, turns: Collection[tuple[str, Point]]) -> set[str]:
-    """Those of whom one waits for his turn in this circle."""
-    pairs = {
-        (assembly.at[point], assembly.at[Point(later, "start")]): {later, point.behavior} for later, point in turns
-    }
-    series = [(tie.source, tie.target) for tie in ties if tie.kind == "series"]
-    return next((pairs[ends] for ends in series if ends in pairs), set())
-
-
-def _route(net: PetriNet, circle: Impossible) -> str:
-    steps = [f"{net.transitions[tie.source].name} ({seconds:+g} s)" for tie, seconds in circle.ties]
-    return " -> ".join((*steps, net.transitions[circle.ties[0][0].source].name))
+def _route(net: PetriNet, circle: Circle) -> str:
+    steps = [f"{net.transitions[tie.source].name} ({seconds:+g} s)" for tie, seconds in circle]
+    return " -> ".join((*steps, net.transitions[circle[0][0].source].name))
 
 
 def _lines_of_instants(ties: list[Place | Bound], net: PetriNet, classes: Classes) -> set[int]:
