@@ -1,5 +1,6 @@
 """Every parameter of engagement generation: unit, default, source. Refused at start when it contradicts itself."""
 
+from math import isfinite
 from typing import Literal
 
 from msgspec import Struct
@@ -105,6 +106,10 @@ class GenerationConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=
                 f"pointing_reliability {pointing} + phrase_reliability {self.phrase_reliability} reaches 1: "
                 'a channel cannot be certain; lower one or set channel = "independent"'
             )
+        for name in self.__struct_fields__:
+            value = getattr(self, name)
+            if isinstance(value, float) and not isfinite(value):
+                raise ValueError(f"{name} must be a finite number, not {value}")
         for name in _POSITIVE:
             if getattr(self, name) <= 0:
                 raise ValueError(f"{name} must be positive, not {getattr(self, name)}")
