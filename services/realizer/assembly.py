@@ -111,26 +111,26 @@ class Assembler:
         by_class: dict[int, list[tuple[Seconds, int]]] = {}
         for number, instant in enumerate(found):
             by_class.setdefault(instant.class_id, []).append((instant.offset, number))
+        for number, instant in enumerate(found):
+            if instant.at is not None and instant.offset == 0.0 and number:
+                self._clock(number, round(instant.at, 9))
         for ladder in by_class.values():
             for (low, source), (high, target) in pairwise(sorted(ladder)):
                 seconds = round(high - low, 9)
                 self.places.append(Place("delay", source, target, seconds, seconds))
                 self.bounds.append(Bound("delay", target, source, -seconds))
-        for number, instant in enumerate(found):
-            if instant.at is not None and instant.offset == 0.0 and number:
-                self._clock(number, round(instant.at, 9))
 
-    def _phases(self, chain: Chain) -> None:
-        id, lines, at = chain.behavior.id, _lines(chain.behavior.line), self.at
-        always = {pair for group in one_instant(chain.type) for pair in pairwise(group)}
-        cut = self.arrangement.cuts.get(id)
-        if (start := at[chain.points[0]]) != 0:
     def _clock(self, number: int, at: Seconds) -> None:
         """Each time is counted from the block's start, whatever else was late."""
         if at >= 0.0:
             self.places.append(Place("delay", 0, number, at, at))
         self.bounds.append(Bound("delay", number, 0, -at))
 
+    def _phases(self, chain: Chain) -> None:
+        id, lines, at = chain.behavior.id, _lines(chain.behavior.line), self.at
+        always = {pair for group in one_instant(chain.type) for pair in pairwise(group)}
+        cut = self.arrangement.cuts.get(id)
+        if (start := at[chain.points[0]]) != 0:
             self.places.append(Place("order", 0, start, behavior=id, lines=lines))
         lag, shortest, longest = 0.0, 0.0, 0.0
         unlimited = False
