@@ -7,15 +7,10 @@ import asyncio
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-from schemas import keys
 from schemas.behaviors import BlockBehavior, Event, TurnSignal, Wait
 from schemas.blocks import Block, BlockOutcome, PerformBlock
 from schemas.body import (
-    AbortBehavior,
     BehaviorOutcome,
-    GoHome,
-    PerformBehavior,
-    PlannedInstant,
     SyncPointArrived,
     SyncPointReached,
 )
@@ -24,6 +19,7 @@ from schemas.feedback import WarningKind
 from schemas.syncref import BLOCK_ITSELF
 from schemas.units import Seconds
 from services.realizer.authority import Authority
+from services.realizer.body_link import BodyLink
 from services.realizer.effects import Begin, Effect, Extend
 from services.realizer.patience import Late, Stalled
 from services.realizer.planner import Plan, plan_block
@@ -50,6 +46,7 @@ class Performance:
         self._requests = around.requests
         self._config = around.config
         self._recognition = RecognitionLink(around.bus, around.requests, around.config, around.peers)
+        self._body = BodyLink(around.bus, around.requests, request.id, plan.block.id)
         self._loop = loop
         self._report = Reporter(around.bus, plan.block.id)
         self._begun: dict[str, asyncio.Future[None]] = {id: loop.create_future() for id in plan.chains}
@@ -59,7 +56,10 @@ class Performance:
         self._asked: dict[str, Begin | Extend] = {}
         """Of each behavior, what it was last told."""
         self._pending: dict[str, Pending] = {}
+        self._running: dict[str, asyncio.Task[None]] = {}
         self._dropped: list[str] = list(plan.dropped)
+        self._unwanted: set[str] = set()
+        """Whose end somebody has asked for."""
         self._elsewhere = elsewhere
         self._foreign = frozenset(point for point in plan.at if ":" in point.behavior)
         """Points of other blocks that this one is tied to."""
@@ -87,7 +87,7 @@ class Performance:
         self._around.ledger.reach(self.plan.block.id, Point(BLOCK_ITSELF, "start"), began)
         try:
             async with asyncio.TaskGroup() as tasks:
-                running = {
+                self._running = {
                     behavior.id: tasks.create_task(
                         self._perform(behavior), name=f"{self.plan.block.id}/{behavior.id}"
                     )
@@ -96,8 +96,8 @@ class Performance:
                 with self._around.ledger.followed(self, self._foreign):
                     self._advance()
                     ending = await self._ending
-                    await self._end_what_moves(ending, running)
-                for task in running.values():
+                    await self._end_what_moves(ending)
+                for task in self._running.values():
                     task.cancel()
         finally:
             self._close()
@@ -108,7 +108,8 @@ class Performance:
             block=self.plan.block.id,
             status=ending.status,
             spoken=self.spoken.texts,
-            dropped=tuple(self._dropped),
+            dropped=tuple(id for id in self._dropped if id not in self._unwanted),
+            interrupted=tuple(id for id in self._dropped if id in self._unwanted),
             replaced_by=ending.replaced_by,
             fault=ending.fault,
         )
@@ -118,16 +119,38 @@ class Performance:
         if not self._ending.done():
             self._ending.set_result(ending)
 
+    def is_going_on(self, behavior: str) -> bool:
+        """Is it of this block, and has it neither ended nor been dropped?"""
+        return not self._ending.done() and behavior in self._running and not self._authority.has_ended(behavior)
+
+    async def interrupt(self, behavior: str) -> bool:
+        """End one behavior on request; the others go on. Returns once it has ended: had it come to its end before?"""
+        task = self._running[behavior]
+        self._unwanted.add(behavior)
+        if behavior in self._pending and performer(self._performed[behavior]) == "body":
+            self._body.abort(behavior)
+            await asyncio.wait([task])
+        else:
+            task.cancel()
+            self._requests.cancel(self._body.id(behavior), "interrupted")
+            self._lose(behavior, Fault(reason="interrupted"))
+            self._advance()
+        return behavior not in self._dropped and self._authority.has_ended(behavior)
+
     def feed(self, message: SyncPointArrived | SyncPointReached) -> None:
         """A body's report about a behavior of this block."""
-        if message.behavior not in self._performed:
+        pending = self._pending.get(message.behavior)
+        if pending is None or pending.request.id != message.id or pending.outcome.done():
             return
         point = Point(message.behavior, message.sync)
+        at = self._authority.plausible(point, self._bus.local(message.at), self._bus.now())
         match message:
-            case SyncPointArrived(at=at):
-                self._authority.arrive(point, self._bus.local(at))
-            case SyncPointReached(at=at, arrived=arrived):
-                self._reach(point, self._bus.local(at), arrived=self._bus.local(arrived), by_body=True)
+            case SyncPointArrived():
+                self._authority.arrive(point, at)
+            case SyncPointReached(arrived=arrived):
+                self._reach(
+                    point, at, arrived=self._authority.plausible(point, self._bus.local(arrived), at), by_body=True
+                )
         self._advance()
 
     def _tell_prediction(self) -> None:
@@ -153,9 +176,9 @@ class Performance:
             self._replan()
             self._advance()
 
-    async def _end_what_moves(self, ending: Ending, running: dict[str, "asyncio.Task[None]"]) -> None:
+    async def _end_what_moves(self, ending: Ending) -> None:
         """Abort what still runs, and wait until all has ended, or for as long as the body is given."""
-        moving = set()
+        moving, running = set(), self._running
         for behavior in self.plan.block.behaviors:
             pending = self._pending.get(behavior.id)
             if pending is None or running[behavior.id].done():
@@ -163,9 +186,9 @@ class Performance:
             if performer(behavior) == "body":
                 moving.add(running[behavior.id])
                 if ending.status != "done" and not pending.outcome.done():
-                    self._abort(behavior.id)
+                    self._body.abort(behavior.id)
             elif ending.status != "done":
-                self._requests.cancel(self._request_id(behavior.id), f"block {ending.status}")
+                self._requests.cancel(self._body.id(behavior.id), f"block {ending.status}")
         if moving:
             await asyncio.wait(moving, timeout=self._config.abort)
         if ending.status == "failed":
@@ -175,7 +198,7 @@ class Performance:
         if self._timer is not None:
             self._timer.cancel()
         for behavior in self.plan.block.behaviors:
-            self._around.routes.pop(self._request_id(behavior.id), None)
+            self._around.routes.pop(self._body.id(behavior.id), None)
         futures: tuple[asyncio.Future[Any], ...] = (*self._begun.values(), *self.sync_points.values())
         for future in futures:
             future.cancel()
@@ -206,10 +229,11 @@ class Performance:
                 self._asked[id] = effect
                 self._begun[id].set_result(None)
             case Late(behavior=id, sync=sync, overdue=overdue):
-                self._warn_late(Point(id, sync), f"{sync} is {overdue:.1f} s overdue")
+                if not self._around.peers.has_left("control"):
+                    self._warn_late(Point(id, sync), f"{sync} is {overdue:.1f} s overdue")
                 self._authority.is_surprised = True
             case Stalled(behavior=id, sync=sync, overdue=overdue):
-                self._abort(id)
+                self._body.abort(id)
                 self._lose(id, Fault(reason=f"stalled before {sync}, {overdue:.1f} s overdue"))
                 return True
         return False
@@ -225,7 +249,7 @@ class Performance:
 
     def _reach(self, point: Point, at: Seconds, *, arrived: Seconds | None = None, by_body: bool = False) -> None:
         for each in self._authority.reach(point, at):
-            came = arrived if each == point else None
+            came = arrived if each == point else self._authority.arrived.get(each)
             skew = self._report.reached(self.plan, self._authority, each, arrived=came, by_body=by_body)
             if (late := max(skew, self._authority.lateness(each))) > self._config.skew:
                 self._warn_late(each, f"{each.sync} came {late:.2f} s later than it should")
@@ -246,8 +270,13 @@ class Performance:
         if id in self._dropped or self._ending.done():
             return
         self._dropped.append(id)
-        self._report.warn(kind, str(fault), id)
         self._around.ledger.lose(self.plan.block.id, id)
+        if id in self._unwanted:
+            # Its parts go home by themselves: the body does not need to be told, nor to forget what it looked at.
+            self._report.interrupted(id, self.spoken.of(id))
+            self._replan()
+            return
+        self._report.warn(kind, str(fault), id)
         if id in self._authority.begun:
             self._go_home(self._parts(id), id)
         if id in self.plan.required:
@@ -268,7 +297,7 @@ class Performance:
             # What is too late now that something else is gone.
             if problem.behavior in plan.dropped and problem.behavior not in gone:
                 if problem.behavior in self._pending:
-                    self._abort(problem.behavior)
+                    self._body.abort(problem.behavior)
                 self._lose(problem.behavior, Fault(reason=problem.message), problem.kind)
 
     # -- performers --------------------------------------------------------------------------------------------------
@@ -282,7 +311,7 @@ class Performance:
             case Event():
                 await self._event(behavior)
             case TurnSignal():
-                self._recognition.signal(self._request_id(behavior.id), self.plan.block.id, behavior)
+                self._recognition.signal(self._body.id(behavior.id), self.plan.block.id, behavior)
                 self._at_once(behavior.id)
             case _ if performer(behavior) == "clock":
                 self._at_once(behavior.id)
@@ -290,7 +319,7 @@ class Performance:
                 await self._by_body(behavior)
 
     async def _by_body(self, behavior: BlockBehavior) -> None:
-        self._around.routes[self._request_id(behavior.id)] = self
+        self._around.routes[self._body.id(behavior.id)] = self
         pending = self._send(behavior)
         try:
             outcome = await pending.outcome
@@ -300,9 +329,10 @@ class Performance:
             return
         except EngageError as error:
             self._pending.pop(behavior.id)
+            fault = Fault(reason=error.fault.reason, where=self.plan.block.id)
             if not self._ending.done():
-                self._report.warn("EXECUTION_FAILURE", str(error.fault))
-            self.stop(Ending("failed", error.fault))
+                self._report.warn("EXECUTION_FAILURE", str(fault))
+            self.stop(Ending("failed", fault))
             return
         if not isinstance(outcome, BehaviorOutcome):
             self._lose(behavior.id, Fault(reason=f"control ended it with a {type(outcome).__name__}"))
@@ -311,34 +341,22 @@ class Performance:
         is_done = outcome.status == "done"
         self.spoken.end(outcome)
         if is_done:
-            self._reach(Point(behavior.id, sync_points(behavior)[-1]), self._bus.local(outcome.at), by_body=True)
+            end = Point(behavior.id, sync_points(behavior)[-1])
+            at = self._authority.plausible(end, self._bus.local(outcome.at), self._bus.now())
+            self._reach(end, at, by_body=True)
         else:
             self._lose(behavior.id, outcome.fault or Fault(reason=f"the body {outcome.status} it"))
         self._advance()
 
     def _send(self, behavior: BlockBehavior) -> Pending:
-        asked = self._asked[behavior.id]
-        perform = PerformBehavior(
-            id=self._request_id(behavior.id),
-            requester=self._bus.name,
-            block=self.plan.block.id,
-            behavior=behavior,
-            through=asked.through,
-            pace=tuple(PlannedInstant(sync=sync, at=self._bus.stamp(at)) for sync, at in asked.pace),
-        )
-        pending = self._pending[behavior.id] = self._requests.send(keys.BEHAVIOR, perform)
+        pending = self._pending[behavior.id] = self._body.perform(behavior, self._asked[behavior.id])
         return pending
-
-    def _abort(self, id: str) -> None:
-        self._requests.send(keys.BEHAVIOR, AbortBehavior(id=self._request_id(id), requester=self._bus.name))
 
     def _go_home(self, parts: set[str], name: str = "") -> None:
         """But not what another behavior moves by now."""
         others = (other for other in self._around.others() if name or other is not self)
         if parts := parts.difference(*(other.parts_moving for other in others)):
-            # No id of a behavior holds a colon.
-            id = f"{self._request_id(name)}:home"
-            self._requests.send(keys.BEHAVIOR, GoHome(id=id, requester=self._bus.name, parts=tuple(sorted(parts))))
+            self._body.go_home(parts, name)
 
     @property
     def parts_used(self) -> set[str]:
@@ -376,7 +394,7 @@ class Performance:
     async def _event(self, event: Event) -> None:
         began = self._bus.now()
         self._reach(Point(event.id, "start"), began)
-        pending = self._recognition.ask(self._request_id(event.id), self.plan.block.id, event, began)
+        pending = self._recognition.ask(self._body.id(event.id), self.plan.block.id, event, began)
         if pending is not None:
             self._pending[event.id] = pending
         self._advance()
@@ -387,6 +405,3 @@ class Performance:
         else:
             self._reach(Point(event.id, "end"), max(began, decision.at), by_body=decision.by_recognition)
         self._advance()
-
-    def _request_id(self, behavior: str) -> str:
-        return f"{self.request.id}/{behavior}"

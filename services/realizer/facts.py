@@ -34,6 +34,12 @@ class Facts:
         points = self._points.get(behavior)
         return points is None or points[-1] in self.reached
 
+    def plausible(self, point: Point, at: Seconds, now: Seconds) -> Seconds:
+        """`at`, but no later than now, nor earlier than the behavior was last heard of: clocks differ, bodies err."""
+        points, number = self._points.get(point.behavior, ()), self.next_number(point.behavior)
+        since = self.reached[points[number - 1]] if points and number else self.begun.get(point.behavior, at)
+        return max(since, min(at, now))
+
     def lateness(self, point: Point) -> Seconds:
         """How much later than its constraints allow a point was that is reached; 0 if it was not."""
         at, transition = self.reached[point], self.plan.at[point]

@@ -20,7 +20,7 @@ from schemas.body import (
 from schemas.faults import EngageError, Fault, NoReply
 from schemas.feedback import WarningFeedback
 from schemas.presence import PeerAlive, PeerGone
-from schemas.requests import Cancel
+from schemas.requests import Cancel, Outcome
 from services.bus import Bus
 from services.realizer.config import RealizerConfig
 from services.realizer.executor import Performance
@@ -67,6 +67,8 @@ class _Realizer:
         self.routes: dict[str, Performance] = {}
         self.peers = Presence()
         self.ledger = Ledger()
+        self.homing: set[asyncio.Future[Outcome]] = set()
+        """Outcomes of what was sent home for a block that replaces others, as long as it is on its way."""
         self.around = Surroundings(bus, self.requests, config, self.peers, self.routes, self.performing, self.ledger)
 
     def performing(self) -> list[Performance]:
@@ -144,15 +146,21 @@ class _Realizer:
     async def _await_turn(self, live: _Live, plan: Plan, elsewhere: Mapping[str, Block]) -> Plan:
         """What composition asks of the blocks that are already there; the plan, anew if that took its time."""
         earlier, live.earlier = live.earlier, []
-        composition, block = live.request.block.composition, live.request.block.id
-        if composition == "MERGE" or not earlier:
+        replaces, block = live.request.block.composition == "REPLACE", live.request.block.id
+        is_free = not earlier and not (replaces and self.homing)
+        if live.request.block.composition == "MERGE" or is_free:
             return plan
-        if composition == "REPLACE":
+        if replaces:
             for other in earlier:
                 other.stop(Ending("interrupted", replaced_by=block))
-        await asyncio.wait([other.ended for other in earlier])
-        if composition == "REPLACE":
-            await self._send_home(live, [other.performance for other in earlier if other.performance is not None])
+        if earlier:
+            await asyncio.wait([other.ended for other in earlier])
+        if replaces:
+            self._send_home(live, [other.performance for other in earlier if other.performance is not None])
+            if self.homing:
+                # Also those that a block has sent home which was itself replaced before it began.
+                _, lost = await asyncio.wait(self.homing, timeout=self.config.abort)
+                self.homing -= lost
         try:
             # The body is elsewhere by now.
             estimates = await self._estimates(plan.block, poses_before(plan))
@@ -162,13 +170,14 @@ class _Realizer:
             live.stop(Ending("failed", error.fault))
             return plan
 
-    async def _send_home(self, live: _Live, replaced: list[Performance]) -> None:
+    def _send_home(self, live: _Live, replaced: list[Performance]) -> None:
         parts = {part for other in replaced for part in other.parts_used}
         parts = parts.difference(*(other.parts_moving for other in self.performing() if other not in replaced))
         if parts:
             home = GoHome(id=f"{live.request.id}/:way", requester=self.bus.name, parts=tuple(sorted(parts)))
-            pending = self.requests.send(keys.BEHAVIOR, home)
-            await asyncio.wait([pending.outcome], timeout=self.config.abort)
+            way = self.requests.send(keys.BEHAVIOR, home).outcome
+            self.homing.add(way)
+            way.add_done_callback(self.homing.discard)
 
     def _warn(self, live: _Live, error: EngageError) -> None:
         kind = error.kind if isinstance(error, BlockRefused) else "PARSING_FAILURE"

@@ -32,14 +32,20 @@ class Presence:
 
     def __init__(self) -> None:
         self._there: set[str] = set()
+        self._left: set[str] = set()
         self._loop = asyncio.get_running_loop()
         self.changed: asyncio.Future[None] = self._loop.create_future()
 
     def feed(self, message: PeerAlive | PeerGone) -> None:
-        update = self._there.add if isinstance(message, PeerAlive) else self._there.discard
-        update(message.participant)
+        now, before = (self._there, self._left) if isinstance(message, PeerAlive) else (self._left, self._there)
+        now.add(message.participant)
+        before.discard(message.participant)
         self.changed.set_result(None)
         self.changed = self._loop.create_future()
+
+    def has_left(self, participant: str) -> bool:
+        """It was there, and is not now. Who never showed himself has not."""
+        return participant in self._left
 
     def __contains__(self, participant: str) -> bool:
         return participant in self._there
