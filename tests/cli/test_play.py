@@ -172,6 +172,24 @@ def test_failing_at_run_time_is_exit_code_3(engage: Engage, files: dict[str, Pat
     assert result.err.count("\n") == 1
 
 
+def test_what_only_pointing_could_mean_fails_if_it_is_out_of_reach(engage: Engage, tmp_path: Path) -> None:
+    path, world = tmp_path / "ask.xml", tmp_path / "world.json"
+    path.write_text(
+        FRAGMENT.replace("blue-square", "cup").replace('text="the blue piece"', 'text="this" deictic="true"')
+    )
+    world.write_text(
+        """{"entities": [{"id": "cup", "kind": "object", "position": [-1.5, 0.1, 0.8]},
+                         {"id": "ann", "kind": "person", "position": [1.2, 0.0, 1.3]}]}"""
+    )
+
+    result = engage(*PLAY, "--world", world, "--events", "-", "--feedback", "-", path)
+
+    assert result.code == 3
+    assert result.out == ""
+    assert result.err.startswith(f"{path}: piece: no way to refer to cup: ")
+    assert result.err.count("\n") == 1
+
+
 def test_the_log_says_what_happens(engage: Engage, files: dict[str, Path]) -> None:
     result = engage(*PLAY, files["hello"])
 
