@@ -1,6 +1,6 @@
 """Behaviors of one block that move the same part: who takes it from whom, and who must wait for his turn."""
 
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Container, Iterable, Mapping, Sequence
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -54,8 +54,12 @@ def arrange(
     classes: Classes,
     before: Arrangement,
     times: Mapping[Point, Seconds],
+    barred: Container[tuple[str, Hand]] = (),
 ) -> tuple[Arrangement, list[Conflict]]:
-    """Who else takes whose place in a schedule made with `before` and where that would break what was asked for."""
+    """Who else takes whose place in a schedule made with `before` and where that would break what was asked for.
+
+    barred: hands with which a behavior cannot be done.
+    """
     held = relations.held
     mentioned = {point.behavior for point in relations.constrained}
     successors, cuts = dict(before.successors), dict(before.cuts)
@@ -69,7 +73,8 @@ def arrange(
             last = _not_given_up(chain, first, held, is_natural, is_asked=successor in mentioned)
             turn = (successor, chain.points[last]) if last is not None else None
             # Who has made his stroke hands over; else the other arm is better, if that is free.
-            hand = _free_hand((successor, id), chains, times) if turn or first <= _STROKE_END else None
+            is_worth_it = turn is not None or first <= _STROKE_END
+            hand = _free_hand((successor, id), chains, times, barred) if is_worth_it else None
             if turn or hand:
                 conflicts.append(Conflict(turn, hand))
         if id in successors:
@@ -126,7 +131,10 @@ def _successors(
 
 
 def _free_hand(
-    rivals: tuple[str, str], chains: Mapping[str, Chain], times: Mapping[Point, Seconds]
+    rivals: tuple[str, str],
+    chains: Mapping[str, Chain],
+    times: Mapping[Point, Seconds],
+    barred: Container[tuple[str, Hand]],
 ) -> tuple[str, Hand] | None:
     """Which of the two can use the other arm instead, since it names none and the arm is free all the while."""
     for id in rivals:
@@ -135,6 +143,8 @@ def _free_hand(
         if other is None or not isinstance(chain.behavior, Pointing | Gesture) or chain.behavior.mode is not None:
             continue
         arm, hand = other
+        if (id, hand) in barred:
+            continue
         if _is_free(arm, _window(chain, times), (each for each in chains.values() if each is not chain), times):
             return id, hand
     return None

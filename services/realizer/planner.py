@@ -5,7 +5,7 @@ each with a warning: what the body cannot do, and what cannot be on time. Docume
 equals; any other permutation of a block gives the same net.
 """
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Container, Iterable, Mapping
 from typing import get_args
 
 from msgspec import Struct
@@ -24,9 +24,19 @@ from services.realizer.handover import Arrangement, Conflict, arrange
 from services.realizer.net import Bound, PetriNet
 from services.realizer.points import ORIGIN, Point, one_instant
 from services.realizer.prediction import Impossible, predict
-from services.realizer.relations import BlockRefused, Elsewhere, Equal, Order, Problem, Relations, Term, at_line, relations
+from services.realizer.relations import (
+    BlockRefused,
+    Elsewhere,
+    Equal,
+    Order,
+    Problem,
+    Relations,
+    Term,
+    at_line,
+    relations,
+)
 from services.realizer.schedule import Solution
-from services.realizer.verdict import Losses, judge
+from services.realizer.verdict import Losses, clashes, judge
 
 
 class Plan(Struct, frozen=True, kw_only=True):
@@ -68,13 +78,15 @@ def plan_block(
     *,
     dropped: Iterable[str] = (),
     elsewhere: Elsewhere | None = None,
+    barred: Container[tuple[str, Hand]] = (),
 ) -> Plan:
     """Plan `block`; durations that no estimate gives are nominal. Raises BlockRefused, with place and line.
 
-    dropped: behaviors to leave out as if never written. elsewhere: other live blocks, by id.
+    dropped: behaviors to leave out as if never written. elsewhere: other live blocks, by id. barred: hands
+    with which a behavior cannot be done.
     """
     items = estimates.items if isinstance(estimates, Estimates) else tuple(estimates)
-    return _Planner(block, {each.behavior: each for each in items}, dropped, elsewhere).plan()
+    return _Planner(block, {each.behavior: each for each in items}, dropped, elsewhere, barred).plan()
 
 
 class _Planner:
@@ -84,10 +96,12 @@ class _Planner:
         estimates: Mapping[str, Estimate],
         dropped: Iterable[str],
         elsewhere: Elsewhere | None,
+        barred: Container[tuple[str, Hand]],
     ) -> None:
         self.block = block
         self.estimates = estimates
         self._check_ids()
+        self.barred = barred
         self.relations = relations(block, elsewhere)
         self.problems = list(self.relations.problems)
         self.dropped = dict.fromkeys(dropped)
@@ -160,8 +174,11 @@ class _Planner:
         while True:
             assembler, assembly, solution = self._solved(assembler, arrangement, classes)
             times = {point: solution.times[transition] for point, transition in assembly.at.items()}
-            arranged, conflicts = arrange(self.chains, present, classes, arrangement, times)
+            arranged, conflicts = arrange(self.chains, present, classes, arrangement, times, self.barred)
             conflicts = [each for each in conflicts if each.hand or each.turn not in self.overlaps]
+            turns = [each.turn for each in conflicts if each.turn and not each.hand]
+            if losses := clashes(turns, self.chains, self.relations.required, classes):
+                raise Losses(losses)
             for conflict in conflicts:
                 self._resolve(conflict)
             if conflicts:

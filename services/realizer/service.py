@@ -1,10 +1,11 @@
 """The realizer on the bus: takes blocks, answers each exactly once, and performs any number of them at a time."""
 
 import asyncio
-from collections.abc import Coroutine, Mapping
+from collections.abc import Coroutine, Iterable, Mapping
 from typing import Any, TypeVar
 
 from schemas import keys
+from schemas.behaviors import Gesture, Hand, Pointing
 from schemas.blocks import Block, BlockOutcome, PerformBlock
 from schemas.body import (
     BodyPose,
@@ -115,12 +116,21 @@ class _Realizer:
             self._end(live, await live.performance.run())
 
     async def _plan(self, block: Block, elsewhere: Mapping[str, Block]) -> Plan:
+        """The body is asked again from where it will be by then, and about the hands that the plan has chosen."""
         relations(block, elsewhere)  # A bad reference is seen without asking the body.
-        plan = plan_block(block, await self._estimates(block, {}), elsewhere=elsewhere)
-        if (before := poses_before(plan)) or plan.block is not block:
-            # The plan may have given a gesture the other hand.
-            plan = plan_block(plan.block, await self._estimates(plan.block, before), elsewhere=elsewhere)
-        return plan
+        barred: set[tuple[str, Hand]] = set()
+        chosen, estimates = block, await self._estimates(block, {})
+        first, is_asked_again = estimates, False
+        while True:
+            plan = plan_block(chosen, estimates, elsewhere=elsewhere, barred=barred)
+            before = poses_before(plan)
+            if plan.block is chosen and (is_asked_again or not before):
+                return plan
+            chosen, is_asked_again = plan.block, True
+            estimates = await self._estimates(chosen, before)
+            if refused := _hands_refused(block, chosen, estimates):
+                barred |= refused
+                chosen, estimates, is_asked_again = block, first, False
 
     async def _estimates(self, block: Block, before: Mapping[str, BodyPose]) -> tuple[Estimate, ...]:
         """before: where the body will be when a behavior starts; the others are asked for from where it is now."""
@@ -221,6 +231,19 @@ async def _unless(stopped: asyncio.Future[Ending], work: Coroutine[Any, Any, Res
     finally:
         task.cancel()
         await asyncio.gather(task, return_exceptions=True)
+
+
+def _hands_refused(block: Block, chosen: Block, estimates: Iterable[Estimate]) -> set[tuple[str, Hand]]:
+    """Hands that `block` leaves open and `chosen` does not, with which the body cannot do it."""
+    impossible = {each.behavior for each in estimates if not each.feasible}
+    return {
+        (ours.id, ours.mode)
+        for theirs, ours in zip(block.behaviors, chosen.behaviors, strict=True)
+        if ours is not theirs
+        and isinstance(ours, Pointing | Gesture)
+        and ours.mode is not None
+        and ours.id in impossible
+    }
 
 
 async def realize(bus: Bus, ready: Ready, config: RealizerConfig) -> None:

@@ -2,11 +2,13 @@
 
 from itertools import pairwise
 
-from schemas.behaviors import After, Constraint, Gaze, Gesture, Pointing, Speech, Timing
+from schemas.behaviors import After, BlockBehavior, Constraint, Gaze, Gesture, Pointing, Speech, Timing
 from schemas.blocks import Block
 from schemas.body import BodyPose, Estimate, JointAngle, Phase
+from schemas.faults import Fault
 from services.realizer.planner import plan_block, poses_before
-from tests.realizer.stage import block, stage
+from tests.realizer.fake_body import FakeBody
+from tests.realizer.stage import after, block, stage
 
 
 def estimate(behavior: str, *points: str, pan: float = 0.0) -> Estimate:
@@ -66,3 +68,38 @@ async def test_a_gesture_that_names_no_hand_is_performed_with_the_free_one() -> 
     times = seen.times()
     assert outcome.dropped == ()
     assert (times["p:start"], times["p:end"], times["q:start"], times["q:end"]) == (0.0, 5.0, 2.0, 7.0)
+
+
+class OneArmed(FakeBody):
+    """Reaches nothing with its left arm."""
+
+    def estimate(self, behavior: BlockBehavior) -> Estimate:
+        if isinstance(behavior, Pointing | Gesture) and behavior.mode == "LEFT_HAND":
+            return Estimate(behavior=behavior.id, feasible=False, fault=Fault(reason="out of reach"))
+        return super().estimate(behavior)
+
+
+async def test_a_gesture_waits_for_its_arm_if_the_free_one_does_not_reach() -> None:
+    behaviors = (
+        Pointing(id="p", target="a", mode="RIGHT_HAND", timing=(Timing("start", "0"), Timing("end", "5"))),
+        Pointing(id="q", target="b"),
+        Speech(id="s", text="this"),
+    )
+    async with stage(OneArmed()) as seen:
+        outcome = await seen.perform(block(behaviors, after("s:end", "q:start")))
+
+    assert outcome.dropped == ()
+    assert seen.warnings() == []
+    assert seen.times()["q:start"] == seen.times()["p:end"] == 5.0
+
+
+async def test_a_gesture_without_time_to_wait_for_its_arm_is_dropped_if_the_free_one_does_not_reach() -> None:
+    behaviors = (
+        Pointing(id="p", target="a", mode="RIGHT_HAND", timing=(Timing("start", "0"), Timing("end", "5"))),
+        Pointing(id="q", target="b", timing=(Timing("start", "2"), Timing("end", "7"))),
+    )
+    async with stage(OneArmed()) as seen:
+        outcome = await seen.perform(block(behaviors))
+
+    assert outcome.dropped == ("q",)
+    assert [(each.kind, each.behavior) for each in seen.warnings()] == [("IMPOSSIBLE_TO_SCHEDULE", "q")]
