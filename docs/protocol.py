@@ -37,7 +37,7 @@ PAGE = Path(__file__).parent / "protocol.md"
 KEYS: tuple[tuple[str, str, str], ...] = (
     (keys.FRAGMENT, "manager → generation", "`PerformFragment`"),
     (keys.INHIBIT, "anyone → generation", "`Inhibit`"),
-    (keys.BLOCK, "manager, generation → realizer", "`PerformBlock`"),
+    (keys.BLOCK, "manager, generation → realizer", "`PerformBlock`, `InterruptBehavior`"),
     (keys.EVENT, "realizer → recognition", "`RequestEvent`"),
     (keys.TURN, "realizer, generation → recognition", "`SignalTurn`"),
     (keys.BEHAVIOR, "realizer → control", "`PerformBehavior`, `AbortBehavior`, `GoHome`"),
@@ -46,7 +46,7 @@ KEYS: tuple[tuple[str, str, str], ...] = (
         keys.request_state("<server>"),
         "server → requester",
         "`Accepted`, `Refused`; from generation `FragmentOutcome`, `InhibitionEnded`; from the realizer"
-        " `BlockOutcome`; from control `BehaviorOutcome`, `HomeReached`; from recognition `EventOutcome`,"
+        " `BlockOutcome`, `BehaviorInterrupted`; from control `BehaviorOutcome`, `HomeReached`; from recognition `EventOutcome`,"
         " `TurnOutcome`",
     ),
     (
@@ -63,7 +63,12 @@ KEYS: tuple[tuple[str, str, str], ...] = (
         "`ActionBegan`, `ActionEnded`, `ActorFound`, `ActorLost`",
     ),
     (keys.CONNECTION_EVENT, "recognition → all", "`ConnectionEvent`"),
-    (keys.fault("<service>"), "any service → all", "`Fault`: a bad message, or what went wrong at the edge"),
+    (
+        keys.fault("<service>"),
+        "any service → all",
+        "`Fault`: a bad message, or what went wrong at the edge; the server of a command that is none gets it as"
+        " `Unreadable`, which is never sent",
+    ),
     (keys.WORLD, "perception → all", "`World`"),
     (keys.HEAD_OWNER, "generation → all", "`HeadOwner`"),
     (keys.statistics("<actor>"), "recognition → all", "`Statistics`, one per person, and `all`"),

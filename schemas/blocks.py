@@ -44,6 +44,29 @@ class PerformBlock(Request, frozen=True, kw_only=True, tag="perform_block", omit
     block: Block
 
 
+class InterruptBehavior(Request, frozen=True, kw_only=True, tag="interrupt_behavior", omit_defaults=True):
+    """cmd: anyone -> realizer: end one behavior of a live block now. Terminal state: `BehaviorInterrupted`.
+
+    The others go on. Gestures relax, speech ends at a word. What it has not reached is as if it had not been written,
+    even of a required behavior: who asks for its end does not miss it. To end a whole block, cancel its request.
+    """
+
+    block: str
+    behavior: str
+
+
+class BehaviorInterrupted(Outcome, frozen=True, kw_only=True, tag="behavior_interrupted", omit_defaults=True):
+    """evt: realizer -> requester. spoken: of a speech, the words that were said.
+
+    was_done: it came to its end before it could be ended.
+    """
+
+    block: str
+    behavior: str
+    spoken: str = ""
+    was_done: bool = False
+
+
 class SpokenText(Struct, frozen=True, kw_only=True, omit_defaults=True):
     """What was said of a speech: all of it, or the words before the interruption."""
 
@@ -63,5 +86,7 @@ class BlockOutcome(Outcome, frozen=True, kw_only=True, tag="block_outcome", omit
     spoken: tuple[SpokenText, ...] = ()
     dropped: tuple[str, ...] = ()
     """Ids of behaviors that were dropped, each with its warning on the feedback stream."""
+    interrupted: tuple[str, ...] = ()
+    """Ids of behaviors that somebody asked to end (`InterruptBehavior`), each with a warning as well."""
     replaced_by: str = ""
     fault: Fault | None = None

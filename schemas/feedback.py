@@ -9,8 +9,10 @@ from schemas.units import Seconds, Stamp
 WarningKind = Literal[
     "PARSING_FAILURE", "NO_SUCH_TARGET", "IMPOSSIBLE_TO_SCHEDULE", "BEHAVIOR_TYPE_NOT_SUPPORTED",
     "CANNOT_CREATE_BEHAVIOR", "EXECUTION_FAILURE", "LATE", "POLICY",
+    "INTERRUPTED",
 ]  # fmt: skip
-"""POLICY: generation performs a fragment otherwise than it asks, for example with a less reliable reference."""
+"""INTERRUPTED: somebody asked for the end of a behavior.
+POLICY: generation performs a fragment otherwise than it asks, for example with a less reliable reference."""
 
 
 class BlockProgress(Struct, frozen=True, kw_only=True, tag="block_progress", omit_defaults=True):

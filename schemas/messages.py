@@ -6,7 +6,7 @@ import msgspec
 
 from schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost
 from schemas.attention import HeadOwner, Inhibit, InhibitionEnded
-from schemas.blocks import BlockOutcome, PerformBlock
+from schemas.blocks import BehaviorInterrupted, BlockOutcome, InterruptBehavior, PerformBlock
 from schemas.body import (
     AbortBehavior,
     BehaviorOutcome,
@@ -43,7 +43,8 @@ MAJOR = 1
 Message = (
     Accepted | Refused | Cancel | Fault
     | PerformFragment | FragmentOutcome | Inhibit | InhibitionEnded | HeadOwner
-    | PerformBlock | BlockOutcome | BlockProgress | SyncPointProgress | PredictionFeedback | WarningFeedback
+    | PerformBlock | BlockOutcome | InterruptBehavior | BehaviorInterrupted
+    | BlockProgress | SyncPointProgress | PredictionFeedback | WarningFeedback
     | PerformBehavior | AbortBehavior | GoHome | HomeReached | BehaviorOutcome
     | SyncPointArrived | SyncPointReached | WordSpoken | RobotState
     | DescribeBody | Capabilities | EstimateBehaviors | Estimates

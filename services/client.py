@@ -24,7 +24,14 @@ from schemas import keys
 from schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost
 from schemas.attention import HeadOwner, Inhibit
 from schemas.behaviors import BlockBehavior, Constraint
-from schemas.blocks import Block, BlockOutcome, Composition, PerformBlock
+from schemas.blocks import (
+    BehaviorInterrupted,
+    Block,
+    BlockOutcome,
+    Composition,
+    InterruptBehavior,
+    PerformBlock,
+)
 from schemas.faults import Fault, InputRefused, NoReply, RunFailed
 from schemas.feedback import Feedback
 from schemas.fragments import FragmentOutcome, PerformFragment, TurnFragment
@@ -151,6 +158,18 @@ class Robot:
         outcome = await self._ask(keys.BLOCK, request, timeout)
         assert isinstance(outcome, BlockOutcome)
         return _unless_failed(outcome, block.id)
+
+    async def interrupt(self, block: str, behavior: str, *, timeout: Seconds | None = None) -> BehaviorInterrupted:
+        """End one behavior of a live block, which goes on without it; returns when it has ended, with what was said.
+
+        To end a whole block, cancel the task that awaits its `realize`.
+        Raises InputRefused if it is not being performed, or as `perform` does.
+        """
+        id = self._request_id(f"{block}:{behavior}")
+        request = InterruptBehavior(id=id, requester=self._bus.name, block=block, behavior=behavior)
+        outcome = await self._ask(keys.BLOCK, request, timeout)
+        assert isinstance(outcome, BehaviorInterrupted)
+        return outcome
 
     @asynccontextmanager
     async def inhibit_gaze(

@@ -1,11 +1,10 @@
-"""One live block on the event loop: one task per behavior, one future per sync point, one timer.
+"""One live block on the event loop: one task per behavior, one future per beginning, one timer.
 
 Decides nothing: what was measured goes to the `Authority`, and what that says is sent to whoever performs.
 """
 
 import asyncio
 from collections.abc import Iterable, Mapping
-from typing import Any
 
 from schemas.behaviors import BlockBehavior, Event, TurnSignal, Wait
 from schemas.blocks import Block, BlockOutcome, PerformBlock
@@ -50,9 +49,6 @@ class Performance:
         self._loop = loop
         self._report = Reporter(around.bus, plan.block.id)
         self._begun: dict[str, asyncio.Future[None]] = {id: loop.create_future() for id in plan.chains}
-        self.sync_points: dict[Point, asyncio.Future[Seconds]] = {
-            point: loop.create_future() for chain in plan.chains.values() for point in chain.points
-        }
         self._asked: dict[str, Begin | Extend] = {}
         """Of each behavior, what it was last told."""
         self._pending: dict[str, Pending] = {}
@@ -155,7 +151,7 @@ class Performance:
 
     def _tell_prediction(self) -> None:
         """Say when the rest is expected, if something was not when it was expected."""
-        if self._authority.is_surprised and not self._ending.done():
+        if self._authority.is_surprised and self._report.may_expect() and not self._ending.done():
             self._report.expect(
                 self._authority.plan, self._authority.began, self._authority.expected(self._bus.now())
             )
@@ -199,8 +195,7 @@ class Performance:
             self._timer.cancel()
         for behavior in self.plan.block.behaviors:
             self._around.routes.pop(self._body.id(behavior.id), None)
-        futures: tuple[asyncio.Future[Any], ...] = (*self._begun.values(), *self.sync_points.values())
-        for future in futures:
+        for future in self._begun.values():
             future.cancel()
 
     # -- decisions, as the authority makes them ----------------------------------------------------------------------
@@ -253,8 +248,6 @@ class Performance:
             skew = self._report.reached(self.plan, self._authority, each, arrived=came, by_body=by_body)
             if (late := max(skew, self._authority.lateness(each))) > self._config.skew:
                 self._warn_late(each, f"{each.sync} came {late:.2f} s later than it should")
-            if not (future := self.sync_points[each]).done():
-                future.set_result(at)
             self.spoken.reach(each)
             self._around.ledger.reach(self.plan.block.id, each, at)
 

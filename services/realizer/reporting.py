@@ -3,6 +3,7 @@
 from collections.abc import Iterable, Mapping
 
 from schemas import keys
+from schemas.blocks import SpokenText
 from schemas.feedback import (
     BlockProgress,
     Feedback,
@@ -22,6 +23,9 @@ from services.realizer.points import Point, type_of
 NOTICEABLE: Seconds = 0.1
 """What people notice between what they see and what they hear; a prediction that moves less is not worth telling."""
 
+AGAIN: Seconds = 0.001
+"""How long after a prediction the next may follow, for each point that it told: what it costs grows with these."""
+
 
 def moved_noticeably(old: Mapping[Point, Seconds], new: Mapping[Point, Seconds]) -> bool:
     """Is any point of `new` expected at another time than `old` said, by more than people notice, or unheard of?
@@ -39,6 +43,8 @@ class Reporter:
         self._block = block
         self._character = ""
         self._predicted: Mapping[Point, Seconds] = {}
+        self._not_before = 0.0
+        """When to look again whether the prediction has moved."""
 
     def started(self, plan: Plan, began: Seconds) -> None:
         self._character = plan.block.character_id
@@ -48,9 +54,14 @@ class Reporter:
         self._say(start)
         self._predict(plan, began, {point: plan.predicted(point) for point in _points(plan)})
 
+    def may_expect(self) -> bool:
+        """Is it time to find out what is expected now?"""
+        return self._bus.now() >= self._not_before
+
     def expect(self, plan: Plan, began: Seconds, times: Mapping[Point, Seconds]) -> None:
         """Tell when the points still to come are expected, seconds from the block's start, if that is news."""
         ours = {point: times[point] for point in _points(plan) if point in times}
+        self._not_before = self._bus.now() + AGAIN * len(ours)
         if moved_noticeably(self._predicted, ours):
             self._predict(plan, began, ours)
 
@@ -58,9 +69,8 @@ class Reporter:
         self._predicted = times
         points = []
         for point, time in times.items():
-            type = type_of(plan.chains[point.behavior].behavior)
-            sync = dialect_sync(point.sync, type, plan.block.dialect)
-            if sync is not None:
+            if (sync := _spelled(point, plan)) is not None:
+                type = type_of(plan.chains[point.behavior].behavior)
                 points.append(PlannedPoint(behavior=point.behavior, sync=sync, time=time, type=type))
         prediction = PredictionFeedback(
             block=self._block, points=tuple(points), at=self._bus.stamp(began), character_id=self._character
@@ -77,8 +87,7 @@ class Reporter:
         plan, at = authority.plan, authority.reached[point]
         together = (authority.reached.get(member.point) for member in plan.members[plan.at[point]])
         skew = at - min(time for time in (*together, at) if time is not None)
-        sync = dialect_sync(point.sync, type_of(plan.chains[point.behavior].behavior), plan.block.dialect)
-        if sync is not None:
+        if (sync := _spelled(point, plan)) is not None:
             self._say(
                 SyncPointProgress(
                     block=self._block,
@@ -106,6 +115,11 @@ class Reporter:
         )
         self._say(warning)
 
+    def interrupted(self, behavior: str, spoken: SpokenText | None) -> None:
+        """Somebody has asked for its end."""
+        said = f" after {spoken.text!r}" if spoken is not None else ""
+        self.warn("INTERRUPTED", f"interrupted{said}", behavior)
+
     def ended(self, status: str, began: Seconds) -> None:
         now = self._bus.now()
         progress = BlockProgress(
@@ -124,3 +138,10 @@ class Reporter:
 
 def _points(plan: Plan) -> Iterable[Point]:
     return (point for chain in plan.chains.values() for point in chain.points)
+
+
+def _spelled(point: Point, plan: Plan) -> str | None:
+    """As the block's dialect has it; None of what feedback does not tell: what is no default point there."""
+    is_repetition = point.sync.startswith("stroke:")
+    type = type_of(plan.chains[point.behavior].behavior)
+    return None if is_repetition else dialect_sync(point.sync, type, plan.block.dialect)

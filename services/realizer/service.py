@@ -6,7 +6,7 @@ from typing import Any, TypeVar
 
 from schemas import keys
 from schemas.behaviors import Gesture, Hand, Pointing
-from schemas.blocks import Block, BlockOutcome, PerformBlock
+from schemas.blocks import BehaviorInterrupted, Block, BlockOutcome, InterruptBehavior, PerformBlock
 from schemas.body import (
     BodyPose,
     Estimate,
@@ -79,6 +79,21 @@ class _Realizer:
         if live := self.live.get(cancel.id):
             reason = cancel.reason or "cancelled"
             live.stop(Ending("interrupted", Fault(reason=reason, where=live.request.block.id)))
+
+    async def interrupt(self, request: InterruptBehavior) -> None:
+        """End one behavior of a block, and say what came of it."""
+        block, behavior = request.block, request.behavior
+        performance = next((each for each in self.performing() if each.plan.block.id == block), None)
+        if performance is None or not performance.is_going_on(behavior):
+            self.desk.refuse(request.id, Fault(reason="it is not being performed", where=f"{block}: {behavior}"))
+            return
+        self.desk.accept(request.id)
+        was_done = await performance.interrupt(behavior)
+        spoken = performance.spoken.of(behavior)
+        text = spoken.text if spoken is not None else ""
+        self.desk.end(
+            BehaviorInterrupted(id=request.id, block=block, behavior=behavior, spoken=text, was_done=was_done)
+        )
 
     def hear_word(self, word: WordSpoken) -> None:
         for performance in self.performing():
@@ -267,6 +282,8 @@ async def realize(bus: Bus, ready: Ready, config: RealizerConfig) -> None:
                         case PerformBlock(id=id) as request if id not in realizer.live:
                             live = realizer.admit(request)
                             tasks.create_task(realizer.perform(live), name=f"block {request.block.id}")
+                        case InterruptBehavior(id=id) as request:
+                            tasks.create_task(realizer.interrupt(request), name=f"interruption {id}")
                         case Cancel() as cancel:
                             realizer.cancel(cancel)
     finally:

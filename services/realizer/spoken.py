@@ -33,11 +33,13 @@ class Spoken:
             text = speech.text if is_done else outcome.spoken or speech.text[: self._position.get(speech.id, 0)]
             self._texts[speech.id] = SpokenText(behavior=speech.id, text=text, complete=is_done)
 
+    def of(self, id: str) -> SpokenText | None:
+        """Of a speech, if it has begun."""
+        if id in self._texts or id not in self._position:
+            return self._texts.get(id)
+        return SpokenText(behavior=id, text=self._speeches[id].text[: self._position[id]], complete=False)
+
     @property
     def texts(self) -> tuple[SpokenText, ...]:
         """Of each that has begun, in document order."""
-        begun = [speech for id, speech in self._speeches.items() if id in self._texts or id in self._position]
-        return tuple(self._texts.get(speech.id) or self._unfinished(speech) for speech in begun)
-
-    def _unfinished(self, speech: Speech) -> SpokenText:
-        return SpokenText(behavior=speech.id, text=speech.text[: self._position[speech.id]], complete=False)
+        return tuple(text for id in self._speeches if (text := self.of(id)) is not None)

@@ -1,0 +1,44 @@
+"""What one block asks of the body."""
+
+from collections.abc import Iterable
+
+from schemas import keys
+from schemas.behaviors import BlockBehavior
+from schemas.body import AbortBehavior, GoHome, PerformBehavior, PlannedInstant
+from services.bus import Bus
+from services.realizer.effects import Begin, Extend
+from services.requests import Pending, Requester
+
+
+class BodyLink:
+    """request: the id of the block's; a behavior's is `<request>/<behavior>`. No behavior's id holds a colon."""
+
+    def __init__(self, bus: Bus, requests: Requester, request: str, block: str) -> None:
+        self._bus = bus
+        self._requests = requests
+        self._request = request
+        self._block = block
+
+    def id(self, behavior: str) -> str:
+        """Of the request for a behavior, whoever performs it."""
+        return f"{self._request}/{behavior}"
+
+    def perform(self, behavior: BlockBehavior, asked: Begin | Extend) -> Pending:
+        """Begin, or go on as far as is asked."""
+        perform = PerformBehavior(
+            id=self.id(behavior.id),
+            requester=self._bus.name,
+            block=self._block,
+            behavior=behavior,
+            through=asked.through.partition(":")[0],  # nobody asks for a repetition
+            pace=tuple(PlannedInstant(sync=sync, at=self._bus.stamp(at)) for sync, at in asked.pace),
+        )
+        return self._requests.send(keys.BEHAVIOR, perform)
+
+    def abort(self, behavior: str) -> None:
+        self._requests.send(keys.BEHAVIOR, AbortBehavior(id=self.id(behavior), requester=self._bus.name))
+
+    def go_home(self, parts: Iterable[str], behavior: str = "") -> None:
+        """behavior: for whose sake; empty: the block's."""
+        going = GoHome(id=f"{self.id(behavior)}:home", requester=self._bus.name, parts=tuple(sorted(parts)))
+        self._requests.send(keys.BEHAVIOR, going)
