@@ -1,6 +1,7 @@
 """Who is to blame for points that wait for each other in a circle: a behavior that is dropped, or the whole block."""
 
-from collections.abc import Collection, Container, Mapping, Sequence
+from collections.abc import Collection, Container, Iterable, Mapping, Sequence
+from itertools import accumulate
 from typing import NamedTuple
 
 from schemas.faults import Fault
@@ -11,6 +12,7 @@ from services.realizer.net import Bound, PetriNet, Place
 from services.realizer.points import Point
 from services.realizer.prediction import Circle, Impossible
 from services.realizer.relations import BlockRefused
+from services.realizer.schedule import EPSILON
 
 Turn = tuple[str, Point]
 """Who waits for which point of another before it takes its part."""
@@ -30,6 +32,33 @@ class Losses(Exception):
     def __init__(self, losses: Sequence[Loss]) -> None:
         self.losses = tuple(losses)
         super().__init__("; ".join(f"{loss.behavior} {loss.reason}" for loss in losses))
+
+
+def clashes(
+    turns: Iterable[Turn], chains: Mapping[str, Chain], required: Collection[str], classes: Classes
+) -> list[Loss]:
+    """Turns that cannot be waited for, whatever the rest of the block: what ties the two leaves no time for both."""
+    rank = {id: number for number, id in enumerate(chains)}
+    losses: dict[str, Loss] = {}
+    for turn in sorted(turns, key=lambda turn: (rank[turn[0]], rank[turn[1].behavior])):
+        later, (earlier, sync) = turn
+        free = [id for id in (earlier, later) if id not in required]
+        if free and not losses.keys() & {earlier, later} and _clash(chains[earlier], sync, chains[later], classes):
+            lost = max(free, key=rank.__getitem__)
+            losses[lost] = Loss(lost, f"cannot be on time: {later} would have to wait for {turn[1]}", turn)
+    return list(losses.values())
+
+
+def _clash(earlier: Chain, sync: str, later: Chain, classes: Classes) -> bool:
+    """Is there a point of each so close to the other's that `later` has to start before `earlier` is at `sync`?"""
+    last = next(number for number, point in enumerate(earlier.points) if point.sync == sync)
+    since_start = list(accumulate((each.shortest for each in later.segments), initial=0.0))
+    left = list(accumulate((each.shortest for each in reversed(earlier.segments[:last])), initial=0.0))[::-1]
+    return any(
+        (apart := classes.offset_between(one, other)) is not None and apart < still + gone - EPSILON
+        for one, still in zip(earlier.points, left, strict=False)
+        for other, gone in zip(later.points, since_start, strict=True)
+    )
 
 
 def judge(
