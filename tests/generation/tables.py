@@ -40,8 +40,9 @@ def body(
     arm: Callable[[str, str], float] = lambda since, target: 60.0,
     arm_for: Callable[[str], str] = lambda target: "right_arm",
     out_of_reach: Sequence[str] = (),
+    refused: Sequence[tuple[str, str]] = (),
 ) -> Motions:
-    """Degrees by (since, target)."""
+    """Degrees by (since, target). refused: (since, target) of points that the body cannot make from there."""
     gazes: dict[tuple[str, str], Estimate] = {}
     points: dict[tuple[str, str], Estimate] = {}
     for target in sequence:
@@ -52,7 +53,7 @@ def body(
         for since in (HERE, *sequence):
             ray = Ray(origin=above, axis=(0.0, 0.0, -1.0), tip=above)
             gazes[since, target] = Estimate(behavior="g", feasible=True, head_degrees=head(since, target), ray=ray)
-            reached = target not in out_of_reach
+            reached = target not in out_of_reach and (since, target) not in refused
             points[since, target] = Estimate(
                 behavior="p",
                 feasible=reached,

@@ -1,18 +1,14 @@
 """Choices of the thesis and of Appendix B, decision by decision; the sequence optimum against brute force."""
 
-from itertools import product
-
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from schemas.behaviors import Reference, SpeechOption
 from schemas.body import NoPointZone
 from schemas.faults import RunFailed
 from schemas.fragments import ReferenceChoice
 from services.generation.config import GenerationConfig
-from services.generation.motions import HERE, Motions
-from services.generation.reference_policy import Pair, Posture, Scene, choose, considered, cost
+from services.generation.motions import HERE
+from services.generation.reference_policy import Pair, choose
 from tests.generation.tables import TANGRAMS, apart, body, flat_world, option, refer, scene
 
 CONFIG = GenerationConfig()
@@ -298,86 +294,3 @@ def test_an_arm_that_is_near_already_changes_the_next_choice() -> None:
     assert [made(choice)[0] for choice in together] == [POINT, POINT]
     assert sum(choice.cost for choice in together) < sum(choice.cost for choice in alone)
     assert "dearer over the sequence" not in {pair.reason for pair in together[1].pairs}
-
-
-def brute_force(
-    references: list[Reference], where: Scene, motions: Motions, config: GenerationConfig
-) -> tuple[float, tuple[object, ...]]:
-    """Least summed cost, then least preferences, over every combination."""
-    allowed = []
-    for reference in references:
-        table = [pair for pair in considered(reference, where, motions, config) if not pair.ruled_out]
-        good = [pair for pair in table if round(pair.reliability - reference.minimum_reliability, 9) >= 0]
-        most = max(round(pair.reliability, 9) for pair in table)
-        allowed.append(good or [pair for pair in table if round(pair.reliability, 9) == most])
-    best = None
-    for combination in product(*allowed):
-        posture, total = Posture(), 0.0
-        for pair, reference in zip(combination, references, strict=True):
-            total += cost(pair, reference.target, posture, motions, config)
-            posture = posture.after(pair.gesture, reference.target, motions)
-        rank = (round(total, 9), tuple(pair.preference for pair in combination))
-        best = rank if best is None or rank < best else best
-    assert best is not None
-    return best
-
-
-NAMES = ("a", "b", "c", "d")
-degrees = st.integers(0, 8).map(lambda steps: steps * 15.0)
-
-
-@st.composite
-def problems(draw: st.DrawFn) -> tuple[list[Reference], Scene, Motions]:
-    spots = st.integers(0, 12).map(lambda steps: steps * 0.06)
-    world = flat_world({name: (draw(spots), draw(spots)) for name in NAMES})
-    sequence = draw(st.lists(st.sampled_from(NAMES), min_size=1, max_size=3))
-    references = []
-    for number, target in enumerate(sequence):
-        others = [name for name in NAMES if name != target]
-        options = [option("some words", draw(st.integers(0, 4)), draw(st.sets(st.sampled_from(others))))]
-        for _ in range(draw(st.integers(0, 2))):
-            text = draw(st.sampled_from(["", "this", "it"]))
-            distractors = draw(st.sets(st.sampled_from(others)))
-            options.append(option(text, draw(st.integers(0, 4)), sorted(distractors), deictic=text == "this"))
-        minimum = draw(st.sampled_from([0.05, 0.3, 0.45, 0.7, 0.85, 0.95, 0.99]))
-        references.append(refer(f"ref-{number}", target, minimum, *options))
-    table = {(since, target): draw(degrees) for since in (HERE, *NAMES) for target in NAMES}
-    reach = {(since, target): draw(degrees) for since in (HERE, *NAMES) for target in NAMES}
-    motions = body(
-        world,
-        sequence,
-        head=lambda since, target: table[since, target],
-        arm=lambda since, target: reach[since, target],
-        arm_for=lambda target: "left_arm" if target in "ab" else "right_arm",
-        out_of_reach=sorted(draw(st.sets(st.sampled_from(NAMES), max_size=1))),
-    )
-    no_gaze = draw(st.sampled_from(["", "", "", "inhibited"]))
-    return references, scene(world, no_gaze=no_gaze), motions
-
-
-@settings(max_examples=100, deadline=None)
-@given(problems())
-def test_the_choice_is_the_optimum_over_the_sequence(problem: tuple[list[Reference], Scene, Motions]) -> None:
-    references, where, motions = problem
-
-    chosen = choose(references, where, motions, CONFIG)
-    least, _ = brute_force(references, where, motions, CONFIG)
-
-    assert sum(choice.cost for choice in chosen.choices) == pytest.approx(least, abs=1e-6)
-
-
-@settings(max_examples=100, deadline=None)
-@given(problems())
-def test_what_holds_for_every_choice(problem: tuple[list[Reference], Scene, Motions]) -> None:
-    references, where, motions = problem
-
-    chosen = choose(references, where, motions, CONFIG)
-
-    for reference, choice in zip(references, chosen.choices, strict=True):
-        deictic = {option.text for option in reference.options if option.deictic}
-        row = next(pair for pair in choice.pairs if pair.chosen)
-        warned = any(f"{reference.id}: nothing reaches" in warning for warning in chosen.warnings)
-        assert choice.phrase not in deictic or choice.gesture == POINT
-        assert warned == (not row.feasible)
-        assert row.reliability > 0
-        assert not where.no_gaze or choice.gesture == "none"
