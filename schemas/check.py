@@ -5,17 +5,18 @@ met is for generation and the realizer to say.
 """
 
 import math
-from collections.abc import Iterator, Set
+from collections.abc import Iterator, Mapping, Set
 from difflib import get_close_matches
 from itertools import pairwise
 
 from msgspec import Struct
+from msgspec.structs import replace
 
 from schemas.behaviors import Behavior, Event, Head, Reference, Speech, Wait
 from schemas.faults import Fault, InputRefused
 from schemas.fragments import TurnFragment
 from schemas.references import Input, marks, sites
-from schemas.syncref import BLOCK_ITSELF, SYNC_POINTS, SyncRef, canonical_sync, is_id, is_sync_point
+from schemas.syncref import BLOCK_ITSELF, LONGEST_ID, SYNC_POINTS, SyncRef, canonical_sync, is_id, is_sync_point
 
 _SYNC_ADVICE = "write behavior:sync, behavior:sync+seconds, or seconds from the block's start"
 
@@ -30,12 +31,14 @@ class Problem(Struct, frozen=True):
     advice: str = ""
 
 
-def check(thing: Input, source: str = "", *, prefix: str = "$", paths: bool = False) -> None:
+def check(thing: Input, source: str = "", *, prefix: str = "$", paths: bool = False, line: int = 0) -> None:
     """Raises InputRefused for the first problem: where, on which line, why, and what to do.
 
     source: file or sender. paths: say where by JSON path, which starts with `prefix`, even if lines are known.
+    line: of the root element, for what is wrong with the whole.
     """
     for problem in problems(thing):
+        problem = problem if problem.line else replace(problem, line=line)
         raise InputRefused(_fault(thing, problem, source, prefix, paths), thing.id or None)
 
 
@@ -85,7 +88,9 @@ def _bad_id(id: str) -> str:
         return "no id"
     if id == BLOCK_ITSELF:
         return f"the id {BLOCK_ITSELF!r} is reserved for the block itself"
-    return "" if is_id(id) else f"id {id!r} may hold neither spaces nor ':' nor '+', nor begin with '-'"
+    if len(id) > LONGEST_ID:
+        return f"id {id[:40]!r}... is longer than {LONGEST_ID} characters"
+    return "" if is_id(id) else f"id {id!r} may hold neither spaces nor control characters nor ':' nor '+', nor begin with '-'"
 
 
 def _behavior(behavior: Behavior, path: str) -> Iterator[Problem]:
@@ -145,6 +150,8 @@ def _options(reference: Reference, path: str) -> Iterator[Problem]:
 
 def _references(thing: Input) -> Iterator[Problem]:
     points = _points(thing)
+    if isinstance(thing, TurnFragment):
+        yield from _inline(thing, points)
     for site in sites(thing):
         try:
             reference = SyncRef.parse(site.text)
@@ -157,10 +164,20 @@ def _references(thing: Input) -> Iterator[Problem]:
             reason = f"unknown behavior {reference.behavior!r} in {site.text!r}"
             yield Problem(reason, site.path, site.name, site.line, _nearest(reference.behavior, points.keys()))
         elif isinstance(thing, TurnFragment) and canonical_sync(reference.sync) not in points[reference.behavior]:
-            # In a plain block the realizer drops such a line with a warning; a fragment is refused whole.
             known = points[reference.behavior]
             reason = f"{reference.behavior!r} has no sync point {reference.sync!r}"
             yield Problem(reason, site.path, site.name, site.line, _nearest(reference.sync, known))
+
+
+def _inline(fragment: TurnFragment, points: Mapping[str, Set[str]]) -> Iterator[Problem]:
+    """Of a block the realizer drops a behavior that is timed at a point it lacks; a fragment is refused whole."""
+    for index, behavior in enumerate(fragment.behaviors):
+        for number, timing in enumerate(behavior.timing):
+            known = points[behavior.id]
+            if canonical_sync(timing.sync) not in known:
+                path = f"$.behaviors[{index}].timing[{number}].sync"
+                reason = f"{behavior.id!r} has no sync point {timing.sync!r}"
+                yield Problem(reason, path, behavior.id, behavior.line, _nearest(timing.sync, known))
 
 
 def _points(thing: Input) -> dict[str, Set[str]]:

@@ -5,7 +5,7 @@ from typing import Literal
 from msgspec import Struct
 
 from schemas.behaviors import Action, Constraint, FragmentBehavior
-from schemas.blocks import SpokenText
+from schemas.blocks import SpokenText, Unread
 from schemas.faults import Fault
 from schemas.recognition import ConnectionEvent
 from schemas.requests import Outcome, Request
@@ -33,6 +33,9 @@ class TurnFragment(Struct, frozen=True, kw_only=True, tag="fragment", omit_defau
     delay: bool = False
     delay_target: str = ""
     accept: tuple[Action, ...] = ()
+    unread: tuple[Unread, ...] = ()
+    """Warned of when the block that it becomes begins."""
+    line: int = 0
 
 
 class PerformFragment(Request, frozen=True, kw_only=True, tag="perform_fragment", omit_defaults=True):

@@ -15,6 +15,7 @@ from schemas.faults import Fault, InputRefused
 from schemas.fragments import TurnFragment
 from schemas.references import disambiguated
 from schemas.xml_codec import decode_xml
+from schemas.xml_names import snake
 from schemas.xml_source import LARGEST
 
 T = TypeVar("T", Block, TurnFragment)
@@ -95,7 +96,7 @@ def _looks_like_fragment(parsed: dict[str, Any]) -> bool:
     refers = isinstance(behaviors, list) and any(
         isinstance(each, dict) and each.get("type") == "reference" for each in behaviors
     )
-    return refers or not _FRAGMENT_ONLY.isdisjoint(parsed)
+    return refers or not _FRAGMENT_ONLY.isdisjoint(map(snake, parsed))
 
 
 def _blamed(parsed: dict[str, Any], kind: type[T], source: str, path: str) -> T:
@@ -128,7 +129,8 @@ def _refuse_unknown_keys(parsed: Any, decoded: Any, path: str, source: str) -> N
             if key in fields:
                 _refuse_unknown_keys(value, getattr(decoded, fields[key]), f"{path}.{key}", source)
             elif key != decoded.__struct_config__.tag_field:
-                raise _refusal(f"unknown key {key!r}", f"{path}.{key}", source, f"known: {', '.join(fields)}")
+                advice = f"did you mean {snake(key)!r}?" if snake(key) in fields else f"known: {', '.join(fields)}"
+                raise _refusal(f"unknown key {key!r}", f"{path}.{key}", source, advice)
     elif isinstance(decoded, tuple) and isinstance(parsed, list):
         for index, (value, item) in enumerate(zip(parsed, decoded, strict=True)):
             _refuse_unknown_keys(value, item, f"{path}[{index}]", source)

@@ -34,14 +34,14 @@ from schemas.recognition import (
     Statistics,
     TurnOutcome,
 )
-from schemas.requests import Accepted, Cancel, Refused
+from schemas.requests import Accepted, Cancel, Refused, Unreadable
 from schemas.status import AskStatus, Status
 from schemas.world import World
 
 MAJOR = 1
 
 Message = (
-    Accepted | Refused | Cancel | Fault
+    Accepted | Refused | Cancel | Unreadable | Fault
     | PerformFragment | FragmentOutcome | Inhibit | InhibitionEnded | HeadOwner
     | PerformBlock | BlockOutcome | InterruptBehavior | BehaviorInterrupted
     | BlockProgress | SyncPointProgress | PredictionFeedback | WarningFeedback

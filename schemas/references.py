@@ -124,6 +124,8 @@ def in_draft_spelling(thing: AnyInput, dialect: Literal["draft", "bml-1.0"]) -> 
 
 def without_lines(thing: AnyInput) -> AnyInput:
     """The same as if it had not come from XML: every `line` 0."""
+    if isinstance(thing, TurnFragment):
+        thing = replace(thing, line=0)
     return replace(
         thing,
         behaviors=tuple(_behavior_without_lines(behavior) for behavior in thing.behaviors),

@@ -37,6 +37,16 @@ class Refused(Struct, frozen=True, kw_only=True, tag="refused", omit_defaults=Tr
     fault: Fault
 
 
+class Unreadable(Struct, frozen=True, kw_only=True, tag="unreadable", omit_defaults=True):
+    """local: bus -> server of the key. What came there as a command is none: made on arrival, never sent.
+
+    id: of the request, as far as it could be read.
+    """
+
+    fault: Fault
+    id: str = ""
+
+
 class Outcome(Struct, frozen=True, kw_only=True, omit_defaults=True):
     """The base of the other terminal states; each domain has its own."""
 

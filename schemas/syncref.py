@@ -24,15 +24,17 @@ from schemas.units import Seconds
 BLOCK_ITSELF = "bml"
 SYNC_POINTS = ("start", "ready", "stroke_start", "stroke", "stroke_end", "relax", "end")
 """What the drafts give every behavior but speech, in order. The system's own spelling."""
-LONGEST = 1000
+LONGEST_ID = 250
+LONGEST = 4 * LONGEST_ID
 """Characters; nobody's reference is longer, and no input gets to keep a regular expression busy."""
 
 _NUMBER = r"(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)"
 _SIGNED = re.compile(rf"([+-]?)\s*({_NUMBER})")
 _WITH_OFFSET = re.compile(rf"(.*?)\s*([+-])\s*({_NUMBER})")
-_PLAIN = re.compile(r"([^\s:+-][^\s:+]*):([A-Za-z_]+)")
+_NAMED = r"[^\s:+\x00-\x1f\x7f-\x9f-][^\s:+\x00-\x1f\x7f-\x9f]*"
+_PLAIN = re.compile(rf"({_NAMED}):([A-Za-z_]+)")
 """Most references: what else can be read need not be looked for."""
-_NAME = re.compile(r"[^\s:+-][^\s:+]*")
+_NAME = re.compile(_NAMED)
 
 
 class SyncRef(Struct, frozen=True, omit_defaults=True):
@@ -97,7 +99,7 @@ class SyncRef(Struct, frozen=True, omit_defaults=True):
 
 def is_id(text: str) -> bool:
     """May this be the id of a block or behavior?"""
-    return _NAME.fullmatch(text) is not None
+    return len(text) <= LONGEST_ID and _NAME.fullmatch(text) is not None
 
 
 def is_sync_point(text: str) -> bool:

@@ -69,7 +69,7 @@ def decode_xml(data: bytes | str, source: str = "") -> Block | TurnFragment:
     """The block or fragment in `data`. Raises InputRefused with `source`, line, reason and advice."""
     document = _Document(Source(data, source))
     thing = document.read()
-    check(thing, source)
+    check(thing, source, line=document.line)
     return thing
 
 
@@ -79,6 +79,7 @@ class _Document:
         self._speaks_1_0 = False
         self._is_strict = False
         self._unread: list[Unread] = []
+        self.line = source.line(source.root)
 
     def read(self) -> Block | TurnFragment:
         root = self._source.root
@@ -94,8 +95,7 @@ class _Document:
 
     def _block(self, root: etree._Element, namespace: str) -> Block:
         plain = attributes(root)
-        for name in sorted(unknown_attributes(plain, "bml", None)):
-            self._leave_out(f"<bml> has no attribute {name!r}", root)
+        self._note_attributes(root, "bml")
         behaviors, constraints = self._content(root)
         raw = {
             "id": self._id(root),
@@ -113,7 +113,7 @@ class _Document:
         raw = self._own_fields(root, TurnFragment)
         behaviors, constraints = self._content(root)
         raw |= {"id": self._id(root), "behaviors": behaviors, "constraints": constraints}
-        raw["accept"] = str(raw.get("accept", "")).split()
+        raw |= {"accept": str(raw.get("accept", "")).split(), "unread": self._unread, "line": self.line}
         fragment = disambiguated(converted(self._source, root, raw, TurnFragment))
         return in_draft_spelling(fragment, "bml-1.0") if self._speaks_1_0 else fragment
 
@@ -136,8 +136,18 @@ class _Document:
         """Note what is not understood. Raises InputRefused where nothing may be left out."""
         if self._is_strict or required:
             raise self._source.refusal(reason, element, advice=advice)
+        self._note(reason, element, behavior, kind)
+
+    def _note(
+        self, reason: str, element: etree._Element, behavior: str, kind: WarningKind = "PARSING_FAILURE"
+    ) -> None:
         message = f"line {self._source.line(element)}: {reason}; it is ignored"
         self._unread.append(Unread(message=message, behavior=behavior, kind=kind))
+
+    def _note_attributes(self, element: etree._Element, local: str, behavior: str = "") -> None:
+        """Of an element that is no behavior."""
+        for name in unknown_attributes(attributes(element), local, None):
+            self._note(f"<{local}> has no attribute {name!r}", element, behavior)
 
     def _content(
         self, parent: etree._Element, *, required: bool = False
@@ -148,7 +158,11 @@ class _Document:
             self._speaks_1_0 |= namespace == BML_1_0
             if local in ("description", "participant"):
                 continue
+            if local == "reference" and namespace in ("", EBML) and not self._is_strict:
+                advice = "send it to generation as a turn fragment: <ebml:ebml>"
+                raise self._source.refusal("a block can't hold an object reference", element, advice=advice)
             if local == "required":
+                self._note_attributes(element, local)
                 more, further = self._content(element, required=True)
                 behaviors += more
                 constraints += further
@@ -156,10 +170,7 @@ class _Document:
                 constraints.append(self._constraint(element, required))
             elif local in CORE_BEHAVIORS and namespace != EBML:
                 behaviors.append(self._behavior(element, local, CORE_BEHAVIORS[local], required))
-            elif local in EXTENSIONS and namespace in ("", EBML):
-                if local == "reference" and not self._is_strict:
-                    advice = "send it to generation as a turn fragment: <ebml:ebml>"
-                    raise self._source.refusal("a block can't hold an object reference", element, advice=advice)
+            elif local in EXTENSIONS and (namespace == EBML or (not namespace and self._is_strict)):
                 behaviors.append(self._behavior(element, local, EXTENSIONS[local], required))
             elif self._is_strict or not element.get("id"):
                 advice = f"known: {', '.join(sorted(CORE_BEHAVIORS))}, constraint"
@@ -214,9 +225,11 @@ class _Document:
                 raw["accept"] = str(raw.get("accept", "")).split()
                 raw["objects"] = [child.get("id", "") for child, _, name in ours(element) if name == "object"]
                 raw["anchors"] = [child.get("ref", "") for child, _, name in ours(element) if name == "anchor"]
-        if not self._is_strict:
+        if local not in EXTENSIONS:
             timing += self._unread_attributes(element, plain, local, kind)
         raw["timing"] = timing
+        if "side" in raw:
+            raw["side"] = raw["side"].upper()
         raw = {name: value for name, value in raw.items() if value is not None}
         return converted(self._source, element, raw, kind)
 
@@ -225,17 +238,24 @@ class _Document:
     ) -> list[of.Timing]:
         """Note the attributes that nobody reads. What names a sync point was meant as timing, and is returned."""
         timing = []
-        for name in sorted(unknown_attributes(plain, local, kind)):
+        for name in unknown_attributes(plain, local, kind):
             if is_reference(plain[name]):
                 timing.append(of.Timing(name, plain[name]))
             else:
-                self._leave_out(f"<{local}> has no attribute {name!r}", element, plain["id"])
+                self._note(f"<{local}> has no attribute {name!r}", element, plain["id"])
         return timing
 
     def _speech(self, element: etree._Element, raw: dict[str, Any]) -> list[of.Timing]:
         said = spoken(self._source, element, raw["id"])
         raw["text"], raw["marks"] = said.text, said.marks
         raw["markup"] = said.markup or raw.get("markup", "")
+        children = list(ours(element))
+        has_text = any(name == "text" for _, _, name in children)
+        for child, _, name in children:
+            if name == "text":
+                self._note_attributes(child, name, raw["id"])
+            elif has_text and name not in ("description", "timing"):
+                self._leave_out(f"unknown element <{name}> beside <text>", child, raw["id"])
         ties = [
             of.Timing(child.get("sync", ""), child.get("ref", ""))
             for child in element
@@ -251,7 +271,8 @@ class _Document:
             reason = "more than one expression in a face"
             self._leave_out(reason, part, raw["id"], required=_is_true(raw), advice="one element for each")
         for part in parts[:1]:
-            raw |= fields(attributes(part)) | {"id": raw["id"]}
+            self._note_attributes(part, split(str(part.tag))[1], raw["id"])
+            raw |= {name: part.get(name) for name in ("lexeme", "au", "side", "amount") if name in part.attrib}
         if kind is of.FaceShift:
             return kind
         if "au" in raw or plain.get("type", "").upper() == "FACS":
@@ -266,11 +287,11 @@ class _Document:
             if name in seen:
                 reason = f"more than one <{name}> in a posture"
                 self._leave_out(reason, child, raw["id"], required=_is_true(raw), advice="one element for each")
-            elif name == "stance":
-                raw["stance"] = child.get("type", "")
-            elif name == "pose":
-                raw["part"], raw["lexeme"] = child.get("part", ""), child.get("lexeme", "")
-            seen |= {name} & {"stance", "pose"}
+            elif name in ("stance", "pose"):
+                seen.add(name)
+                self._note_attributes(child, name, raw["id"])
+                read = {"stance": "type"} if name == "stance" else {"part": "part", "lexeme": "lexeme"}
+                raw |= {field: child.get(attribute, "") for field, attribute in read.items()}
 
     def _option(self, element: etree._Element) -> of.SpeechOption:
         self._only(element, "speechOption")
@@ -280,6 +301,7 @@ class _Document:
         return converted(self._source, element, raw, of.SpeechOption)
 
     def _constraint(self, element: etree._Element, required: bool) -> of.Constraint:
+        self._note_attributes(element, "constraint")
         required = required or _is_true(fields(attributes(element)))
         operators = []
         for child, _, local in ours(element):
@@ -291,6 +313,7 @@ class _Document:
                 self._leave_out(reason, child, required=required, advice=advice)
                 continue
             self._only(child, local)
+            self._note_attributes(child, local)
             raw: dict[str, Any] = {"syncs": [self._ref(sync) for sync, _, name in ours(child) if name == "sync"]}
             if (ref := child.get("ref")) is not None:
                 raw["ref"] = ref
@@ -315,6 +338,7 @@ class _Document:
     def _ref(self, sync: etree._Element) -> str:
         if (ref := sync.get("ref")) is None:
             raise self._source.refusal("<sync> without ref", sync, advice='<sync ref="behavior:sync"/>')
+        self._note_attributes(sync, "sync")
         return ref
 
     def _only(self, element: etree._Element, local: str, behavior: str = "") -> None:

@@ -20,7 +20,9 @@ _NOT_ATTRIBUTES = frozenset(
 )
 _SPELLINGS = {
     "gesture": {"hand"}, "pointing": {"hand"}, "head": {"action", "rotation", "repeats"}, "face": {"overshoot"},
-    "emit": {"event"}, "bml": {"composition", "characterId"},
+    "emit": {"event"}, "bml": {"composition", "characterId"}, "synchronize": {"ref"}, "before": {"ref"},
+    "after": {"ref"}, "sync": {"ref"}, "lexeme": {"lexeme", "amount"}, "facs": {"au", "side", "amount"},
+    "pose": {"part", "lexeme"},
 }  # fmt: skip
 """Attributes that are read though no field is called so, beside `id` and `type`, which every element may have."""
 _HANDS = {"left": "LEFT_HAND", "right": "RIGHT_HAND", "both": "BOTH_HANDS"}
@@ -47,15 +49,15 @@ def attributes(element: etree._Element) -> dict[str, str]:
 
 def fields(plain: dict[str, str]) -> dict[str, Any]:
     """offsetAngle, offset-angle -> offset_angle. `line` is ours to say."""
-    snake = {_snake(name): value for name, value in plain.items()}
-    return {name: value for name, value in snake.items() if name not in ("line", "timing", "marks", "unread")}
+    named = {snake(name): value for name, value in plain.items()}
+    return {name: value for name, value in named.items() if name not in ("line", "timing", "marks", "unread")}
 
 
 def unknown_attributes(plain: dict[str, str], local: str, kind: type[msgspec.Struct] | None) -> Iterator[str]:
     """Of an element's own attributes those that nobody will read."""
-    read = {"id", "type", "required", *_SPELLINGS.get(local, ())}
-    for name in plain.keys() - read - SYNC_ATTRIBUTES:
-        if kind is None or _snake(name) not in set(kind.__struct_fields__) - _NOT_ATTRIBUTES:
+    read = {"id", "type", "required", *_SPELLINGS.get(local, ()), *(SYNC_ATTRIBUTES if kind else ())}
+    for name in sorted(plain.keys() - read):
+        if kind is None or snake(name) not in set(kind.__struct_fields__) - _NOT_ATTRIBUTES:
             yield name
 
 
@@ -78,7 +80,8 @@ def camel(field: str) -> str:
     return re.sub("_([a-z])", lambda match: match[1].upper(), field)
 
 
-def _snake(name: str) -> str:
+def snake(name: str) -> str:
+    """offsetAngle, offset-angle -> offset_angle."""
     return re.sub("(?<=[a-z])([A-Z])", r"_\1", name).replace("-", "_").lower()
 
 

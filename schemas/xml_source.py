@@ -33,6 +33,13 @@ MOST_PREFIXES = 100
 _UNDECLARED_PREFIX = "NS_ERR_UNDEFINED_NAMESPACE"
 _UNDECLARED = re.compile(r"Namespace prefix ([^\s\"'<>&=/]+) (?:for|on) ")
 _NOBODYS = "urn:undeclared:"
+_ADVICE = {
+    "ERR_UNDECLARED_ENTITY": "write the character itself; only &amp; &lt; &gt; &quot; &apos; are known",
+    "ERR_INVALID_CHAR": "remove it: XML holds no control characters",
+    "ERR_DOCUMENT_END": "a document is one <bml> or one <ebml>",
+    "ERR_ATTRIBUTE_REDEFINED": "name each attribute once",
+}
+"""By libxml2's name for what is wrong."""
 _DECLARED = re.compile(rb"(?:\xef\xbb\xbf)?<\?xml[^>?]*?\sencoding\s*=\s*[\"']([A-Za-z0-9._-]+)[\"']")
 _ENCODINGS = re.compile(r"utf-?8|(?:us-)?ascii|iso-?8859-\d+|latin-?\d|windows-125\d|cp125\d", re.IGNORECASE)
 """In all of them a `<` is a byte 0x3C: no tag can hide from `_start_lines`."""
@@ -53,8 +60,8 @@ class Source:
             )
         text = data if isinstance(data, str) else self._decoded(data)
         text = text.removeprefix("\ufeff")
-        if _DOCTYPE.match(text):
-            raise self.refusal("a document type (<!DOCTYPE>) is not read", advice="remove it: no entities, no DTD")
+        if doctype := _DOCTYPE.match(text):
+            raise self._doctype(text.count("\n", 0, doctype.end()) + 1)
         self.root = self._parse(text)
         self.block = self.root.get("id") or None
         # No further than that: a million elements take seconds to look at.
@@ -84,7 +91,7 @@ class Source:
         """Raises InputRefused for an encoding other than its declaration says, or one in which tags could hide."""
         if data[:2] in (b"\xff\xfe", b"\xfe\xff"):
             encoding = "utf-16"
-        elif data[:2] in (b"<\0", b"\0<"):
+        elif data[1:4:2] == b"\0\0" or data[:3:2] == b"\0\0":
             encoding = "utf-16-le" if data[0] else "utf-16-be"
         else:
             declared = _DECLARED.match(data)
@@ -99,7 +106,8 @@ class Source:
             reason = f"malformed XML: this is not {encoding} ({error.reason})"
             raise self.refusal(reason, line=line, advice="save it as UTF-8, or declare its encoding") from error
         except LookupError as error:
-            raise self.refusal(f"malformed XML: encoding {encoding!r} is not known", line=1) from error
+            reason = f"malformed XML: encoding {encoding!r} is not known"
+            raise self.refusal(reason, line=1, advice="save it as UTF-8") from error
 
     def _parse(self, text: str) -> etree._Element:
         """An attribute whose prefix nobody declared is somebody else's; every other error refuses the document.
@@ -116,8 +124,12 @@ class Source:
             else:
                 break
         if root.getroottree().docinfo.doctype:  # type: ignore[union-attr]
-            raise self.refusal("a document type (<!DOCTYPE>) is not read", advice="remove it: no entities, no DTD")
+            raise self._doctype(0)
         return root
+
+    def _doctype(self, line: int) -> InputRefused:
+        reason = "a document type (<!DOCTYPE>) is not read"
+        return self.refusal(reason, line=line, advice="remove it: no entities, no DTD")
 
     def _undeclared(self, parser: etree.XMLParser, error: etree.XMLSyntaxError, known: Set[str]) -> set[str]:
         """Prefixes to declare, at least one. Raises InputRefused if anything else is wrong."""
@@ -128,7 +140,10 @@ class Source:
             return found
         reason = wrong.message.strip() if wrong else str(error)
         line = int(wrong.line if wrong else error.lineno or 0)
-        raise self.refusal(f"malformed XML: {reason}", line=line, advice="close and quote everything") from error
+        if reason.startswith("Excessive depth"):
+            raise self.refusal(f"nested deeper than {DEEPEST} levels", line=line, advice="unnest it") from error
+        advice = _ADVICE.get(wrong.type_name if wrong else "", "close and quote everything")
+        raise self.refusal(f"malformed XML: {reason}", line=line, advice=advice) from error
 
     def _require_plain(self, elements: Iterable[etree._Element]) -> None:
         """Raises InputRefused for an element of an undeclared prefix, or with more attributes than anyone needs."""
@@ -146,7 +161,7 @@ class Source:
         for event, element in etree.iterwalk(self.root, events=("start", "end")):
             depth += 1 if event == "start" else -1
             if depth > DEEPEST:
-                raise self.refusal(f"nested deeper than {DEEPEST} levels", element)
+                raise self.refusal(f"nested deeper than {DEEPEST} levels", element, advice="unnest it")
 
 
 def _parser() -> etree.XMLParser:

@@ -16,8 +16,10 @@ from msgspec import Struct
 
 from schemas import keys
 from schemas.blocks import Block, PerformBlock
+from schemas.faults import EngageError
 from schemas.fragments import PerformFragment
 from schemas.messages import Message, decode
+from schemas.requests import Unreadable
 from schemas.status import BusHealth
 from schemas.units import Seconds, Stamp
 from schemas.xml_codec import decode_xml
@@ -237,3 +239,10 @@ def read_payload(payload: bytes, encoding: str, key: str, source: str) -> Messag
     if isinstance(thing, Block):
         return PerformBlock(id=thing.id, requester=source, block=thing)
     return PerformFragment(id=thing.id, requester=source, fragment=thing)
+
+
+def unreadable(error: EngageError, key: str) -> Unreadable | None:
+    """What the server of `key` gets to hear of a bad payload: it owes an answer. None on keys that have no server."""
+    if keys.key_class(key) != "cmd":
+        return None
+    return Unreadable(id=getattr(error, "block", None) or "", fault=error.fault)

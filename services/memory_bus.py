@@ -14,7 +14,7 @@ from schemas.messages import Message, decode, encode
 from schemas.presence import PeerAlive, PeerGone
 from schemas.status import BusHealth
 from schemas.units import Probability, Seconds, Stamp
-from services.bus import Answer, Bus, Hub, Keep, Received, Subscription, read_payload
+from services.bus import Answer, Bus, Hub, Keep, Received, Subscription, read_payload, unreadable
 
 
 class Faults(Struct, frozen=True, kw_only=True):
@@ -88,6 +88,10 @@ class MemoryHub(Hub):
         except InputRefused as error:
             for bus in [bus for bus in self._buses.values() if bus.wants(key)]:
                 bus.publish(keys.fault(bus.name), msgspec.structs.replace(error.fault, where=key, service=bus.name))
+            refused = unreadable(error, key)
+            if refused is not None and (server := self._buses.get(keys.server_of(key))):
+                self.sent += 1
+                server.deliver(Received(key, refused, "", self._loop.time()), self.sent)
         else:
             self._pass_on("", Received(key, message, "", self._loop.time()))
 

@@ -21,7 +21,7 @@ from schemas import keys
 from schemas.faults import EngageError, Fault, RunFailed
 from schemas.messages import Message
 from schemas.presence import PeerAlive, PeerGone
-from schemas.requests import Accepted, Cancel, Outcome, Refused, Request
+from schemas.requests import Accepted, Cancel, Outcome, Refused, Request, Unreadable
 from schemas.units import Seconds
 from services.bus import Bus, Received
 
@@ -265,6 +265,8 @@ class RequestDesk:
                 if received.past and request.requester in self._runs:
                     return None
                 return self._take_cancel(request) if isinstance(request, Cancel) else self._take(request)
+            case Unreadable(id=id, fault=fault) if id and id not in self._live:
+                self._bus.publish(keys.request_state(self._server), Refused(id=id, fault=fault))
             case PeerGone(participant=requester):
                 self._requester_gone(requester)
             case PeerAlive(participant=requester, run=run):

@@ -11,7 +11,8 @@ from schemas import keys
 from schemas.faults import EngageError
 from schemas.messages import Message
 from schemas.presence import PeerAlive, PeerGone
-from services.bus import Bus, Received, Subscription, read_payload
+from schemas.requests import Unreadable
+from services.bus import Bus, Received, Subscription, read_payload, unreadable
 from services.zenoh_order import Envelope, Follower, Ledger, Missing, Past, Pulse, Written
 from services.zenoh_peers import Peers, finish
 from services.zenoh_session import Doorway
@@ -128,12 +129,14 @@ class Readers:
         if self._decoded is None or self._decoded[0] is not written:
             self._decoded = (written, self._decode(reader.bus, written))
         message = self._decoded[1]
+        if isinstance(message, Unreadable) and reader.bus.name != keys.server_of(written.key):
+            return
         if message is not None:
             received = Received(written.key, message, written.envelope.source, self._loop.time(), past)
             reader.subscription.offer(received)
 
     def _decode(self, bus: Bus, written: Written) -> Message | None:
-        """The message; None for a bad one, which is counted and complained about."""
+        """The message, or what its server hears of a bad one, which is counted and complained about."""
         try:
             return read_payload(written.payload, written.encoding, written.key, written.envelope.source)
         except EngageError as error:
@@ -142,7 +145,7 @@ class Readers:
                 where = f"{written.key} from {written.envelope.source or 'a stranger'}"
                 fault = msgspec.structs.replace(error.fault, where=where, service=bus.name)
                 bus.publish(keys.fault(bus.name), fault)
-            return None
+            return unreadable(error, written.key)
 
     def _follow(self, reader: _Reader, run: str) -> Follower:
         follower = reader.followers.get(run)

@@ -171,7 +171,9 @@ class _Emitter:
         self._time_speeches_and_references()
         opening, closing = self._opening(), self._closing()
         behaviors = (*opening, *self._in_document_order(), *closing)
-        block = Block(id=self.fragment.id, behaviors=behaviors, constraints=tuple(self.constraints))
+        block = Block(
+            id=self.fragment.id, behaviors=behaviors, constraints=tuple(self.constraints), unread=self.fragment.unread
+        )
         return Emission(block, tuple(f"{behavior.id} is left out: inhibited" for behavior in self.dropped))
 
     def _speeches(self) -> list[str]:

@@ -43,14 +43,14 @@ def addressee(fragment: TurnFragment, world: World) -> str:
         if fragment.addressee not in people:
             advice = f"people: {', '.join(people)}" if people else "the world knows nobody"
             reason = f"the world does not know the person {fragment.addressee!r}"
-            raise _refused(fragment, "$.addressee", reason, 0, advice)
+            raise _refused(fragment, "$.addressee", reason, fragment.line, advice)
         return fragment.addressee
     if fragment.turn_status in ("middle", "end"):
         return ""
     if len(people) != 1:
         reason = f"no addressee, and the world knows {len(people) or 'no'} people"
         advice = f"name one of {', '.join(people)}" if people else "the world needs a person to speak to"
-        raise _refused(fragment, "$.addressee", reason, 0, advice)
+        raise _refused(fragment, "$.addressee", reason, fragment.line, advice)
     return people[0]
 
 
@@ -85,7 +85,7 @@ def _targets(fragment: TurnFragment) -> Iterator[tuple[str, str, int]]:
         if isinstance(behavior, Gaze | GazeShift | Pointing | HeadDirectionShift):
             yield f"$.behaviors[{index}].target", behavior.target, behavior.line
     if fragment.delay_target:
-        yield "$.delay_target", fragment.delay_target, 0
+        yield "$.delay_target", fragment.delay_target, fragment.line
 
 
 def _nearest(name: str, known: Mapping[str, Entity]) -> str:

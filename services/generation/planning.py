@@ -15,7 +15,7 @@ from services.generation.motions import Motions
 from services.generation.ordering import ordered
 from services.generation.permits import Permits
 from services.generation.reference_policy import Choices, Scene, choose
-from services.generation.turn_policy import TurnPlan
+from services.generation.turn_policy import TurnPlan, vain_delay
 
 
 class Plan(Struct, frozen=True, kw_only=True):
@@ -52,7 +52,8 @@ def plan(
     if made := references(fragment):
         chosen = choose(made, _scene(world, body, permits, config), motions, config)
     emission = emit(fragment, turn, chosen.choices, config, permits, chosen.hands)
-    return Plan(block=emission.block, choices=chosen.choices, warnings=chosen.warnings + emission.warnings)
+    warnings = (*vain_delay(fragment), *chosen.warnings, *emission.warnings)
+    return Plan(block=emission.block, choices=chosen.choices, warnings=warnings)
 
 
 def _scene(world: World, body: Capabilities | None, permits: Permits, config: GenerationConfig) -> Scene:

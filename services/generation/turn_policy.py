@@ -187,5 +187,16 @@ class TurnPolicy:
         return Aborted(plan.turn, plan.addressee, ended, reason)
 
 
+def vain_delay(fragment: TurnFragment) -> tuple[str, ...]:
+    """The warning that a fragment asks to hold the turn in a way that holds nothing; none if it does not."""
+    if fragment.delay_target and not fragment.delay:
+        return ("delayTarget without delay='true': the turn is not held",)
+    if fragment.delay and fragment.turn_status not in ("beginning", "middle"):
+        return (f"delay: after {fragment.turn_status!r} there is no turn to hold",)
+    if fragment.delay and not fragment.delay_target:
+        return ("delay without delayTarget: the gaze stays where it is",)
+    return ()
+
+
 def _illegal(fragment: TurnFragment, field: str, reason: str, advice: str) -> InputRefused:
-    return InputRefused(Fault(reason=reason, where=f"{fragment.id}: $.{field}", advice=advice))
+    return InputRefused(Fault(reason=reason, where=f"{fragment.id}: $.{field}", line=fragment.line, advice=advice))

@@ -21,7 +21,7 @@ from schemas.body import (
 from schemas.faults import EngageError, Fault, NoReply
 from schemas.feedback import WarningFeedback
 from schemas.presence import PeerAlive, PeerGone
-from schemas.requests import Cancel, Outcome
+from schemas.requests import Cancel, Outcome, Unreadable
 from services.bus import Bus
 from services.realizer.config import RealizerConfig
 from services.realizer.executor import Performance
@@ -248,6 +248,11 @@ async def _unless(stopped: asyncio.Future[Ending], work: Coroutine[Any, Any, Res
         await asyncio.gather(task, return_exceptions=True)
 
 
+def unread(block: str, fault: Fault) -> WarningFeedback:
+    """The warning about what came as a block and is none. block: empty where nobody knows whose it was."""
+    return WarningFeedback(block=block or None, kind="PARSING_FAILURE", message=str(fault))
+
+
 def _hands_refused(block: Block, chosen: Block, estimates: Iterable[Estimate]) -> set[tuple[str, Hand]]:
     """Hands that `block` leaves open and `chosen` does not, with which the body cannot do it."""
     impossible = {each.behavior for each in estimates if not each.feasible}
@@ -277,6 +282,8 @@ async def realize(bus: Bus, ready: Ready, config: RealizerConfig) -> None:
                             realizer.hear_word(word)
                         case PeerAlive() | PeerGone() as change:
                             realizer.peers.feed(change)
+                        case Unreadable(id=id, fault=fault):
+                            bus.publish(keys.FEEDBACK, unread(id, fault))
                     realizer.requests.feed(received)
                     match realizer.desk.take(received):
                         case PerformBlock(id=id) as request if id not in realizer.live:

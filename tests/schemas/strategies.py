@@ -95,7 +95,12 @@ def _inputs(draw: st.DrawFn, *, in_fragment: bool) -> tuple[tuple[of.Behavior, .
     made = []
     for name in names:
         behavior = draw(behaviors(name, references, in_fragment=in_fragment))
-        timed = draw(st.lists(st.sampled_from([*SYNC_POINTS, "strokeStart", "m-1"]), unique=True, max_size=2))
+        known = [*SYNC_POINTS, "strokeStart", "m-1"]
+        if in_fragment:  # of which the reader refuses what a behavior does not have
+            known = (
+                ["start", "end"] if isinstance(behavior, of.Speech | of.Reference) else [*SYNC_POINTS, "strokeStart"]
+            )
+        timed = draw(st.lists(st.sampled_from(known), unique=True, max_size=2))
         timing = tuple(of.Timing(sync, draw(references)) for sync in timed)
         made.append(replace(behavior, timing=timing, required=draw(st.booleans())))
     free = [id for id in draw(st.lists(ids, unique=True, max_size=2)) if id not in names]

@@ -151,3 +151,14 @@ def test_what_is_not_json_is_refused_with_its_line(data: bytes, line: int) -> No
 
     assert fault.where.startswith("file.json")
     assert fault.line == line
+
+
+@pytest.mark.parametrize("id", ["b\u0001", "\u0000", "b\u007f", "b\u0085"])
+def test_an_id_holds_no_control_characters(id: str) -> None:
+    with pytest.raises(InputRefused, match="may hold"):
+        decode_json(json.dumps({"id": id}))
+
+
+def test_a_key_in_camel_case_is_known_for_what_it_was_meant_to_be() -> None:
+    with pytest.raises(InputRefused, match="did you mean 'turn_status'"):
+        decode_json('{"id": "f", "turnStatus": "full"}')

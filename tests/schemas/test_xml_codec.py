@@ -83,6 +83,7 @@ def test_a_turn_fragment_is_read_with_the_line_of_everything() -> None:
         turn_index=1,
         turn_status="full",
         addressee="human",
+        line=2,
         accept=("nod", "act"),
         behaviors=(
             Speech(id="speech-1", text="Put it on", line=5),

@@ -89,3 +89,49 @@ def test_a_refusal_knows_whose_it_is(xml: str, block: str | None) -> None:
         decode_xml(xml, "file.xml")
 
     assert refusal.value.block == block
+
+
+@pytest.mark.parametrize(
+    ("content", "element", "behavior"),
+    [
+        ('<required velocity="1"><wait id="w" duration="1"/></required>', "required", ""),
+        ('<constraint velocity="1"/>', "constraint", ""),
+        ('<constraint><after ref="1" velocity="1"/></constraint>', "after", ""),
+        ('<constraint><after ref="0"><sync ref="1" velocity="1"/></after></constraint>', "sync", ""),
+        ('<face id="f"><lexeme lexeme="SMILE" velocity="1"/></face>', "lexeme", "f"),
+        ('<face id="f"><facs au="1" velocity="1"/></face>', "facs", "f"),
+        ('<posture id="f"><stance type="X" velocity="1"/></posture>', "stance", "f"),
+        ('<posture id="f"><pose part="X" velocity="1"/></posture>', "pose", "f"),
+        ('<speech id="f"><text velocity="1">Hi</text></speech>', "text", "f"),
+        ('<gaze id="f" target="t" velocity="1"/>', "gaze", "f"),
+    ],
+)
+@pytest.mark.parametrize("root", ["bml", "ebml:ebml"])
+def test_an_attribute_that_nobody_reads_is_noted_wherever_it_stands(
+    content: str, element: str, behavior: str, root: str
+) -> None:
+    thing = decode_xml(f'<{root} id="b" xmlns="{DRAFT}" xmlns:ebml="edu.wpi.ebml">\n{content}</{root}>')
+
+    message = f"line 2: <{element}> has no attribute 'velocity'; it is ignored"
+    assert thing.unread == (Unread(message=message, behavior=behavior),)
+
+
+@pytest.mark.parametrize("namespace", [DRAFT, "", BML_1_0])
+def test_an_event_of_the_core_is_unknown_in_each_dialect(namespace: str) -> None:
+    assert block('<event id="e" emit="x"/>', namespace).behaviors == (Unknown(id="e", element="event"),)
+
+
+def test_a_fragment_with_a_sync_point_that_a_behavior_lacks_is_refused() -> None:
+    with pytest.raises(InputRefused, match="line 2: 'g' has no sync point 'apex'"):
+        decode_xml(
+            '<ebml id="f" xmlns="edu.wpi.ebml">\n<gaze xmlns="" id="g" target="t" apex="s:end"/>'
+            '<speech xmlns="" id="s">Hi</speech></ebml>'
+        )
+
+
+@pytest.mark.parametrize("id", ["a b", "a:b", "bml", "x" * 251])
+def test_a_bad_id_of_the_whole_names_its_line(id: str) -> None:
+    with pytest.raises(InputRefused) as refusal:
+        decode_xml(f'<!-- -->\n<bml id="{id}"/>')
+
+    assert refusal.value.fault.line == 2
