@@ -10,7 +10,7 @@ import pytest
 from schemas import keys
 from schemas.attention import Inhibit, InhibitionEnded
 from schemas.behaviors import Speech
-from schemas.blocks import Block, BlockOutcome, PerformBlock
+from schemas.blocks import BehaviorInterrupted, Block, BlockOutcome, InterruptBehavior, PerformBlock
 from schemas.faults import Fault, InputRefused, NoReply, RunFailed
 from schemas.fragments import FragmentOutcome, PerformFragment, TurnFragment
 from schemas.recognition import ConnectionEvent, Statistics, WindowStatistics
@@ -184,6 +184,26 @@ async def test_a_block_goes_past_the_policies_to_the_realizer(hub: MemoryHub) ->
 
     assert (outcome.block, outcome.status) == ("wave", "done")
     assert again.status == "done"
+
+
+async def test_one_behavior_of_a_block_is_interrupted_by_its_name(hub: MemoryHub) -> None:
+    async def realizer(bus: Bus, ready: Ready) -> None:
+        desk = RequestDesk(bus, "realizer", lambda cancel: None)
+        with bus.subscribe(*RequestDesk.patterns("realizer")) as inbox:
+            ready()
+            async for received in inbox:
+                match desk.take(received):
+                    case InterruptBehavior(id=id, block="wave", behavior=behavior):
+                        desk.end(BehaviorInterrupted(id=id, block="wave", behavior=behavior, spoken="Hello"))
+                    case InterruptBehavior(id=id, block=block):
+                        desk.refuse(id, Fault(reason="it is not being performed", where=block))
+
+    async with running(hub, {"realizer": realizer}), connect(hub=hub) as robot:
+        outcome = await robot.interrupt("wave", "speech-1")
+        with pytest.raises(InputRefused, match="nod: it is not being performed"):
+            await robot.interrupt("nod", "head-1")
+
+    assert (outcome.behavior, outcome.spoken, outcome.was_done) == ("speech-1", "Hello", False)
 
 
 async def test_connection_events_come_from_the_moment_they_are_asked_for(hub: MemoryHub) -> None:

@@ -1,0 +1,60 @@
+"""Ids of blocks: free again after the end, and nobody's else before."""
+
+import pytest
+
+from schemas import keys
+from schemas.behaviors import Speech, Wait
+from schemas.blocks import BlockOutcome, Composition, PerformBlock
+from schemas.feedback import BlockProgress
+from services.requests import Pending, RequestRefused
+from tests.realizer.stage import Stage, block, stage
+
+STORY = Speech(id="s", text="one")
+"""Takes a second."""
+COMPOSITIONS: tuple[Composition, ...] = ("MERGE", "APPEND", "REPLACE")
+
+
+def ask(seen: Stage, request: str, composition: Composition = "MERGE", id: str = "b") -> Pending:
+    made = block((STORY, Wait(id="w", duration=2.0)), id=id, composition=composition)
+    return seen.requests.send(keys.BLOCK, PerformBlock(id=request, requester="test", block=made))
+
+
+@pytest.mark.parametrize("composition", COMPOSITIONS)
+async def test_the_id_of_a_live_block_is_refused_and_the_live_one_goes_on(composition: Composition) -> None:
+    async with stage() as seen:
+        first = ask(seen, "r1")
+        await seen.seen("s:start")
+        with pytest.raises(RequestRefused, match="b: a block of this id is still being performed"):
+            await ask(seen, "r2", composition).outcome
+        outcome = await first.outcome
+
+    assert isinstance(outcome, BlockOutcome)
+    assert (outcome.status, outcome.replaced_by) == ("done", "")
+    assert seen.times() == {"w:start": 0.0, "s:start": 0.0, "s:end": 1.0, "w:end": 2.0}
+    assert [(each.block, each.kind) for each in seen.warnings()] == [("b", "PARSING_FAILURE")]
+
+
+@pytest.mark.parametrize("composition", COMPOSITIONS)
+async def test_the_id_of_a_block_that_waits_for_its_turn_is_refused_too(composition: Composition) -> None:
+    async with stage() as seen:
+        first = ask(seen, "r1", id="a")
+        waiting = ask(seen, "r2", "APPEND")
+        await waiting.accepted
+        with pytest.raises(RequestRefused, match="still being performed"):
+            await ask(seen, "r3", composition).outcome
+        outcomes = [await first.outcome, await waiting.outcome]
+
+    assert [outcome.status for outcome in outcomes if isinstance(outcome, BlockOutcome)] == ["done", "done"]
+
+
+@pytest.mark.parametrize("composition", COMPOSITIONS)
+async def test_after_its_end_an_id_is_free_again(composition: Composition) -> None:
+    async with stage() as seen:
+        for request in ("r1", "r2"):
+            outcome = await ask(seen, request, composition).outcome
+            assert isinstance(outcome, BlockOutcome)
+            assert outcome.status == "done"
+
+    told = [each.progress for each in seen.feedback if isinstance(each, BlockProgress)]
+    assert told == ["start", "end", "start", "end"]
+    assert seen.warnings() == []
