@@ -171,12 +171,12 @@ def test_if_then_nothing_is_left_the_reference_cannot_be_made() -> None:
 
 
 def test_of_two_equally_dear_ways_to_one_posture_the_preferred_one_goes_on() -> None:
-    """The first look costs nothing and is understood better; the second is needed and ends in the same posture."""
-    degrees = {(since, target): 0 for since in (HERE, "a", "b") for target in ("a", "b")}
-    references = [refer("1", "a", 0.5, option("it")), refer("2", "b", 0.8, option("it"))]
+    """First a look without a word or a word without a look, both 0.35 s; the second look is needed either way."""
+    degrees = {(since, target): 35 for since in (HERE, "a", "b") for target in ("a", "b")}
+    references = [refer("1", "a", 0.05, option("", 0), option("it")), refer("2", "b", 0.8, option("it"))]
     problem = Problem({"a": (0.0, 0.0), "b": (9.0, 0.0)}, references, degrees, degrees, lambda target: "right_arm")
 
     choices = chosen(problem)
 
-    assert [choice.gesture for choice in choices.choices] == ["gaze", "gaze"]
+    assert [(choice.gesture, choice.phrase) for choice in choices.choices] == [("none", "it"), ("gaze", "it")]
     assert_best(problem, optimum(problem))
