@@ -38,8 +38,8 @@ class Authority(Facts):
         self.patience = Patience(config)
         self._through: dict[str, int] = {}
         self._granted_at: dict[str, Seconds] = {}
-        self._paces: dict[str, Pace] = {}
-        self._not_before: dict[str, Seconds] = {}
+        self.paces: dict[str, Pace] = {}
+        self.not_before: dict[str, Seconds] = {}
         """When a behavior that is overdue is expected at its next point."""
         self._expected = {point: began + plan.predicted(point) for point in plan.at}
         self.replan(plan)
@@ -100,7 +100,7 @@ class Authority(Facts):
             return ()
         known = self._next.get(point.behavior, 0)
         news = points[known : points.index(point) + 1]
-        if len(news) == 1 and point not in self.arrived:
+        if len(news) == 1 and not self.holds(point):
             self._learn(point, at)
         for each in news:
             self.reached[each] = at
@@ -149,7 +149,7 @@ class Authority(Facts):
         """Correct what is expected of the same parts by how long a phase took that nobody has hurried or held up."""
         chain = self.plan.chains.get(point.behavior)
         number = self._next.get(point.behavior, 0)
-        if chain is None or number == 0 or chain.points[number] != point or self._paces.get(point.behavior):
+        if chain is None or number == 0 or chain.points[number] != point or self.paces.get(point.behavior):
             return
         if performer(chain.behavior) == "body":
             took = at - self.reached[chain.points[number - 1]]
@@ -178,8 +178,8 @@ class Authority(Facts):
         # Of two that begin together on one part, the later in the document takes it over.
         for behavior in sorted(beginning, key=list(self.plan.chains).index) if len(beginning) > 1 else beginning:
             through = self._furthest(behavior, now)
-            self._paces[behavior] = pace(behavior, self, now)
-            effects.append(Begin(behavior, self._points[behavior][through].sync, self._paces[behavior]))
+            self.paces[behavior] = pace(behavior, self, now)
+            effects.append(Begin(behavior, self._points[behavior][through].sync, self.paces[behavior]))
             self._watch(behavior)
         effects += self.patience.overdue(now)
         return effects
@@ -213,7 +213,7 @@ class Authority(Facts):
             points = self._points.get(behavior, ())
             if self._next.get(behavior) != number or number >= len(points) or self.holds(points[number]):
                 continue
-            until = self._not_before[behavior] = now + (now - expected)
+            until = self.not_before[behavior] = now + (now - expected)
             self.forecast.overdue(self.plan.at[points[number]], until)
             heapq.heappush(self._arrivals, (until, expected, behavior, number))
         self._conclude()
@@ -297,7 +297,7 @@ class Authority(Facts):
         for each in range(number, points.index(member.point) + 1):
             at += self._phase(member.behavior, each)
             if each == number:
-                at = max(at, self._not_before.get(member.behavior, at))
+                at = max(at, self.not_before.get(member.behavior, at))
         return at
 
     def _phase(self, behavior: str, number: int) -> Seconds:
@@ -309,14 +309,14 @@ class Authority(Facts):
 
     def _extension(self, behavior: str, now: Seconds) -> Iterable[Extend]:
         """Its new authority, if that is further than before or asks for another pace."""
-        known, before = self._through[behavior], self._paces.get(behavior, ())
+        known, before = self._through[behavior], self.paces.get(behavior, ())
         through = self._furthest(behavior, now)
-        after = self._paces[behavior] = pace(behavior, self, now)
+        after = self.paces[behavior] = pace(behavior, self, now)
         if through > known or differs(before, after):
             self._watch(behavior)
             yield Extend(behavior, self._points[behavior][through].sync, after)
         else:
-            self._paces[behavior] = before
+            self.paces[behavior] = before
 
     def _furthest(self, behavior: str, now: Seconds) -> int:
         """The number of the last point that it may go through."""
@@ -357,7 +357,7 @@ class Authority(Facts):
             return
         since = self.reached[points[number - 1]] if number else self.begun[behavior]
         natural = chain.segments[number - 1].natural if number else 0.0
-        asked = dict(self._paces.get(behavior, ())).get(points[number].sync, since + natural)
+        asked = dict(self.paces.get(behavior, ())).get(points[number].sync, since + natural)
         expected = max(since + natural, asked, self._granted_at[behavior] if is_there else 0.0)
         self.patience.expect(behavior, points[number].sync, expected, natural)
 
@@ -370,7 +370,7 @@ class Authority(Facts):
                 self._dirty.add(self.plan.at[points[each]])
                 break
         if self.forecast is not None and 0 < number < len(points):
-            self._not_before.pop(behavior, None)
+            self.not_before.pop(behavior, None)
             expected = self.reached[points[number - 1]] + self._phase(behavior, number)
             heapq.heappush(self._arrivals, (expected, expected, behavior, number))
 
@@ -395,4 +395,4 @@ class Authority(Facts):
     @property
     def has_overdue(self) -> bool:
         """Is anybody expected later than facts alone would say?"""
-        return bool(self._not_before)
+        return bool(self.not_before)

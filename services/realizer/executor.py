@@ -244,7 +244,7 @@ class Performance:
 
     def _reach(self, point: Point, at: Seconds, *, arrived: Seconds | None = None, by_body: bool = False) -> None:
         for each in self._authority.reach(point, at):
-            came = arrived if each == point else self._authority.arrived.get(each)
+            came = self._authority.arrived.get(each, arrived if each == point else None)
             skew = self._report.reached(self.plan, self._authority, each, arrived=came, by_body=by_body)
             if (late := max(skew, self._authority.lateness(each))) > self._config.skew:
                 self._warn_late(each, f"{each.sync} came {late:.2f} s later than it should")

@@ -29,6 +29,8 @@ def pace(behavior: str, authority: "Authority", now: Seconds) -> Pace:
         here = plan.at[point]
         if here != before:
             natural, latest = at + forecast.phase(behavior, here), at + forecast.longest(behavior, here)
+            if point is points[number] and not authority.paces.get(behavior):
+                natural = max(natural, authority.not_before.get(behavior, natural))  # overdue, not slower on purpose
             at = max(natural, now) if authority.holds(point) else natural
             if authority.member(point).kind == "passive" and forecast.times[here] > natural + NOTICEABLE:
                 at = max(natural, min(forecast.times[here], latest))

@@ -128,3 +128,13 @@ async def test_an_utterance_on_time_never_pauses_and_one_that_has_not_begun_is_d
     assert seen.times()["s:start"] == 0.25
     assert seen.times()["p:stroke"] == seen.times()["s:m"] == 1.25
     assert body.stops == []
+
+
+async def test_an_arm_that_is_overdue_is_not_told_to_take_its_time() -> None:
+    """That it is expected later does not mean that it should be."""
+    story = Speech(id="s", text="one two", marks=(Mark("m", 3),))
+    slow = FakeBody({"p": Script(slow=3.0)}, elastic=(0.5, 4.0))
+    async with stage(slow) as seen:
+        await seen.perform(block((Pointing(id="p", target="a"), story), together("p:stroke", "s:m")))
+
+    assert seen.times()["p:ready"] == 3 * 0.5
