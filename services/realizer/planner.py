@@ -35,7 +35,7 @@ from services.realizer.relations import (
     at_line,
     relations,
 )
-from services.realizer.schedule import Solution
+from services.realizer.schedule import EPSILON, Solution
 from services.realizer.verdict import Losses, clashes, judge
 
 
@@ -350,8 +350,14 @@ def poses_before(plan: Plan) -> dict[str, BodyPose]:
         estimate = plan.estimates.get(id)
         for part in plan.chains[id].parts:
             before = latest.get(part)
-            if before is not None and before.pose_after is not None:
+            if before is not None and before.pose_after is not None and not _is_home(plan, before.behavior, id):
                 poses[id] = before.pose_after
             if estimate is not None:
                 latest[part] = estimate
     return poses
+
+
+def _is_home(plan: Plan, earlier: str, later: str) -> bool:
+    """Has the earlier had the time to take its part home?"""
+    relax, end = (plan.predicted(point) for point in plan.chains[earlier].points[-2:])
+    return relax + EPSILON < end <= plan.predicted(plan.chains[later].points[0]) + EPSILON
