@@ -23,6 +23,7 @@ MACHINERY = {"bus", "memory_bus", "requests", "runtime", "virtual_time", "client
 """Modules of `services` that pure files don't know either; `zenoh_*` too."""
 SHELLS = {
     "services/realizer/executor.py",  # awaits bodies
+    "services/realizer/body_link.py",  # asks the body
     "services/realizer/recognition_link.py",  # asks recognition
     "services/realizer/reporting.py",  # publishes feedback
     "services/realizer/surroundings.py",  # what the executor is given
