@@ -194,6 +194,25 @@ def plan(
 
 
 @app.command()
+def explain(
+    file: Annotated[
+        Path, typer.Argument(metavar="FILE", help="EBML turn fragment (XML), or JSON of one or several.")
+    ],
+    format: Annotated[
+        Literal["text", "json"], typer.Option("--format", help="A table for each reference, or a list of all pairs.")
+    ] = "text",
+    world: WorldFile = None,
+    config: ConfigFile = None,
+    settings: Settings = None,
+) -> None:
+    """Tell why each object reference is made as it is: all gestures with all phrases. Nothing moves."""
+    from services.commandline import explain, run
+
+    where = run.Where(config, settings=tuple(settings or ()))
+    raise typer.Exit(explain.main(file, format, world, where))
+
+
+@app.command()
 def watch(
     json: Annotated[bool, typer.Option("--json", help="JSON lines of every kind instead of text.")] = False,
     robot: Robot = None,

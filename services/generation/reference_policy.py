@@ -358,4 +358,5 @@ def _below(value: Probability, minimum: Probability) -> bool:
 
 def _name(pair: Pair) -> str:
     phrase = repr(pair.option.text) if pair.option.text else "no phrase"
-    return f"{pair.gesture.replace('_', ' ')} with {phrase}"
+    gesture = "no gesture" if pair.gesture == "none" else pair.gesture.replace("_", " ")
+    return f"{gesture} with {phrase}"

@@ -35,7 +35,9 @@ def bad(request: pytest.FixtureRequest, tmp_path: Path) -> tuple[Path, str, str]
     return path, line, reason
 
 
-@pytest.mark.parametrize("command", [("plan",), ("play", "--embedded", "--virtual-time")], ids=["plan", "play"])
+@pytest.mark.parametrize(
+    "command", [("plan",), ("explain",), ("play", "--embedded", "--virtual-time")], ids=["plan", "explain", "play"]
+)
 def test_a_bad_file_is_refused_with_place_and_reason(
     engage: Engage, bad: tuple[Path, str, str], command: tuple[str, ...]
 ) -> None:
