@@ -9,7 +9,7 @@ from schemas.fragments import ReferenceChoice
 from services.generation.config import GenerationConfig
 from services.generation.motions import HERE
 from services.generation.reference_policy import Pair, choose
-from tests.generation.tables import TANGRAMS, apart, body, flat_world, option, refer, scene
+from tests.generation.tables import apart, body, flat_world, option, refer, scene
 
 CONFIG = GenerationConfig()
 
@@ -73,67 +73,6 @@ def test_the_eight_choices_of_appendix_b(references: list[Reference], expected: 
 
     assert [made(choice) for choice in chosen.choices] == expected
     assert chosen.warnings == ()
-
-
-# -- Fig. 3.2 ---------------------------------------------------------------------------------------------------
-
-FIGURE = GenerationConfig(
-    phrase_reliability=0.85, gaze_reliability=0.05, directed_gaze_reliability=0.08, pointing_reliability=0.10
-)
-TRIANGLES = ("pink-triangle", "purple-triangle")
-SQUARES = ("red-square", "blue-square", "pink-square", "green-square")
-IT = option("it")
-
-
-def figure_3_2(*more: SpeechOption) -> list[Reference]:
-    """Its two references; `more` options for the first."""
-
-    def all_but(target: str) -> list[str]:
-        return [id for id in TANGRAMS if id != target]
-
-    yellow = refer(
-        "ref-1",
-        "yellow-triangle",
-        0.85,
-        option("the triangle", distractors=TRIANGLES),
-        option("the yellow triangle"),
-        *more,
-        option("this piece", distractors=all_but("yellow-triangle"), deictic=True),
-    )
-    purple = refer(
-        "ref-2",
-        "purple-square",
-        0.85,
-        option("the square", distractors=SQUARES),
-        option("the purple square"),
-        option("this piece", distractors=all_but("purple-square"), deictic=True),
-    )
-    return [yellow, purple]
-
-
-def choose_as_in_the_figure(references: list[Reference]) -> list[tuple[str, str]]:
-    """A triangle in the gaze cone at the yellow one, a square in that at the purple one; the body near the yellow."""
-    places = {id: (float(index), 0.0) for index, id in enumerate(TANGRAMS)}
-    places |= {"pink-triangle": (2.15, 0.0), "purple-square": (7.0, 0.0), "red-square": (7.15, 0.0)}
-    world = flat_world(places)
-    near = {"yellow-triangle": 1.0, "purple-square": 30.0}
-    motions = body(
-        world,
-        ["yellow-triangle", "purple-square"],
-        head=lambda since, target: near[target],
-        arm=lambda since, target: near[target],
-    )
-    chosen = choose(references, scene(world), motions, FIGURE)
-    assert not chosen.warnings
-    return [made(choice) for choice in chosen.choices]
-
-
-def test_fig_3_2_becomes_fig_3_3_without_the_option_it() -> None:
-    assert choose_as_in_the_figure(figure_3_2()) == [(POINT, "this piece"), ("none", "the purple square")]
-
-
-def test_with_the_option_it_fig_3_2_needs_no_gesture() -> None:
-    assert choose_as_in_the_figure(figure_3_2(IT)) == [("none", "it"), ("none", "the purple square")]
 
 
 # -- decisions --------------------------------------------------------------------------------------------------
