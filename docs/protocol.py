@@ -54,7 +54,7 @@ KEYS: tuple[tuple[str, str, str], ...] = (
         "realizer → all",
         "`BlockProgress`, `SyncPointProgress`, `PredictionFeedback`, `WarningFeedback`",
     ),
-    (keys.FRAGMENT_FEEDBACK, "generation → all", "`WarningFeedback`: what the policies did otherwise than asked"),
+    (keys.FRAGMENT_FEEDBACK, "generation → all", "`WarningFeedback`: what was refused, or done otherwise than asked"),
     (keys.SYNC_POINT, "control → realizer", "`SyncPointArrived`, `SyncPointReached`, `WordSpoken`"),
     (keys.ROBOT_ACTION, "control → recognition", "`ActionBegan`, `ActionEnded`"),
     (

@@ -90,7 +90,9 @@ def _bad_id(id: str) -> str:
         return f"the id {BLOCK_ITSELF!r} is reserved for the block itself"
     if len(id) > LONGEST_ID:
         return f"id {id[:40]!r}... is longer than {LONGEST_ID} characters"
-    return "" if is_id(id) else f"id {id!r} may hold neither spaces nor control characters nor ':' nor '+', nor begin with '-'"
+    if is_id(id):
+        return ""
+    return f"id {id!r} may hold neither spaces nor control characters nor ':' nor '+', nor begin with '-'"
 
 
 def _behavior(behavior: Behavior, path: str) -> Iterator[Problem]:

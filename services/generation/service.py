@@ -19,12 +19,12 @@ from schemas.body import (
     RobotState,
 )
 from schemas.faults import EngageError, Fault, InputRefused, NoReply, RunFailed
-from schemas.feedback import SyncPointProgress, WarningFeedback
+from schemas.feedback import SyncPointProgress, WarningFeedback, WarningKind
 from schemas.fragments import PerformFragment
 from schemas.messages import Message
 from schemas.presence import PeerGone
 from schemas.recognition import ConnectionEvent, SignalTurn, Statistics
-from schemas.requests import Cancel
+from schemas.requests import Cancel, Unreadable
 from schemas.units import Seconds
 from schemas.world import World
 from services.bus import Bus, Received
@@ -122,6 +122,8 @@ class _Generation:
                 self._arbiter.feed(message, now)
             case SyncPointProgress():
                 self._follow(message)
+            case Unreadable(id=id, fault=fault):
+                self._warn(id, "PARSING_FAILURE", str(fault))
             case PeerGone(participant="control"):
                 self._body = None  # another may come
         self._after(now)
@@ -135,6 +137,7 @@ class _Generation:
             turn = self._turns.accept(fragment, fragment.addressee)
         except EngageError as error:
             self._refuse(request.id, error.fault)
+            self._warn(request.fragment.id, "PARSING_FAILURE", str(error.fault))
             return
         performance = Performance(request, fragment, turn, self._config.decision_patience)
         self._events.expect(fragment.id, turn.turn)
@@ -162,6 +165,10 @@ class _Generation:
     def _refuse(self, id: str, fault: Fault) -> None:
         self._desk.refuse(id, fault)
         self._bus.publish(keys.fault(NAME), fault)
+
+    def _warn(self, fragment: str, kind: WarningKind, message: str) -> None:
+        """fragment: empty where nobody knows whose it was."""
+        self._bus.publish(keys.FRAGMENT_FEEDBACK, WarningFeedback(block=fragment or None, kind=kind, message=message))
 
     def _follow(self, progress: SyncPointProgress) -> None:
         """The arbiter sees the gazes of fragments where they are realized."""
@@ -310,8 +317,7 @@ class _Generation:
     async def _perform_block(self, performance: Performance) -> BlockOutcome:
         assert performance.plan is not None
         for message in performance.plan.warnings:
-            warning = WarningFeedback(block=performance.fragment.id, kind="POLICY", message=message)
-            self._bus.publish(keys.FRAGMENT_FEEDBACK, warning)
+            self._warn(performance.fragment.id, "POLICY", message)
         request = PerformBlock(id=performance.block_id, requester=self._bus.name, block=performance.plan.block)
         pending = self._requests.send(keys.BLOCK, request)
         await pending.accepted
