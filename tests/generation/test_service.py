@@ -233,7 +233,7 @@ async def test_a_reference_that_cannot_be_made_fails_its_fragment(hub: MemoryHub
         assert outcome.status == "failed"
         assert outcome.fault is not None
         assert "no way to refer to middle" in outcome.fault.reason
-        assert partners.blocks == []
+        assert [request.block.id for request in partners.blocks] == ["maintenance-1"]  # the head alone
 
 
 # -- what ends a turn early ---------------------------------------------------------------------------------------
