@@ -68,6 +68,7 @@ class Performance:
         """Of which it has been said."""
         self._ending: asyncio.Future[Ending] = loop.create_future()
         self._timer: asyncio.TimerHandle | None = None
+        self._is_stale = False
 
     # -- life ------------------------------------------------------------------------------------------------------
 
@@ -201,6 +202,8 @@ class Performance:
     # -- decisions, as the authority makes them ----------------------------------------------------------------------
 
     def _advance(self) -> None:
+        if self._is_stale and not self._ending.done():
+            self._replan()
         again = True
         while again and not self._ending.done():
             made_facts = [self._apply(effect) for effect in self._authority.advance(self._bus.now())]
@@ -267,18 +270,18 @@ class Performance:
         if id in self._unwanted:
             # Its parts go home by themselves: the body does not need to be told, nor to forget what it looked at.
             self._report.interrupted(id, self.spoken.of(id))
-            self._replan()
-            return
-        self._report.warn(kind, str(fault), id)
-        if id in self._authority.begun:
-            self._go_home(self._parts(id), id)
-        if id in self.plan.required:
-            self.stop(Ending("failed", Fault(reason=fault.reason, where=f"{self.plan.block.id}: {id}")))
-            return
-        self._replan()
+        else:
+            self._report.warn(kind, str(fault), id)
+            if id in self._authority.begun:
+                self._go_home(self._parts(id), id)
+            if id in self.plan.required:
+                self.stop(Ending("failed", Fault(reason=fault.reason, where=f"{self.plan.block.id}: {id}")))
+        self._is_stale = True  # Planned anew once for all that is lost in one go.
+        self._loop.call_soon(self._advance)
 
     def _replan(self) -> None:
         """Go on as if what was dropped, or vanished elsewhere, had never been written."""
+        self._is_stale = False
         gone = (*self._dropped, *self._vanished)
         try:
             plan = plan_block(self.plan.block, self.plan.estimates.values(), dropped=gone, elsewhere=self._elsewhere)
@@ -313,12 +316,10 @@ class Performance:
 
     async def _by_body(self, behavior: BlockBehavior) -> None:
         self._around.routes[self._body.id(behavior.id)] = self
-        pending = self._send(behavior)
         try:
-            outcome = await pending.outcome
+            outcome = await self._send(behavior).outcome
         except RequestRefused as error:
             self._lose(behavior.id, error.fault, kind="CANNOT_CREATE_BEHAVIOR")
-            self._advance()
             return
         except EngageError as error:
             self._pending.pop(behavior.id)
@@ -329,7 +330,6 @@ class Performance:
             return
         if not isinstance(outcome, BehaviorOutcome):
             self._lose(behavior.id, Fault(reason=f"control ended it with a {type(outcome).__name__}"))
-            self._advance()
             return
         is_done = outcome.status == "done"
         self.spoken.end(outcome)
@@ -337,9 +337,9 @@ class Performance:
             end = Point(behavior.id, sync_points(behavior)[-1])
             at = self._authority.plausible(end, self._bus.local(outcome.at), self._bus.now())
             self._reach(end, at, by_body=True)
+            self._advance()
         else:
             self._lose(behavior.id, outcome.fault or Fault(reason=f"the body {outcome.status} it"))
-        self._advance()
 
     def _send(self, behavior: BlockBehavior) -> Pending:
         pending = self._pending[behavior.id] = self._body.perform(behavior, self._asked[behavior.id])
