@@ -150,7 +150,7 @@ def test_no_square_beside_it_needs_a_gaze_that_is_dearer_than_a_word() -> None:
 
 
 def test_a_point_that_costs_one_word_exactly_ties_and_is_made() -> None:
-    """0.3 s of waiting, a degree of the head and 2.4 of the arm: the word that "the yellow triangle" has more. Decision B13."""
+    """0.3 s of waiting, 1 degree of the head, 2.4 of the arm: the word that "the yellow triangle" has more (B13)."""
     tie = planned(WITHOUT_IT, yellow=(1.0, 2.4))
     dearer = planned(WITHOUT_IT, yellow=(1.0, 2.41))
 

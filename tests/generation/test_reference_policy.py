@@ -1,13 +1,13 @@
-"""Choices of the thesis and of Appendix B, decision by decision; the sequence optimum against brute force."""
+"""Choices of the thesis and of Appendix B, decision by decision, and of sequences."""
 
 import pytest
 
-from schemas.behaviors import Reference, SpeechOption
+from schemas.behaviors import Pointing, Reference, SpeechOption
 from schemas.body import NoPointZone
 from schemas.faults import RunFailed
 from schemas.fragments import ReferenceChoice
 from services.generation.config import GenerationConfig
-from services.generation.motions import HERE
+from services.generation.motions import HERE, from_each_other
 from services.generation.reference_policy import Pair, choose
 from tests.generation.tables import apart, body, flat_world, option, refer, scene
 
@@ -191,6 +191,44 @@ def test_ties_are_broken_as_decided(options: list[SpeechOption], expected: tuple
     assert made(choice) == expected
 
 
+def test_where_words_cost_nothing_they_tie_whatever_their_number() -> None:
+    world = flat_world({"rectangle": (0.0, 0.0), "trapezoid": (0.05, 0.0)})
+    reference = refer("r", "rectangle", 0.3, option("it", distractors=["trapezoid"]), option("the long rectangle"))
+
+    chosen = choose([reference], scene(world), body(world, ["rectangle"]), GenerationConfig(seconds_per_word=0.0))
+
+    assert made(chosen.choices[0]) == ("none", "the long rectangle")  # R .70 instead of .41
+
+
+def test_with_independent_channels_more_is_needed_for_the_same_minimum() -> None:
+    world = apart()
+    reference = refer("r", "rectangle", 0.8, option("it"))
+
+    summed, independent = (
+        choose([reference], scene(world), body(world, ["rectangle"]), GenerationConfig(channel=channel)).choices[0]
+        for channel in ("sum", "independent")  # type: ignore[arg-type]
+    )
+
+    assert (made(summed), summed.reliability) == (("gaze", "it"), pytest.approx(0.8))
+    assert (made(independent), independent.reliability) == (
+        (POINT, "it"), pytest.approx(1 - 0.72 * 0.3),
+    )  # fmt: skip
+    assert independent.pairs[2].reliability == pytest.approx(0.76)  # directed gaze: 1 - .8 x .3
+
+
+def test_only_objects_are_distractors_and_the_target_is_none_of_its_own() -> None:
+    world = apart()
+    everything = [entity.id for entity in world.entities]
+    choice = choose(
+        [refer("r", "rectangle", 0.1, option("it", distractors=everything))],
+        scene(world),
+        body(world, ["rectangle"]),
+        CONFIG,
+    ).choices[0]
+
+    assert set(choice.pairs[0].distractors) == {id for id in everything if id not in ("human", "rectangle")}
+
+
 def test_of_equal_cost_and_reliability_the_fewer_gestures_win() -> None:
     """Two gestures cannot have one reliability by the formula, so compare the preference itself."""
     one, other = (
@@ -233,3 +271,30 @@ def test_an_arm_that_is_near_already_changes_the_next_choice() -> None:
     assert [made(choice)[0] for choice in together] == [POINT, POINT]
     assert sum(choice.cost for choice in together) < sum(choice.cost for choice in alone)
     assert "dearer over the sequence" not in {pair.reason for pair in together[1].pairs}
+
+
+def test_a_hand_that_has_pointed_elsewhere_starts_from_there_and_the_other_from_home() -> None:
+    world = apart()
+    targets = ["rectangle", "trapezoid", "pink-square"]
+    references = [refer(id, id, 0.95, option("it")) for id in targets]
+    sides = {"rectangle": "left_arm", "trapezoid": "right_arm", "pink-square": "left_arm"}
+    degrees = {(HERE, "rectangle"): 60.0, (HERE, "trapezoid"): 120.0, ("rectangle", "pink-square"): 6.0}
+    motions = body(world, targets, arm=lambda since, target: degrees.get((since, target), 999.0), arm_for=sides.get)  # type: ignore[arg-type]
+
+    chosen = choose(references, scene(world), motions, CONFIG)
+
+    assert [choice.gesture for choice in chosen.choices] == [POINT] * 3
+    assert [choice.cost for choice in chosen.choices] == pytest.approx([0.85 + 1.0, 0.85 + 2.0, 0.85 + 0.1])
+    assert chosen.hands == {"rectangle": "LEFT_HAND", "trapezoid": "RIGHT_HAND", "pink-square": "LEFT_HAND"}
+
+
+def test_from_there_the_body_is_asked_about_the_hand_that_will_be_named() -> None:
+    world = apart()
+    sides = {"rectangle": "left_arm", "trapezoid": "right_arm"}
+    motions = body(world, list(sides), arm_for=sides.get)  # type: ignore[arg-type]
+    here = [motion for id in sides for motion in (motions.gaze(HERE, id), motions.point(HERE, id))]
+
+    asked = [item.behavior for item in from_each_other(["trapezoid", "rectangle", "trapezoid"], here[2:] + here[:2])]
+
+    points = [(point.target, point.mode) for point in asked if isinstance(point, Pointing)]
+    assert points == [("rectangle", "LEFT_HAND"), ("trapezoid", "RIGHT_HAND"), ("trapezoid", "RIGHT_HAND")]
