@@ -50,38 +50,52 @@ def from_each_other(
 ) -> tuple[EstimateItem, ...]:
     """Second question: the same from the pose that an earlier reference of the `sequence` of targets leaves.
 
-    answers: to `from_here` of `distinct(sequence)`.
+    A point only where one arm makes both. answers: to `from_here` of `distinct(sequence)`.
     """
-    first = collect(sequence, answers, ())
+    first = _from_here(sequence, answers)
     items = []
-    for since, target in _steps(sequence):
-        head, arm = first.gaze(HERE, since).pose_after, first.point(HERE, since).pose_after
-        # The block will name this hand: no other may be asked about, whichever is nearer from there.
-        named = hand_of(first.point(HERE, target)) or hand
-        items.append(EstimateItem(behavior=Gaze(id=f"gaze at {target}", target=target), pose=head))
-        items.append(EstimateItem(behavior=Pointing(id=f"point at {target}", target=target, mode=named), pose=arm))
+    for since, target, one_arm in _steps(sequence, first):
+        pose = first.gaze(HERE, since).pose_after
+        items.append(EstimateItem(behavior=Gaze(id=f"gaze at {target}", target=target), pose=pose))
+        if one_arm:
+            # The block will name this hand: no other may be asked about, whichever is nearer from there.
+            named = hand_of(first.point(HERE, target)) or hand
+            pointing = Pointing(id=f"point at {target}", target=target, mode=named)
+            items.append(EstimateItem(behavior=pointing, pose=first.point(HERE, since).pose_after))
     return tuple(items)
 
 
 def collect(sequence: Sequence[str], here: Sequence[Estimate], onward: Sequence[Estimate]) -> Motions:
     """The answers to both questions, by where the motion starts and what it goes to."""
-    gazes: dict[tuple[str, str], Estimate] = {}
-    points: dict[tuple[str, str], Estimate] = {}
-    for target, gaze, point in zip(distinct(sequence), here[::2], here[1::2], strict=True):
-        gazes[HERE, target], points[HERE, target] = gaze, point
-    for step, gaze, point in zip(_steps(sequence), onward[::2], onward[1::2], strict=False):
-        gazes[step], points[step] = gaze, point
-    return Motions(gazes, points)
+    motions = _from_here(sequence, here)
+    answers = iter(onward)
+    for since, target, one_arm in _steps(sequence, motions):
+        motions.gazes[since, target] = next(answers)
+        if one_arm:
+            motions.points[since, target] = next(answers)
+    return motions
 
 
 def distinct(sequence: Sequence[str]) -> tuple[str, ...]:
     return tuple(dict.fromkeys(sequence))
 
 
-def _steps(sequence: Sequence[str]) -> Iterator[tuple[str, str]]:
+def _from_here(sequence: Sequence[str], answers: Sequence[Estimate]) -> Motions:
+    gazes: dict[tuple[str, str], Estimate] = {}
+    points: dict[tuple[str, str], Estimate] = {}
+    for target, gaze, point in zip(distinct(sequence), answers[::2], answers[1::2], strict=True):
+        gazes[HERE, target], points[HERE, target] = gaze, point
+    return Motions(gazes, points)
+
+
+def _steps(sequence: Sequence[str], motions: Motions) -> Iterator[tuple[str, str, bool]]:
+    """From each target to each later one, and whether one arm points at both."""
     seen: set[tuple[str, str]] = set()
     for index, target in enumerate(sequence):
+        there = motions.point(HERE, target)
         for since in sequence[:index]:
             if (since, target) not in seen:
                 seen.add((since, target))
-                yield since, target
+                before = motions.point(HERE, since)
+                one_arm = before.feasible and there.feasible and arm_of(before) == arm_of(there)
+                yield since, target, one_arm

@@ -98,10 +98,10 @@ class Choices(Struct, frozen=True):
 
 
 class _Way(Struct, frozen=True):
-    """The best way to reach a posture: its cost, then its preferences, decide."""
+    """The best way to reach a posture. rank: what decides, its rounded cost and then its preferences."""
 
     cost: Seconds
-    preferences: tuple[tuple[bool, float, int, int], ...]
+    rank: tuple[float, tuple[tuple[bool, float, int, int], ...]]
     pairs: tuple[Pair, ...]
     postures: tuple[Posture, ...]
     """Before each pair, and after the last."""
@@ -109,10 +109,6 @@ class _Way(Struct, frozen=True):
     @property
     def posture(self) -> Posture:
         return self.postures[-1]
-
-    @property
-    def rank(self) -> tuple[float, tuple[tuple[bool, float, int, int], ...]]:
-        return round(self.cost, ROUNDING), self.preferences
 
 
 def choose(references: Sequence[Reference], scene: Scene, motions: Motions, config: GenerationConfig) -> Choices:
@@ -247,7 +243,7 @@ def _cheapest_way(
     config: GenerationConfig,
 ) -> _Way:
     """argmin of the summed cost over all sequences of pairs, the posture carried along (decision B11)."""
-    ways = [_Way(0.0, (), (), (Posture(),))]
+    ways = [_Way(0.0, (0.0, ()), (), (Posture(),))]
     for reference, table in zip(references, tables, strict=True):
         possible = [pair for pair in table if not pair.ruled_out]
         onward: list[_Way] = []
@@ -274,19 +270,16 @@ def _continued(
 ) -> list[_Way]:
     """The best way to each posture that one of `pairs` leads to from one of `ways`; none where the body cannot."""
     best: dict[Posture, _Way] = {}
+    preferences = [(pair, pair.preference) for pair in pairs]
     for way in ways:
-        for pair in pairs:
+        for pair, preference in preferences:
             if _hindrance(pair.gesture, target, way.posture, motions):
                 continue
+            seconds = way.cost + cost(pair, target, way.posture, motions, config)
+            rank = (round(seconds, ROUNDING), (*way.rank[1], preference))
             reached = way.posture.after(pair.gesture, target, motions)
-            longer = _Way(
-                way.cost + cost(pair, target, way.posture, motions, config),
-                (*way.preferences, pair.preference),
-                (*way.pairs, pair),
-                (*way.postures, reached),
-            )
-            if reached not in best or longer.rank < best[reached].rank:
-                best[reached] = longer
+            if reached not in best or rank < best[reached].rank:
+                best[reached] = _Way(seconds, rank, (*way.pairs, pair), (*way.postures, reached))
     return list(best.values())
 
 

@@ -1,13 +1,15 @@
 """Choices of the thesis and of Appendix B, decision by decision, and of sequences."""
 
+from collections.abc import Sequence
+
 import pytest
 
-from schemas.behaviors import Pointing, Reference, SpeechOption
-from schemas.body import NoPointZone
+from schemas.behaviors import Gaze, Pointing, Reference, SpeechOption
+from schemas.body import Estimate, NoPointZone
 from schemas.faults import RunFailed
 from schemas.fragments import ReferenceChoice
 from services.generation.config import GenerationConfig
-from services.generation.motions import HERE, from_each_other
+from services.generation.motions import HERE, collect, from_each_other
 from services.generation.reference_policy import Pair, choose
 from tests.generation.tables import apart, body, flat_world, option, refer, scene
 
@@ -288,13 +290,21 @@ def test_a_hand_that_has_pointed_elsewhere_starts_from_there_and_the_other_from_
     assert chosen.hands == {"rectangle": "LEFT_HAND", "trapezoid": "RIGHT_HAND", "pink-square": "LEFT_HAND"}
 
 
-def test_from_there_the_body_is_asked_about_the_hand_that_will_be_named() -> None:
+def test_from_there_the_body_is_asked_about_the_hand_that_will_be_named_and_about_no_other() -> None:
     world = apart()
-    sides = {"rectangle": "left_arm", "trapezoid": "right_arm"}
+    sides = {"trapezoid": "right_arm", "rectangle": "left_arm", "pink-square": "left_arm"}
     motions = body(world, list(sides), arm_for=sides.get)  # type: ignore[arg-type]
     here = [motion for id in sides for motion in (motions.gaze(HERE, id), motions.point(HERE, id))]
+    sequence = ["trapezoid", "rectangle", "trapezoid", "pink-square"]
 
-    asked = [item.behavior for item in from_each_other(["trapezoid", "rectangle", "trapezoid"], here[2:] + here[:2])]
+    asked = [item.behavior for item in from_each_other(sequence, here)]
 
-    points = [(point.target, point.mode) for point in asked if isinstance(point, Pointing)]
-    assert points == [("rectangle", "LEFT_HAND"), ("trapezoid", "RIGHT_HAND"), ("trapezoid", "RIGHT_HAND")]
+    gazes = [behavior.target for behavior in asked if isinstance(behavior, Gaze)]
+    points = [(behavior.target, behavior.mode) for behavior in asked if isinstance(behavior, Pointing)]
+    assert gazes == ["rectangle", "trapezoid", "trapezoid", "pink-square", "pink-square"]
+    assert points == [("trapezoid", "RIGHT_HAND"), ("pink-square", "LEFT_HAND")]
+    assert collect(sequence, here, from_each_other_answered(asked)).point("rectangle", "pink-square").behavior == "6"
+
+
+def from_each_other_answered(asked: Sequence[object]) -> list[Estimate]:
+    return [Estimate(behavior=str(number), feasible=True) for number, _ in enumerate(asked)]
