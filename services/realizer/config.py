@@ -17,6 +17,7 @@ class RealizerConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
     abort: how long the body may take to end what was aborted before the block ends without it.
     event_grace: an event ends as failed this much after its limit if recognition is not there to decide it.
     event_patience: and this much if it is there, but says nothing.
+    most: behaviors, marks and sync references in a block; more is refused, as planning takes the loop 0.1 ms each.
     *_limit: of an event that names no limit: recognition's own (its design page), the longer for a pair.
     """
 
@@ -30,6 +31,7 @@ class RealizerConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
     abort: Seconds = 5.0
     event_grace: Seconds = 0.5
     event_patience: Seconds = 10.0
+    most: int = 2000
     directed_gaze_limit: Seconds = 2.5
     mutual_facial_gaze_limit: Seconds = 1.9
     adjacency_pair_limit: Seconds = 8.0

@@ -1,6 +1,7 @@
 """Longest paths that are kept up to date: an instant that moves costs what depends on it, not the whole net."""
 
 import heapq
+from collections import defaultdict
 from collections.abc import Sequence
 
 from msgspec import Struct
@@ -12,7 +13,7 @@ FINEST: Seconds = 1e-8
 """Changes below are rounding."""
 
 
-class Arc(Struct):
+class Arc(Struct, gc=False):
     """`target` is no earlier than `source` + `seconds`.
 
     asked: what `seconds` is when nothing gives way. least: what it may give way to. behavior: whose phase it is.
@@ -47,7 +48,7 @@ class LongestPaths:
         self._is_known = [False] * size
         """Is its time kept? What no decision depends on yet need not be known."""
         self._cause: list[int] = [-1] * size
-        self._effects: list[set[int]] = [set() for _ in range(size)]
+        self._effects: defaultdict[int, set[int]] = defaultdict(set)
         self._arcs: list[Arc] = []
         self._out: list[list[int]] = [[] for _ in range(size)]
         self._in: list[list[int]] = [[] for _ in range(size)]
@@ -196,7 +197,6 @@ class LongestPaths:
         self._is_fact.append(True)
         self._is_known.append(True)
         self._cause.append(-1)
-        self._effects.append(set())
         self._out.append([])
         self._in.append([])
         self._rank.append(-1)

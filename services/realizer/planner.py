@@ -99,6 +99,7 @@ class _Planner:
         barred: Container[tuple[str, Hand]],
     ) -> None:
         self.block = block
+        self.lines = {behavior.id: behavior.line for behavior in block.behaviors}
         self.estimates = estimates
         self._check_ids()
         self.barred = barred
@@ -139,17 +140,14 @@ class _Planner:
     def _refuse_if_required(self, id: str, reason: str, kind: WarningKind) -> None:
         if id in self.relations.required:
             advice = "it is required; without `required` it would be dropped"
-            fault = Fault(reason=reason, where=f"{self.block.id}: {id}", line=self._line(id), advice=advice)
+            fault = Fault(reason=reason, where=f"{self.block.id}: {id}", line=self.lines[id], advice=advice)
             raise BlockRefused(fault, kind)
 
     def _drop(self, id: str, kind: WarningKind, reason: str) -> None:
         self._refuse_if_required(id, reason, kind)
         self.chains.pop(id, None)
         self.dropped[id] = None
-        self.problems.append(Problem(kind, at_line(self._line(id), f"{reason}; the behavior is dropped"), id))
-
-    def _line(self, id: str) -> int:
-        return next(behavior.line for behavior in self.block.behaviors if behavior.id == id)
+        self.problems.append(Problem(kind, at_line(self.lines[id], f"{reason}; the behavior is dropped"), id))
 
     def plan(self) -> Plan:
         """What cannot be on time is dropped, until the rest can be."""
@@ -303,8 +301,7 @@ class _Planner:
 
     def _may_speak_at_once(self, id: str, present: Relations) -> bool:
         """Of an utterance that only begins the block nobody has said that it must be over by then: the voice will."""
-        is_asked = any(point.behavior == id for point in present.constrained)
-        return self.chains[id].type == "speech" and not is_asked
+        return self.chains[id].type == "speech" and all(point.behavior != id for point in present.constrained)
 
     def _resolve(self, conflict: Conflict) -> None:
         """Use the other arm, or wait for one's turn."""

@@ -251,3 +251,11 @@ def relations(block: Block, elsewhere: Elsewhere | None = None) -> Relations:
     reader.read_constraints()
     reader.read_timing()
     return reader.result()
+
+
+def extent(block: Block) -> int:
+    """How much there is to plan: behaviors, marks in speech, and sync references."""
+    marks = sum(len(each.marks) for each in block.behaviors if isinstance(each, Speech))
+    inline = sum(len(each.timing) for each in block.behaviors)
+    operators = (operator for constraint in block.constraints for operator in constraint.operators)
+    return len(block.behaviors) + marks + inline + sum(1 + len(operator.syncs) for operator in operators)

@@ -28,7 +28,7 @@ from services.realizer.executor import Performance
 from services.realizer.ledger import Ledger
 from services.realizer.planner import Plan, plan_block, poses_before
 from services.realizer.points import performer
-from services.realizer.relations import BlockRefused, relations
+from services.realizer.relations import BlockRefused, extent, relations
 from services.realizer.surroundings import Ending, Presence, Surroundings
 from services.requests import RequestDesk, Requester
 from services.runtime import Ready
@@ -132,6 +132,9 @@ class _Realizer:
 
     async def _plan(self, block: Block, elsewhere: Mapping[str, Block]) -> Plan:
         """The body is asked again from where it will be by then, and about the hands that the plan has chosen."""
+        if (held := extent(block)) > self.config.most:
+            reason = f"{held} behaviors, marks and sync references; at most {self.config.most} can be planned in time"
+            raise BlockRefused(Fault(reason=reason, where=block.id, advice="send several, each with APPEND"))
         relations(block, elsewhere)  # A bad reference is seen without asking the body.
         barred: set[tuple[str, Hand]] = set()
         chosen, estimates = block, await self._estimates(block, {})

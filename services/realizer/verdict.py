@@ -40,12 +40,16 @@ def clashes(
     """Turns that cannot be waited for, whatever the rest of the block: what ties the two leaves no time for both."""
     rank = {id: number for number, id in enumerate(chains)}
     losses: dict[str, Loss] = {}
-    for turn in sorted(turns, key=lambda turn: (rank[turn[0]], rank[turn[1].behavior])):
-        later, (earlier, sync) = turn
+    stays: dict[str, str] = {}
+    """Who has the part instead of who is lost."""
+    for later, (earlier, sync) in sorted(turns, key=lambda turn: (rank[turn[0]], rank[turn[1].behavior])):
+        earlier = stays.get(earlier, earlier)
         free = [id for id in (earlier, later) if id not in required]
-        if free and not losses.keys() & {earlier, later} and _clash(chains[earlier], sync, chains[later], classes):
+        if free and later not in losses and _clash(chains[earlier], sync, chains[later], classes):
             lost = max(free, key=rank.__getitem__)
+            turn = (later, Point(earlier, sync))
             losses[lost] = Loss(lost, f"cannot be on time: {later} would have to wait for {turn[1]}", turn)
+            stays[lost] = later if lost == earlier else earlier
     return list(losses.values())
 
 

@@ -1,13 +1,16 @@
 """What can go wrong while a block runs: it ends, exactly once, the rest runs, nothing hangs in the air."""
 
 import asyncio
+from typing import Any
 
 import pytest
 from msgspec.structs import replace
 
-from schemas.behaviors import Gaze, Mark, Pointing, Speech
+from schemas.behaviors import Gaze, GazeShift, Mark, Pointing, Speech
 from schemas.blocks import BlockOutcome
+from services.realizer import executor
 from services.realizer.config import RealizerConfig
+from services.realizer.planner import Plan, plan_block
 from services.requests import RequestRefused
 from tests.realizer.fake_body import FakeBody, Script
 from tests.realizer.stage import block, stage, together
@@ -40,6 +43,23 @@ async def test_a_lost_behavior_is_dropped_with_one_warning_and_the_rest_runs(
     assert seen.times()["speech-1:start"] == speech_start
     assert seen.body.homes == [("right_arm",)]
     assert len(seen.ends()) == 1
+
+
+async def test_what_is_lost_in_one_go_is_planned_around_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    shifts = tuple(GazeShift(id=f"shift-{number}", target="can-1") for number in range(40))
+    plans: list[Plan] = []
+
+    def counted(*arguments: Any, **more: Any) -> Plan:
+        plans.append(plan_block(*arguments, **more))
+        return plans[-1]
+
+    monkeypatch.setattr(executor, "plan_block", counted)
+    async with stage(FakeBody({shift.id: Script(refuse=True) for shift in shifts})) as seen:
+        at_once = together(*(f"{shift.id}:start" for shift in shifts))
+        outcome = await seen.perform(block((SPEECH, *shifts), at_once))
+
+    assert (outcome.status, len(outcome.dropped)) == ("done", 40)
+    assert len(plans) <= 2
 
 
 @pytest.mark.parametrize("script", [Script(refuse=True), Script(fail="stroke"), Script(stall="stroke")])

@@ -86,6 +86,22 @@ def fixed(size: int) -> Parts:
     ], []
 
 
+def hopeless(size: int) -> Parts:
+    """None has the time that it takes: each is dropped, for a reason of its own."""
+    return [
+        Speech(id=f"s{number}", text="one two", timing=(Timing("start", "0"), Timing("end", "0.001")))
+        for number in range(2 * size)
+    ], []
+
+
+def rivals(size: int) -> Parts:
+    """All want the arm at the same time: all but the first are dropped."""
+    return [
+        Pointing(id=f"p{number}", target="a", mode="LEFT_HAND", timing=(Timing("start", "1"), Timing("end", "3")))
+        for number in range(size)
+    ], []
+
+
 def calls(size: int, shape: Callable[[int], Parts]) -> int:
     """Python functions called, and list and dictionary methods, to plan a block, check its net and fire it."""
     behaviors, operators = shape(size)
@@ -108,7 +124,7 @@ def calls(size: int, shape: Callable[[int], Parts]) -> int:
     return count
 
 
-@pytest.mark.parametrize("shape", [references, looks, series, measured_words, joined, fixed])
+@pytest.mark.parametrize("shape", [references, looks, series, measured_words, joined, fixed, hopeless, rivals])
 def test_twice_the_block_costs_twice_the_work(shape: Callable[[int], Parts]) -> None:
     calls(20, shape)  # what is remembered from now on
 

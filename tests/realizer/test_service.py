@@ -5,10 +5,11 @@ import asyncio
 import pytest
 
 from schemas import keys
-from schemas.behaviors import Gaze, GazeShift, Mark, Pointing, Speech, Wait
+from schemas.behaviors import Gaze, GazeShift, Mark, Pointing, Speech, Timing, Wait
 from schemas.blocks import PerformBlock
 from schemas.feedback import BlockProgress, PredictionFeedback
 from services.memory_bus import Faults, MemoryHub
+from services.realizer.config import RealizerConfig
 from services.requests import RequestRefused
 from tests.realizer.fake_body import FakeBody, Script
 from tests.realizer.stage import after, block, stage, together
@@ -25,6 +26,16 @@ async def test_a_refused_block_moves_nothing_and_the_next_is_performed() -> None
 
     assert commands == []
     assert [(each.block, each.kind) for each in seen.warnings()] == [("bad", "PARSING_FAILURE")]
+    assert outcome.status == "done"
+
+
+async def test_a_block_too_big_to_be_planned_in_time_is_refused() -> None:
+    async with stage(config=RealizerConfig(most=3)) as seen:
+        with pytest.raises(RequestRefused, match="big: 4 behaviors, marks and sync references; at most 3"):
+            wait = Wait(id="w", duration=1.0, timing=(Timing("start", "s:end"),))
+            await seen.ask(block((STORY, wait), id="big")).outcome
+        outcome = await seen.perform(block((STORY,)))
+
     assert outcome.status == "done"
 
 
