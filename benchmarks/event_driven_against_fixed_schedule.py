@@ -156,7 +156,7 @@ async def by_the_clock(block: Block, plan: Plan, bus: Bus, requests: Requester) 
 
 def _until_next_hold(plan: Plan, point: Point) -> str:
     points = plan.chains[point.behavior].points
-    holds = {member.point for members in plan.members for member in members if member.kind == "hold"}
+    holds = {member.point for members in plan.members for member in members if member.can_wait}
     number = points.index(point)
     while number + 1 < len(points) and plan.at[points[number + 1]] == plan.at[points[number]]:
         number += 1

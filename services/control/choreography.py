@@ -135,7 +135,7 @@ def _glance(goal: tuple[float, float], scene: Scene) -> Course:
         Leg(goal=base, seconds=back, marks=_at(1.0, "end")),
     )
     ray = kinematics.gaze({**scene.pose, **dict(zip(joints, goal, strict=True))})
-    return _course(("head",), joints, legs, _held_on_target(), goal, scene, ray)
+    return _course(("head",), joints, legs, _held_on_target("stroke"), goal, scene, ray)
 
 
 def _shift(joints: tuple[str, ...], goal: tuple[float, ...], scene: Scene) -> Course:
@@ -276,7 +276,7 @@ def _excursion(part: str, goal: tuple[float, ...], scene: Scene) -> Course:
         Leg(goal=after, velocity=drift, seconds=settle, marks=_at(1.0, "stroke_end", "relax")),
         Leg(goal=rest, seconds=back, marks=_at(1.0, "end")),
     )
-    return _course((part,), joints, legs, _held_on_target(), goal, scene, None)
+    return _course((part,), joints, legs, _held_on_target("ready", "stroke_start", "stroke"), goal, scene, None)
 
 
 def _course(
@@ -327,8 +327,13 @@ def _sides(mode: str | None, rank: Callable[[Side], float], scene: Scene) -> lis
             return sorted(("left", "right"), key=lambda side: (f"{side}_arm" in scene.busy, rank(side)))
 
 
-def _held_on_target() -> tuple[Point, ...]:
-    return tuple(Point(sync, "relax" if sync in ("stroke_end", "relax") else "") for sync in SEVEN)
+def _held_on_target(*arrival: str) -> tuple[Point, ...]:
+    """arrival: points at which it is first on target."""
+    before = SEVEN[: SEVEN.index("stroke_end")]
+    return (
+        *(Point(sync, "stroke", stands_at="relax") if sync in arrival else Point(sync) for sync in before),
+        *(Point("stroke_end", "relax"), Point("relax", "relax"), Point("end")),
+    )
 
 
 def _held_around_stroke(strokes: Sequence[str] = ()) -> tuple[Point, ...]:

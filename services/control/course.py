@@ -21,10 +21,14 @@ class Impossible(Exception):
 
 
 class Point(Struct, frozen=True):
-    """A sync point. held_with: the hold point at which this one waits; its own name for a hold point itself."""
+    """A sync point. held_with: the hold point at which this one waits; its own name for a hold point itself.
+
+    stands_at: the later point that it may go on to while it waits here, since on target it is in both places.
+    """
 
     sync: str
     held_with: str = ""
+    stands_at: str = ""
 
 
 class Course(Struct, frozen=True, kw_only=True):

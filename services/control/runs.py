@@ -21,7 +21,7 @@ STALL, OVERHEAT = "(stall)", "(overheat)"
 class Run:
     """`course` under `authority`. Its bell rings when the authority changes or another behavior takes over.
 
-    cut_at: when a later behavior took its parts. holding: it stands at a hold point.
+    cut_at: when a later behavior took its parts. holding: it waits at a hold point, where it stands or comes to stand.
     """
 
     def __init__(
@@ -102,8 +102,21 @@ class Run:
         """How far along `path` it may go now."""
         for point in self.pending:
             if point.sync in (STALL, OVERHEAT) or (point.held_with and not self.authority.covers(point.held_with)):
-                return path.marks.get(point.sync, inf)
+                return path.marks.get(point.stands_at or point.sync, inf)
         return inf
+
+    def stands(self, now: Seconds) -> bool:
+        """Has it come to a stop where it has to wait?"""
+        return self.holding and now >= self.motion.end
+
+    def leave(self, hold: str, now: Seconds) -> list[str]:
+        """Wait there no longer; the sync points that it leaves. Where it stands may be another hold point, too."""
+        passed = [point.sync for point in self.pending if point.held_with == hold]
+        self.pending = [point for point in self.pending if point.held_with != hold]
+        following, here = self.pending[0], self.motion.s(now) + 1e-9
+        is_here = following.held_with and self.motion.path.marks[following.sync] <= here
+        self.holding = self.stands(now) and bool(is_here)
+        return passed
 
     def with_faults(self, legs: tuple[Leg, ...]) -> tuple[Leg, ...]:
         """`legs` that were made anew, with the faults that are still due."""

@@ -211,6 +211,7 @@ class _Control:
         match progress:
             case Arrived(sync=sync, at=at):
                 self._tell(SyncPointArrived(id=id, block=block, behavior=behavior, sync=sync, at=self._bus.stamp(at)))
+                self.note_look(live, at)
             case Reached(sync=sync, at=at, arrived=arrived):
                 self._tell(
                     SyncPointReached(

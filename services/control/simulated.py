@@ -203,22 +203,27 @@ class SimulatedBody(Body):
 
     async def _pass_points(self, run: Run) -> AsyncGenerator[Progress, None]:
         """Report the sync points of `run` as it crosses them, until it is done, cut or revoked. Raises BodyFailed."""
+        since = -inf
         while run.pending and not run.is_over:
-            self._extend(run)
+            if not run.holding:
+                self._extend(run)
             point = run.pending[0]
             due = run.motion.crossing(run.motion.path.marks[point.sync])
             if due is None or self._loop.time() < due:
                 await run.bell.heard(inf if due is None else due)
             elif point.sync in (STALL, OVERHEAT):
                 await self._fail_or_stall(run, point)
-            elif point.held_with and not run.authority.covers(point.held_with):
-                run.holding = True
-                yield Arrived(point.held_with, due)
+            elif point.held_with and (run.holding or not run.authority.covers(point.held_with)):
+                arrived = max(due, since)
+                if not run.authority.covers(point.held_with):
+                    run.holding = True
+                    yield Arrived(point.held_with, arrived)
                 while not run.authority.covers(point.held_with) and not run.is_over:
                     await run.bell.heard(inf)
                 if not run.is_over:
-                    for progress in self._leave_hold(run, point.held_with, due):
-                        yield progress
+                    since = self._loop.time()
+                    for sync in self._leave_hold(run, point.held_with):
+                        yield Reached(sync, since, arrived)
             else:
                 run.pending.pop(0)
                 self._attention.follow_run(run, self._loop.time())
@@ -228,19 +233,17 @@ class SimulatedBody(Body):
                 yield Reached(sync, run.cut_at, run.cut_at)
             run.pending.clear()
 
-    def _leave_hold(self, run: Run, hold: str, arrived: Seconds) -> list[Progress]:
-        """Go on from a standstill: what is left of the path is planned afresh from rest."""
+    def _leave_hold(self, run: Run, hold: str) -> list[str]:
+        """Go on, if it stands: what is left of the path is planned afresh from rest. The sync points that it leaves."""
         now = self._loop.time()
-        passed = [point.sync for point in run.pending if point.held_with == hold]
-        run.pending = [point for point in run.pending if point.held_with != hold]
-        legs = run.motion.path.after(run.motion.path.marks[hold])
-        if run.course.parts == ("head",):
-            legs = (head.way_back(self._tracks["head"].angles(now), self._attention.angles),)
-        legs = run.with_faults(legs)
-        run.holding = False
-        start = tracks.joined([self._tracks[part].at(now) for part in run.course.parts])
-        self._play(run, Path(start, legs, tracks.limits_of(run.course.parts)))
-        return [Reached(sync, now, arrived) for sync in passed]
+        stood, passed = run.stands(now), run.leave(hold, now)
+        if stood and not run.holding:
+            legs = run.motion.path.after(run.motion.s(now))
+            if run.course.parts == ("head",):
+                legs = (head.way_back(self._tracks["head"].angles(now), self._attention.angles),)
+            start = tracks.joined([self._tracks[part].at(now) for part in run.course.parts])
+            self._play(run, Path(start, run.with_faults(legs), tracks.limits_of(run.course.parts)))
+        return passed
 
     def _extend(self, run: Run) -> None:
         now = self._loop.time()
@@ -319,7 +322,7 @@ class SimulatedBody(Body):
             course = choreography.plan(run.behavior, scene)
         except Impossible:
             return
-        if run.holding:
+        if run.stands(now):
             head.turn(track, tuple(course.on_target.values()), now)
         elif (path := head.retargeted(run, course, track, now)) is not None:
             run.course = course

@@ -27,6 +27,11 @@ class Member(Struct, frozen=True, gc=False):
     kind: Gate
     point: Point
 
+    @property
+    def can_wait(self) -> bool:
+        """Under way, and there before the others?"""
+        return self.kind in ("hold", "prompt")
+
 
 class Assembly(Struct, frozen=True):
     """is_ordered: transitions are numbered as they can fire; else some wait for each other."""
@@ -146,8 +151,9 @@ class Assembler:
             if (segment.since, segment.to) in always or (source == target and shortest <= EPSILON):
                 continue
             self.places.append(Place("phase", source, target, lag, shortest, id, lines))
-            if not gone and source != target and self.kinds[id, target] != "hold":
-                stretch = None if unlimited else max(0.0, longest - lag)
+            kind = self.kinds[id, target]
+            if not gone and source != target and kind != "hold":
+                stretch = None if unlimited or kind == "prompt" else max(0.0, longest - lag)
                 self.bounds.append(Bound("phase", target, source, -lag, stretch, id, lines))
             lag, shortest, longest, unlimited = 0.0, 0.0, 0.0, False
 

@@ -231,7 +231,7 @@ class Authority(Facts):
         if self._unmet[transition] or (transition and transition in self._instants):
             return
         missing = [member for member in members if member.kind != "start" and not self._is_there(member)]
-        may_pass = missing[0] if len(missing) == 1 and missing[0].kind == "hold" else None
+        may_pass = missing[0] if len(missing) == 1 and missing[0].can_wait else None
         ready = max(
             (self._instants[source] + lag for source, lag in self._wiring.waits_for[transition]), default=self.began
         )
@@ -333,7 +333,7 @@ class Authority(Facts):
 
     def may_pass(self, point: Point) -> bool:
         transition = self.plan.at[point]
-        can_wait = self.member(point).kind == "hold" or self._wiring.pauses(point)
+        can_wait = self.member(point).can_wait or self._wiring.pauses(point)
         if not can_wait or point in self.reached:
             return True
         return (transition, point.behavior) in self._granted

@@ -55,7 +55,7 @@ class Facts:
         return self.member(point).point in self.arrived
 
     def _is_there(self, member: Member) -> bool:
-        can_wait = member.kind == "hold" or self._wiring.pauses(member.point)
+        can_wait = member.can_wait or self._wiring.pauses(member.point)
         return member.point in self.reached or (can_wait and member.point in self.arrived)
 
     def next_number(self, behavior: str) -> int:

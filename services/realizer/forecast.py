@@ -183,9 +183,10 @@ class Forecast(LongestPaths):
         """How long the phase that ends there may take; inf where the body can wait."""
         return self._longest.get((behavior, target), inf) * self._factor(behavior)
 
-    def gives_way(self, behavior: str) -> bool:
-        """Is it to be faster or slower than is natural?"""
-        return any(number in self._given_way for number in self._of_behavior.get(behavior, ()))
+    def is_hurried(self, behavior: str) -> bool:
+        """Is it to be faster than is natural?"""
+        hurried = (number for number in self._given_way if not self._arcs[number].is_bound)
+        return any(self._arcs[number].behavior == behavior for number in hurried)
 
     def update(self) -> set[int]:
         """Draw the conclusions of all facts since the last time; the transitions whose time has changed."""

@@ -22,7 +22,7 @@ def pace(behavior: str, authority: "Authority", now: Seconds) -> Pace:
     points = plan.chains[behavior].points
     number = authority.next_number(behavior)
     at = authority.reached[points[number - 1]] if number else now
-    is_paced = forecast.gives_way(behavior)
+    is_paced = forecast.is_hurried(behavior)
     planned: list[tuple[str, Seconds]] = []
     before = plan.at[points[number - 1]] if number else -1
     for point in points[number:]:

@@ -27,8 +27,11 @@ ORIGIN = Point("", "start")
 """The start of the block itself."""
 
 Performer = Literal["body", "recognition", "clock"]
-Gate = Literal["start", "hold", "passive"]
-"""How an instant of a behavior can be made to wait: not yet begun, holding there, or not at all."""
+Gate = Literal["start", "hold", "prompt", "passive"]
+"""How an instant of a behavior can be made to wait: not yet begun, holding there, or not at all.
+
+prompt: holding there too, but it sets out so late that it need not. Who looks at a thing long before it matters misleads.
+"""
 
 WITH_STROKE = frozenset({"gesture", "pointing", "head"})
 ON_TARGET = frozenset({"gaze", "face", "faceLexeme", "faceFacs", "posture"})
@@ -41,11 +44,12 @@ _PERFORMERS: dict[str, Performer] = {
 }  # fmt: skip
 
 _ONE_INSTANT = {"gaze": (("start", "ready", "stroke_start"), ("stroke_end", "relax"))}
-_LASTING_INSTANT = (("stroke_end", "relax"),)
+_LASTING_INSTANT = (("ready", "stroke_start", "stroke"), ("stroke_end", "relax"))
 
 NOMINAL_STROKE: tuple[Seconds, ...] = (0.5, 0.1, 0.3, 0.2, 0.1, 0.6)
 """Seconds per phase of a behavior with all seven points, where no body says better."""
-NOMINAL_ON_TARGET: tuple[Seconds, ...] = (0.0, 0.0, 0.4, 0.0, 0.0, 0.4)
+NOMINAL_GAZE: tuple[Seconds, ...] = (0.0, 0.0, 0.4, 0.0, 0.0, 0.4)
+NOMINAL_ON_TARGET: tuple[Seconds, ...] = (0.4, 0.0, 0.0, 0.0, 0.0, 0.4)
 NOMINAL_SHIFT: Seconds = 0.5
 NOMINAL_PER_CHARACTER: Seconds = 0.07
 GUESSED_SHORTEST: Seconds = 0.01
@@ -96,7 +100,7 @@ def hold_points(type: str) -> frozenset[str]:
     if type in WITH_STROKE:
         return frozenset({"stroke_start", "stroke_end"})
     if type in ON_TARGET:
-        return frozenset({"relax"})
+        return frozenset({"stroke", "relax"})
     return frozenset({"end"}) if type == "wait" else frozenset()
 
 
@@ -113,7 +117,10 @@ def gate(type: str, syncs: tuple[str, ...]) -> Gate:
     """
     if syncs[0] == "start":
         return "start"
-    return "hold" if gate_point(type, syncs) in hold_points(type) else "passive"
+    here = gate_point(type, syncs)
+    if here not in hold_points(type):
+        return "passive"
+    return "prompt" if here == "stroke" else "hold"
 
 
 @lru_cache(maxsize=1024)
@@ -156,4 +163,6 @@ def _nominal(behavior: Behavior, points: tuple[str, ...]) -> tuple[Seconds, ...]
             return (0.0,)
     if len(points) == 2:
         return (0.0 if type_of(behavior) == "emit" else NOMINAL_SHIFT,)
+    if type_of(behavior) == "gaze":
+        return NOMINAL_GAZE
     return NOMINAL_ON_TARGET if type_of(behavior) in ON_TARGET else NOMINAL_STROKE

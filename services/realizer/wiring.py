@@ -46,12 +46,13 @@ class Wiring:
 
 
 def _is_predictive(plan: Plan) -> bool:
-    """Is anything constrained that cannot wait, or bounded from above? Else nothing need be predicted."""
+    """Is anything constrained that cannot wait, or had better not, or bounded from above? Else nothing need be."""
     if any(bound.kind != "phase" for bound in plan.bounds):
         return True
     constrained = _constrained(plan)
     return any(
-        any(member.kind == "passive" for member in members) and (len(members) > 1 or transition in constrained)
+        any(member.kind in ("passive", "prompt") for member in members)
+        and (len(members) > 1 or transition in constrained)
         for transition, members in enumerate(plan.members)
     )
 

@@ -64,7 +64,7 @@ BEHAVIORS: tuple[BlockBehavior, ...] = (
     Wait(id="wait", duration=0.5),
 )
 HOLDS = {
-    "gaze": ("relax",), "faceLexeme": ("relax",), "posture": ("relax",), "wait": ("end",),
+    "gaze": ("stroke", "relax"), "faceLexeme": ("stroke", "relax"), "posture": ("stroke", "relax"), "wait": ("end",),
     "pointing": ("stroke_start", "stroke_end"), "gesture": ("stroke_start", "stroke_end"),
     "head": ("stroke_start", "stroke_end"),
 }  # fmt: skip

@@ -9,10 +9,10 @@ import pytest
 from schemas.behaviors import Gaze, GazeShift, Head, PostureShift
 from schemas.units import Vector
 from schemas.world import World
-from services.control.body import sync_points
+from services.control.body import Arrived, Reached, sync_points
 from services.control.simulated import SimulatedBody
 from tests.control.contract import WORLD, Stage, performed, times
-from tests.control.motions import recorded, violations
+from tests.control.motions import recorded, stops, violations
 
 
 def body_in(world: World) -> SimulatedBody:
@@ -68,9 +68,10 @@ async def test_a_new_base_beneath_a_gaze_moves_nothing_until_the_gaze_ends():
     assert misses_by(body, (0.70, 0.30, 0.73)) < 0.5
 
 
-async def test_a_gaze_that_holds_follows_a_face():
+@pytest.mark.parametrize(("through", "hold"), [("start", "stroke"), ("stroke", "relax")])
+async def test_a_gaze_that_holds_follows_a_face(through: str, hold: str):
     body = body_in(WORLD)
-    stage = Stage(body, Gaze(id="g", target="human"))
+    stage = Stage(body, Gaze(id="g", target="human"), through)
     world = WORLD
     async with recorded(body) as recording:
         for step in range(30):
@@ -79,7 +80,7 @@ async def test_a_gaze_that_holds_follows_a_face():
             body.see(world)
         await asyncio.sleep(0.5)
 
-    assert stage.waits_at == ["relax"]
+    assert stage.waits_at == [hold]
     assert misses_by(body, (1.3, 0.58, 1.2)) < 0.6
     assert body.state().looking_at == "human"
     assert violations(recording, body.capabilities.joints) == []
@@ -99,7 +100,7 @@ async def test_a_base_gaze_follows_a_hand_on_the_move():
 
 async def test_a_gaze_whose_target_moves_on_the_way_arrives_at_it():
     body = body_in(WORLD)
-    stage = Stage(body, Gaze(id="g", target="far-left"))
+    stage = Stage(body, Gaze(id="g", target="far-left"), "stroke")
     async with recorded(body) as recording:
         await asyncio.sleep(0.2)
         body.see(moved_to(WORLD, "far-left", (0.6, 0.0, 0.73)))
@@ -115,7 +116,7 @@ async def test_a_gaze_whose_target_moves_on_the_way_arrives_at_it():
 
 async def test_a_nod_adds_to_the_gaze():
     body = body_in(WORLD)
-    stage = Stage(body, Gaze(id="g", target="human"))
+    stage = Stage(body, Gaze(id="g", target="human"), "stroke")
     await asyncio.sleep(1.0)
     nodding = asyncio.create_task(performed(body, Head(id="nod", lexeme="NOD")))
     async with recorded(body, ["neck_pitch"]) as recording:
@@ -148,3 +149,44 @@ async def test_with_an_offset_the_eyes_are_beside_the_target_and_on_nothing():
     assert (body.state().looking_at, straight.state().looking_at) == ("", "human")
     assert axis[1] < on_target[1]  # right
     assert axis[2] > on_target[2]  # up
+
+
+async def test_standing_on_target_is_one_stop_however_its_authority_comes():
+    """Told to leave before it stands, it never stops; told late, it leaves from where it stands, which is on target."""
+    gaze = Gaze(id="g", target="far-left")
+    free = SimulatedBody()
+    free.see(WORLD)
+    arrival = times(await performed(free, gaze))["stroke"]
+    for told, expected in ((arrival + 0.01, 0), (arrival + 1.0, 1)):
+        body = body_in(WORLD)
+        began = asyncio.get_running_loop().time()
+        stage = Stage(body, gaze)
+        async with recorded(body, ["neck_yaw", "neck_pitch"]) as recording:
+            await asyncio.sleep(told)
+            on_target = misses_by(body, (0.70, 0.30, 0.73))
+            stage.authority.extend("end")
+            progress = await stage.over()
+
+        left = times(progress)
+        assert on_target < 0.5
+        assert stage.waits_at == ["stroke"]
+        assert left["stroke"] == pytest.approx(began + told)
+        assert left["relax"] <= left["stroke"] + 0.1
+        assert stops(recording, began, left["end"]) == expected
+
+
+async def test_left_at_the_stroke_alone_it_stays_on_target():
+    body = body_in(WORLD)
+    stage = Stage(body, Gaze(id="g", target="far-left"))
+    await asyncio.sleep(1.0)
+    before = body.state().pose
+    stage.authority.extend("stroke")
+    await asyncio.sleep(1.0)
+
+    assert stage.waits_at == ["stroke", "relax"]
+    assert body.state().pose == before
+    left, arrived = (next(it for it in stage.progress if isinstance(it, kind) and it.sync == sync)
+                     for kind, sync in ((Reached, "stroke"), (Arrived, "relax")))  # fmt: skip
+    assert left.at == arrived.at
+    stage.authority.extend("end")
+    await stage.over()

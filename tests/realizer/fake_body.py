@@ -39,11 +39,11 @@ HOLDS = {
     "gesture": ("stroke_start", "stroke_end"),
     "pointing": ("stroke_start", "stroke_end"),
     "head": ("stroke_start", "stroke_end"),
-    "gaze": ("relax",),
-    "face": ("relax",),
-    "faceLexeme": ("relax",),
-    "faceFacs": ("relax",),
-    "posture": ("relax",),
+    "gaze": ("stroke", "relax"),
+    "face": ("stroke", "relax"),
+    "faceLexeme": ("stroke", "relax"),
+    "faceFacs": ("stroke", "relax"),
+    "posture": ("stroke", "relax"),
 }
 PART = {"head": "nod", "gaze": "head", "gazeShift": "head", "speech": "voice"}
 ARMS = {None: ("right_arm",), "RIGHT_HAND": ("right_arm",), "LEFT_HAND": ("left_arm",)}
@@ -52,10 +52,10 @@ DURATIONS: dict[str, tuple[Seconds, ...]] = {
     "gesture": (0.5, 0.25, 0.5, 0.25, 0.25, 0.5),
     "head": (0.25, 0.0, 0.25, 0.25, 0.0, 0.25),
     "gaze": (0.0, 0.0, 0.5, 0.0, 0.0, 0.5),
-    "face": (0.0, 0.0, 0.25, 0.0, 0.0, 0.25),
-    "faceLexeme": (0.0, 0.0, 0.25, 0.0, 0.0, 0.25),
-    "faceFacs": (0.0, 0.0, 0.25, 0.0, 0.0, 0.25),
-    "posture": (0.0, 0.0, 0.5, 0.0, 0.0, 0.5),
+    "face": (0.25, 0.0, 0.0, 0.0, 0.0, 0.25),
+    "faceLexeme": (0.25, 0.0, 0.0, 0.0, 0.0, 0.25),
+    "faceFacs": (0.25, 0.0, 0.0, 0.0, 0.0, 0.25),
+    "posture": (0.5, 0.0, 0.0, 0.0, 0.0, 0.5),
 }
 """Seconds per phase: binary fractions, so that times come out exact."""
 
@@ -68,6 +68,14 @@ def points_of(behavior: BlockBehavior) -> tuple[str, ...]:
     if isinstance(behavior, Speech):
         return ("start", *(mark.id for mark in sorted(behavior.marks, key=lambda mark: mark.position)), "end")
     return SEVEN if type_of(behavior) in HOLDS else ("start", "end")
+
+
+def held_with_next(behavior: BlockBehavior) -> tuple[str, ...]:
+    """Points that wait with the next hold point: a gaze is on target at once, and leaves at once."""
+    type = type_of(behavior)
+    if "relax" not in HOLDS.get(type, ()):
+        return ()
+    return ("stroke_end",) if type == "gaze" else ("ready", "stroke_start", "stroke_end")
 
 
 def parts_of(behavior: BlockBehavior) -> tuple[str, ...]:
@@ -239,7 +247,7 @@ class FakeBody:
             if sync == script.fail:
                 self._end(act, "failed", Fault(reason="overheated"))
                 return
-            if type_of(behavior) not in ("pointing", "gesture", "head") and sync == "stroke_end":
+            if sync in held_with_next(behavior):
                 pending.append(sync)
                 continue
             arrived = self.bus.now()

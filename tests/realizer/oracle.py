@@ -39,8 +39,8 @@ HOLDS = {
     "pointing": {"stroke_start", "stroke_end"},
     "gesture": {"stroke_start", "stroke_end"},
     "head": {"stroke_start", "stroke_end"},
-    "gaze": {"stroke_end", "relax"},
-    "posture": {"stroke_end", "relax"},
+    "gaze": {"stroke", "stroke_end", "relax"},
+    "posture": {"ready", "stroke_start", "stroke", "stroke_end", "relax"},
     "wait": {"end"},
 }
 SECONDS = {
@@ -48,7 +48,7 @@ SECONDS = {
     "gesture": (0.25, 0.25, 0.5, 0.25, 0.25, 0.5),
     "head": (0.25, 0.125, 0.25, 0.25, 0.0, 0.25),
     "gaze": (0.0, 0.0, 0.5, 0.0, 0.0, 0.5),
-    "posture": (0.25, 0.0, 0.5, 0.0, 0.0, 0.5),
+    "posture": (0.75, 0.0, 0.0, 0.0, 0.0, 0.5),
 }
 FASTEST, SLOWEST = 0.5, 1.25
 """Of a phase that is neither held nor rigid: times its natural duration."""
@@ -65,7 +65,8 @@ class Limits(Struct):
 class Oracle(Struct):
     """What is known of the points of a block, as (one, other, seconds): other is no earlier than one + seconds.
 
-    natural, extreme: with natural durations, or as short and long as can be. customs: what holds where nobody has
+    natural, extreme: with natural durations (who is to be on target is so just in time), or as short and long as can
+    be. customs: what holds where nobody has
     said anything else: series of one type, and looks that last.
     """
 
@@ -102,6 +103,11 @@ def phases_of(behavior: BlockBehavior) -> list[Limits]:
         Limits(FASTEST * natural, natural, None if to in holds else SLOWEST * natural)
         for to, natural in zip(points[1:], seconds, strict=True)
     ]
+
+
+def is_prompt(behavior: BlockBehavior, sync: str) -> bool:
+    """Does it come there just in time if it can, and wait if it must?"""
+    return sync == ("stroke" if type_of(behavior) == "gaze" else "ready") and type_of(behavior) in ("gaze", "posture")
 
 
 def estimate(behavior: BlockBehavior) -> Estimate:
@@ -144,12 +150,16 @@ def consult(block: Block) -> Oracle:
             if phase.longest is not None:
                 natural.append((to, since, -phase.natural))
                 extreme.append((to, since, -phase.longest))
+            elif is_prompt(behavior, to.rpartition(":")[2]):
+                natural.append((to, since, -phase.natural))
         if type_of(behavior) == "gaze":
             no_earlier(f"{behavior.id}:ready", f"{behavior.id}:start", 0.0)
             no_earlier(f"{behavior.id}:stroke_start", f"{behavior.id}:ready", 0.0)
             no_earlier(f"{behavior.id}:stroke_start", f"{behavior.id}:start", 0.0)
         if type_of(behavior) in ("gaze", "posture"):
             no_earlier(f"{behavior.id}:relax", f"{behavior.id}:stroke_end", 0.0)
+        if type_of(behavior) == "posture":
+            no_earlier(f"{behavior.id}:stroke", f"{behavior.id}:ready", 0.0)
     for kind, one, others in said(block):
         ref, offset = point(one, block)
         for text in others:

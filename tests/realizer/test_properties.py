@@ -258,7 +258,8 @@ def oracle(block: Block) -> dict[str, float] | None:
         for (since, to), seconds in zip(pairwise(points), durations, strict=True):
             lags.append((since, to, seconds))
             held = to.rpartition(":")[2] in holds or (isinstance(behavior, Gaze) and to.endswith(":stroke_end"))
-            if not held:
+            is_just_in_time = isinstance(behavior, Gaze) and to.endswith(":stroke")
+            if not held or is_just_in_time:
                 lags.append((to, since, -seconds))
     for operator in block.constraints[0].operators:
         ref, offset = _split(operator.ref, block)
