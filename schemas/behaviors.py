@@ -196,11 +196,14 @@ class SpeechOption(Struct, frozen=True, kw_only=True, omit_defaults=True):
 
 
 class Reference(Behavior, frozen=True, kw_only=True, tag="reference", omit_defaults=True):
-    """An object reference: generation replaces it by a phrase and perhaps a gaze, a directed gaze, a point."""
+    """An object reference: generation replaces it by a phrase and perhaps a gaze, a directed gaze, a point.
+
+    options: the phrases to choose from; None: generation proposes some, from what the world knows of the target.
+    """
 
     target: str
     minimum_reliability: float
-    options: tuple[SpeechOption, ...]
+    options: tuple[SpeechOption, ...] | None = None
 
 
 _Spelled = (

@@ -140,8 +140,10 @@ def _options(reference: Reference, path: str) -> Iterator[Problem]:
     if not 0 < reference.minimum_reliability < 1:
         reason = f"minimum reliability {reference.minimum_reliability:g} is outside (0, 1)"
         yield Problem(reason, f"{path}.minimum_reliability", reference.id, reference.line, "for example 0.85")
+    if reference.options is None:
+        return
     if not reference.options:
-        advice = "offer at least one phrase (speechOption)"
+        advice = 'offer a phrase (speechOption); to have some proposed: propose="true", in JSON leave out `options`'
         yield Problem("no phrase to choose from", f"{path}.options", reference.id, reference.line, advice)
     for number, option in enumerate(reference.options):
         if not (math.isfinite(option.cost) and option.cost >= 0):

@@ -142,6 +142,6 @@ def without_lines(thing: AnyInput) -> AnyInput:
 
 def _behavior_without_lines(behavior: AnyBehavior) -> AnyBehavior:
     behavior = replace(behavior, line=0)
-    if isinstance(behavior, Reference):
+    if isinstance(behavior, Reference) and behavior.options is not None:
         return replace(behavior, options=tuple(replace(option, line=0) for option in behavior.options))
     return behavior

@@ -14,6 +14,7 @@ class Entity(Struct, frozen=True, kw_only=True, omit_defaults=True):
 
     footprint: corners in the entity's own frame, metres (x, y), before turning by `yaw` about z.
     Only `object` entities can be distractors.
+    category, size, color, shape, name, features: what phrases for it are made of; empty: unknown.
     """
 
     id: str
@@ -22,8 +23,14 @@ class Entity(Struct, frozen=True, kw_only=True, omit_defaults=True):
     yaw: Radians = 0.0
     footprint: tuple[tuple[float, float], ...] = ()
     radius: Meters = 0.0
+    category: str = ""
+    """What it is, a noun: `cup`. Without one its shape is the noun: `square`."""
     color: str = ""
     shape: str = ""
+    size: str = ""
+    """`big`, `small`. Empty: as its footprint or radius compares with others of its kind."""
+    features: tuple[str, ...] = ()
+    """All else that sets it apart, as adjectives: `striped`, `wooden`. What is not listed does not hold."""
     name: str = ""
     owner: str = ""
     """Of a hand: the person."""

@@ -220,7 +220,7 @@ class _Document:
             case "speech":
                 timing += self._speech(element, raw)
             case "reference":
-                raw["options"] = [self._option(child) for child, _, name in ours(element) if name == "speechOption"]
+                raw["options"] = self._options(element, raw)
             case "event":
                 raw["accept"] = str(raw.get("accept", "")).split()
                 raw["objects"] = [child.get("id", "") for child, _, name in ours(element) if name == "object"]
@@ -293,6 +293,15 @@ class _Document:
                 read = {"stance": "type"} if name == "stance" else {"part": "part", "lexeme": "lexeme"}
                 raw |= {field: child.get(attribute, "") for field, attribute in read.items()}
 
+    def _options(self, element: etree._Element, raw: dict[str, Any]) -> list[of.SpeechOption] | None:
+        """None where the author leaves the phrases to generation."""
+        options = [self._option(child) for child, _, name in ours(element) if name == "speechOption"]
+        if not _says_yes(raw.pop("propose", "")):
+            return options
+        if options:
+            raise self._source.refusal("phrases are to be proposed, and offered", element, advice="leave out one")
+        return None
+
     def _option(self, element: etree._Element) -> of.SpeechOption:
         self._only(element, "speechOption")
         raw = self._own_fields(element, of.SpeechOption)
@@ -328,7 +337,8 @@ class _Document:
         raw: dict[str, Any] = fields({name: value for name, value in plain.items() if name not in SYNC_ATTRIBUTES})
         if "min_reliability" in raw:
             raw["minimum_reliability"] = raw.pop("min_reliability")
-        for name in raw.keys() - set(kind.__struct_fields__) - {"character_id"}:
+        known = {*kind.__struct_fields__, "character_id", "propose" if kind is of.Reference else "id"}
+        for name in raw.keys() - known:
             local = split(str(element.tag))[1]
             raise self._source.refusal(
                 f"<{local}> has no attribute {camel(name)!r}", element, advice=f"known: {known_attributes(kind)}"
@@ -350,7 +360,11 @@ class _Document:
 
 
 def _is_true(raw: dict[str, Any]) -> bool:
-    return str(raw.get("required", "")).strip().lower() in ("true", "1")
+    return _says_yes(raw.get("required", ""))
+
+
+def _says_yes(value: object) -> bool:
+    return str(value).strip().lower() in ("true", "1")
 
 
 def _event_of(element: etree._Element) -> str | None:

@@ -99,7 +99,9 @@ def _behavior(root: etree._Element, namespace: str, behavior: of.Behavior) -> No
                 pose = {"part": behavior.part, "lexeme": behavior.lexeme}
                 etree.SubElement(element, f"{{{namespace}}}pose", pose)
         case of.Reference():
-            for option in behavior.options:
+            if behavior.options is None:
+                element.set("propose", "true")
+            for option in behavior.options or ():
                 inner = etree.SubElement(element, f"{{{namespace}}}speechOption", {"text": option.text})
                 _set_fields(inner, option)
                 for distractor in option.distractors:

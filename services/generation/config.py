@@ -10,6 +10,7 @@ from schemas.units import Degrees, Meters, Probability, Radians, Seconds
 Channel = Literal["sum", "independent"]
 Profile = Literal["check-back", "figure-3.3"]
 Condition = Literal["operational", "degraded-generation", "degraded-recognition"]
+PhraseAttribute = Literal["size", "shape", "color", "feature"]
 
 
 class GenerationConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -50,6 +51,13 @@ class GenerationConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=
     """Of the cylinder around a pointing forearm. None: what the body says of itself."""
     figure_lead: Seconds = 2.0
     """From gaze on target to the stroke of the point in profile figure-3.3."""
+
+    # Phrases for references that come without any: services/generation/phrases.py.
+    phrase_attributes: tuple[PhraseAttribute, ...] = ("color", "shape", "feature", "size")
+    """What proposed phrases may say beside the noun, the most preferred first: absolute before relative, as people
+    do (Dale and Reiter 1995, after Pechmann 1989). `shape` only where the noun is something else."""
+    this_within: Meters = 0.65
+    """Proposed for what is so near to the robot: "this"; beyond: "that". Ours; both are said as in Appendix B."""
 
     turn_silence: Seconds = 10.0
     """How long an open turn may lie still before it closes as aborted."""
@@ -116,6 +124,8 @@ class GenerationConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=
         for name in _NOT_NEGATIVE:
             if getattr(self, name) < 0:
                 raise ValueError(f"{name} must not be negative, not {getattr(self, name)}")
+        if len(set(self.phrase_attributes)) < len(self.phrase_attributes):
+            raise ValueError(f"phrase_attributes names one twice: {', '.join(self.phrase_attributes)}")
         if self.mtbce_low > self.mtbce_high:
             raise ValueError(f"mtbce_low {self.mtbce_low} is above mtbce_high {self.mtbce_high}")
         for name in ("gaze_half_angle", "pointing_radius"):
@@ -141,6 +151,6 @@ _POSITIVE = (
 )  # fmt: skip
 _NOT_NEGATIVE = (
     "seconds_per_head_degree", "seconds_per_arm_degree", "seconds_per_word", "wait_weight", "expected_delay",
-    "figure_lead", "dwell", "hand_speed", "hand_onset", "hand_stillness", "face_lost",
+    "figure_lead", "this_within", "dwell", "hand_speed", "hand_onset", "hand_stillness", "face_lost",
     "mtbce_events",
 )  # fmt: skip

@@ -1,4 +1,4 @@
-"""From a fragment to its block, in one pure step: references chosen, then everything emitted."""
+"""From a fragment to its block, in one pure step: phrases proposed, references chosen, then everything emitted."""
 
 from collections.abc import Sequence
 
@@ -14,12 +14,17 @@ from services.generation.emission import emit
 from services.generation.motions import Motions
 from services.generation.ordering import ordered
 from services.generation.permits import Permits
+from services.generation.phrases import proposed
 from services.generation.reference_policy import Choices, Scene, choose
+from services.generation.trail import NOTHING, Trail
 from services.generation.turn_policy import TurnPlan, vain_delay
 
 
 class Plan(Struct, frozen=True, kw_only=True):
+    """trail: what the block leaves for the turn's next fragment."""
+
     block: Block
+    trail: Trail = NOTHING
     choices: tuple[ReferenceChoice, ...] = ()
     warnings: tuple[str, ...] = ()
 
@@ -43,17 +48,19 @@ def plan(
     motions: Motions,
     permits: Permits,
     config: GenerationConfig,
+    before: Trail = NOTHING,
 ) -> Plan:
-    """The block of a checked fragment. body, motions: needed for references only.
+    """The block of a checked fragment. body, motions: needed for references only. before: the turn's other blocks'.
 
     Raises RunFailed where a reference cannot be made at all.
     """
     chosen = Choices()
-    if made := references(fragment):
-        chosen = choose(made, _scene(world, body, permits, config), motions, config)
-    emission = emit(fragment, turn, chosen.choices, config, permits, chosen.hands)
-    warnings = (*vain_delay(fragment), *chosen.warnings, *emission.warnings)
-    return Plan(block=emission.block, choices=chosen.choices, warnings=warnings)
+    made = proposed(references(fragment), world, config)
+    if made.references:
+        chosen = choose(made.references, _scene(world, body, permits, config), motions, config)
+    emission = emit(fragment, turn, chosen.choices, config, permits, chosen.hands, before)
+    warnings = (*vain_delay(fragment), *made.warnings, *chosen.warnings, *emission.warnings)
+    return Plan(block=emission.block, trail=emission.trail, choices=chosen.choices, warnings=warnings)
 
 
 def _scene(world: World, body: Capabilities | None, permits: Permits, config: GenerationConfig) -> Scene:

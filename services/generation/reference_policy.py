@@ -153,7 +153,7 @@ def considered(reference: Reference, scene: Scene, motions: Motions, config: Gen
         points = gesture == "directed_gaze_with_pointing"
         obstacle = "" if gesture == "none" else no_gaze or (no_point if points else "")
         shown = universe if gesture == "none" else gazed & pointed if points else gazed
-        for order, option in enumerate(reference.options):
+        for order, option in enumerate(reference.options or ()):
             said = frozenset(option.distractors) & universe if option.text and not option.deictic else universe
             channel = channel_reliability(gesture, option.text, config)
             distractors = shown & said
@@ -340,7 +340,7 @@ def _doubts(reference: Reference, scene: Scene) -> list[str]:
     universe = scene.universe - {reference.target}
     return [
         f"{reference.id}: the distractors of the deictic {option.text!r} are everything else, not those listed"
-        for option in reference.options
+        for option in reference.options or ()
         if option.deictic and option.distractors and set(option.distractors) - {reference.target} != universe
     ]
 

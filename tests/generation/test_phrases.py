@@ -1,0 +1,224 @@
+"""What the service says of an object when nobody tells it how to call it."""
+
+from itertools import combinations
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from msgspec.structs import replace
+
+from schemas.behaviors import Reference, SpeechOption
+from schemas.fragments import TurnFragment
+from schemas.world import Entity, World
+from services.generation.config import GenerationConfig
+from services.generation.permits import Permits
+from services.generation.phrases import Proposals, proposed
+from services.generation.planning import plan
+from services.generation.turn_policy import plan_turn
+from services.tangram_table import tangram_table
+from tests.generation.tables import body
+
+SMALL, BIG = 0.02, 0.04
+CONFIG = GenerationConfig()
+
+
+def thing(id: str, **known: object) -> Entity:
+    return Entity(id=id, kind="object", **{"position": (0.5, 0.0, 0.7), **known})  # type: ignore[arg-type]
+
+
+def world(*things: Entity) -> World:
+    return World(entities=(*things, Entity(id="human", kind="person", position=(1.3, 0.0, 1.2))))
+
+
+TANGRAM = world(*(tangram_table().lying(piece, piece.start) for piece in tangram_table().pieces))
+SQUARES = world(
+    thing("a", shape="square", color="red", radius=BIG),
+    thing("b", shape="square", color="red", radius=SMALL),
+    thing("c", shape="square", color="blue", radius=BIG),
+    thing("d", shape="disc", color="red", radius=BIG),
+)
+
+
+def refer(id: str, target: str, *options: SpeechOption) -> Reference:
+    return Reference(id=id, target=target, minimum_reliability=0.85, options=options or None)
+
+
+def offered(around: World, *targets: str, config: GenerationConfig = CONFIG) -> Proposals:
+    return proposed([refer(f"ref-{index}", target) for index, target in enumerate(targets, 1)], around, config)
+
+
+def options(around: World, *targets: str, config: GenerationConfig = CONFIG) -> tuple[SpeechOption, ...]:
+    """Of the last of these references."""
+    return offered(around, *targets, config=config).references[-1].options or ()
+
+
+def table(around: World, *targets: str, config: GenerationConfig = CONFIG) -> dict[str, set[str]]:
+    return {option.text: set(option.distractors) for option in options(around, *targets, config=config)}
+
+
+def test_phrases_go_from_short_to_long_each_with_its_words_and_what_else_they_may_mean() -> None:
+    descriptions = [option for option in options(SQUARES, "a") if not option.deictic]
+
+    assert [(option.text, option.cost, option.distractors) for option in descriptions] == [
+        ("the square", 2.0, ("b", "c")),
+        ("the red square", 3.0, ("b",)),
+        ("the big square", 3.0, ("c",)),
+        ("the big red square", 4.0, ()),
+    ]
+
+
+def test_each_piece_of_the_tangram_is_named_without_doubt() -> None:
+    for piece in TANGRAM.objects:
+        alone = [
+            option.text for option in options(TANGRAM, piece.id) if not option.deictic and not option.distractors
+        ]
+        unique = sum(other.shape == piece.shape for other in TANGRAM.objects) == 1
+
+        assert alone == [f"the {piece.shape}" if unique else f"the {piece.color} {piece.shape}"]
+
+
+def test_words_that_rule_nothing_out_are_not_said() -> None:
+    assert table(SQUARES, "d") == {"this": set(), "the disc": set()}
+
+
+def test_the_preferred_attribute_wins_among_equals() -> None:
+    pair = world(
+        thing("a", shape="square", color="red", size="big"), thing("b", shape="square", color="blue", size="small")
+    )
+    by_size = GenerationConfig(phrase_attributes=("size", "color"))
+
+    assert list(table(pair, "a")) == ["this", "the square", "the red square"]
+    assert list(table(pair, "a", config=by_size)) == ["this", "the square", "the big square"]
+    assert list(table(pair, "a", config=GenerationConfig(phrase_attributes=()))) == ["this", "the square"]
+
+
+def test_what_is_not_known_of_an_object_does_not_rule_it_out() -> None:
+    dim = world(
+        thing("a", shape="square", color="red"), thing("b", shape="square"), thing("c"), thing("d", shape="disc")
+    )
+
+    assert table(dim, "a") == {"this": set(), "the square": {"b", "c"}}
+
+
+def test_features_that_are_not_listed_do_not_hold() -> None:
+    cups = world(
+        thing("a", category="cup", shape="round", features=("wooden", "striped")),
+        thing("b", category="cup", features=("wooden",)),
+        thing("c", category="cup"),
+    )
+
+    assert table(cups, "a") == {"this": set(), "the cup": {"b", "c"}, "the striped cup": set()}
+    assert table(cups, "b") == {"this": set(), "the cup": {"a", "c"}, "the wooden cup": {"a"}}
+
+
+def test_modifiers_are_said_in_the_order_of_english() -> None:
+    cup = {"category": "cup", "size": "big", "shape": "round", "color": "red", "features": ("wooden",)}
+    others = [
+        {**cup, "size": "small"}, {**cup, "shape": "square"}, {**cup, "color": "blue"}, {**cup, "features": ()},
+    ]  # fmt: skip
+    around = world(thing("a", **cup), *(thing(f"o{index}", **other) for index, other in enumerate(others)))
+
+    longest = [text for text in table(around, "a") if len(text.split()) == 5]
+
+    assert set(longest) == {
+        "the round red wooden cup", "the big red wooden cup", "the big round wooden cup", "the big round red cup",
+    }  # fmt: skip
+
+
+def test_a_shape_may_be_the_noun_of_one_and_an_attribute_of_another() -> None:
+    cups = [thing("b", category="cup", shape="square"), thing("c", category="cup", shape="round")]
+    around = world(thing("a", shape="square"), *cups)
+
+    assert table(around, "a")["the square"] == {"b"}
+    assert table(around, "b") == {"this": set(), "the cup": {"c"}, "the square cup": set()}
+
+
+@pytest.mark.parametrize(
+    ("radii", "big"),
+    [((1.0, 1.24), set()), ((1.0, 1.26), {"o1"}), ((1.0, 1.2, 1.8, 2.0), {"o2", "o3"}), ((0.0, 0.0), set())],
+)
+def test_big_and_small_are_told_apart_at_the_greatest_step(radii: tuple[float, ...], big: set[str]) -> None:
+    around = world(*(thing(f"o{index}", shape="disc", radius=radius) for index, radius in enumerate(radii)))
+
+    assert {each.id for each in around.objects if "the big disc" in table(around, each.id)} == big
+
+
+def test_it_is_offered_only_where_nothing_else_was_mentioned() -> None:
+    assert "it" not in table(SQUARES, "a")
+    assert table(SQUARES, "a", "a")["it"] == set()
+    assert "it" in table(SQUARES, "a", "a", "a")
+    assert "it" not in table(SQUARES, "a", "b")
+    assert "it" not in table(SQUARES, "a", "b", "b")
+
+
+def test_phrases_of_the_authors_own_count_as_mentioned_and_stay_as_they_are() -> None:
+    own = refer("ref-1", "a", SpeechOption(text="the left one", cost=3))
+
+    made = proposed([own, refer("ref-2", "a")], SQUARES, CONFIG).references
+
+    assert made[0] is own
+    assert made[1].options is not None
+    assert made[1].options[0].text == "it"
+
+
+def test_near_things_are_this_and_far_ones_that_as_in_appendix_b() -> None:
+    assert "this" in table(TANGRAM, "green-square")
+    assert "that" in table(TANGRAM, "purple-triangle")
+    assert [option.deictic for option in options(TANGRAM, "green-square")] == [True, False, False]
+
+
+def test_what_the_world_does_not_describe_is_this_one_with_a_warning() -> None:
+    made = offered(world(thing("obj-17"), thing("b", color="red")), "obj-17")
+
+    assert made.warnings == ("ref-1: the world does not say what obj-17 looks like",)
+    assert [(o.text, o.cost, o.deictic, o.distractors) for o in made.references[0].options or ()] == [
+        ("this one", 2.0, True, ()), ("the object", 2.0, False, ("b",)),
+    ]  # fmt: skip
+
+
+def test_without_a_noun_it_is_the_red_one() -> None:
+    assert table(world(thing("a", color="red"), thing("b", color="blue")), "a")["the red one"] == set()
+
+
+def test_a_name_is_the_last_resort_for_a_noun() -> None:
+    assert table(world(thing("a", name="teapot"), thing("b", name="jug")), "a") == {
+        "this": set(),
+        "the teapot": set(),
+    }
+
+
+words = st.sampled_from(["", "x", "y", "z"])
+things = st.builds(
+    thing, id=st.just(""), category=words, color=words, shape=words, size=words,
+    features=st.lists(st.sampled_from(["p", "q"]), unique=True).map(tuple), radius=st.sampled_from([0.0, SMALL, BIG]),
+)  # fmt: skip
+
+
+@settings(max_examples=100)
+@given(st.lists(things, min_size=1, max_size=7))
+def test_no_phrase_is_beaten_and_a_distinguishing_one_is_offered_if_there_is_one(some: list[Entity]) -> None:
+    around = world(*(replace(each, id=f"o{index}") for index, each in enumerate(some)))
+    descriptions = [option for option in options(around, "o0") if not option.deictic]
+
+    assert descriptions[0].cost == 2.0
+    assert [option.cost for option in descriptions] == sorted(option.cost for option in descriptions)
+    for one, other in combinations(descriptions, 2):
+        assert not set(one.distractors) <= set(other.distractors)
+    others = {entity.id for entity in around.objects} - {"o0"}
+    assert all(set(option.distractors) <= others for option in descriptions)
+    assert all(option.cost == len(option.text.split()) for option in descriptions)
+
+
+def test_the_outcome_of_a_plan_explains_the_proposed_phrases() -> None:
+    fragment = TurnFragment(id="f", behaviors=(refer("ref", "a"),))
+    made = plan(fragment, plan_turn(fragment, "f", "human"), SQUARES, None, body(SQUARES, ["a"]), Permits(), CONFIG)
+
+    (choice,) = made.choices
+    assert {pair.phrase for pair in choice.pairs} == set(table(SQUARES, "a"))
+    assert choice.phrase in table(SQUARES, "a")
+    assert len(choice.pairs) == 4 * len(table(SQUARES, "a"))
+
+
+def test_an_attribute_cannot_be_preferred_twice() -> None:
+    with pytest.raises(ValueError, match="phrase_attributes names one twice: color, color"):
+        GenerationConfig(phrase_attributes=("color", "color"))
