@@ -106,7 +106,7 @@ def as_dot(plan: Plan) -> str:
         frame = 2 if number in critical else 0.5
         lines.append(f"  t{number} [shape=box, style=filled, fillcolor=gray85, penwidth={frame}, label={label}];")
     for number, place in enumerate(net.places):
-        text = "●" if net.initial[number] else f"{place.lag:g}" if place.lag else ""
+        text = "●" if net.initial[number] else f"{place.lag:.3g}" if place.lag else ""
         constraint = ", constraint=false" if place.kind == "idle" else ""
         lines.append(f"  p{number} [shape=circle, label={_quoted(text)}, tooltip={_quoted(place.kind)}];")
         lines.append(f"  t{place.source} -> p{number}; p{number} -> t{place.target} [style=solid{constraint}];")
