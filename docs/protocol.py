@@ -55,6 +55,7 @@ KEYS: tuple[tuple[str, str, str], ...] = (
         "`BlockProgress`, `SyncPointProgress`, `PredictionFeedback`, `WarningFeedback`",
     ),
     (keys.FRAGMENT_FEEDBACK, "generation → all", "`WarningFeedback`: what was refused, or done otherwise than asked"),
+    (keys.TURN_CLOSED, "generation → all", "`TurnClosed`"),
     (keys.SYNC_POINT, "control → realizer", "`SyncPointArrived`, `SyncPointReached`, `WordSpoken`"),
     (keys.ROBOT_ACTION, "control → recognition", "`ActionBegan`, `ActionEnded`"),
     (

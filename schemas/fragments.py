@@ -86,3 +86,20 @@ class FragmentOutcome(Outcome, frozen=True, kw_only=True, tag="fragment_outcome"
     choices: tuple[ReferenceChoice, ...] = ()
     warnings: tuple[str, ...] = ()
     fault: Fault | None = None
+
+
+class TurnClosed(Struct, frozen=True, kw_only=True, tag="turn_closed", omit_defaults=True):
+    """evt: generation. Once for each turn of the robot: all its fragments have ended, and its adjacency pair is decided.
+
+    turn: id of the fragment that opened it. aborted: barge-in, fault, cancellation or silence ended it; `reason`.
+    """
+
+    turn: str
+    addressee: str
+    status: Literal["done", "aborted"]
+    reason: str = ""
+    fragments: tuple[str, ...] = ()
+    spoken: tuple[SpokenText, ...] = ()
+    """Of all its fragments, in their order; speeches named `fragment:behavior`."""
+    events: tuple[ConnectionEvent, ...] = ()
+    """Each connection event of the turn in its last known state, by start."""

@@ -29,6 +29,7 @@ BEHAVIOR = f"{PREFIX}/cmd/control/behavior"
 
 FEEDBACK = f"{PREFIX}/evt/realizer/feedback"
 FRAGMENT_FEEDBACK = f"{PREFIX}/evt/generation/feedback"
+TURN_CLOSED = f"{PREFIX}/evt/generation/turn"
 SYNC_POINT = f"{PREFIX}/evt/control/sync_point"
 ROBOT_ACTION = f"{PREFIX}/evt/control/action"
 PERCEIVED_ACTION = f"{PREFIX}/evt/perception/action"

@@ -24,7 +24,7 @@ from schemas.body import (
 )
 from schemas.faults import Fault, InputRefused
 from schemas.feedback import BlockProgress, PredictionFeedback, SyncPointProgress, WarningFeedback
-from schemas.fragments import FragmentOutcome, PerformFragment
+from schemas.fragments import FragmentOutcome, PerformFragment, TurnClosed
 from schemas.presence import PeerAlive, PeerGone
 from schemas.recognition import (
     ConnectionEvent,
@@ -42,7 +42,7 @@ MAJOR = 1
 
 Message = (
     Accepted | Refused | Cancel | Unreadable | Fault
-    | PerformFragment | FragmentOutcome | Inhibit | InhibitionEnded | HeadOwner
+    | PerformFragment | FragmentOutcome | TurnClosed | Inhibit | InhibitionEnded | HeadOwner
     | PerformBlock | BlockOutcome | InterruptBehavior | BehaviorInterrupted
     | BlockProgress | SyncPointProgress | PredictionFeedback | WarningFeedback
     | PerformBehavior | AbortBehavior | GoHome | HomeReached | BehaviorOutcome

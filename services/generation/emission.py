@@ -30,8 +30,10 @@ from schemas.fragments import ReferenceChoice, TurnFragment
 from schemas.references import type_name
 from services.generation.config import GenerationConfig
 from services.generation.ordering import ordered
+from services.generation.parts import Names, Parts
 from services.generation.permits import Permits
-from services.generation.rewriting import Operator, Replacement, Rewriting, points_named
+from services.generation.rewriting import Operator, Rewriting, points_named
+from services.generation.trail import NOTHING, Stroke, Trail, stroke
 from services.generation.turn_policy import TurnPlan
 
 _LASTING = frozenset({"gaze", "face", "faceLexeme", "faceFacs", "posture", "event", "turn"})
@@ -39,9 +41,10 @@ _LASTING = frozenset({"gaze", "face", "faceLexeme", "faceFacs", "posture", "even
 
 
 class Emission(Struct, frozen=True):
-    """The block of a fragment; what of the input was left out, and why."""
+    """The block of a fragment; what it leaves for the next one; what of the input was left out, and why."""
 
     block: Block
+    trail: Trail
     warnings: tuple[str, ...]
 
 
@@ -52,80 +55,14 @@ def emit(
     config: GenerationConfig,
     permits: Permits,
     hands: Mapping[str, Hand] | None = None,
+    before: Trail = NOTHING,
 ) -> Emission:
     """The block that performs `fragment`.
 
     choices: one for each reference. hands: the one to point with, by reference; where it is left to the body, two
-    points count as of the same arm.
+    points count as of the same arm. before: what the turn's earlier fragments still have to do.
     """
-    return _Emitter(fragment, turn, choices, config, permits, hands or {}).emit()
-
-
-class _Parts:
-    """The behaviors that replace one reference."""
-
-    def __init__(
-        self, reference: Reference, choice: ReferenceChoice, names: "_Names", turn: TurnPlan, hand: Hand | None
-    ):
-        points = choice.gesture == "directed_gaze_with_pointing"
-        looks = choice.gesture != "none"
-        required, line = reference.required, reference.line
-        self.reference = reference
-        self.gaze = self.point = self.phrase = self.event = self.glance = ""
-        self.behaviors: list[BlockBehavior] = []
-        anchors: list[str] = []
-        if looks:
-            self.gaze = names.fresh(f"{reference.id}-gaze")
-            self.behaviors.append(Gaze(id=self.gaze, target=reference.target, required=required, line=line))
-            anchors.append(f"{self.gaze}:stroke")
-        if points:
-            self.point = names.fresh(f"{reference.id}-point")
-            self.behaviors.append(
-                Pointing(id=self.point, target=reference.target, mode=hand, required=required, line=line)
-            )
-            anchors.append(f"{self.point}:stroke")
-        if choice.phrase:
-            self.phrase = names.fresh(f"{reference.id}-phrase")
-            self.behaviors.append(Speech(id=self.phrase, text=choice.phrase, required=required, line=line))
-            anchors.append(f"{self.phrase}:start")
-        if looks and choice.gesture != "gaze":
-            self.event = names.fresh(f"{reference.id}-event")
-            self.behaviors.append(
-                Event(
-                    id=self.event,
-                    kind="directed_gaze",
-                    responder=turn.addressee,
-                    objects=(reference.target,),
-                    cause="reference",
-                    anchors=tuple(anchors),
-                    turn=turn.turn,
-                    timing=(Timing("start", f"{self.gaze}:start"),),
-                )
-            )
-
-    def replacement(self, *, gaze_leads: bool) -> Replacement:
-        start = (self.gaze or self.phrase, "start")
-        if gaze_leads and self.gaze and self.phrase:
-            start = (self.phrase, "start")
-        if self.phrase:
-            end = (self.phrase, "end")
-        else:
-            end = (self.point, "stroke_end") if self.point else (self.gaze, "stroke")
-        return Replacement(start, end, loose_start=gaze_leads and bool(self.gaze and self.phrase))
-
-
-class _Names:
-    """Ids nobody in the fragment uses."""
-
-    def __init__(self, fragment: TurnFragment) -> None:
-        self._taken = {behavior.id for behavior in fragment.behaviors}
-
-    def fresh(self, wish: str) -> str:
-        name, count = wish, 2
-        while name in self._taken:
-            name, count = f"{wish}-{count}", count + 1
-        self._taken.add(name)
-        return name
+    return _Emitter(fragment, turn, choices, config, permits, hands or {}, before).emit()
 
 
 class _Emitter:
@@ -137,16 +74,18 @@ class _Emitter:
         config: GenerationConfig,
         permits: Permits,
         hands: Mapping[str, Hand],
+        before: Trail,
     ) -> None:
         self.fragment, self.turn, self.config, self.permits, self.hands = fragment, turn, config, permits, hands
-        self.names = _Names(fragment)
+        self.before = before
+        self.names = Names(fragment)
         self.figure = config.profile == "figure-3.3"
         self.dropped = [behavior for behavior in fragment.behaviors if not permits.allows(behavior)]
         kept = [behavior for behavior in fragment.behaviors if permits.allows(behavior)]
         self.order = ordered(kept, fragment.constraints, fragment.id)
         chosen = {choice.reference: choice for choice in choices}
         self.parts = {
-            behavior.id: _Parts(
+            behavior.id: Parts(
                 behavior, chosen[behavior.id], self.names, turn, hands.get(behavior.id, permits.only_hand)
             )
             for behavior in self.order
@@ -158,23 +97,27 @@ class _Emitter:
             fragment=fragment.id,
             replacements={id: parts.replacement(gaze_leads=self.figure) for id, parts in self.parts.items()},
             dropped=frozenset(behavior.id for behavior in self.dropped),
+            begins=before.start,
         )
         self.constraints: list[Constraint] = []
         self.speeches = self._speeches()
-        self.last_gaze = ""
-        """The one before the end-of-turn gaze, if it may be told when to relax."""
+        self.last_gaze = self.last_glance = ""
+        """The one before the end-of-turn gaze, if it may be told when to relax; and the last glance."""
+        self.strokes: list[Stroke] = []
 
     def emit(self) -> Emission:
         for constraint in self.fragment.constraints:
             if (rewritten := self.rewriting.constraint(constraint)) is not None:
                 self.constraints.append(rewritten)
+        self._follow_the_turn()
         self._time_speeches_and_references()
         opening, closing = self._opening(), self._closing()
         behaviors = (*opening, *self._in_document_order(), *closing)
         block = Block(
             id=self.fragment.id, behaviors=behaviors, constraints=tuple(self.constraints), unread=self.fragment.unread
         )
-        return Emission(block, tuple(f"{behavior.id} is left out: inhibited" for behavior in self.dropped))
+        trail = Trail(self.speeches[-1] if self.speeches else "", self.last_glance, tuple(self.strokes))
+        return Emission(block, trail, tuple(f"{behavior.id} is left out: inhibited" for behavior in self.dropped))
 
     def _speeches(self) -> list[str]:
         """Ids of plain speeches and phrases, in order."""
@@ -201,11 +144,37 @@ class _Emitter:
             return msgspec.structs.replace(behavior, timing=timing, mode=self.permits.only_hand)
         return msgspec.structs.replace(behavior, timing=timing) if timing != behavior.timing else behavior
 
+    # -- what the turn is still at ---------------------------------------------------------------------------------
+
+    def _follow_the_turn(self) -> None:
+        """Nothing of the fragment begins before the words before it have ended, nor a stroke before its limb is free.
+
+        What nobody mentions follows the one before it of its type; naming it would let it go at once.
+        """
+        operators: list[Operator] = []
+        free: list[str] = []
+        types: set[str] = set()
+        for behavior in self.fragment.behaviors:
+            if isinstance(behavior, Reference) or not self.permits.allows(behavior):
+                continue
+            is_first = type_name(behavior) not in types
+            types.add(type_name(behavior))
+            if (made := stroke(behavior, self.permits.only_hand)) is not None:
+                self.strokes.append(made)
+            if is_first or behavior.id in self.named_behaviors:
+                free.append(f"{behavior.id}:start")
+                if made is not None:
+                    operators += [_after(sync, f"{behavior.id}:start") for sync in self.before.frees(made.limb)]
+        if self.before.start and free:
+            operators.insert(0, After(ref=self.before.start, syncs=tuple(free)))
+        if operators:
+            self.constraints.append(Constraint(id=self.names.fresh("turn-goes-on"), operators=tuple(operators)))
+
     # -- references and phrases -----------------------------------------------------------------------------------
 
     def _time_speeches_and_references(self) -> None:
-        preceding = ""  # id of the speech or phrase before; "": the block start stands for it
-        glance = ""
+        preceding = self.before.speech  # the speech or phrase before; "": the block start stands for it
+        glance = self.before.glance
         points: dict[Hand | None, str] = {}  # hand -> its last point
         gazes = 0
         last = self._last_reference()
@@ -213,16 +182,19 @@ class _Emitter:
             if isinstance(behavior, Reference):
                 parts = self.parts[behavior.id]
                 operators: list[Operator] = list(self.rewriting.inherited(behavior))
+                hand = self.hands.get(behavior.id, self.permits.only_hand)
+                if parts.point:
+                    operators += [_after(sync, f"{parts.point}:start") for sync in self.before.frees(hand)]
+                    self.strokes.append(Stroke(parts.point, hand))
                 if self.figure:
                     operators += self._as_in_the_figure(parts, preceding)
                 else:
-                    hand = self.hands.get(behavior.id)
                     operators += self._checking_back(parts, preceding, glance, points.get(hand, ""))
                     if parts.point:
                         points[hand] = parts.point
                         if behavior.id != last:
                             operators.append(self._glance(parts))
-                            glance = parts.glance
+                            glance = self.last_glance = parts.glance
                 if operators:
                     id = self.names.fresh(f"{behavior.id}-timing")
                     self.constraints.append(Constraint(id=id, operators=tuple(operators), line=behavior.line))
@@ -240,14 +212,15 @@ class _Emitter:
                 unnamed_follower = gazes > 1 and behavior.id not in self.named_behaviors
                 self.last_gaze = behavior.id if free and not unnamed_follower else ""
 
-    def _checking_back(self, parts: _Parts, preceding: str, glance: str, previous_point: str) -> list[Operator]:
+    def _checking_back(self, parts: Parts, preceding: str, glance: str, previous_point: str) -> list[Operator]:
         """Profile `check-back`, its lines in the order of docs/generation.md."""
         gaze, point, phrase, event = parts.gaze, parts.point, parts.phrase, parts.event
         operators: list[Operator] = []
         if phrase and preceding:
             operators.append(_after(f"{preceding}:end", f"{phrase}:start"))
         if gaze:
-            if preceding and (parts.reference.id, "start") not in self.named:
+            is_timed = (parts.reference.id, "start") in self.named
+            if preceding and (not is_timed or preceding == self.before.speech):
                 operators.append(_after(f"{preceding}:end", f"{gaze}:start"))
             if glance:
                 operators.append(_after(f"{glance}:stroke", f"{gaze}:start"))
@@ -266,17 +239,20 @@ class _Emitter:
                 operators.append(_after(f"{previous_point}:stroke_end", f"{point}:start"))
         return operators
 
-    def _glance(self, parts: _Parts) -> Operator:
+    def _glance(self, parts: Parts) -> Operator:
         parts.glance = self.names.fresh(f"{parts.reference.id}-glance")
         parts.behaviors.append(Gaze(id=parts.glance, target=self.turn.addressee))
         return _same(f"{parts.gaze}:relax", f"{parts.glance}:start")
 
-    def _as_in_the_figure(self, parts: _Parts, preceding: str) -> list[Operator]:
+    def _as_in_the_figure(self, parts: Parts, preceding: str) -> list[Operator]:
         """Profile `figure-3.3`: the gaze leads by a phrase, and the point is over when the phrase begins."""
         gaze, point, phrase = parts.gaze, parts.point, parts.phrase
         operators: list[Operator] = []
         if gaze and preceding:
-            operators.append(_same(f"{preceding}:start", f"{gaze}:stroke"))
+            # When an earlier fragment's words begin is not for this block to foresee: the gaze goes when they do.
+            follows = preceding == self.before.speech
+            relate, sync = (_after, "start") if follows else (_same, "stroke")
+            operators.append(relate(f"{preceding}:start", f"{gaze}:{sync}"))
         if point:
             operators.append(_same(f"{gaze}:stroke+{self.config.figure_lead:g}", f"{point}:stroke_start"))
             if phrase:
@@ -287,7 +263,7 @@ class _Emitter:
 
     def _keep_in_line(self, speech: Speech, preceding: str) -> None:
         """Speeches without timing follow one another by document order, but only while nothing names them; we do."""
-        if preceding and speech.id not in self.named_behaviors:
+        if preceding and preceding != self.before.speech and speech.id not in self.named_behaviors:
             start = f"{speech.id}:start"
             operator: Operator = (
                 _same(f"{preceding}:end", start) if self.figure else _after(f"{preceding}:end", start)
@@ -364,22 +340,24 @@ class _Emitter:
             if self.speeches:
                 operators.append(_same(f"{self.speeches[-1]}:end", f"{gaze}:start"))
             else:
-                operators += [_after(f"{id}:end", f"{gaze}:start") for id in self._with_an_end_of_their_own()]
+                operators += self._once_all_is_done(f"{gaze}:start")
             if self.last_gaze:
                 operators.append(_same(f"{self.last_gaze}:relax", f"{gaze}:start"))
             signal = msgspec.structs.replace(signal, timing=(Timing("start", f"{gaze}:start"),))
         if self.speeches:
             signal = msgspec.structs.replace(signal, timing=(Timing("start", f"{self.speeches[-1]}:end"),))
         elif not self._ends_with_gaze:
-            operators += [_after(f"{id}:end", f"{ended}:start") for id in self._with_an_end_of_their_own()]
+            operators += self._once_all_is_done(f"{ended}:start")
         closing.append(signal)
         if operators:
             self.constraints.append(Constraint(id=self.names.fresh("turn-timing"), operators=tuple(operators)))
         return closing
 
-    def _with_an_end_of_their_own(self) -> list[str]:
-        """Behaviors that end by themselves; a gaze or a face lasts until all of these have."""
-        return [behavior.id for behavior in self._in_document_order() if _ends_by_itself(behavior)]
+    def _once_all_is_done(self, sync: str) -> list[Operator]:
+        """After the last words of the turn, and all that ends by itself; a gaze or a face lasts until that has."""
+        ends = [self.before.start] if self.before.start else []
+        ends += [f"{behavior.id}:end" for behavior in self._in_document_order() if _ends_by_itself(behavior)]
+        return [_after(end, sync) for end in ends]
 
 
 def _ends_by_itself(behavior: BlockBehavior) -> bool:

@@ -15,7 +15,7 @@ from schemas.world import Entity, World
 
 
 def checked(fragment: TurnFragment, world: World, robot: str) -> TurnFragment:
-    """The fragment with its addressee filled in, as far as it says, and marks that look like offsets made explicit.
+    """The fragment with addressee and delay target filled in, and marks that look like offsets made explicit.
 
     robot: its actor id, which may be a target too. Raises InputRefused with JSON path and XML line of the first
     thing that is wrong, by itself or with regard to the world.
@@ -30,7 +30,7 @@ def checked(fragment: TurnFragment, world: World, robot: str) -> TurnFragment:
         if isinstance(behavior, Reference):
             _check_objects(fragment, index, behavior, known)
             _check_timing(fragment, index, behavior)
-    return replace(fragment, addressee=addressee(fragment, world))
+    return replace(fragment, addressee=addressee(fragment, world), delay_target=_away(fragment, world))
 
 
 def addressee(fragment: TurnFragment, world: World) -> str:
@@ -54,13 +54,20 @@ def addressee(fragment: TurnFragment, world: World) -> str:
     return people[0]
 
 
+def _away(fragment: TurnFragment, world: World) -> str:
+    """Where to look while it holds the turn: where it says, else at the first surface, away from the other's face."""
+    if not fragment.delay or fragment.delay_target:
+        return fragment.delay_target
+    return next((entity.id for entity in world.entities if entity.kind == "surface"), "")
+
+
 def _check_objects(fragment: TurnFragment, index: int, reference: Reference, known: Mapping[str, Entity]) -> None:
     objects = {id: entity for id, entity in known.items() if entity.kind == "object"}
     if reference.target not in objects:
         reason = f"the world does not know the object {reference.target!r}"
         path = f"$.behaviors[{index}].target"
         raise _refused(fragment, path, reason, reference.line, _nearest(reference.target, objects))
-    for number, option in enumerate(reference.options):
+    for number, option in enumerate(reference.options or ()):
         for place, distractor in enumerate(option.distractors):
             if distractor not in objects:
                 path = f"$.behaviors[{index}].options[{number}].distractors[{place}]"

@@ -4,8 +4,8 @@ from collections.abc import Iterator, Sequence
 
 from msgspec import Struct
 
-from schemas.behaviors import Gaze, Hand, Pointing
-from schemas.body import Estimate, EstimateItem
+from schemas.behaviors import BlockBehavior, Gaze, Hand, Pointing
+from schemas.body import BodyPose, Estimate, EstimateItem
 
 HERE = ""
 """Where the body is now, as the place a motion starts from."""
@@ -36,12 +36,44 @@ def hand_of(point: Estimate) -> Hand | None:
     return hands[0] if len(hands) == 1 else None
 
 
-def from_here(targets: Sequence[str], hand: Hand | None = None) -> tuple[EstimateItem, ...]:
-    """First question: a gaze and a point at each of the distinct `targets`, from where the body is."""
+class Pose(Struct, frozen=True):
+    """Where head and arms will be when what moves them now is on target; None: where they are."""
+
+    head: BodyPose | None = None
+    arms: BodyPose | None = None
+
+
+HERE_AND_NOW = Pose()
+
+
+def last_motions(moving: Sequence[BlockBehavior]) -> tuple[EstimateItem, ...]:
+    """Of what moves the head and the arms, in order: whatever comes last."""
+    points = [behavior for behavior in moving if isinstance(behavior, Pointing)]
+    gazes = [behavior for behavior in moving if not isinstance(behavior, Pointing)]
+    return tuple(EstimateItem(behavior=behavior) for behavior in (*gazes[-1:], *points[-1:]))
+
+
+def pose_after(items: Sequence[EstimateItem], answers: Sequence[Estimate]) -> Pose:
+    """answers: to `last_motions`."""
+    pose = Pose()
+    for item, answer in zip(items, answers, strict=True):
+        if isinstance(item.behavior, Pointing):
+            pose = Pose(pose.head, answer.pose_after)
+        else:
+            pose = Pose(answer.pose_after, pose.arms)
+    return pose
+
+
+def from_here(
+    targets: Sequence[str], hand: Hand | None = None, pose: Pose = HERE_AND_NOW
+) -> tuple[EstimateItem, ...]:
+    """First question: a gaze and a point at each of the distinct `targets`, from where the body is or will be."""
     items = []
     for target in targets:
-        items.append(EstimateItem(behavior=Gaze(id=f"gaze at {target}", target=target)))
-        items.append(EstimateItem(behavior=Pointing(id=f"point at {target}", target=target, mode=hand)))
+        gaze = Gaze(id=f"gaze at {target}", target=target)
+        point = Pointing(id=f"point at {target}", target=target, mode=hand)
+        items.append(EstimateItem(behavior=gaze, pose=pose.head))
+        items.append(EstimateItem(behavior=point, pose=pose.arms))
     return tuple(items)
 
 

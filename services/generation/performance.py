@@ -1,53 +1,32 @@
 """One fragment from its acceptance to its outcome: what runs, what it started, and when nothing of it is open."""
 
-from collections.abc import Iterable
-
 from msgspec import Struct
 
-from schemas.behaviors import Behavior, Event, Gaze, GazeShift, Hand, HeadDirectionShift, Pointing, TurnSignal
+from schemas.behaviors import (
+    Behavior,
+    BlockBehavior,
+    Event,
+    Gaze,
+    GazeShift,
+    Hand,
+    HeadDirectionShift,
+    Pointing,
+    TurnSignal,
+)
 from schemas.blocks import BlockOutcome, SpokenText
 from schemas.faults import Fault
 from schemas.feedback import SyncPointProgress
 from schemas.fragments import FragmentOutcome, PerformFragment, TurnFragment
-from schemas.recognition import ConnectionEvent
 from schemas.units import Seconds
 from services.generation.planning import Plan
+from services.generation.trail import NOTHING, Trail
+from services.generation.turn_events import TurnEvents
 from services.generation.turn_policy import TurnPlan
 
 AWAITED = ("directed_gaze", "mutual_facial_gaze")
 """Events that must be decided before the outcome. An adjacency pair may take as long as its answer."""
-
-
-class TurnEvents:
-    """The connection events of the robot's turns in their last known state."""
-
-    def __init__(self) -> None:
-        self._events: dict[str, ConnectionEvent] = {}
-        self._turn_of: dict[str, str] = {}
-        """Which turn each block belongs to."""
-
-    def expect(self, block: str, turn: str) -> None:
-        self._turn_of[block] = turn
-
-    def feed(self, event: ConnectionEvent) -> None:
-        # What is first heard of in a later state belongs to an earlier performance under the same id.
-        if event.block in self._turn_of and (event.state == "started" or event.id in self._events):
-            self._events[event.id] = event
-
-    def of(self, turn: str) -> tuple[ConnectionEvent, ...]:
-        """By start."""
-        events = [event for event in self._events.values() if self._turn_of[event.block] == turn]
-        return tuple(sorted(events, key=lambda event: event.started.seconds))
-
-    def at(self, block: str, behavior: str) -> ConnectionEvent | None:
-        mine = (event for event in reversed(self._events.values()) if event.block == block)
-        return next((event for event in mine if event.behavior == behavior), None)
-
-    def forget(self, turns: Iterable[str]) -> None:
-        """Keep only these turns."""
-        kept = set(turns)
-        self._turn_of = {block: turn for block, turn in self._turn_of.items() if turn in kept}
-        self._events = {id: event for id, event in self._events.items() if event.block in self._turn_of}
+Looks = Gaze | GazeShift | HeadDirectionShift
+"""What moves the head to look at something."""
 
 
 class Ended(Struct, frozen=True):
@@ -65,7 +44,7 @@ class Performance:
         self.request = request
         self.fragment = fragment
         self.turn = turn
-        self.block_id = f"{request.id}.block"
+        self.block_id = ""
         self.plan: Plan | None = None
         self.accepted = False
         self.refusal: Fault | None = None
@@ -73,6 +52,7 @@ class Performance:
         self.signalled_end = False
         """Has recognition been told that the turn is over?"""
         self._patience = patience
+        self._tries = 0
         self._warnings: list[str] = []
         self._behaviors: dict[str, Behavior] = {}
         self._running: dict[str, Behavior] = {}
@@ -83,11 +63,15 @@ class Performance:
         self._closed: set[str] = set()
         """Those that the realizer has ended."""
         self._forbidden: set[str] = set()
+        self._reached: set[tuple[str, str]] = set()
         self._ended: Ended | None = None
 
     def begin(self, plan: Plan) -> None:
+        """Its block is to be sent; again, if what it referred to had ended when it came."""
+        self._tries += 1
+        self.block_id = f"{self.request.id}.block" + (f"-{self._tries}" if self._tries > 1 else "")
         self.plan = plan
-        self._warnings += plan.warnings
+        self._warnings = list(plan.warnings)
         self._behaviors = {behavior.id: behavior for behavior in plan.block.behaviors}
 
     def feed(self, progress: SyncPointProgress) -> None:
@@ -95,9 +79,10 @@ class Performance:
         behavior = self._behaviors.get(progress.behavior)
         if behavior is None:
             return
+        self._reached.add((behavior.id, progress.sync))
         if progress.sync == "start":
             self._running[behavior.id] = behavior
-            if isinstance(behavior, Gaze | GazeShift | HeadDirectionShift):
+            if isinstance(behavior, Looks):
                 self._gaze = behavior.id
             elif isinstance(behavior, Event) and behavior.kind in AWAITED:
                 self._started.add(behavior.id)
@@ -110,16 +95,35 @@ class Performance:
                 self._gaze = ""
 
     @property
-    def gaze(self) -> Gaze | GazeShift | HeadDirectionShift | None:
+    def gaze(self) -> Looks | None:
         """What holds the head now. A shift holds it until the block ends."""
         behavior = self._behaviors.get(self._gaze) if self._ended is None else None
-        return behavior if isinstance(behavior, Gaze | GazeShift | HeadDirectionShift) else None
+        return behavior if isinstance(behavior, Looks) else None
+
+    def goes_on_with(self, other: "Performance") -> bool:
+        """Is it another fragment of the same turn, and its block on its way or being performed?"""
+        return self is not other and self.turn.turn == other.turn.turn and self.plan is not None and not self.is_over
+
+    @property
+    def trail(self) -> Trail:
+        """What the turn's next fragment has to follow."""
+        return self.plan.trail.pending(self.fragment.id, self._reached) if self.plan is not None else NOTHING
+
+    @property
+    def moving(self) -> tuple[BlockBehavior, ...]:
+        """Gazes and points that are not over, in order: they say where the body will be."""
+        return tuple(
+            behavior
+            for behavior in (self.plan.block.behaviors if self.plan is not None else ())
+            if isinstance(behavior, Looks | Pointing)
+            and not {(behavior.id, "relax"), (behavior.id, "end")} & self._reached
+        )
 
     def forbid(self, *, gaze: bool, hands: tuple[Hand, ...]) -> tuple[str, ...]:
         """Body requests under way that an inhibition forbids, each once. gaze, hands: what is still allowed."""
         ids = []
         for behavior in self._running.values():
-            looks = isinstance(behavior, Gaze | GazeShift | HeadDirectionShift)
+            looks = isinstance(behavior, Looks)
             points = isinstance(behavior, Pointing) and not (behavior.mode in hands or (hands and not behavior.mode))
             if ((looks and not gaze) or points) and behavior.id not in self._forbidden:
                 self._forbidden.add(behavior.id)
@@ -188,3 +192,23 @@ class Performance:
     def _decided(self, behavior: str, events: TurnEvents) -> bool:
         event = events.at(self.fragment.id, behavior)
         return behavior in self._closed if event is None else event.state != "started"
+
+
+class GazesOfFragments:
+    """Which gaze of a fragment has the head: of those that go on, the one that began last."""
+
+    def __init__(self) -> None:
+        self._gazes: dict[str, Looks] = {}
+        """By request, in the order of their starts."""
+
+    def follow(self, performance: Performance) -> None:
+        gaze, id = performance.gaze, performance.request.id
+        if gaze is None:
+            self._gazes.pop(id, None)
+        elif gaze is not self._gazes.get(id):
+            self._gazes.pop(id, None)
+            self._gazes[id] = gaze
+
+    @property
+    def holder(self) -> Looks | None:
+        return next(reversed(self._gazes.values()), None)

@@ -2,11 +2,11 @@
 
 from collections.abc import Iterator, Mapping
 
-import msgspec
 from msgspec import Struct
+from msgspec.structs import replace
 
 from schemas.behaviors import After, Before, Behavior, Constraint, Synchronize, Timing
-from schemas.syncref import SyncRef
+from schemas.syncref import BLOCK_ITSELF, SyncRef
 
 Operator = Synchronize | Before | After
 
@@ -24,15 +24,21 @@ class Replacement(Struct, frozen=True):
 
 
 class Rewriting(Struct, frozen=True, kw_only=True):
+    """begins: the sync point of another block that stands for the start of this one; "": it begins by itself."""
+
     fragment: str
     replacements: Mapping[str, Replacement]
     dropped: frozenset[str] = frozenset()
+    begins: str = ""
 
     def text(self, text: str) -> str | None:
         """A sync reference as the block must have it; None if what it names was dropped."""
         ref = self._parse(text)
         if ref is None:
             return text
+        if ref.behavior in ("", BLOCK_ITSELF):
+            begins = SyncRef.parse(self.begins) if self.begins and ref.sync != "end" else ref
+            return text if begins is ref else str(replace(begins, offset=ref.offset))
         if ref.behavior in self.dropped:
             return None
         replacement = self.replacements.get(ref.behavior)
@@ -44,7 +50,7 @@ class Rewriting(Struct, frozen=True, kw_only=True):
     def constraint(self, constraint: Constraint) -> Constraint | None:
         """None if nothing is left of it."""
         operators = tuple(new for old in constraint.operators for new in self._operators(old))
-        return msgspec.structs.replace(constraint, operators=operators) if operators else None
+        return replace(constraint, operators=operators) if operators else None
 
     def timing(self, behavior: Behavior) -> tuple[Timing, ...]:
         """The inline timing of a behavior that stays."""
@@ -68,7 +74,7 @@ class Rewriting(Struct, frozen=True, kw_only=True):
         reference = self.text(operator.ref)
         syncs = tuple(text for sync in operator.syncs if (text := self.text(sync)) is not None)
         if reference is not None and syncs:
-            yield msgspec.structs.replace(operator, ref=reference, syncs=syncs)
+            yield replace(operator, ref=reference, syncs=syncs)
 
     def _synchronize(self, operator: Synchronize) -> Iterator[Operator]:
         members = [member for member in (operator.ref, *operator.syncs) if member]
@@ -88,11 +94,11 @@ class Rewriting(Struct, frozen=True, kw_only=True):
         return replacement is not None and replacement.loose_start
 
     def _parse(self, text: str) -> SyncRef | None:
-        """None for what is not a behavior of this fragment."""
+        """None for what is not of this fragment."""
         if not text:
             return None
         ref = SyncRef.parse(text)
-        return ref if ref.behavior and ref.block in ("", self.fragment) else None
+        return ref if ref.block in ("", self.fragment) else None
 
 
 def points_named(

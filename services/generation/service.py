@@ -1,27 +1,18 @@
 """The generation service: fragments, people and the body in; blocks, outcomes and the owner of the head out."""
 
 import asyncio
-from collections.abc import Sequence
+from collections.abc import Collection
+from functools import reduce
 
 from schemas import keys
 from schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost
 from schemas.attention import HeadOwner, Inhibit, InhibitionEnded
 from schemas.behaviors import GazeShift, TurnSignal
 from schemas.blocks import BlockOutcome, PerformBlock
-from schemas.body import (
-    AbortBehavior,
-    Capabilities,
-    DescribeBody,
-    Estimate,
-    EstimateBehaviors,
-    EstimateItem,
-    Estimates,
-    RobotState,
-)
-from schemas.faults import EngageError, Fault, InputRefused, NoReply, RunFailed
+from schemas.body import AbortBehavior, RobotState
+from schemas.faults import EngageError, Fault, InputRefused, RunFailed
 from schemas.feedback import SyncPointProgress, WarningFeedback, WarningKind
 from schemas.fragments import PerformFragment
-from schemas.messages import Message
 from schemas.presence import PeerGone
 from schemas.recognition import ConnectionEvent, SignalTurn, Statistics
 from schemas.requests import Cancel, Unreadable
@@ -29,14 +20,16 @@ from schemas.units import Seconds
 from schemas.world import World
 from services.bus import Bus, Received
 from services.generation.arbiter import Arbiter, Shift
+from services.generation.body_link import BodyLink
 from services.generation.config import GenerationConfig
 from services.generation.fragment_check import checked
 from services.generation.leases import Leases
-from services.generation.motions import Motions, collect, distinct, from_each_other, from_here
-from services.generation.performance import Performance, TurnEvents
+from services.generation.performance import GazesOfFragments, Performance
 from services.generation.planning import plan, targets
+from services.generation.trail import NOTHING, Trail
+from services.generation.turn_events import TurnEvents, TurnOutcomes
 from services.generation.turn_policy import Aborted, TurnPolicy
-from services.requests import RequestDesk, Requester, RequestRefused
+from services.requests import Pending, RequestDesk, Requester, RequestRefused
 from services.runtime import Ready
 
 NAME = "generation"
@@ -73,13 +66,17 @@ class _Generation:
         self._arbiter = Arbiter(bus.robot, config)
         self._leases = Leases(config)
         self._events = TurnEvents()
+        self._outcomes = TurnOutcomes(self._events, config.decision_patience)
+        self._gazes = GazesOfFragments()
         self._world: World | None = None
-        self._body: Capabilities | None = None
+        self._body = BodyLink(bus, config.body_patience)
         self._early: dict[str, tuple[PerformFragment, Seconds]] = {}
         """Fragments that came before the first report of the world, and when they give up."""
         self._live: dict[str, Performance] = {}
         """By request id: from acceptance to outcome."""
         self._line: asyncio.Queue[Performance] = asyncio.Queue()
+        self._blocks: dict[asyncio.Task[None], str] = {}
+        """What waits for the end of a fragment's block, and of which turn that is."""
         self._changed = asyncio.Event()
         self._session = f"{bus.name}@{bus.now():.6f}"
         """Makes request ids of our own unique after a restart."""
@@ -125,7 +122,7 @@ class _Generation:
             case Unreadable(id=id, fault=fault):
                 self._warn(id, "PARSING_FAILURE", str(fault))
             case PeerGone(participant="control"):
-                self._body = None  # another may come
+                self._body.forget()
         self._after(now)
 
     def _admit(self, request: PerformFragment, now: Seconds) -> None:
@@ -140,10 +137,12 @@ class _Generation:
             self._warn(request.fragment.id, "PARSING_FAILURE", str(error.fault))
             return
         performance = Performance(request, fragment, turn, self._config.decision_patience)
+        if (displaced := self._outcomes.expect(fragment.id, turn)) is not None:
+            self._bus.publish(keys.TURN_CLOSED, displaced)
         self._events.expect(fragment.id, turn.turn)
-        if any(not each.is_over for each in self._live.values()):
+        if any(not each.is_over and each.turn.turn != turn.turn for each in self._live.values()):
             self._accept(performance)
-        # The first in line is accepted with its block: what the realizer finds impossible is refused here, too.
+        # What need not wait is accepted with its block: what the realizer finds impossible is refused here, too.
         self._live[request.id] = performance
         self._line.put_nowait(performance)
 
@@ -176,16 +175,21 @@ class _Generation:
         if not named:
             return
         performance = min(named, key=lambda each: each.is_over)  # an ended one may still hear of its events
-        before = performance.gaze
         performance.feed(progress)
-        gaze = performance.gaze
-        if gaze is not None and gaze is not before:
-            if isinstance(gaze, GazeShift):
-                self._arbiter.fragment_shifts(gaze.target)
-            else:
-                self._arbiter.fragment_gazes(gaze.target)
-        elif gaze is None and before is not None:
+        if performance.signalled_end:
+            self._turns.turn_ended(performance.turn.turn)
+        self._follow_gaze(performance)
+
+    def _follow_gaze(self, performance: Performance) -> None:
+        before = self._gazes.holder
+        self._gazes.follow(performance)
+        gaze = self._gazes.holder
+        if gaze is None and before is not None:
             self._arbiter.fragment_lets_go()
+        elif isinstance(gaze, GazeShift) and gaze is not before:
+            self._arbiter.fragment_shifts(gaze.target)
+        elif gaze is not None and gaze is not before:
+            self._arbiter.fragment_gazes(gaze.target)
 
     def _cancel(self, cancel: Cancel) -> None:
         """On request, or because the requester is gone."""
@@ -196,10 +200,9 @@ class _Generation:
         elif self._early.pop(cancel.id, None):
             self._desk.refuse(cancel.id, Fault(reason="cancelled", where=cancel.id))
         elif performance := self._live.get(cancel.id):
-            aborted = self._turns.fragment_ended(
-                performance.fragment.id, complete=False, now=now, reason=cancel.reason or "cancelled"
-            )
-            self._interrupt(performance, cancel.reason or "cancelled", now)
+            reason = cancel.reason or "cancelled"
+            aborted = self._turns.fragment_ended(performance.fragment.id, complete=False, now=now, reason=reason)
+            self._interrupt({performance.fragment.id, *(aborted.fragments if aborted else ())}, reason, now)
             self._abort(aborted, now)
         self._after(now)
 
@@ -216,7 +219,7 @@ class _Generation:
                 self._after(self._bus.now())
 
     def _deadline(self) -> Seconds | None:
-        due = [self._turns.deadline, self._arbiter.deadline, self._leases.deadline]
+        due = [self._turns.deadline, self._outcomes.deadline, self._arbiter.deadline, self._leases.deadline]
         due += [performance.deadline for performance in self._live.values()]
         due += [until for _, until in self._early.values()]
         return min((each for each in due if each is not None), default=None)
@@ -236,11 +239,16 @@ class _Generation:
             self._enforce_inhibitions(performance)
             if performance.refusal is not None:
                 del self._live[performance.request.id]
+                self._outcomes.refuse(performance.fragment.id, performance.turn)
                 self._refuse(performance.request.id, performance.refusal)
             elif (outcome := performance.outcome(self._events, now)) is not None:
                 del self._live[performance.request.id]
+                self._outcomes.end(outcome, performance.turn, now)
                 self._desk.end(outcome)
-        self._events.forget({each.turn.turn for each in self._live.values()} | {self._turns.open_turn})
+        going = {each.turn.turn for each in self._live.values()} | {self._turns.open_turn}
+        for closed in self._outcomes.closed(going, now):
+            self._bus.publish(keys.TURN_CLOSED, closed)
+        self._events.forget({*going, *self._outcomes.turns})
         self._rule(now)
         self._changed.set()
 
@@ -275,73 +283,105 @@ class _Generation:
         for id in performance.forbid(gaze=permits.gaze, hands=permits.hands):
             self._bus.publish(keys.BEHAVIOR, AbortBehavior(id=id, requester=self._bus.name))
 
-    # -- fragments, one after the other ---------------------------------------------------------------------------
+    # -- fragments: those of a turn at once, turns one after the other --------------------------------------------
 
     async def perform_in_order(self) -> None:
-        while True:
-            performance = await self._line.get()
-            if not performance.is_over:
-                await self._perform(performance)
-            self._after(self._bus.now())
+        """Send each fragment's block as soon as the turn before has ended: what it is to follow stands in it."""
+        async with asyncio.TaskGroup() as tasks:
+            while True:
+                performance = await self._line.get()
+                turn = performance.turn.turn
+                if before := [block for block, its in self._blocks.items() if its != turn]:
+                    await asyncio.wait(before)
+                if not performance.is_over and (pending := await self._begin(performance)) is not None:
+                    block = tasks.create_task(self._await_end(performance, pending), name=performance.block_id)
+                    self._blocks[block] = turn
+                    block.add_done_callback(self._blocks.pop)
+                self._after(self._bus.now())
 
-    async def _perform(self, performance: Performance) -> None:
-        fragment = performance.fragment
+    async def _begin(self, performance: Performance) -> Pending | None:
+        """The request for its block, accepted; None if nothing comes of it."""
+        fragment, turn = performance.fragment, performance.turn
         self._arbiter.stop_thinking()
-        self._arbiter.speak_to(performance.turn.addressee)
+        self._arbiter.speak_to(turn.addressee)
+        permits = self._leases.permits
         try:
-            motions = await self._ask_body(targets(fragment))
-            if performance.is_over:  # cancelled meanwhile
-                return
-            assert self._world is not None
-            performance.begin(
-                plan(
-                    fragment, performance.turn, self._world, self._body, motions, self._leases.permits(), self._config
-                )
-            )
-            outcome = await self._perform_block(performance)
-            performance.end_with(outcome, self._bus.now())
+            while True:
+                company = [each for each in self._live.values() if each.goes_on_with(performance)]
+                moving = [behavior for each in company for behavior in each.moving]
+                motions = await self._body.motions(targets(fragment), permits().only_hand, moving)
+                if performance.is_over:  # cancelled meanwhile
+                    return None
+                assert self._world is not None
+                body = self._body.capabilities
+                if body is not None:
+                    self._arbiter.gaze_perceived_within(body.gaze_half_angle)
+                before = reduce(Trail.then, (each.trail for each in company), NOTHING)
+                performance.begin(plan(fragment, turn, self._world, body, motions, permits(), self._config, before))
+                try:
+                    return await self._send_block(performance)
+                except RequestRefused:
+                    if not any(each.is_over for each in company):
+                        raise
+                    # It has named blocks that ended while it was on its way: once more, without them.
         except RequestRefused as error:
             performance.refuse(error.fault, self._bus.now())  # the realizer did
         except EngageError as error:
             performance.end(self._bus.now(), "failed", fault=error.fault)
-        now = self._bus.now()
-        self._arbiter.fragment_lets_go()
-        complete = performance.status == "done"
-        aborted = self._turns.fragment_ended(
-            fragment.id, complete=complete, now=now, reason=f"{fragment.id} {performance.status}"
-        )
-        self._abort(aborted, now, performance)
-        if complete and self._turns.thinks_after(fragment):
-            self._arbiter.think(fragment.delay_target)
+        self._block_ended(performance)
+        return None
 
-    async def _perform_block(self, performance: Performance) -> BlockOutcome:
+    async def _send_block(self, performance: Performance) -> Pending:
         assert performance.plan is not None
-        for message in performance.plan.warnings:
-            self._warn(performance.fragment.id, "POLICY", message)
         request = PerformBlock(id=performance.block_id, requester=self._bus.name, block=performance.plan.block)
+        self._turns.fragment_begins(performance.turn.turn)
         pending = self._requests.send(keys.BLOCK, request)
         await pending.accepted
         self._accept(performance)
-        outcome = await pending.outcome
-        if not isinstance(outcome, BlockOutcome):
-            raise RunFailed(Fault(reason=f"the realizer answered {type(outcome).__name__}", where=request.id))
-        return outcome
+        for message in performance.plan.warnings:
+            self._warn(performance.fragment.id, "POLICY", message)
+        return pending
 
-    def _interrupt(self, performance: Performance, reason: str, now: Seconds) -> None:
-        if performance.plan is not None:
-            self._requests.cancel(performance.block_id, reason)
-        else:
-            performance.end(now, "interrupted", fault=Fault(reason=reason, where=performance.fragment.id))
+    async def _await_end(self, performance: Performance, pending: Pending) -> None:
+        try:
+            outcome = await pending.outcome
+            if not isinstance(outcome, BlockOutcome):
+                reason = f"the realizer answered {type(outcome).__name__}"
+                raise RunFailed(Fault(reason=reason, where=performance.block_id))
+            performance.end_with(outcome, self._bus.now())
+        except EngageError as error:
+            performance.end(self._bus.now(), "failed", fault=error.fault)
+        self._block_ended(performance)
+        self._after(self._bus.now())
 
-    def _abort(self, aborted: Aborted | None, now: Seconds, cause: Performance | None = None) -> None:
-        """A turn has ended early: so have its fragments in line, and recognition learns of it."""
+    def _block_ended(self, performance: Performance) -> None:
+        """Or there will be none."""
+        now, fragment = self._bus.now(), performance.fragment
+        self._follow_gaze(performance)
+        complete = performance.status == "done"
+        reason = f"{fragment.id} {performance.status}"
+        self._abort(self._turns.fragment_ended(fragment.id, complete=complete, now=now, reason=reason), now)
+        if target := self._turns.averted_to:
+            self._arbiter.think(target)
+
+    def _interrupt(self, fragments: Collection[str], reason: str, now: Seconds) -> None:
+        """The latest first: what follows the words of another must not begin because those end."""
+        for performance in reversed(self._live.values()):
+            if performance.is_over or performance.fragment.id not in fragments:
+                continue
+            if performance.plan is not None:
+                self._requests.cancel(performance.block_id, reason)
+            else:
+                performance.end(now, "interrupted", fault=Fault(reason=reason, where=performance.fragment.id))
+
+    def _abort(self, aborted: Aborted | None, now: Seconds) -> None:
+        """A turn has ended early: so have its fragments, and recognition learns of it."""
         if aborted is None:
             return
         self._arbiter.stop_thinking()
-        for performance in list(self._live.values()):
-            if performance.fragment.id in aborted.fragments and performance is not cause:
-                self._interrupt(performance, aborted.reason, now)
-        if cause is not None and (cause.signalled_end or cause.plan is None):
+        self._outcomes.abort(aborted)
+        self._interrupt(aborted.fragments, aborted.reason, now)
+        if not aborted.is_known:
             return
         self._signals += 1
         id = f"turn-aborted-{self._signals}"
@@ -350,36 +390,3 @@ class _Generation:
             id=f"{self._session}/{id}", requester=self._bus.name, signal=signal, at=self._bus.stamp(now)
         )
         self._requests.send(keys.TURN, request)
-
-    # -- what the body says ---------------------------------------------------------------------------------------
-
-    async def _ask_body(self, sequence: Sequence[str]) -> Motions:
-        """Costs, rays and poses of everything the references could need. Raises NoReply without a body."""
-        if not sequence:
-            return Motions({}, {})
-        if self._body is None:
-            described = await self._ask(keys.DESCRIBE, DescribeBody())
-            if isinstance(described, Capabilities):
-                self._body = described
-                self._arbiter.gaze_perceived_within(described.gaze_half_angle)
-        hand = self._leases.permits().only_hand
-        here = await self._estimates(from_here(distinct(sequence), hand))
-        return collect(sequence, here, await self._estimates(from_each_other(sequence, here, hand)))
-
-    async def _estimates(self, items: tuple[EstimateItem, ...]) -> tuple[Estimate, ...]:
-        if not items:
-            return ()
-        answer = await self._ask(keys.ESTIMATE, EstimateBehaviors(items=items))
-        if not isinstance(answer, Estimates) or len(answer.items) != len(items):
-            raise RunFailed(Fault(reason="the body's estimates do not fit the question", where=keys.ESTIMATE))
-        return answer.items
-
-    async def _ask(self, key: str, question: Message) -> Message:
-        """Once more and again, while a body may still come up."""
-        until = self._bus.now() + self._config.body_patience
-        while True:
-            try:
-                return await self._bus.query(key, question)
-            except NoReply:
-                if self._bus.now() >= until:
-                    raise

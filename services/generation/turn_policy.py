@@ -47,12 +47,16 @@ class TurnPlan(Struct, frozen=True, kw_only=True):
 
 
 class Aborted(Struct, frozen=True):
-    """A turn that ended early. fragments: those of it not yet ended, in order."""
+    """A turn that ended early. fragments: those of it not yet ended, in order.
+
+    is_known: it had begun and was not over, so recognition has to be told.
+    """
 
     turn: str
     addressee: str
     fragments: tuple[str, ...]
     reason: str
+    is_known: bool = False
 
 
 def plan_turn(fragment: TurnFragment, turn: str, addressee: str) -> TurnPlan:
@@ -81,10 +85,16 @@ class TurnPolicy:
         """The turn that the next fragment would continue."""
         self._live: dict[str, TurnPlan] = {}
         """Fragments accepted and not ended, in order."""
+        self._begun: dict[str, bool] = {}
+        """Turns of which a block was sent, and whether their end was signalled."""
+        self._delay_target = ""
+        """Of the last fragment."""
         self._silent_since: Seconds | None = None
         self._robot_speaks = False
-        self._interrupters: dict[str, Seconds] = {}
-        """People who began to speak while the robot spoke, and when."""
+        self._spoke_in = ""
+        """The turn of the robot's last words."""
+        self._interrupters: dict[str, Seconds | None] = {}
+        """People who began to speak within the robot's turn, and since when he speaks too."""
 
     @property
     def open_turn(self) -> str:
@@ -92,7 +102,13 @@ class TurnPolicy:
 
     @property
     def holds_the_turn(self) -> bool:
-        return self._open is not None or any(not plan.backchannel for plan in self._live.values())
+        return self._current is not None
+
+    @property
+    def _current(self) -> TurnPlan | None:
+        """The turn that the robot has, until its end is signalled. A backchannel is said in the other's."""
+        plans = (*self._live.values(), *([self._open] if self._open else []))
+        return next((plan for plan in plans if not plan.backchannel and not self._begun.get(plan.turn)), None)
 
     def accept(self, fragment: TurnFragment, addressee: str) -> TurnPlan:
         """Take a fragment into the conversation. Raises InputRefused, and changes nothing, where it is illegal.
@@ -100,8 +116,8 @@ class TurnPolicy:
         addressee: may be empty for the rest of a turn.
         """
         status = fragment.turn_status
-        if fragment.id in self._live:
-            reason = "a fragment with this id is being performed"
+        if fragment.id in {*self._live, *(plan.turn for plan in self._live.values()), self.open_turn}:
+            reason = "a fragment or turn of this id goes on"
             raise _illegal(fragment, "id", reason, "give every fragment its own id")
         if status in ("middle", "end"):
             if self._open is None:
@@ -122,12 +138,23 @@ class TurnPolicy:
             turn = fragment.id
         plan = plan_turn(fragment, turn, addressee)
         self._live[fragment.id] = plan
+        self._delay_target = fragment.delay_target if fragment.delay else ""
         if status == "beginning":
             self._open = plan
         elif status == "end":
             self._open = None
         self._silent_since = None
         return plan
+
+    def fragment_begins(self, turn: str) -> None:
+        """The block of a fragment of `turn` is on its way."""
+        self._begun.setdefault(turn, False)
+
+    def turn_ended(self, turn: str) -> None:
+        """Its last words were said and its end signalled; the last block may go on for a moment."""
+        if turn in self._begun:
+            self._begun[turn] = True
+            self._interrupters.clear()
 
     def fragment_ended(self, id: str, *, complete: bool, now: Seconds, reason: str = "") -> Aborted | None:
         """The fragment's block is over. Unless it was performed to its end its turn is aborted."""
@@ -138,43 +165,57 @@ class TurnPolicy:
             return self._abort(plan, reason)
         if self._open is not None and not self._live:
             self._silent_since = now
+        self._forget()
         return None
 
-    def thinks_after(self, fragment: TurnFragment) -> bool:
-        """Is the gaze to be averted now, until the next fragment of this turn?"""
-        return fragment.delay and bool(fragment.delay_target) and self._open is not None and not self._live
+    @property
+    def averted_to(self) -> str:
+        """Where the robot looks to think, now that nothing of its open turn is performed; "": it does not think."""
+        return self._delay_target if self._open is not None and not self._live else ""
 
     def feed(self, message: ActionBegan | ActionEnded, now: Seconds) -> None:
-        """Who speaks: a person who talks into the robot's speech for long takes the turn."""
+        """Who speaks: whoever is spoken to and talks into the robot's turn for long takes it.
+
+        Between two of its utterances nobody is talked into: that counts again from where the robot goes on.
+        """
         if message.action != "speak":
             return
-        began = isinstance(message, ActionBegan)
+        began, current = isinstance(message, ActionBegan), self._current
         if message.actor == self._robot:
             self._robot_speaks = began
-            if not began:
-                self._interrupters.clear()
+            if began and current is not None:
+                self._spoke_in = current.turn
+                since = {actor: now if at is None else at for actor, at in self._interrupters.items()}
+                self._interrupters.update(since)
         elif not began:
             self._interrupters.pop(message.actor, None)
-        elif self._robot_speaks:
-            self._interrupters[message.actor] = now
+        elif current is not None and current.addressee == message.actor and self._spoke_in == current.turn:
+            self._interrupters[message.actor] = now if self._robot_speaks else None
 
     @property
     def deadline(self) -> Seconds | None:
-        due = [began + self._config.barge_in for began in self._interrupters.values()] if self._live else []
+        due = [began + self._config.barge_in for began in self._talked_into.values()]
         if self._silent_since is not None:
             due.append(self._silent_since + self._config.turn_silence)
         return min(due, default=None)
+
+    @property
+    def _talked_into(self) -> dict[str, Seconds]:
+        """Since when people talk into what the robot says now."""
+        if not self._robot_speaks or not self._live:
+            return {}
+        return {actor: began for actor, began in self._interrupters.items() if began is not None}
 
     def tick(self, now: Seconds) -> Aborted | None:
         """What silence or a barge-in has ended by `now`."""
         if self._silent_since is not None and now >= self._silent_since + self._config.turn_silence:
             assert self._open is not None
             return self._abort(self._open, f"silence for {self._config.turn_silence:g} s")
-        for actor, began in self._interrupters.items():
+        for actor, began in self._talked_into.items():
             if now >= began + self._config.barge_in:
+                current = self._current
                 self._interrupters.clear()
-                interrupted = next((plan for plan in self._live.values() if plan.addressee == actor), None)
-                return self._abort(interrupted, f"{actor} took the floor") if interrupted else None
+                return self._abort(current, f"{actor} took the floor") if current else None
         return None
 
     def _abort(self, plan: TurnPlan, reason: str) -> Aborted:
@@ -184,7 +225,16 @@ class TurnPolicy:
         ended = tuple(id for id, live in self._live.items() if live.turn == plan.turn)
         for id in ended:
             del self._live[id]
-        return Aborted(plan.turn, plan.addressee, ended, reason)
+        is_known = self._begun.get(plan.turn) is False
+        self._forget()
+        return Aborted(plan.turn, plan.addressee, ended, reason, is_known)
+
+    def _forget(self) -> None:
+        """What no longer concerns anybody: who talks into a turn that is over, and what became of it."""
+        kept = {plan.turn for plan in self._live.values()} | {self.open_turn}
+        self._begun = {turn: is_over for turn, is_over in self._begun.items() if turn in kept}
+        if self._current is None or self._current.turn != self._spoke_in:
+            self._interrupters.clear()
 
 
 def vain_delay(fragment: TurnFragment) -> tuple[str, ...]:
@@ -194,7 +244,7 @@ def vain_delay(fragment: TurnFragment) -> tuple[str, ...]:
     if fragment.delay and fragment.turn_status not in ("beginning", "middle"):
         return (f"delay: after {fragment.turn_status!r} there is no turn to hold",)
     if fragment.delay and not fragment.delay_target:
-        return ("delay without delayTarget: the gaze stays where it is",)
+        return ("delay: the world has no surface to look at; name a delayTarget",)
     return ()
 
 

@@ -205,11 +205,33 @@ def test_somebody_else_talking_does_not_end_the_turn() -> None:
 
 def test_the_robot_thinks_only_within_an_open_turn_with_nothing_in_line() -> None:
     turns = policy()
-    hold = fragment("a", "beginning", delay=True, delay_target="table")
-    turns.accept(hold, "human")
+    turns.accept(fragment("a", "beginning", delay=True, delay_target="table"), "human")
+    meanwhile = turns.averted_to
     turns.fragment_ended("a", complete=True, now=1.0)
-    assert turns.thinks_after(hold)
+    assert (meanwhile, turns.averted_to) == ("", "table")
 
-    turns.accept(fragment("b", "end"), "human")
-    assert not turns.thinks_after(hold)
-    assert not turns.thinks_after(fragment("b", "end", delay=True, delay_target="table"))
+    turns.accept(fragment("b", "end", delay=True, delay_target="table"), "human")
+    assert turns.averted_to == ""
+    turns.fragment_ended("b", complete=True, now=2.0)
+    assert turns.averted_to == ""
+
+
+def test_it_is_the_last_fragment_that_asks_for_time_to_think_whichever_ends_last() -> None:
+    turns = policy()
+    turns.accept(fragment("a", "beginning"), "human")
+    turns.accept(fragment("b", "middle", delay=True, delay_target="table"), "human")
+    turns.fragment_ended("b", complete=True, now=1.0)
+    still_busy = turns.averted_to
+    turns.fragment_ended("a", complete=True, now=2.0)
+
+    assert (still_busy, turns.averted_to) == ("", "table")
+
+
+def test_a_fragment_without_delay_ends_the_thinking() -> None:
+    turns = policy()
+    turns.accept(fragment("a", "beginning", delay=True, delay_target="table"), "human")
+    turns.accept(fragment("b", "middle"), "human")
+    for id in ("a", "b"):
+        turns.fragment_ended(id, complete=True, now=1.0)
+
+    assert turns.averted_to == ""

@@ -1,0 +1,70 @@
+"""What generation asks the body: what it is, and what the motions of references would cost."""
+
+from collections.abc import Sequence
+
+from schemas import keys
+from schemas.behaviors import BlockBehavior, Hand
+from schemas.body import Capabilities, DescribeBody, Estimate, EstimateBehaviors, EstimateItem, Estimates
+from schemas.faults import Fault, NoReply, RunFailed
+from schemas.messages import Message
+from schemas.units import Seconds
+from services.bus import Bus
+from services.generation.motions import (
+    Motions,
+    collect,
+    distinct,
+    from_each_other,
+    from_here,
+    last_motions,
+    pose_after,
+)
+
+
+class BodyLink:
+    """capabilities: what the body last said of itself. patience: how long one may take to come up."""
+
+    def __init__(self, bus: Bus, patience: Seconds) -> None:
+        self.capabilities: Capabilities | None = None
+        self._bus = bus
+        self._patience = patience
+
+    def forget(self) -> None:
+        """It is gone; another may come."""
+        self.capabilities = None
+
+    async def motions(
+        self, sequence: Sequence[str], hand: Hand | None, moving: Sequence[BlockBehavior] = ()
+    ) -> Motions:
+        """Costs, rays and poses of all that references to the `sequence` of targets could need.
+
+        hand: the only one allowed, if so. moving: what goes on, in order; it will be on target before. Raises
+        NoReply without a body.
+        """
+        if not sequence:
+            return Motions({}, {})
+        if self.capabilities is None:
+            described = await self._ask(keys.DESCRIBE, DescribeBody())
+            if isinstance(described, Capabilities):
+                self.capabilities = described
+        last = last_motions(moving)
+        pose = pose_after(last, await self._estimates(last))
+        here = await self._estimates(from_here(distinct(sequence), hand, pose))
+        return collect(sequence, here, await self._estimates(from_each_other(sequence, here, hand)))
+
+    async def _estimates(self, items: tuple[EstimateItem, ...]) -> tuple[Estimate, ...]:
+        if not items:
+            return ()
+        answer = await self._ask(keys.ESTIMATE, EstimateBehaviors(items=items))
+        if not isinstance(answer, Estimates) or len(answer.items) != len(items):
+            raise RunFailed(Fault(reason="the body's estimates do not fit the question", where=keys.ESTIMATE))
+        return answer.items
+
+    async def _ask(self, key: str, question: Message) -> Message:
+        """Once more and again, while a body may still come up."""
+        until = self._bus.now() + self._patience
+        while True:
+            try:
+                return await self._bus.query(key, question)
+            except NoReply:
+                if self._bus.now() >= until:
+                    raise

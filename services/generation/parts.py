@@ -1,0 +1,73 @@
+"""The behaviors that replace one reference, and ids that nobody in the fragment uses."""
+
+from schemas.behaviors import BlockBehavior, Event, Gaze, Hand, Pointing, Reference, Speech, Timing
+from schemas.fragments import ReferenceChoice, TurnFragment
+from services.generation.rewriting import Replacement
+from services.generation.turn_policy import TurnPlan
+
+
+class Names:
+    """Ids nobody in the fragment uses."""
+
+    def __init__(self, fragment: TurnFragment) -> None:
+        self._taken = {behavior.id for behavior in fragment.behaviors}
+
+    def fresh(self, wish: str) -> str:
+        name, count = wish, 2
+        while name in self._taken:
+            name, count = f"{wish}-{count}", count + 1
+        self._taken.add(name)
+        return name
+
+
+class Parts:
+    """The behaviors that replace one reference."""
+
+    def __init__(
+        self, reference: Reference, choice: ReferenceChoice, names: Names, turn: TurnPlan, hand: Hand | None
+    ):
+        points = choice.gesture == "directed_gaze_with_pointing"
+        looks = choice.gesture != "none"
+        required, line = reference.required, reference.line
+        self.reference = reference
+        self.gaze = self.point = self.phrase = self.event = self.glance = ""
+        self.behaviors: list[BlockBehavior] = []
+        anchors: list[str] = []
+        if looks:
+            self.gaze = names.fresh(f"{reference.id}-gaze")
+            self.behaviors.append(Gaze(id=self.gaze, target=reference.target, required=required, line=line))
+            anchors.append(f"{self.gaze}:stroke")
+        if points:
+            self.point = names.fresh(f"{reference.id}-point")
+            self.behaviors.append(
+                Pointing(id=self.point, target=reference.target, mode=hand, required=required, line=line)
+            )
+            anchors.append(f"{self.point}:stroke")
+        if choice.phrase:
+            self.phrase = names.fresh(f"{reference.id}-phrase")
+            self.behaviors.append(Speech(id=self.phrase, text=choice.phrase, required=required, line=line))
+            anchors.append(f"{self.phrase}:start")
+        if looks and choice.gesture != "gaze":
+            self.event = names.fresh(f"{reference.id}-event")
+            self.behaviors.append(
+                Event(
+                    id=self.event,
+                    kind="directed_gaze",
+                    responder=turn.addressee,
+                    objects=(reference.target,),
+                    cause="reference",
+                    anchors=tuple(anchors),
+                    turn=turn.turn,
+                    timing=(Timing("start", f"{self.gaze}:start"),),
+                )
+            )
+
+    def replacement(self, *, gaze_leads: bool) -> Replacement:
+        start = (self.gaze or self.phrase, "start")
+        if gaze_leads and self.gaze and self.phrase:
+            start = (self.phrase, "start")
+        if self.phrase:
+            end = (self.phrase, "end")
+        else:
+            end = (self.point, "stroke_end") if self.point else (self.gaze, "stroke")
+        return Replacement(start, end, loose_start=gaze_leads and bool(self.gaze and self.phrase))
