@@ -1,7 +1,7 @@
 """JSON Schemas of everything that travels, for other languages: `python -m schemas.export [--check]`.
 
 One file per message of the bus, and one each for a block and a turn fragment. Draft 2020-12; quantities carry
-their unit as `description`.
+their unit as `description`. And the tool by which language models speak, as an API takes it (`schemas.tool`).
 """
 
 import argparse
@@ -12,6 +12,7 @@ from typing import Any, get_args
 
 import msgspec
 
+from schemas import tool
 from schemas.blocks import Block
 from schemas.fragments import TurnFragment
 from schemas.messages import MAJOR, Message
@@ -39,9 +40,11 @@ def schema(kind: type[msgspec.Struct]) -> dict[str, Any]:
 
 def files() -> dict[str, bytes]:
     """What the folder should hold: name to content."""
+    contents = {f"{kind.__name__}.json": schema(kind) for kind in exported_types()}
+    contents[tool.FILE] = tool.definition()
     return {
-        f"{kind.__name__}.json": msgspec.json.format(msgspec.json.encode(schema(kind)), indent=2) + b"\n"
-        for kind in exported_types()
+        name: msgspec.json.format(msgspec.json.encode(content), indent=2) + b"\n"
+        for name, content in contents.items()
     }
 
 

@@ -1,7 +1,7 @@
-"""Blocks and fragments from JSON, and back; and `read`, which takes either form. Errors carry the JSON path.
+"""Blocks and fragments from JSON, and back; and `read`, which takes XML, too. Errors carry the JSON path.
 
-The form is that of the structs, as in the exported schemas. Unknown keys are refused: a misspelled `turn_status`
-must not silently become a full turn.
+The form is that of the structs, as in the exported schemas, or what a language model writes (schemas.tool). Unknown
+keys are refused: a misspelled `turn_status` must not silently become a full turn.
 """
 
 from typing import Any, TypeVar
@@ -14,12 +14,14 @@ from schemas.check import check
 from schemas.faults import Fault, InputRefused
 from schemas.fragments import TurnFragment
 from schemas.references import disambiguated
+from schemas.tool_call import from_tool, is_tool_input
 from schemas.xml_codec import decode_xml
 from schemas.xml_names import snake
 from schemas.xml_source import LARGEST
 
 T = TypeVar("T", Block, TurnFragment)
 
+UNNAMED = "fragment"
 _FRAGMENT_ONLY = frozenset(TurnFragment.__struct_fields__) - frozenset(Block.__struct_fields__)
 _UTF_16 = (b"\xff\xfe", b"\xfe\xff")
 
@@ -28,16 +30,20 @@ def encode_json(thing: Block | TurnFragment) -> bytes:
     return msgspec.json.format(msgspec.json.encode(thing), indent=2)
 
 
-def decode_json(data: bytes | str, source: str = "") -> Block | TurnFragment:
+def decode_json(data: bytes | str, source: str = "", unnamed: str = UNNAMED) -> Block | TurnFragment:
     """One block or fragment. Raises InputRefused with source, JSON path, reason and advice.
 
     Without `type` it is a fragment if it has a field that only fragments have, or holds a reference.
+    unnamed: the id of a language model's, which has none.
     """
-    return _thing(_parsed(data, source), source, "$")
+    return _thing(_parsed(data, source), source, "$", unnamed)
 
 
-def read(data: bytes, source: str = "") -> tuple[Block | TurnFragment, ...]:
-    """Everything in a file: one XML document, one JSON object, or a JSON array of several. Raises InputRefused."""
+def read(data: bytes, source: str = "", unnamed: str = UNNAMED) -> tuple[Block | TurnFragment, ...]:
+    """Everything in a file: one XML document, one JSON object, or a JSON array of several. Raises InputRefused.
+
+    unnamed: the id of a language model's fragment, which has none; of several `<unnamed>-1`, `<unnamed>-2`...
+    """
     start = data[:64].removeprefix(b"\xef\xbb\xbf").lstrip()
     if start.startswith((b"<", b"\0<", *_UTF_16)):
         return (decode_xml(data, source),)
@@ -46,8 +52,8 @@ def read(data: bytes, source: str = "") -> tuple[Block | TurnFragment, ...]:
         raise InputRefused(Fault(reason="neither XML nor JSON" if start else "empty", where=source, advice=advice))
     parsed = _parsed(data, source)
     if not isinstance(parsed, list):
-        return (_thing(parsed, source, "$"),)
-    return tuple(_thing(item, source, f"$[{index}]") for index, item in enumerate(parsed))
+        return (_thing(parsed, source, "$", unnamed),)
+    return tuple(_thing(item, source, f"$[{index}]", f"{unnamed}-{index + 1}") for index, item in enumerate(parsed))
 
 
 def _parsed(data: bytes | str, source: str) -> Any:
@@ -80,9 +86,11 @@ def _line(raw: bytes, error: msgspec.DecodeError | UnicodeDecodeError) -> int:
     return raw.count(b"\n", 0, end) + 1
 
 
-def _thing(parsed: Any, source: str, path: str) -> Block | TurnFragment:
+def _thing(parsed: Any, source: str, path: str, unnamed: str) -> Block | TurnFragment:
     if not isinstance(parsed, dict):
         raise _refusal(f"expected an object, found {type(parsed).__name__}", path, source)
+    if is_tool_input(parsed):
+        return from_tool(parsed, unnamed, source, path)
     kind = parsed.get("type") or ("fragment" if _looks_like_fragment(parsed) else "block")
     if kind == "fragment":
         return _blamed(parsed, TurnFragment, source, path)

@@ -12,6 +12,7 @@ from schemas import json_codec
 from schemas.blocks import Block
 from schemas.faults import Fault, InputRefused
 from schemas.fragments import TurnFragment
+from schemas.syncref import is_id
 from schemas.world import World
 from services.runtime import Service
 
@@ -39,7 +40,8 @@ class Source(Struct, frozen=True, kw_only=True):
 
 def read_source(path: Path) -> Source:
     """Raises InputRefused with the file, the line or JSON path, and the reason."""
-    things = json_codec.read(_bytes(path), str(path))
+    unnamed = path.stem if is_id(path.stem) else json_codec.UNNAMED
+    things = json_codec.read(_bytes(path), str(path), unnamed)
     if not things:
         raise InputRefused(Fault(reason="holds nothing to perform", where=str(path)))
     return Source(path=path, things=things)

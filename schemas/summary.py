@@ -1,0 +1,174 @@
+"""What became of fragments in a few hundred characters, for a language model to read: `json` or `text`."""
+
+from collections.abc import Iterable, Sequence
+from typing import Literal
+
+import msgspec
+from msgspec import Struct
+
+from schemas.behaviors import Action
+from schemas.blocks import SpokenText
+from schemas.faults import Fault
+from schemas.fragments import FragmentOutcome, GestureChoice, ReferenceChoice
+from schemas.recognition import ConnectionEvent
+from schemas.units import Seconds
+
+LONGEST_PROBLEM = 160
+MOST_PROBLEMS = 4
+ROUNDING = 2
+"""Decimals of seconds."""
+_BY: dict[GestureChoice, str] = {
+    "none": "words alone", "gaze": "a look", "directed_gaze": "a look", "directed_gaze_with_pointing": "pointing",
+}  # fmt: skip
+
+
+class Referred(Struct, frozen=True, kw_only=True, omit_defaults=True):
+    """How an object was referred to. looked: did the person look there? Absent: the robot did not wait for it."""
+
+    object: str
+    phrase: str
+    by: str
+    """`words alone`, `a look` or `pointing`."""
+    looked: bool | None = None
+    delay: Seconds | None = None
+    """How long it took them."""
+
+
+class Summary(Struct, frozen=True, kw_only=True, omit_defaults=True):
+    """status: the worst of all fragments. said: the words that were really spoken.
+
+    eye_contact: did the person return the look at the end of the turn? Absent: the turn goes on.
+    answer: the action that answered the turn, `none` if none came in time, `pending` while there is time;
+    absent: it expects none.
+    """
+
+    status: Literal["done", "interrupted", "failed", "refused"]
+    said: str = ""
+    cut_short: bool = False
+    """Were words left unsaid?"""
+    references: tuple[Referred, ...] = ()
+    eye_contact: bool | None = None
+    answer: Action | Literal["none", "pending"] | None = None
+    answer_delay: Seconds | None = None
+    """From the end of the turn; negative if it came earlier."""
+    problems: tuple[str, ...] = ()
+
+    @property
+    def json(self) -> str:
+        return msgspec.json.encode(self).decode()
+
+    @property
+    def text(self) -> str:
+        """The same in words, on one line."""
+        return " ".join(_sentences(self))
+
+
+def summary(*outcomes: FragmentOutcome) -> Summary:
+    """Of one fragment, or of the fragments of one turn in order."""
+    spoken = [each for outcome in outcomes for each in outcome.spoken]
+    statuses = {outcome.status for outcome in outcomes}
+    events = {event.id: event for outcome in outcomes for event in outcome.events}
+    fragments = {outcome.fragment for outcome in outcomes}
+    pair = _last(event for event in events.values() if event.kind == "adjacency_pair")
+    contact = _last(
+        event for event in events.values() if event.kind == "mutual_facial_gaze" and event.block in fragments
+    )
+    return Summary(
+        status="failed" if "failed" in statuses else "interrupted" if "interrupted" in statuses else "done",
+        said=_said(spoken),
+        cut_short=bool(statuses - {"done"}) or not all(each.complete for each in spoken),
+        references=tuple(
+            _referred(outcome, choice, events.values()) for outcome in outcomes for choice in outcome.choices
+        ),
+        eye_contact=_decision(contact),
+        answer=_answer(pair),
+        answer_delay=_rounded(pair.delay) if pair and _decision(pair) else None,
+        problems=_problems(
+            text
+            for outcome in outcomes
+            for text in ([str(outcome.fault)] if outcome.fault else []) + list(outcome.warnings)
+        ),
+    )
+
+
+def refusal(fault: Fault) -> Summary:
+    """Of a fragment that was refused: nothing was said or done, and why."""
+    return Summary(status="refused", problems=_problems([str(fault)]))
+
+
+def _said(spoken: Sequence[SpokenText]) -> str:
+    return " ".join(" ".join(each.text for each in spoken).split())
+
+
+def _referred(outcome: FragmentOutcome, choice: ReferenceChoice, events: Iterable[ConnectionEvent]) -> Referred:
+    event = _last(
+        each
+        for each in events
+        if each.block == outcome.fragment and each.behavior.startswith(f"{choice.reference}-event")
+    )
+    looked = _decision(event)
+    delay = _rounded(event.delay) if event and looked else None
+    return Referred(object=choice.target, phrase=choice.phrase, by=_BY[choice.gesture], looked=looked, delay=delay)
+
+
+def _last(events: Iterable[ConnectionEvent]) -> ConnectionEvent | None:
+    return max(events, key=lambda event: event.started.seconds, default=None)
+
+
+def _decision(event: ConnectionEvent | None) -> bool | None:
+    """Did the person do their part? None: it came to nothing, or nobody waited."""
+    if event is None or event.state not in ("succeeded", "completed", "failed"):
+        return None
+    return event.state != "failed"
+
+
+def _answer(pair: ConnectionEvent | None) -> Action | Literal["none", "pending"] | None:
+    if pair is None:
+        return None
+    if pair.state == "started":
+        return "pending"
+    return (pair.response if _decision(pair) else None) or "none"
+
+
+def _problems(texts: Iterable[str]) -> tuple[str, ...]:
+    told = tuple(dict.fromkeys(map(_shortened, texts)))
+    left = len(told) - MOST_PROBLEMS
+    return told if left <= 0 else (*told[:MOST_PROBLEMS], f"and {left} more")
+
+
+def _shortened(text: str) -> str:
+    return text if len(text) <= LONGEST_PROBLEM else f"{text[: LONGEST_PROBLEM - 3]}..."
+
+
+def _rounded(seconds: Seconds | None) -> Seconds | None:
+    return None if seconds is None else round(seconds, ROUNDING) + 0.0  # no negative zero
+
+
+def _sentences(it: Summary) -> Iterable[str]:
+    if it.status == "refused":
+        yield "Refused, nothing was said or done."
+    elif it.status != "done":
+        yield f"The fragment {'failed' if it.status == 'failed' else 'was interrupted'}."
+    if it.said:
+        yield f'{"Only said" if it.cut_short else "Said"}: "{it.said}".'
+    elif it.status != "refused":
+        yield "Nothing was said."
+    for each in it.references:
+        yield f"{each.object}: {each.phrase or 'no words'}, by {each.by}; {_look(each)}."
+    if it.eye_contact is not None:
+        yield f"At the end they {'looked' if it.eye_contact else 'did not look'} at the robot."
+    match it.answer:
+        case "pending":
+            yield "No answer yet."
+        case "none":
+            yield "No answer came."
+        case str() as action:
+            yield f"Answered by: {action}, after {it.answer_delay or 0.0:g} s."
+    if it.problems:
+        yield f"Problems: {'; '.join(it.problems)}."
+
+
+def _look(each: Referred) -> str:
+    if each.looked is None:
+        return "not waited for their look"
+    return f"they looked after {each.delay or 0.0:g} s" if each.looked else "they did not look"

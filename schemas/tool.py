@@ -1,0 +1,205 @@
+"""What a language model is given to talk with: one tool, `perform_turn_fragment`, and the form of its input.
+
+The form is smaller than a turn fragment: parts in the order in which they are to be said and done. Neither gestures
+nor timing nor ids; Engage finds those. `schemas.tool_call` makes the fragment of it. The JSON Schema is made from
+the structs below and keeps to what both APIs constrain sampling by: objects are closed, no `$ref`, no bounds, no
+defaults, and the alternatives of a part differ in their first key.
+"""
+
+from typing import Annotated, Any, Literal, get_args
+
+import msgspec
+from msgspec import Meta, Struct
+
+from schemas.fragments import TurnStatus
+from schemas.world import Entity, World
+
+NAME = "perform_turn_fragment"
+FILE = f"{NAME}.tool.json"
+"""In the folder of exported schemas."""
+DESCRIPTION = """\
+Speak as the robot, to the person in front of it. Say what is to be said and name the objects you mean by their ids; \
+the robot finds the words for them, where to look, when to point, and the timing. It returns once this has been \
+performed, with what was really said, whether the person looked where you referred to and at the robot's face, and \
+what went wrong. If they did not look at an object that matters, refer to it again with certainty `high`."""
+
+Format = Literal["anthropic", "openai", "openai-chat"]
+"""Of Anthropic's Messages API, OpenAI's Responses API, or the Chat Completions API, which many others speak, too."""
+Expects = Literal["reply", "action"]
+Certainty = Literal["normal", "high"]
+
+ObjectId = Annotated[str, Meta(description="Id of an object, exactly as the world calls it. Ids are never spoken.")]
+
+
+class Say(Struct, frozen=True, kw_only=True, omit_defaults=True, forbid_unknown_fields=True):
+    say: Annotated[str, Meta(description="Words to speak. Leave out the words for an object: use `refer` for it.")]
+
+
+class Refer(Struct, frozen=True, kw_only=True, omit_defaults=True, forbid_unknown_fields=True):
+    refer: ObjectId
+    phrases: Annotated[
+        tuple[str, ...],
+        Meta(
+            description="Only if the words matter: noun phrases to choose from, each of which fits the sentence "
+            "and means this object alone. Leave it out and the robot finds them."
+        ),
+    ] = ()
+    certainty: Annotated[
+        Certainty,
+        Meta(
+            description="`normal` if left out. `high` if the person must not mistake it, or has not looked there "
+            "before: then the robot usually points."
+        ),
+    ] = "normal"
+
+
+class Look(Struct, frozen=True, kw_only=True, omit_defaults=True, forbid_unknown_fields=True):
+    look: Annotated[
+        str,
+        Meta(
+            description="Id of an object, surface or person to look at before what follows is said. Seldom needed: "
+            "the robot looks at what it refers to, and at the person at the end of a turn."
+        ),
+    ]
+
+
+class Gesture(Struct, frozen=True, kw_only=True, omit_defaults=True, forbid_unknown_fields=True):
+    gesture: Annotated[Literal["nod", "shake"], Meta(description="Nod or shake the head while what follows is said.")]
+
+
+Part = Say | Refer | Look | Gesture
+"""Which it is, its first key says."""
+PARTS: tuple[type[Part], ...] = get_args(Part)
+
+
+class ToolInput(Struct, frozen=True, kw_only=True, omit_defaults=True, forbid_unknown_fields=True):
+    """What the model writes. parts: each is a `Part`, which a tagless union cannot say."""
+
+    turn_status: Annotated[
+        TurnStatus,
+        Meta(
+            description="`full`: all you have to say for now; the robot hands over by looking at the person. If you "
+            "have much to say, or must think or look something up meanwhile, send it in pieces, each as soon as you "
+            "have it: `beginning`, then any number of `middle`, then `end`, which hands over. Nothing else may "
+            "follow before the `end`. `backchannel`: a short sign of listening while the person has the turn."
+        ),
+    ]
+    parts: Annotated[
+        tuple[dict[str, Any], ...],
+        Meta(description="What to say and do, in this order. With `end` it may be empty if all has been said."),
+    ]
+    turn_index: Annotated[
+        Literal[1, 2, 3],
+        Meta(
+            description="1, or left out: you open an exchange and expect an answer. 2: you answer what the person "
+            "just said or asked. 3: you close an exchange (thanks, well done)."
+        ),
+    ] = 1
+    expects: Annotated[
+        Expects,
+        Meta(
+            description="`reply`, or left out: words, a nod, a shake of the head or pointing answers this turn. "
+            "`action`: you ask for something to be done to an object, and doing it is the answer."
+        ),
+    ] = "reply"
+    thinking: Annotated[
+        bool,
+        Meta(
+            description="With `beginning` or `middle`: true if you need time before the next piece. The robot looks "
+            "away then, as people do, and keeps the turn for up to 10 seconds."
+        ),
+    ] = False
+    addressee: Annotated[
+        str, Meta(description="Id of the person to speak to; left out or empty if there is only one.")
+    ] = ""
+
+
+Schema = dict[str, Any]
+
+
+def definition(format: Format = "anthropic", world: World | None = None) -> Schema:
+    """The tool as an entry of the API's `tools`. world: its objects and people are the only ids allowed.
+
+    OpenAI's are strict (every field required, null where it may be left out); to have Anthropic's so, add
+    `"strict": true`.
+    """
+    if format == "anthropic":
+        return {"name": NAME, "description": DESCRIPTION, "input_schema": input_schema(world)}
+    function = {
+        "name": NAME, "description": DESCRIPTION, "strict": True, "parameters": _all_required(input_schema(world)),
+    }  # fmt: skip
+    return {"type": "function", **function} if format == "openai" else {"type": "function", "function": function}
+
+
+def input_schema(world: World | None = None) -> Schema:
+    """The JSON Schema of `ToolInput`. Whatever it allows, `schemas.tool_call` decodes."""
+    parts = [_schema_of(kind) for kind in PARTS]
+    whole = _schema_of(ToolInput)
+    whole["properties"]["parts"]["items"] = {"anyOf": parts}
+    if world is not None:
+        _, refer, look, _ = parts
+        people = [person.id for person in world.people]
+        _only(refer["properties"]["refer"], [thing.id for thing in world.objects], _inventory(world))
+        _only(look["properties"]["look"], [each.id for each in world.entities if each.kind != "hand"])
+        _only(whole["properties"]["addressee"], ["", *people] if people else [])
+    return whole
+
+
+def _schema_of(kind: type[Struct]) -> Schema:
+    """Of one struct: closed, without titles and defaults; what a description says need not be said twice."""
+    _, components = msgspec.json.schema_components((kind,))
+    (component,) = components.values()
+    properties = {name: _stripped(each) for name, each in component["properties"].items()}
+    return {
+        "type": "object",
+        "properties": properties,
+        "required": component["required"],
+        "additionalProperties": False,
+    }
+
+
+def _stripped(schema: Schema) -> Schema:
+    stripped = {key: value for key, value in schema.items() if key != "default"}
+    if "enum" in stripped:
+        numbers = all(isinstance(value, int) for value in stripped["enum"])
+        stripped = {"type": "integer" if numbers else "string", **stripped}
+    return stripped
+
+
+def _only(schema: Schema, ids: list[str], told: str = "") -> None:
+    if ids:
+        schema["enum"] = ids
+    if told:
+        schema["description"] += f" There are: {told}."
+
+
+def _inventory(world: World) -> str:
+    return ", ".join(f"{thing.id} ({looks})" if (looks := _looks(thing)) else thing.id for thing in world.objects)
+
+
+def _looks(thing: Entity) -> str:
+    """What perception knows of it, unless its id says so already."""
+    noun = thing.category or ("" if thing.shape else thing.name)
+    words = [thing.size, thing.color, *thing.features, thing.shape, noun]
+    said = thing.id.lower()
+    return "" if all(word.lower() in said for word in words) else " ".join(filter(None, words))
+
+
+def _all_required(schema: Schema) -> Schema:
+    """The same for OpenAI's strict functions: what may be left out is null instead."""
+    if "anyOf" in schema:
+        return {**schema, "anyOf": [_all_required(each) for each in schema["anyOf"]]}
+    if "items" in schema:
+        return {**schema, "items": _all_required(schema["items"])}
+    if "properties" not in schema:
+        return schema
+    properties = {
+        name: _all_required(each) if name in schema["required"] else _nullable(each)
+        for name, each in schema["properties"].items()
+    }
+    return {**schema, "properties": properties, "required": list(properties)}
+
+
+def _nullable(schema: Schema) -> Schema:
+    rest = {key: value for key, value in schema.items() if key != "description"}
+    return {"description": schema["description"], "anyOf": [_all_required(rest), {"type": "null"}]}

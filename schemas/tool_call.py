@@ -1,0 +1,122 @@
+"""From the input of the tool `perform_turn_fragment` (schemas.tool) to the turn fragment that it means.
+
+Whatever is wrong is refused with its JSON path, so that the model can correct itself.
+"""
+
+from collections.abc import Iterable
+from typing import Any, get_args, get_type_hints
+
+import msgspec
+from msgspec.structs import replace
+
+from schemas.behaviors import Action, After, Constraint, FragmentBehavior, Gaze, Head, Reference, Speech, SpeechOption
+from schemas.faults import Fault, InputRefused
+from schemas.fragments import TurnFragment
+from schemas.tool import PARTS, Certainty, Expects, Gesture, Look, Part, Refer, Say, ToolInput
+from schemas.units import Probability
+
+RELIABILITY: dict[Certainty, Probability] = {"normal": 0.85, "high": 0.95}
+"""The minimum for a reference: of landmarks, and of the piece to be moved, as in the thesis' Appendix B."""
+ANSWERS: dict[Expects, tuple[Action, ...]] = {"reply": (), "action": ("act", "speak", "nod", "shake")}
+"""What answers the turn; empty: recognition's default."""
+DEMONSTRATIVES = ("this", "that")
+"""A phrase that begins so means nothing without a point."""
+
+_KINDS = {kind.__struct_fields__[0]: kind for kind in PARTS}
+
+
+def is_tool_input(parsed: dict[str, Any]) -> bool:
+    """Rather than a turn fragment or a block?"""
+    return "parts" in parsed and "behaviors" not in parsed
+
+
+def from_tool(parsed: dict[str, Any], id: str, source: str = "", path: str = "$") -> TurnFragment:
+    """The fragment, called `id`, of a decoded tool input. Raises InputRefused with source, JSON path and advice."""
+    call = _converted(parsed, ToolInput, source, path)
+    parts = [_part(raw, source, f"{path}.parts[{index}]") for index, raw in enumerate(call.parts)]
+    return fragment_of(parts, replace(call, parts=()), id)
+
+
+def fragment_of(parts: Iterable[Part], turn: ToolInput, id: str) -> TurnFragment:
+    """Says and does the parts in this order. turn: everything but its own parts.
+
+    A behavior is called after its part: `say-1`, `refer-2`.
+    """
+    behaviors: list[FragmentBehavior] = []
+    order: list[Constraint] = []
+    before = ""
+    for number, part in enumerate(parts, start=1):
+        behavior, over = _behavior(part, number)
+        if before:
+            after = After(ref=before, syncs=(f"{behavior.id}:start",))
+            order.append(Constraint(id=f"order-{number}", operators=(after,)))
+        behaviors.append(behavior)
+        before = f"{behavior.id}:{over}" if over else before
+    return TurnFragment(
+        id=id,
+        turn_status=turn.turn_status,
+        turn_index=turn.turn_index,
+        behaviors=tuple(behaviors),
+        constraints=tuple(order),
+        addressee=turn.addressee,
+        delay=turn.thinking and turn.turn_status in ("beginning", "middle"),
+        accept=ANSWERS[turn.expects],
+    )
+
+
+def _behavior(part: Part, number: int) -> tuple[FragmentBehavior, str]:
+    """And the sync point from which on the next one may start; empty: at once."""
+    match part:
+        case Say(say=text):
+            return Speech(id=f"say-{number}", text=" ".join(text.split())), "end"
+        case Refer(refer=target, phrases=phrases, certainty=certainty):
+            reference = Reference(
+                id=f"refer-{number}",
+                target=target,
+                minimum_reliability=RELIABILITY[certainty],
+                options=tuple(map(_option, phrases)) if phrases else None,
+            )
+            return reference, "end"
+        case Look(look=target):
+            return Gaze(id=f"look-{number}", target=target), "stroke"
+        case Gesture(gesture=gesture):
+            return Head(id=f"gesture-{number}", lexeme=gesture.upper()), ""
+
+
+def _option(phrase: str) -> SpeechOption:
+    words = phrase.split()
+    deictic = bool(words) and words[0].lower() in DEMONSTRATIVES
+    return SpeechOption(text=" ".join(words), cost=float(len(words)), deictic=deictic)
+
+
+def _part(raw: dict[str, Any], source: str, path: str) -> Part:
+    kinds = [_KINDS[key] for key, value in raw.items() if key in _KINDS and value is not None]
+    if len(kinds) != 1:
+        found = f"{len(kinds)} of them" if kinds else f"only {', '.join(map(repr, raw)) or 'nothing'}"
+        advice = f"give each part exactly one of {', '.join(_KINDS)}"
+        raise InputRefused(Fault(reason=f"a part holds {found}", where=_place(source, path), advice=advice))
+    part: Part = _converted(raw, kinds[0], source, path)
+    return part
+
+
+def _converted(raw: dict[str, Any], kind: type[Any], source: str, path: str) -> Any:
+    """Null stands for what is left out."""
+    given = {key: value for key, value in raw.items() if value is not None}
+    try:
+        return msgspec.convert(given, kind)
+    except msgspec.ValidationError as error:
+        reason, _, where = str(error).partition(" - at `$")
+        known = ", ".join(kind.__struct_fields__)
+        advice = f"known: {known}" if "unknown field" in reason else _allowed(where.strip("`."), kind)
+        fault = Fault(reason=reason, where=_place(source, f"{path}{where.rstrip('`')}"), advice=advice)
+        raise InputRefused(fault) from error
+
+
+def _allowed(field: str, kind: type[Any]) -> str:
+    """The values of a field that has only a few."""
+    values = [str(value) for value in get_args(get_type_hints(kind).get(field)) if isinstance(value, str | int)]
+    return f"one of {', '.join(values)}" if values else "see `engage tool`"
+
+
+def _place(source: str, path: str) -> str:
+    return f"{source}: {path}" if source else path
