@@ -4,6 +4,7 @@ A higher claim takes over at once; when the owner lets go the head stays for a d
 Claims 3 to 6 move the base gaze by `gazeShift` blocks, which end on arrival and hold nothing; a fragment's own
 gaze overlays it, and is never fought: while it owns the head nothing else is sent. Where it is on a face the base
 goes there too, unseen beneath it: the gaze at the end of a turn must not fall back to where the head was before.
+So it does when an inhibition that holds the head has a fragment's gaze aborted: else the head would go home.
 """
 
 from msgspec import Struct
@@ -17,15 +18,26 @@ from schemas.recognition import ConnectionEvent, Statistics
 from schemas.units import Degrees, Radians, Seconds
 from schemas.world import World
 from services.generation.config import GenerationConfig
+from services.generation.leases import Inhibition
 from services.generation.response_policy import ResponsePolicy
 from services.generation.watches import FaceWatch, GlanceWatch, HandWatch
 
-NOBODY = Claim(kind="none", priority=0)
+NOBODY = Claim(kind="none", priority=0, reason="nobody has been seen")
 UP_RIGHT: Degrees = 60.0
 """From the table: at nothing that anybody could mean, as far as the neck turns. Thesis 5.3."""
 Observation = (
     World | RobotState | Statistics | ConnectionEvent | ActionBegan | ActionEnded | ActorFound | ActorLost
 )  # fmt: skip
+
+
+class Aim(Struct, frozen=True):
+    """Where the base gaze belongs. target: empty to leave it where it is. beside: past it, to the upper right."""
+
+    target: str = ""
+    beside: bool = False
+
+
+NOWHERE = Aim()
 
 
 class Shift(Struct, frozen=True):
@@ -73,10 +85,10 @@ class Arbiter:
     def __init__(self, robot: str, config: GenerationConfig) -> None:
         self._config = config
         self._responses = ResponsePolicy(robot, config)
-        self._hands = HandWatch(config)
-        self._faces = FaceWatch(config)
+        self._hands = HandWatch(robot, config)
+        self._faces = FaceWatch(robot, config)
         self._glances = GlanceWatch(config)
-        self._inhibition: Claim | None = None
+        self._inhibition: Inhibition | None = None
         self._fragment: Claim | None = None
         self._thought: Claim | None = None
         self._world: World | None = None
@@ -84,11 +96,15 @@ class Arbiter:
         self._half_angle: Radians = config.gaze_half_angle or 0.1
         self._owner = NOBODY
         self._since: Seconds = 0.0
-        self._waiting: tuple[Claim, ...] = ()
+        self._waiting: tuple[Claim, ...] | None = None
+        """None before the first ruling, which is always news."""
         self._lapsed: Seconds | None = None
-        self._base = ""
+        self._base = NOWHERE
         """Where the base gaze was last sent."""
-        self._retry: Seconds | None = None
+        self._held = NOWHERE
+        """Where an inhibition with mode hold found the head."""
+        self._failed: tuple[Aim, Seconds] | None = None
+        """What the last shift did not reach, and when to try that again."""
         self._shifts = 0
 
     # -- what happens ---------------------------------------------------------------------------------------------
@@ -125,21 +141,25 @@ class Arbiter:
         """What the body says of its gaze cone; the configuration goes before."""
         self._half_angle = self._config.gaze_half_angle or half_angle
 
-    def inhibit(self, claim: Claim | None) -> None:
+    def inhibit(self, inhibition: Inhibition | None) -> None:
         """The newest lease on gaze, if there is one."""
-        self._inhibition = claim
+        self._inhibition = inhibition
 
-    def fragment_gazes(self, target: str) -> None:
+    def fragment_gazes(self, target: str, reason: str = "") -> None:
         """A gaze of a fragment has started."""
-        self._fragment = Claim(kind="fragment", priority=2, target=target)
+        self._fragment = Claim(kind="fragment", priority=2, target=target, reason=reason)
 
-    def fragment_shifts(self, target: str) -> None:
+    def fragment_shifts(self, target: str, reason: str = "") -> None:
         """A fragment moves the base gaze itself."""
-        self.fragment_gazes(target)
-        self._base = target
+        self.fragment_gazes(target, reason)
+        self._base = Aim(target)
+
+    def fragment_rests(self) -> None:
+        """Its gaze has ended, its block has not: the head is back on the base gaze, and stays the fragment's."""
+        self._fragment = Claim(kind="fragment", priority=2, target=self._base.target, reason="until its block ends")
 
     def fragment_lets_go(self) -> None:
-        """Its last gaze, or its block, has ended."""
+        """Its block has ended."""
         self._fragment = None
 
     def think(self, target: str) -> None:
@@ -153,17 +173,25 @@ class Arbiter:
         self._faces.partner = person
 
     def shift_failed(self, id: str, now: Seconds) -> None:
-        """The base gaze is not where it was sent; try again after a pause."""
+        """The base gaze is not where it was sent: try that again after a pause, and anything else at once."""
         if id.rpartition("-")[2] == str(self._shifts):
-            self._base = ""
-            self._retry = now + self._config.retry
+            self._failed = self._base, now + self._config.retry
+            self._base = NOWHERE
+
+    def body_lost(self) -> None:
+        """Another may come, and look elsewhere."""
+        self._base = NOWHERE
+
+    def recognition_lost(self) -> None:
+        """Nobody will say how the events end that it began."""
+        self._responses.forget()
 
     # -- what follows ---------------------------------------------------------------------------------------------
 
     @property
     def deadline(self) -> Seconds | None:
         due = [self._hands.deadline, self._faces.deadline, self._glances.deadline, self._responses.deadline]
-        due.append(self._retry)
+        due.append(self._failed[1] if self._failed else None)
         if self._lapsed is not None:
             due.append(self._lapsed + self._config.dwell)
         return min((each for each in due if each is not None), default=None)
@@ -175,6 +203,8 @@ class Arbiter:
         self._owner = self._next_owner(claims, now)
         if self._owner != before:
             self._lapsed = None
+            if before.kind != "inhibition":
+                self._held = Aim(before.target) if before.kind == "fragment" else NOWHERE
             if (self._owner.kind, self._owner.target) != (before.kind, before.target):
                 self._since = now
             if self._owner.kind == "glance" != before.kind:
@@ -190,14 +220,14 @@ class Arbiter:
         face = self._faces.claim(now)
         self._glances.face = face.target if face else ""
         claims = [
-            self._inhibition, self._fragment or self._thought, self._glances.claim(now), self._responses.claim(now),
-            self._hands.claim(now), face,
+            self._inhibition.claim if self._inhibition else None, self._fragment or self._thought,
+            self._glances.claim(now), self._responses.claim(now), self._hands.claim(now), face,
         ]  # fmt: skip
         return [claim for claim in claims if claim is not None]
 
     def _head_on(self) -> str:
         """What the head is on or on its way to: the owner's target, else what the body says."""
-        return self._owner.target or (self._state.looking_at if self._state else "") or self._base
+        return self._owner.target or (self._state.looking_at if self._state else "") or self._base.target
 
     def _next_owner(self, claims: list[Claim], now: Seconds) -> Claim:
         best = claims[0] if claims else NOBODY
@@ -213,22 +243,31 @@ class Arbiter:
 
     def _shift(self, now: Seconds) -> Shift | None:
         """None while the head is where it belongs, or is not ours to move."""
-        owner = self._owner
-        if self._retry is not None and now >= self._retry:
-            self._retry = None
-        target = self._surface() if self._config.speech_only else owner.target
-        if not target or target == self._base or self._retry is not None or self._lapsed is not None:
+        if self._failed is not None and now >= self._failed[1]:
+            self._failed = None
+        owner, aim = self._owner, self._aim()
+        if not aim.target or aim == self._base or self._lapsed is not None:
             return None
-        if self._fragment is not None and not self._faces.is_face(target):
+        if self._failed is not None and aim == self._failed[0]:
             return None
-        self._base = target
+        if owner.kind == "fragment" and self._fragment is not None and not self._faces.is_face(aim.target):
+            return None
+        self._base = aim
         self._shifts += 1
         cause = "response" if owner.kind == "response" else "maintenance"
-        return Shift(
-            f"{cause}-{self._shifts}", target, glance=owner.kind == "glance", beside=self._config.speech_only
-        )
+        return Shift(f"{cause}-{self._shifts}", aim.target, glance=owner.kind == "glance", beside=aim.beside)
 
-    def _surface(self) -> str:
-        """The first in the world: what the head stares past in the study's condition without gaze."""
+    def _aim(self) -> Aim:
+        mode = self._inhibition.mode if self._inhibition and self._owner.kind == "inhibition" else "target"
+        match mode:
+            case "hold":
+                return self._held
+            case "stare":
+                return Aim(self._landmark(), beside=True)
+        return Aim(self._owner.target)
+
+    def _landmark(self) -> str:
+        """What the head stares past in the study's condition without gaze: a surface, or else whatever there is."""
         entities = self._world.entities if self._world else ()
-        return next((entity.id for entity in entities if entity.kind == "surface"), "")
+        surfaces = [entity.id for entity in entities if entity.kind == "surface"]
+        return next(iter([*surfaces, *(entity.id for entity in entities)]), "")

@@ -1,5 +1,8 @@
 """Inhibition of gaze and of pointing: leases that end by themselves when their owner dies or lets them lapse."""
 
+from math import inf
+from typing import Literal
+
 from msgspec import Struct
 
 from schemas.attention import Claim, Inhibit
@@ -10,6 +13,17 @@ from services.generation.config import GenerationConfig
 from services.generation.permits import HANDS, Permits
 
 _HAND_OF: dict[str, Hand] = {"point-left": "LEFT_HAND", "point-right": "RIGHT_HAND"}
+
+
+class Inhibition(Struct, frozen=True):
+    """A claim on the head. hold: it stays on what it is on; stare: past everything, to the upper right."""
+
+    claim: Claim
+    mode: Literal["release", "hold", "target", "stare"]
+
+
+SPEECH_ONLY = Inhibition(Claim(kind="inhibition", priority=1, reason="speech only: head up right"), "stare")
+"""Stands in degraded generation: the study had the head there, so that nobody takes it for a look. Thesis 5.3."""
 
 
 class _Lease(Struct):
@@ -25,12 +39,18 @@ class Leases:
         self._leases: dict[str, _Lease] = {}
 
     def take(self, request: Inhibit, now: Seconds) -> None:
-        """A new lease, a renewed one, or one whose owner has changed its mind. Raises InputRefused."""
-        if request.ttl <= 0:
-            raise InputRefused(Fault(reason=f"ttl {request.ttl} is not positive", where=f"{request.id}: ttl"))
+        """A new lease, or one whose owner has changed its mind. Raises InputRefused."""
+        if not 0 < request.ttl < inf:
+            reason = f"ttl {request.ttl} is not a positive number of seconds"
+            raise InputRefused(Fault(reason=reason, where=f"{request.id}: ttl"))
         if request.mode == "target" and not request.target:
             raise InputRefused(Fault(reason="mode 'target' without a target", where=f"{request.id}: target"))
         self._leases[request.id] = _Lease(request, now + request.ttl)
+
+    def renew(self, id: str, now: Seconds) -> None:
+        """It has been sent again."""
+        if (lease := self._leases.get(id)) is not None:
+            lease.ends = now + lease.request.ttl
 
     def release(self, id: str) -> bool:
         """End a lease early. False if there is none of this id."""
@@ -47,17 +67,17 @@ class Leases:
             del self._leases[id]
         return lapsed
 
-    def claim(self) -> Claim | None:
+    @property
+    def inhibition(self) -> Inhibition | None:
         """Of the newest lease on gaze."""
         if self._config.speech_only:
-            return Claim(kind="inhibition", priority=1, reason="speech only: head up")
+            return SPEECH_ONLY
         for lease in reversed(self._leases.values()):
             request = lease.request
             if request.part == "gaze":
                 target = request.target if request.mode == "target" else ""
-                return Claim(
-                    kind="inhibition", priority=1, target=target, reason=f"{request.requester}: {request.mode}"
-                )
+                reason = f"{request.requester}: {request.mode}"
+                return Inhibition(Claim(kind="inhibition", priority=1, target=target, reason=reason), request.mode)
         return None
 
     def permits(self) -> Permits:

@@ -8,7 +8,6 @@ from schemas.behaviors import (
     Event,
     Gaze,
     GazeShift,
-    Hand,
     HeadDirectionShift,
     Pointing,
     TurnSignal,
@@ -18,6 +17,7 @@ from schemas.faults import Fault
 from schemas.feedback import SyncPointProgress
 from schemas.fragments import FragmentOutcome, PerformFragment, TurnFragment
 from schemas.units import Seconds
+from services.generation.permits import Permits
 from services.generation.planning import Plan
 from services.generation.trail import NOTHING, Trail
 from services.generation.turn_events import TurnEvents
@@ -119,13 +119,11 @@ class Performance:
             and not {(behavior.id, "relax"), (behavior.id, "end")} & self._reached
         )
 
-    def forbid(self, *, gaze: bool, hands: tuple[Hand, ...]) -> tuple[str, ...]:
-        """Body requests under way that an inhibition forbids, each once. gaze, hands: what is still allowed."""
+    def forbid(self, permits: Permits) -> tuple[str, ...]:
+        """Body requests under way that an inhibition forbids, each once."""
         ids = []
         for behavior in self._running.values():
-            looks = isinstance(behavior, Looks)
-            points = isinstance(behavior, Pointing) and not (behavior.mode in hands or (hands and not behavior.mode))
-            if ((looks and not gaze) or points) and behavior.id not in self._forbidden:
+            if permits.stops(behavior) and behavior.id not in self._forbidden:
                 self._forbidden.add(behavior.id)
                 ids.append(f"{self.block_id}/{behavior.id}")
         return tuple(ids)
@@ -198,17 +196,24 @@ class GazesOfFragments:
     """Which gaze of a fragment has the head: of those that go on, the one that began last."""
 
     def __init__(self) -> None:
-        self._gazes: dict[str, Looks] = {}
-        """By request, in the order of their starts."""
+        self._gazes: dict[str, Looks | None] = {}
+        """By request, in the order of their starts; None once it has ended and its block has not."""
 
     def follow(self, performance: Performance) -> None:
         gaze, id = performance.gaze, performance.request.id
-        if gaze is None:
+        if performance.is_over:
             self._gazes.pop(id, None)
-        elif gaze is not self._gazes.get(id):
+        elif gaze is None and id in self._gazes:
+            self._gazes[id] = None
+        elif gaze is not None and gaze is not self._gazes.get(id):
             self._gazes.pop(id, None)
             self._gazes[id] = gaze
 
     @property
     def holder(self) -> Looks | None:
-        return next(reversed(self._gazes.values()), None)
+        return next((gaze for gaze in reversed(self._gazes.values()) if gaze is not None), None)
+
+    @property
+    def rest(self) -> bool:
+        """Does the block of one go on, whatever became of its gazes?"""
+        return bool(self._gazes)

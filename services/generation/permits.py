@@ -1,6 +1,7 @@
 """What the robot may do just now, as far as inhibitions and the study's condition say."""
 
 from msgspec import Struct
+from msgspec.structs import replace
 
 from schemas.behaviors import (
     Behavior,
@@ -34,6 +35,12 @@ class Permits(Struct, frozen=True, kw_only=True):
             wanted = HANDS if behavior.mode == "BOTH_HANDS" else (behavior.mode,) if behavior.mode else ()
             return bool(self.hands) and set(wanted) <= set(self.hands) and not self.speech_only
         return not self.speech_only or isinstance(behavior, Speech | Reference | Event | TurnSignal | Emit | Wait)
+
+    def stops(self, running: Behavior) -> bool:
+        """Must it be aborted? A point without `mode` may be by either arm: only the body knows."""
+        if isinstance(running, Pointing):
+            return not self.allows(running if running.mode else replace(running, mode="BOTH_HANDS"))
+        return isinstance(running, Gaze | GazeShift | HeadDirectionShift) and not self.looks
 
     @property
     def looks(self) -> bool:

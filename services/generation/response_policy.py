@@ -59,6 +59,9 @@ class ResponsePolicy:
         else:
             self._open.pop(event.id, None)
 
+    def forget(self) -> None:
+        self._open.clear()
+
     @property
     def deadline(self) -> Seconds | None:
         """When the claim changes by itself."""

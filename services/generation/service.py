@@ -93,7 +93,7 @@ class _Generation:
         self._requests.feed(received)
         message = received.message
         if isinstance(message, Inhibit) and self._desk.is_live(message.id):
-            self._leases.take(message, now)  # sent again: renewed
+            self._leases.renew(message.id, now)
         match self._desk.take(received):
             case PerformFragment() as request:
                 self._admit(request, now)
@@ -123,6 +123,11 @@ class _Generation:
                 self._warn(id, "PARSING_FAILURE", str(fault))
             case PeerGone(participant="control"):
                 self._body.forget()
+                self._arbiter.body_lost()
+            case PeerGone(participant="realizer"):
+                self._arbiter.body_lost()
+            case PeerGone(participant="recognition"):
+                self._arbiter.recognition_lost()
         self._after(now)
 
     def _admit(self, request: PerformFragment, now: Seconds) -> None:
@@ -157,6 +162,7 @@ class _Generation:
                 raise InputRefused(Fault(reason=f"the world does not know {request.target!r}", where=request.id))
             self._leases.take(request, now)
         except EngageError as error:
+            self._leases.release(request.id)
             self._refuse(request.id, error.fault)
         else:
             self._desk.accept(request.id)
@@ -184,12 +190,14 @@ class _Generation:
         before = self._gazes.holder
         self._gazes.follow(performance)
         gaze = self._gazes.holder
-        if gaze is None and before is not None:
+        if not self._gazes.rest:
             self._arbiter.fragment_lets_go()
+        elif gaze is None and before is not None:
+            self._arbiter.fragment_rests()
         elif isinstance(gaze, GazeShift) and gaze is not before:
-            self._arbiter.fragment_shifts(gaze.target)
+            self._arbiter.fragment_shifts(gaze.target, gaze.id)
         elif gaze is not None and gaze is not before:
-            self._arbiter.fragment_gazes(gaze.target)
+            self._arbiter.fragment_gazes(gaze.target, gaze.id)
 
     def _cancel(self, cancel: Cancel) -> None:
         """On request, or because the requester is gone."""
@@ -255,7 +263,7 @@ class _Generation:
     # -- the head -------------------------------------------------------------------------------------------------
 
     def _rule(self, now: Seconds) -> None:
-        self._arbiter.inhibit(self._leases.claim())
+        self._arbiter.inhibit(self._leases.inhibition)
         ruling = self._arbiter.rule(now)
         if ruling.changed:
             since = self._bus.stamp(ruling.since)
@@ -279,8 +287,7 @@ class _Generation:
         pending.outcome.add_done_callback(ended)  # type: ignore[arg-type]
 
     def _enforce_inhibitions(self, performance: Performance) -> None:
-        permits = self._leases.permits()
-        for id in performance.forbid(gaze=permits.gaze, hands=permits.hands):
+        for id in performance.forbid(self._leases.permits()):
             self._bus.publish(keys.BEHAVIOR, AbortBehavior(id=id, requester=self._bus.name))
 
     # -- fragments: those of a turn at once, turns one after the other --------------------------------------------
@@ -358,9 +365,12 @@ class _Generation:
         """Or there will be none."""
         now, fragment = self._bus.now(), performance.fragment
         self._follow_gaze(performance)
-        complete = performance.status == "done"
-        reason = f"{fragment.id} {performance.status}"
-        self._abort(self._turns.fragment_ended(fragment.id, complete=complete, now=now, reason=reason), now)
+        if performance.refusal is not None:
+            aborted = self._turns.fragment_refused(fragment.id, now)
+        else:
+            complete, reason = performance.status == "done", f"{fragment.id} {performance.status}"
+            aborted = self._turns.fragment_ended(fragment.id, complete=complete, now=now, reason=reason)
+        self._abort(aborted, now)
         if target := self._turns.averted_to:
             self._arbiter.think(target)
 

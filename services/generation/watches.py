@@ -13,7 +13,6 @@ from services.generation.config import GenerationConfig
 
 
 class _Hand(Struct):
-    owner: str
     moving_since: Seconds | None = None
     still_since: Seconds | None = None
     active: bool = False
@@ -22,12 +21,13 @@ class _Hand(Struct):
 class HandWatch:
     """Claim 5: a hand that moves, or with which its owner manipulates something, until it has been still."""
 
-    def __init__(self, config: GenerationConfig) -> None:
+    def __init__(self, robot: str, config: GenerationConfig) -> None:
+        self._robot = robot
         self._config = config
         self._hands: dict[str, _Hand] = {}
         self._places: dict[str, Entity] = {}
-        self._acts: dict[str, str] = {}
-        """Manipulations under way: actor -> the hand, or the object if no hand of theirs is known."""
+        self._acts: dict[tuple[str, tuple[str, ...]], str] = {}
+        """Manipulations under way: actor and targets -> the hand, or the object if no hand of theirs is known."""
         self._watched = ""
 
     def feed(self, message: World | ActionBegan | ActionEnded | ActorLost, now: Seconds) -> None:
@@ -36,23 +36,30 @@ class HandWatch:
                 self._places = {entity.id: entity for entity in message.entities}
                 self._see(message, now)
             case ActionBegan(action="act", actor=actor, targets=targets):
-                self._acts[actor] = self._hand_at(actor, targets)
-                hand = self._hands.setdefault(self._acts[actor], _Hand(actor))
-                hand.active = True
-            case ActionEnded(action="act", actor=actor) | ActorLost(actor=actor):
-                if (id := self._acts.pop(actor, None)) is not None:
-                    hand = self._hands[id]
-                    if hand.moving_since is None:
-                        hand.still_since = now
+                id = self._acts.setdefault((actor, targets), self._hand_at(actor, targets))
+                self._hands.setdefault(id, _Hand()).active = True
+            case ActionEnded(action="act", actor=actor, targets=targets):
+                self._rest((actor, targets), now)
+            case ActorLost(actor=actor):
+                for act in [act for act in self._acts if act[0] == actor]:
+                    self._rest(act, now)
+
+    def _rest(self, act: tuple[str, tuple[str, ...]], now: Seconds) -> None:
+        """A manipulation is over: its hand is still from now, unless it goes on moving."""
+        id = self._acts.pop(act, None)
+        if id is not None and (hand := self._hands[id]).moving_since is None:
+            hand.still_since = now
 
     def _see(self, world: World, now: Seconds) -> None:
         fast = {
-            entity.id: entity
+            entity.id
             for entity in world.entities
-            if entity.kind == "hand" and math.hypot(*entity.velocity) > self._config.hand_speed
+            if entity.kind == "hand"
+            and entity.owner != self._robot
+            and math.hypot(*entity.velocity) > self._config.hand_speed
         }
-        for entity in fast.values():
-            hand = self._hands.setdefault(entity.id, _Hand(entity.owner))
+        for id in sorted(fast):
+            hand = self._hands.setdefault(id, _Hand())
             if hand.moving_since is None:
                 hand.moving_since = now
             hand.still_since = None
@@ -64,7 +71,7 @@ class HandWatch:
     def _hand_at(self, actor: str, targets: tuple[str, ...]) -> str:
         """The hand of `actor` that moves, else the one nearest to what it manipulates, else that thing itself."""
         hands = [entity for entity in self._places.values() if entity.kind == "hand" and entity.owner == actor]
-        moving = [hand.id for hand in hands if self._hands.get(hand.id, _Hand(actor)).moving_since is not None]
+        moving = [hand.id for hand in hands if self._hands.get(hand.id, _Hand()).moving_since is not None]
         if moving:
             return moving[0]
         thing = self._places.get(targets[0]) if targets else None
@@ -106,21 +113,23 @@ class HandWatch:
 
 
 class FaceWatch:
-    """Claim 6: the face of the person spoken to last, else of whoever is nearest; lost for long, its direction."""
+    """Claim 6: the face of the person spoken to last, else of whoever was nearest; lost for long, its direction."""
 
-    def __init__(self, config: GenerationConfig) -> None:
+    def __init__(self, robot: str, config: GenerationConfig) -> None:
+        self._robot = robot
         self._config = config
         self._people: dict[str, Entity] = {}
         self._lost: dict[str, Seconds] = {}
         self._known: list[str] = []
         self._seen: Seconds = float("-inf")
+        self._followed = ""
         self.partner = ""
         """Who was spoken to last."""
 
     def feed(self, message: World | ActorFound | ActorLost, now: Seconds) -> None:
         match message:
             case World():
-                seen = {person.id: person for person in message.people}
+                seen = {person.id: person for person in message.people if person.id != self._robot}
                 for id in self._people.keys() - seen.keys():
                     self._lost.setdefault(id, now)
                 for id in seen.keys() - self._people.keys():
@@ -152,7 +161,12 @@ class FaceWatch:
         present = self.present(now)
         if not present:
             return Claim(kind="face", priority=6, reason="lost: hold the direction") if self._known else None
-        return Claim(kind="face", priority=6, target=self.partner if self.partner in present else present[0])
+        if self.partner in present:
+            self._followed = self.partner
+        elif self._followed not in present:  # stay with a face while it is seen, however people move about
+            self._followed = present[0]
+        reason = "spoken to last" if self._followed == self.partner else "nearest when it came"
+        return Claim(kind="face", priority=6, target=self._followed, reason=reason)
 
     def is_face(self, target: str) -> bool:
         return target in self._known
@@ -170,6 +184,8 @@ class GlanceWatch:
         self._statistics: dict[str, Statistics] = {}
         self._quiet_since: Seconds | None = None
         self._on_face = False
+        self._own = 0
+        """Glances of ours among the events so far."""
         self._until: Seconds | None = None
         self._seen: Seconds = float("-inf")
         self.face = ""
@@ -179,8 +195,9 @@ class GlanceWatch:
         match message:
             case Statistics(actor=actor):
                 self._statistics[actor] = message
-            case ConnectionEvent(state="started"):
+            case ConnectionEvent(state="started", cause=cause):
                 self._quiet_since = now
+                self._own += cause == "maintenance"
 
     def head_is_on_face(self, on_face: bool, now: Seconds) -> None:
         if self._on_face != on_face or self._quiet_since is None:
@@ -200,7 +217,7 @@ class GlanceWatch:
     def pace(self) -> Seconds:
         """Mean time between connection events, without our own glances, within its limits."""
         seen = self._statistics.get(self.face) or self._statistics.get("")
-        if seen is None or seen.session.events < self._config.mtbce_events:
+        if seen is None or seen.session.events - self._own < self._config.mtbce_events:
             return self._config.mtbce_prior
         recent = seen.recent.mtbce_without_maintenance
         if recent is None:
@@ -223,4 +240,5 @@ class GlanceWatch:
         wanted = now < self._until if self._until is not None else self._due is not None and now >= self._due
         if not wanted or not self.face:
             return None
-        return Claim(kind="glance", priority=3, target=self.face, reason=f"quiet for longer than {self.pace:.1f} s")
+        quiet = self._config.glance_factor * self.pace
+        return Claim(kind="glance", priority=3, target=self.face, reason=f"quiet for longer than {quiet:.1f} s")

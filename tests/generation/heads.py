@@ -10,9 +10,16 @@ from schemas.units import Seconds, Stamp, Vector
 from schemas.world import Entity, World
 from services.generation.arbiter import Arbiter, Ruling
 from services.generation.config import GenerationConfig
+from services.generation.leases import Inhibition
 
 AT = Stamp("test", 0.0)
-INHIBITED = Claim(kind="inhibition", priority=1, reason="hold")
+
+
+def inhibition(mode: str = "hold", target: str = "") -> Inhibition:
+    return Inhibition(Claim(kind="inhibition", priority=1, target=target, reason=f"manager: {mode}"), mode)  # type: ignore[arg-type]
+
+
+INHIBITED = inhibition()
 
 
 def world(speed: float = 0.0, person: bool = True) -> World:

@@ -6,9 +6,18 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from schemas.attention import Claim
 from schemas.world import Entity, World
-from tests.generation.heads import INHIBITED, Stage, act, event, looking_at, on_the_face, statistics, world
+from tests.generation.heads import (
+    INHIBITED,
+    Stage,
+    act,
+    event,
+    inhibition,
+    looking_at,
+    on_the_face,
+    statistics,
+    world,
+)
 
 # -- priorities -------------------------------------------------------------------------------------------------
 
@@ -170,7 +179,7 @@ def test_thinking_averts_the_gaze_until_the_next_fragment() -> None:
 
 def test_an_inhibition_with_a_target_moves_the_head_there_and_one_without_leaves_it() -> None:
     stage = on_the_face()
-    stage.do(lambda arbiter: arbiter.inhibit(Claim(kind="inhibition", priority=1, target="piece")))
+    stage.do(lambda arbiter: arbiter.inhibit(inhibition("target", "piece")))
     stage.do(lambda arbiter: arbiter.inhibit(INHIBITED))
     stage.feed(world(speed=0.5))
     stage.until(20.0)
@@ -240,5 +249,5 @@ def test_the_head_has_one_owner_and_it_is_never_below_a_waiting_claim(
         assert ruling.owner.kind not in {claim.kind for claim in ruling.waiting}
         assert all(ruling.owner.priority < priority for priority in priorities)
         if ruling.shift:
-            assert ruling.shift.target == ruling.owner.target
+            assert ruling.shift.target == (ruling.owner.target or "other")  # held where the fragment had it
             assert ruling.owner.kind != "none"

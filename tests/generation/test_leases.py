@@ -6,7 +6,7 @@ from schemas.attention import Claim, Inhibit
 from schemas.behaviors import Gaze, Gesture, Pointing, Speech
 from schemas.faults import InputRefused
 from services.generation.config import GenerationConfig
-from services.generation.leases import Leases
+from services.generation.leases import Inhibition, Leases
 from services.generation.permits import Permits
 
 
@@ -17,14 +17,14 @@ def lease(id: str = "l", **fields: object) -> Inhibit:
 def test_a_lease_lapses_unless_it_is_renewed() -> None:
     leases = Leases(GenerationConfig())
     leases.take(lease(ttl=5.0), 0.0)
-    leases.take(lease(ttl=5.0), 3.0)
+    leases.renew("l", 3.0)
 
     assert leases.deadline == 8.0
     assert leases.lapse(7.9) == ()
     assert not leases.permits().gaze
     assert leases.lapse(8.0) == ("l",)
     assert leases.permits() == Permits()
-    assert leases.claim() is None
+    assert leases.inhibition is None
 
 
 def test_the_newest_lease_on_gaze_claims_the_head() -> None:
@@ -33,13 +33,23 @@ def test_the_newest_lease_on_gaze_claims_the_head() -> None:
     leases.take(lease("b", mode="target", target="table"), 0.0)
     leases.take(lease("c", part="point-left"), 0.0)
 
-    assert leases.claim() == Claim(kind="inhibition", priority=1, target="table", reason="manager: target")
+    claim = Claim(kind="inhibition", priority=1, target="table", reason="manager: target")
+    assert leases.inhibition == Inhibition(claim, "target")
     assert leases.release("b")
-    assert leases.claim() == Claim(kind="inhibition", priority=1, reason="manager: hold")
+    assert leases.inhibition == Inhibition(Claim(kind="inhibition", priority=1, reason="manager: hold"), "hold")
     assert not leases.release("b")
 
 
-@pytest.mark.parametrize(("fields", "reason"), [({"ttl": 0.0}, "ttl"), ({"mode": "target"}, "target")])
+@pytest.mark.parametrize(
+    ("fields", "reason"),
+    [
+        ({"ttl": 0.0}, "ttl"),
+        ({"ttl": -1.0}, "ttl"),
+        ({"ttl": float("nan")}, "ttl"),
+        ({"ttl": float("inf")}, "ttl"),
+        ({"mode": "target"}, "target"),
+    ],
+)
 def test_a_lease_that_means_nothing_is_refused(fields: dict[str, object], reason: str) -> None:
     leases = Leases(GenerationConfig())
 
@@ -75,9 +85,8 @@ def test_degraded_generation_is_a_standing_inhibition_of_everything_but_words() 
     leases = Leases(GenerationConfig(condition="degraded-generation"))
     permits = leases.permits()
 
-    claim = leases.claim()
-    assert claim is not None
-    assert (claim.kind, claim.target) == ("inhibition", "")
+    assert leases.inhibition is not None
+    assert (leases.inhibition.claim.kind, leases.inhibition.mode) == ("inhibition", "stare")
     assert permits.allows(Speech(id="s", text="hello"))
     assert not permits.allows(Gaze(id="g", target="x"))
     assert not permits.allows(Gesture(id="b", lexeme="beat"))
@@ -88,4 +97,4 @@ def test_degraded_recognition_changes_nothing_here() -> None:
     leases = Leases(GenerationConfig(condition="degraded-recognition"))
 
     assert leases.permits() == Permits()
-    assert leases.claim() is None
+    assert leases.inhibition is None
