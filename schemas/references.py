@@ -101,25 +101,36 @@ def _explicit(text: str, known: Mapping[str, frozenset[str]]) -> str:
     return text if told == plain else str(told)
 
 
-def in_draft_spelling(thing: AnyInput, dialect: Literal["draft", "bml-1.0"]) -> AnyInput:
-    """The same with every sync point spelled as the drafts do (`schemas.syncref.canonical_sync`)."""
-    types = {behavior.id: type_name(behavior) for behavior in thing.behaviors}
+def respelled(
+    thing: AnyInput, name: Callable[[str, str], str], elsewhere: Mapping[str, Block] | None = None
+) -> AnyInput:
+    """The same with every sync point called `name(sync, type)`. type: of its behavior, "" where nobody knows it.
+
+    elsewhere: other blocks that it may refer to, by id.
+    """
+    known: list[Input] = [*(elsewhere or {}).values(), thing]
+    types = {(each.id, behavior.id): type_name(behavior) for each in known for behavior in each.behaviors}
 
     def change(text: str) -> str:
         try:
             reference = SyncRef.parse(text)
         except ValueError:
             return text
-        sync = canonical_sync(reference.sync, types.get(reference.behavior, ""), dialect)
+        sync = name(reference.sync, types.get((reference.block or thing.id, reference.behavior), ""))
         return text if sync == reference.sync else str(replace(reference, sync=sync))
 
-    def canonical(behavior: AnyBehavior) -> AnyBehavior:
-        timing = tuple(
-            Timing(canonical_sync(each.sync, type_name(behavior), dialect), each.ref) for each in behavior.timing
-        )
-        return replace(behavior, timing=timing)
+    def renamed(behavior: AnyBehavior) -> AnyBehavior:
+        timing = tuple(Timing(name(each.sync, type_name(behavior)), each.ref) for each in behavior.timing)
+        return replace(behavior, timing=timing) if timing != behavior.timing else behavior
 
-    return rewritten(replace(thing, behaviors=tuple(canonical(each) for each in thing.behaviors)), change)
+    return rewritten(replace(thing, behaviors=tuple(renamed(each) for each in thing.behaviors)), change)
+
+
+def in_draft_spelling(
+    thing: AnyInput, dialect: Literal["draft", "bml-1.0"], elsewhere: Mapping[str, Block] | None = None
+) -> AnyInput:
+    """The same with every sync point spelled as the drafts do (`schemas.syncref.canonical_sync`)."""
+    return respelled(thing, lambda sync, type: canonical_sync(sync, type, dialect), elsewhere)
 
 
 def without_lines(thing: AnyInput) -> AnyInput:

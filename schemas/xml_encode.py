@@ -98,6 +98,8 @@ def _behavior(root: etree._Element, namespace: str, behavior: of.Behavior) -> No
             if behavior.part or behavior.lexeme:
                 pose = {"part": behavior.part, "lexeme": behavior.lexeme}
                 etree.SubElement(element, f"{{{namespace}}}pose", pose)
+        case of.FaceShift() if namespace == BML_1_0:
+            _nest_expression(element)
         case of.Reference():
             if behavior.options is None:
                 element.set("propose", "true")
@@ -111,6 +113,18 @@ def _behavior(root: etree._Element, namespace: str, behavior: of.Behavior) -> No
                 etree.SubElement(element, f"{{{EBML}}}object", {"id": id})
             for anchor in behavior.anchors:
                 etree.SubElement(element, f"{{{EBML}}}anchor", {"ref": anchor})
+
+
+def _nest_expression(shift: etree._Element) -> None:
+    """BML 1.0 has the one expression of a shift inside it."""
+    given = [name for name in ("lexeme", "au") if name in shift.attrib]
+    if len(given) != 1:
+        return
+    local, names = ("lexeme", ("lexeme",)) if given == ["lexeme"] else ("facs", ("au", "side"))
+    child = etree.SubElement(shift, f"{{{BML_1_0}}}{local}")
+    for name in names:
+        if name in shift.attrib:
+            child.set(name, shift.attrib.pop(name))
 
 
 def _set_timing(element: etree._Element, behavior: of.Behavior) -> None:
@@ -148,8 +162,8 @@ def _camel(field: str) -> str:
 
 
 def _indent(element: etree._Element, level: int) -> None:
-    """Line breaks between elements, but none inside <text>, where white space is speech."""
-    if len(element) == 0 or str(element.tag).endswith("}text"):
+    """Line breaks between elements, but none inside <text> and <description>, where white space is speech."""
+    if len(element) == 0 or str(element.tag).endswith(("}text", "}description")):
         return
     for child in element:
         _indent(child, level + 1)

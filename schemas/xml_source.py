@@ -15,7 +15,9 @@ from schemas.faults import Fault, InputRefused
 DRAFT = "org.mindmakers.bml"
 BML_1_0 = "http://www.bml-initiative.org/bml/bml-1.0"
 EBML = "edu.wpi.ebml"
-CORE = frozenset({"", DRAFT, BML_1_0})
+BML_1_0_EXTENSIONS = "http://www.bml-initiative.org/bml/coreextensions-1.0"
+"""The standard's own: `faceFacs` stands there, though many write it in the core."""
+CORE = frozenset({"", DRAFT, BML_1_0, BML_1_0_EXTENSIONS})
 """Namespaces of BML proper; elements of any other but ours are somebody else's and are left alone."""
 
 LARGEST = 4 * 1024 * 1024

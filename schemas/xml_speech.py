@@ -13,7 +13,7 @@ from lxml import etree
 
 from schemas.behaviors import Mark, Speech, Timing
 from schemas.faults import InputRefused
-from schemas.xml_source import CORE, EBML, Source, split
+from schemas.xml_source import BML_1_0, CORE, EBML, Source, split
 
 SSML = "http://www.w3.org/2001/10/synthesis"
 XML = "http://www.w3.org/XML/1998/namespace"
@@ -143,12 +143,17 @@ def _attribute(name: str, value: str) -> str:
 
 
 def fill(element: etree._Element, speech: Speech, namespace: str) -> None:
-    """Write text, marks and markup into an empty <speech>, so that `spoken` reads the same."""
+    """Write text, marks and markup into an empty <speech>, so that `spoken` reads the same.
+
+    BML 1.0 has markup in a description beside the text, the drafts in it. What is not XML is an attribute of ours.
+    """
     content = etree.SubElement(element, f"{{{namespace}}}text")
-    if (inline := _inline(speech, namespace)) is not None:
+    if namespace == BML_1_0 and (description := _description(speech)) is not None:
+        element.append(description)
+    elif namespace != BML_1_0 and (inline := _inline(speech, namespace)) is not None:
         element.replace(content, inline)
         return
-    if speech.markup:
+    elif speech.markup:
         element.set(f"{{{EBML}}}markup", speech.markup)
     if speech.text != " ".join(
         filter(None, speech.text.translate(dict.fromkeys(map(ord, "\t\r\n"), " ")).split(" "))
@@ -171,6 +176,21 @@ def _append_text(content: etree._Element) -> Callable[[str], None]:
             content.text = words or None
 
     return say
+
+
+def _description(speech: Speech) -> etree._Element | None:
+    """The markup as SSML, if reading it back gives exactly this markup."""
+    if not speech.markup:
+        return None
+    raw = (
+        f'<description xmlns="{BML_1_0}" priority="1" type="application/ssml+xml">'
+        f'<speak xmlns="{SSML}">{speech.markup}</speak></description>'
+    )
+    try:
+        description = Source(raw).root
+    except InputRefused:
+        return None
+    return description if len(description) == 1 and serialized(description[0]) == speech.markup else None
 
 
 def _inline(speech: Speech, namespace: str) -> etree._Element | None:

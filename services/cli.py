@@ -194,6 +194,26 @@ def plan(
 
 
 @app.command()
+def bml(
+    file: Annotated[
+        Path, typer.Argument(metavar="FILE", help="A turn fragment or a BML block (XML), or JSON of one or several.")
+    ],
+    dialect: Annotated[Literal["bml-1.0", "draft"], typer.Option("--dialect", help="How to spell it.")] = "bml-1.0",
+    core: Annotated[
+        bool, typer.Option("--core", help="Without connection events and all else that only Engage knows.")
+    ] = False,
+    world: WorldFile = None,
+    config: ConfigFile = None,
+    settings: Settings = None,
+) -> None:
+    """Print the BML that a turn fragment becomes, or a block in another dialect. Nothing moves."""
+    from services.commandline import bml, run
+
+    where = run.Where(config, settings=tuple(settings or ()))
+    raise typer.Exit(bml.main(file, dialect, core, world, where))
+
+
+@app.command()
 def explain(
     file: Annotated[
         Path, typer.Argument(metavar="FILE", help="EBML turn fragment (XML), or JSON of one or several.")

@@ -5,22 +5,19 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import msgspec
-from msgspec.structs import asdict, replace
+from msgspec.structs import asdict
 from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from schemas.body import Estimate, EstimateItem
-from schemas.faults import Fault, InputRefused, RunFailed
+from schemas.faults import Fault, InputRefused
 from schemas.fragments import GestureChoice, PairConsidered, ReferenceChoice, TurnFragment
-from schemas.world import World
+from services.commandline.generating import generated
 from services.commandline.outputs import Terminal
 from services.commandline.process import DONE
 from services.commandline.run import Where
 from services.commandline.sources import read_source, read_world
-from services.config import Config
 from services.generation.planning import Plan
-from services.virtual_time import run_virtual
 
 GESTURES: dict[GestureChoice, str] = {
     "none": "none",
@@ -43,7 +40,7 @@ def main(path: Path, format: str, world: Path | None, where: Where) -> int:
         advice = "only turn fragments refer to objects; for a block: engage plan"
         raise InputRefused(Fault(reason="holds no turn fragment", where=str(path), advice=advice))
     with source.blamed():
-        plans = run_virtual(_planned(fragments, around, config, str(path)))
+        plans = generated(fragments, around, config, str(path))
     if format == "json":
         print(as_json([choice for plan in plans for choice in plan.choices]))
         for warning in (warning for plan in plans for warning in plan.warnings):
@@ -51,43 +48,6 @@ def main(path: Path, format: str, world: Path | None, where: Where) -> int:
     else:
         show(plans, Terminal(highlight=False, markup=False, emoji=False))
     return DONE
-
-
-async def _planned(fragments: Sequence[TurnFragment], world: World, config: Config, source: str) -> list[Plan]:
-    """As generation would plan them one after the other, the simulated body at home before each."""
-    from services.control.simulated import SimulatedBody
-    from services.generation.fragment_check import checked
-    from services.generation.leases import Leases
-    from services.generation.motions import collect, distinct, from_each_other, from_here
-    from services.generation.planning import plan, targets
-    from services.generation.turn_policy import TurnPolicy
-
-    body = SimulatedBody(config.control.no_point_zones, config.control.variability)
-    permits = Leases(config.generation).permits()
-    turns = TurnPolicy(config.robot, config.generation)
-
-    def estimated(items: Sequence[EstimateItem]) -> list[Estimate]:
-        return [body.estimate(item.behavior, item.pose, world) for item in items]
-
-    plans = []
-    for each in fragments:
-        fragment = checked(each, world, config.robot)
-        turn = turns.accept(fragment, fragment.addressee)
-        sequence = targets(fragment)
-        here = estimated(from_here(distinct(sequence), permits.only_hand))
-        onward = estimated(from_each_other(sequence, here, permits.only_hand))
-        motions = collect(sequence, here, onward)
-        try:
-            plans.append(plan(fragment, turn, world, body.capabilities, motions, permits, config.generation))
-        except RunFailed as error:
-            where = f"{source}: {fragment.id}: {error.fault.where}"
-            raise RunFailed(replace(error.fault, where=where, line=_line(fragment, error.fault.where))) from error
-        turns.fragment_ended(fragment.id, complete=True, now=0.0)
-    return plans
-
-
-def _line(fragment: TurnFragment, behavior: str) -> int:
-    return next((each.line for each in fragment.behaviors if each.id == behavior), 0)
 
 
 def as_json(choices: Sequence[ReferenceChoice]) -> str:

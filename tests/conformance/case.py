@@ -13,8 +13,9 @@
     within = 0.05                                       # how near points must be that can only be predicted
     dialects = ["draft"]                                # by default all three
 
-Spelled for BML 1.0, `stroke_start` becomes `strokeStart` and so on, and the `stroke` of what is called `gaze-*` or
-`posture-*` becomes `ready`. `{human}` and such need no care: the world is that of the tangram table.
+Spelled for BML 1.0, `stroke_start` becomes `strokeStart` and so on, the `stroke` of what is called `gaze-*` or
+`posture-*` becomes `ready`, words stand in a `<text>`, and all points of a `<synchronize>` inside it. `{human}` and
+such need no care: the world is that of the tangram table.
 """
 
 import re
@@ -101,6 +102,10 @@ def _written(block: dict[str, Any], dialect: str) -> Written:
 
 
 def in_bml_1_0(content: str) -> str:
+    content = re.sub(
+        r"(<speech [^>]*[^/]>)(?!\s*<text)(.*?)(</speech>)", r"\1<text>\2</text>\3", content, flags=re.DOTALL
+    )
+    content = re.sub(r'<synchronize ref="([^"]*)">', r'<synchronize><sync ref="\1"/>', content)
     content = re.sub(r"\bstroke_start\b", "strokeStart", content)
     content = re.sub(r"\bstroke_end\b", "strokeEnd", content)
     content = re.sub(r"\b((?:gaze|posture)-\d\s*:\s*)stroke\b", r"\1ready", content)

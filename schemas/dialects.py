@@ -1,0 +1,125 @@
+"""A block in another dialect, and without our extension: for realizers that know BML 1.0 and nothing else.
+
+What is respelled means the same, point for point: `tests/conformance` plans both to the same net.
+"""
+
+from collections.abc import Callable, Collection, Iterator, Mapping
+from typing import TypeVar
+
+from msgspec.structs import replace
+
+from schemas.behaviors import (
+    After,
+    Before,
+    Behavior,
+    Constraint,
+    Event,
+    Reference,
+    Speech,
+    Synchronize,
+    Timing,
+    TurnSignal,
+    Unknown,
+)
+from schemas.blocks import Block, Dialect
+from schemas.references import in_draft_spelling, respelled
+from schemas.syncref import SYNC_POINTS, SyncRef, dialect_sync
+
+EXTENSIONS = (Event, TurnSignal, Reference, Unknown)
+"""What no other realizer knows."""
+AnyBehavior = TypeVar("AnyBehavior", bound=Behavior)
+Operator = Synchronize | Before | After
+
+_FACE = {"stroke_start": "ready", "stroke": "ready", "stroke_end": "relax"}
+_SAME_INSTANT: dict[str, Mapping[str, str]] = {
+    "gaze": {"ready": "start", "stroke_start": "start", "stroke_end": "relax"},
+    "posture": {"ready": "stroke", "stroke_start": "stroke", "stroke_end": "relax"},
+    "face": _FACE, "faceLexeme": _FACE, "faceFacs": _FACE,
+}  # fmt: skip
+"""Points of the drafts that BML 1.0 has no name for, and the one of the same instant that it has: thesis 4.1.2."""
+
+
+def core(block: Block) -> Block:
+    """Without connection events, turn signals and what else is not BML's: what was tied to them no longer is."""
+    removed = {behavior.id for behavior in block.behaviors if isinstance(behavior, EXTENSIONS)}
+
+    def stays(reference: str) -> bool:
+        named = SyncRef.parse(reference)
+        return named.block not in ("", block.id) or named.behavior not in removed
+
+    behaviors = tuple(
+        replace(behavior, timing=tuple(each for each in behavior.timing if stays(each.ref)))
+        for behavior in block.behaviors
+        if behavior.id not in removed
+    )
+    constraints = (replace(each, operators=tuple(_remaining(each.operators, stays))) for each in block.constraints)
+    return replace(block, behaviors=behaviors, constraints=tuple(each for each in constraints if each.operators))
+
+
+def _remaining(operators: Collection[Operator], stays: Callable[[str], bool]) -> Iterator[Operator]:
+    for operator in operators:
+        members = (operator.ref, *operator.syncs) if operator.ref else operator.syncs
+        left = tuple(member for member in members if stays(member))
+        if left == members:
+            yield operator
+        elif isinstance(operator, Synchronize) and len(left) > 1:
+            yield Synchronize(syncs=left, line=operator.line)
+        elif not isinstance(operator, Synchronize) and len(left) > 1 and left[0] == operator.ref:
+            yield replace(operator, syncs=left[1:])
+
+
+def spelled(block: Block, dialect: Dialect, elsewhere: Mapping[str, Block] | None = None) -> Block:
+    """The block as `dialect` writes it. elsewhere: other blocks that it refers to, by id, however they are spelled.
+
+    In BML 1.0 a gaze knows no `stroke_start`, a synchronize has no `ref`, and speech is not timed at its marks by
+    attribute: points are called by the name of their instant, and what has no attribute becomes a constraint.
+    """
+    draft = replace(in_draft_spelling(block, block.dialect, elsewhere), dialect="draft")
+    if dialect == "draft":
+        return draft
+    named = respelled(draft, _bml_1_0, elsewhere)
+    ties = [tie for behavior in named.behaviors for tie in _ties(behavior)]
+    behaviors = tuple(
+        replace(behavior, timing=tuple(_attributes(behavior))) if behavior.timing else behavior
+        for behavior in named.behaviors
+    )
+    constraints = tuple(
+        replace(constraint, operators=tuple(_without_ref(operator) for operator in constraint.operators))
+        for constraint in named.constraints
+    )
+    return replace(named, behaviors=behaviors, constraints=(*constraints, *ties), dialect="bml-1.0")
+
+
+def _bml_1_0(sync: str, type: str) -> str:
+    if sync not in SYNC_POINTS or type == "speech":
+        return sync
+    sync = _SAME_INSTANT.get(type, {}).get(sync, sync)
+    return dialect_sync(sync, type, "bml-1.0") or sync
+
+
+def _attributes(behavior: Behavior) -> Iterator[Timing]:
+    """The timing that can stand as attributes: each once, and no marks."""
+    seen: set[str] = set()
+    for timing in behavior.timing:
+        is_mark = isinstance(behavior, Speech) and timing.sync not in ("start", "end")
+        if timing.sync not in seen and not is_mark:
+            seen.add(timing.sync)
+            yield timing
+
+
+def _ties(behavior: Behavior) -> Iterator[Constraint]:
+    """The rest of the timing."""
+    stands = list(_attributes(behavior))
+    for timing in behavior.timing:
+        if timing in stands:
+            stands.remove(timing)
+            continue
+        here = str(SyncRef(behavior=behavior.id, sync=timing.sync))
+        tie = Synchronize(syncs=(here, timing.ref), line=behavior.line)
+        yield Constraint(operators=(tie,), required=behavior.required, line=behavior.line)
+
+
+def _without_ref(operator: Operator) -> Operator:
+    if isinstance(operator, Synchronize) and operator.ref:
+        return replace(operator, ref="", syncs=(operator.ref, *operator.syncs))
+    return operator

@@ -1,0 +1,62 @@
+"""What generation makes of the fragments of a file, worked out here and now: no bus, nothing moves."""
+
+from collections.abc import Sequence
+
+from msgspec.structs import replace
+
+from schemas.blocks import Block
+from schemas.body import Estimate, EstimateItem
+from schemas.faults import RunFailed
+from schemas.fragments import TurnFragment
+from schemas.world import World
+from services.commandline.sources import Thing
+from services.config import Config
+from services.generation.planning import Plan
+from services.virtual_time import run_virtual
+
+
+def generated(things: Sequence[Thing], world: World, config: Config, source: str) -> list[Plan]:
+    """As generation would plan them one after the other, the simulated body at home before each.
+
+    A block is its own plan. Raises InputRefused or RunFailed, as performing them would.
+    """
+    return run_virtual(_generated(things, world, config, source))
+
+
+async def _generated(things: Sequence[Thing], world: World, config: Config, source: str) -> list[Plan]:
+    from services.control.simulated import SimulatedBody
+    from services.generation.fragment_check import checked
+    from services.generation.leases import Leases
+    from services.generation.motions import collect, distinct, from_each_other, from_here
+    from services.generation.planning import plan, targets
+    from services.generation.turn_policy import TurnPolicy
+
+    body = SimulatedBody(config.control.no_point_zones, config.control.variability)
+    permits = Leases(config.generation).permits()
+    turns = TurnPolicy(config.robot, config.generation)
+
+    def estimated(items: Sequence[EstimateItem]) -> list[Estimate]:
+        return [body.estimate(item.behavior, item.pose, world) for item in items]
+
+    plans = []
+    for each in things:
+        if isinstance(each, Block):
+            plans.append(Plan(block=each))
+            continue
+        fragment = checked(each, world, config.robot)
+        turn = turns.accept(fragment, fragment.addressee)
+        sequence = targets(fragment)
+        here = estimated(from_here(distinct(sequence), permits.only_hand))
+        onward = estimated(from_each_other(sequence, here, permits.only_hand))
+        motions = collect(sequence, here, onward)
+        try:
+            plans.append(plan(fragment, turn, world, body.capabilities, motions, permits, config.generation))
+        except RunFailed as error:
+            where = f"{source}: {fragment.id}: {error.fault.where}"
+            raise RunFailed(replace(error.fault, where=where, line=_line(fragment, error.fault.where))) from error
+        turns.fragment_ended(fragment.id, complete=True, now=0.0)
+    return plans
+
+
+def _line(fragment: TurnFragment, behavior: str) -> int:
+    return next((each.line for each in fragment.behaviors if each.id == behavior), 0)
