@@ -253,6 +253,8 @@ class _Emitter:
             follows = preceding == self.before.speech
             relate, sync = (_after, "start") if follows else (_same, "stroke")
             operators.append(relate(f"{preceding}:start", f"{gaze}:{sync}"))
+            if point and follows:
+                operators.append(_after(f"{gaze}:start", f"{point}:start"))
         if point:
             operators.append(_same(f"{gaze}:stroke+{self.config.figure_lead:g}", f"{point}:stroke_start"))
             if phrase:

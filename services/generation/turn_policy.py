@@ -168,6 +168,17 @@ class TurnPolicy:
         self._forget()
         return None
 
+    def fragment_refused(self, id: str, now: Seconds) -> Aborted | None:
+        """The realizer has found it impossible: it never was. Its turn goes on, unless that has nothing else to it."""
+        plan = self._live.get(id)
+        if plan is None:
+            return None
+        other = self._open is not None and self._open.turn != plan.turn
+        if plan.turn == id or other:
+            return self.fragment_ended(id, complete=False, now=now, reason=f"{id} was refused")
+        self._open = plan
+        return self.fragment_ended(id, complete=True, now=now)
+
     @property
     def averted_to(self) -> str:
         """Where the robot looks to think, now that nothing of its open turn is performed; "": it does not think."""
