@@ -76,7 +76,7 @@ class LongestPaths:
 
     def _relax(self) -> int | None:
         """Move what is too early; the bound on a fact that cannot be kept then, if any. Raises Circle."""
-        violated: int | None = None
+        violated: list[int] = []
         moves = 0
         while self._todo:
             _, here = heapq.heappop(self._todo)
@@ -88,7 +88,7 @@ class LongestPaths:
                 if self._is_fact[arc.target]:
                     is_late = arc.is_bound and not self._is_fact[here] and not arc.behavior
                     if is_late and at > self.times[arc.target] + EPSILON:
-                        violated = number
+                        violated.append(number)
                     continue
                 if not self._is_known[arc.target]:
                     continue
@@ -97,10 +97,10 @@ class LongestPaths:
                 if moves & (moves - 1) == 0 and (cycle := self._circle(arc.target)):
                     self._touch(here)
                     raise Circle(cycle)
-        if violated is not None:
-            # Seen again when it has been made way for: there may be others.
-            self._touch(self._arcs[violated].source)
-        return violated
+        # Seen again when one has been made way for.
+        for number in violated:
+            self._touch(self._arcs[number].source)
+        return violated[-1] if violated else None
 
     def _set(self, transition: int, at: Seconds, cause: int) -> None:
         self._old.setdefault(transition, self.times[transition])
