@@ -28,6 +28,7 @@ SHELLS = {
     "services/realizer/reporting.py",  # publishes feedback
     "services/realizer/surroundings.py",  # what the executor is given
     "services/generation/body_link.py",  # asks the body
+    "services/generation/conductor.py",  # awaits the blocks of fragments
     "services/control/body.py",  # the interface of bodies: coroutines
     "services/control/simulated.py",  # a body that moves on the loop's clock
     "services/control/waiting.py",  # waits for a moment or a change of authority

@@ -25,9 +25,8 @@ from services.recognition.config import RecognitionConfig
 from services.recognition.service import recognize
 from services.requests import Pending, Requester
 from services.runtime import Service, running
+from tests.generation.emitted import lines
 from tests.generation.partners import TABLE
-
-WORD = "word"
 
 
 class Robot:
@@ -112,8 +111,6 @@ class Robot:
         return sorted(spoken, key=lambda each: each[1])
 
     def constraints(self, block: str) -> list[str]:
-        from tests.generation.emitted import lines
-
         return lines(self.blocks[block].block)
 
 

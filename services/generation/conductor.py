@@ -1,0 +1,281 @@
+"""Fragments from their acceptance to their outcomes: what each sends, follows and waits for."""
+
+import asyncio
+from collections.abc import Callable, Collection
+from functools import reduce
+
+from schemas import keys
+from schemas.actions import ActionBegan, ActionEnded
+from schemas.behaviors import GazeShift, TurnSignal
+from schemas.blocks import BlockOutcome, PerformBlock
+from schemas.body import AbortBehavior
+from schemas.faults import EngageError, Fault, RunFailed
+from schemas.feedback import SyncPointProgress, WarningFeedback
+from schemas.fragments import PerformFragment
+from schemas.recognition import ConnectionEvent, SignalTurn
+from schemas.units import Seconds
+from schemas.world import World
+from services.bus import Bus
+from services.generation.arbiter import Arbiter
+from services.generation.body_link import BodyLink
+from services.generation.config import GenerationConfig
+from services.generation.fragment_check import checked
+from services.generation.leases import Leases
+from services.generation.performance import GazesOfFragments, Performance
+from services.generation.planning import plan, targets
+from services.generation.trail import NOTHING, Trail
+from services.generation.turn_events import TurnEvents, TurnOutcomes
+from services.generation.turn_policy import Aborted, TurnPolicy
+from services.requests import Pending, RequestDesk, Requester, RequestRefused
+
+
+class Conductor:
+    """Any number of fragments at once. `deadline`: when to `settle` at the latest."""
+
+    def __init__(
+        self,
+        bus: Bus,
+        config: GenerationConfig,
+        desk: RequestDesk,
+        requests: Requester,
+        arbiter: Arbiter,
+        leases: Leases,
+        changed: Callable[[Seconds], None],
+    ) -> None:
+        """changed: called when a fragment has come further by itself."""
+        self._bus = bus
+        self._config = config
+        self._desk = desk
+        self._requests = requests
+        self._arbiter = arbiter
+        self._leases = leases
+        self._changed = changed
+        self._turns = TurnPolicy(bus.robot, config)
+        self._events = TurnEvents()
+        self._outcomes = TurnOutcomes(self._events, config.decision_patience)
+        self._gazes = GazesOfFragments()
+        self._body = BodyLink(bus, config.body_patience)
+        self._world: World | None = None
+        self._live: dict[str, Performance] = {}
+        """By request id: from acceptance to outcome."""
+        self._line: asyncio.Queue[Performance] = asyncio.Queue()
+        self._blocks: dict[asyncio.Task[None], str] = {}
+        """What waits for the end of a fragment's block, and of which turn that is."""
+        self._session = f"{bus.name}@{bus.now():.6f}"
+        """Makes request ids of our own unique after a restart."""
+        self._signals = 0
+
+    # -- what arrives ---------------------------------------------------------------------------------------------
+
+    def admit(self, request: PerformFragment, world: World) -> None:
+        """Raises InputRefused, and changes nothing, where the fragment is illegal."""
+        fragment = checked(request.fragment, world, self._bus.robot)
+        turn = self._turns.accept(fragment, fragment.addressee)
+        performance = Performance(request, fragment, turn, self._config.decision_patience)
+        if (displaced := self._outcomes.expect(fragment.id, turn)) is not None:
+            self._bus.publish(keys.TURN_CLOSED, displaced)
+        self._events.expect(fragment.id, turn.turn)
+        if any(not each.is_over and each.turn.turn != turn.turn for each in self._live.values()):
+            self._accept(performance)
+        # What need not wait is accepted with its block: what the realizer finds impossible is refused here, too.
+        self._live[request.id] = performance
+        self._line.put_nowait(performance)
+
+    def _accept(self, performance: Performance) -> None:
+        if not performance.accepted:
+            performance.accepted = True
+            self._desk.accept(performance.request.id)
+
+    def cancel(self, id: str, reason: str, now: Seconds) -> None:
+        """A request, if it is one of these."""
+        if (performance := self._live.get(id)) is None:
+            return
+        aborted = self._turns.fragment_ended(performance.fragment.id, complete=False, now=now, reason=reason)
+        self._interrupt({performance.fragment.id, *(aborted.fragments if aborted else ())}, reason, now)
+        self._abort(aborted, now)
+
+    def feed(
+        self, message: World | ConnectionEvent | ActionBegan | ActionEnded | SyncPointProgress, now: Seconds
+    ) -> None:
+        match message:
+            case World():
+                self._world = message
+            case ConnectionEvent():
+                self._events.feed(message)
+            case ActionBegan() | ActionEnded():
+                self._turns.feed(message, now)
+            case SyncPointProgress():
+                self._follow(message)
+
+    def body_lost(self) -> None:
+        """Another may come."""
+        self._body.forget()
+
+    def _follow(self, progress: SyncPointProgress) -> None:
+        """The arbiter sees the gazes of fragments where they are realized."""
+        named = [each for each in self._live.values() if each.fragment.id == progress.block]
+        if not named:
+            return
+        performance = min(named, key=lambda each: each.is_over)  # an ended one may still hear of its events
+        performance.feed(progress)
+        if performance.signalled_end:
+            self._turns.turn_ended(performance.turn.turn)
+        self._follow_gaze(performance)
+
+    def _follow_gaze(self, performance: Performance) -> None:
+        before = self._gazes.holder
+        self._gazes.follow(performance)
+        gaze = self._gazes.holder
+        if not self._gazes.rest:
+            self._arbiter.fragment_lets_go()
+        elif gaze is None and before is not None:
+            self._arbiter.fragment_rests()
+        elif isinstance(gaze, GazeShift) and gaze is not before:
+            self._arbiter.fragment_shifts(gaze.target, gaze.id)
+        elif gaze is not None and gaze is not before:
+            self._arbiter.fragment_gazes(gaze.target, gaze.id)
+
+    # -- time -----------------------------------------------------------------------------------------------------
+
+    @property
+    def deadline(self) -> Seconds | None:
+        due = [self._turns.deadline, self._outcomes.deadline]
+        due += [performance.deadline for performance in self._live.values()]
+        return min((each for each in due if each is not None), default=None)
+
+    def settle(self, now: Seconds) -> list[tuple[str, Fault]]:
+        """End what has come to its end by now. Requests that turned out to be impossible, and why."""
+        refused: list[tuple[str, Fault]] = []
+        while (aborted := self._turns.tick(now)) is not None:
+            self._abort(aborted, now)
+        for performance in list(self._live.values()):
+            self._enforce_inhibitions(performance)
+            if performance.refusal is not None:
+                del self._live[performance.request.id]
+                self._outcomes.refuse(performance.fragment.id, performance.turn)
+                refused.append((performance.request.id, performance.refusal))
+            elif (outcome := performance.outcome(self._events, now)) is not None:
+                del self._live[performance.request.id]
+                self._outcomes.end(outcome, performance.turn, now)
+                self._desk.end(outcome)
+        going = {each.turn.turn for each in self._live.values()} | {self._turns.open_turn}
+        for closed in self._outcomes.closed(going, now):
+            self._bus.publish(keys.TURN_CLOSED, closed)
+        self._events.forget({*going, *self._outcomes.turns})
+        return refused
+
+    def _enforce_inhibitions(self, performance: Performance) -> None:
+        for id in performance.forbid(self._leases.permits()):
+            self._bus.publish(keys.BEHAVIOR, AbortBehavior(id=id, requester=self._bus.name))
+
+    # -- fragments: those of a turn at once, turns one after the other --------------------------------------------
+
+    async def perform_in_order(self) -> None:
+        """Send each fragment's block as soon as the turn before has ended: what it is to follow stands in it."""
+        async with asyncio.TaskGroup() as tasks:
+            while True:
+                performance = await self._line.get()
+                turn = performance.turn.turn
+                if before := [block for block, its in self._blocks.items() if its != turn]:
+                    await asyncio.wait(before)
+                if not performance.is_over and (pending := await self._begin(performance)) is not None:
+                    block = tasks.create_task(self._await_end(performance, pending), name=performance.block_id)
+                    self._blocks[block] = turn
+                    block.add_done_callback(self._blocks.pop)
+                self._changed(self._bus.now())
+
+    async def _begin(self, performance: Performance) -> Pending | None:
+        """The request for its block, accepted; None if nothing comes of it."""
+        fragment, turn = performance.fragment, performance.turn
+        self._arbiter.stop_thinking()
+        self._arbiter.speak_to(turn.addressee)
+        permits = self._leases.permits
+        try:
+            while True:
+                company = [each for each in self._live.values() if each.goes_on_with(performance)]
+                moving = [behavior for each in company for behavior in each.moving]
+                motions = await self._body.motions(targets(fragment), permits().only_hand, moving)
+                if performance.is_over:  # cancelled meanwhile
+                    return None
+                assert self._world is not None
+                body = self._body.capabilities
+                if body is not None:
+                    self._arbiter.gaze_perceived_within(body.gaze_half_angle)
+                before = reduce(Trail.then, (each.trail for each in company), NOTHING)
+                performance.begin(plan(fragment, turn, self._world, body, motions, permits(), self._config, before))
+                try:
+                    return await self._send_block(performance)
+                except RequestRefused:
+                    if not any(each.is_over for each in company):
+                        raise
+                    # It has named blocks that ended while it was on its way: once more, without them.
+        except RequestRefused as error:
+            performance.refuse(error.fault, self._bus.now())  # the realizer did
+        except EngageError as error:
+            performance.end(self._bus.now(), "failed", fault=error.fault)
+        self._block_ended(performance)
+        return None
+
+    async def _send_block(self, performance: Performance) -> Pending:
+        assert performance.plan is not None
+        request = PerformBlock(id=performance.block_id, requester=self._bus.name, block=performance.plan.block)
+        self._turns.fragment_begins(performance.turn.turn)
+        pending = self._requests.send(keys.BLOCK, request)
+        await pending.accepted
+        self._accept(performance)
+        for message in performance.plan.warnings:
+            warning = WarningFeedback(block=performance.fragment.id, kind="POLICY", message=message)
+            self._bus.publish(keys.FRAGMENT_FEEDBACK, warning)
+        return pending
+
+    async def _await_end(self, performance: Performance, pending: Pending) -> None:
+        try:
+            outcome = await pending.outcome
+            if not isinstance(outcome, BlockOutcome):
+                reason = f"the realizer answered {type(outcome).__name__}"
+                raise RunFailed(Fault(reason=reason, where=performance.block_id))
+            performance.end_with(outcome, self._bus.now())
+        except EngageError as error:
+            performance.end(self._bus.now(), "failed", fault=error.fault)
+        self._block_ended(performance)
+        self._changed(self._bus.now())
+
+    def _block_ended(self, performance: Performance) -> None:
+        """Or there will be none."""
+        now, fragment = self._bus.now(), performance.fragment
+        self._follow_gaze(performance)
+        if performance.refusal is not None:
+            aborted = self._turns.fragment_refused(fragment.id, now)
+        else:
+            complete, reason = performance.status == "done", f"{fragment.id} {performance.status}"
+            aborted = self._turns.fragment_ended(fragment.id, complete=complete, now=now, reason=reason)
+        self._abort(aborted, now)
+        if target := self._turns.averted_to:
+            self._arbiter.think(target)
+
+    def _interrupt(self, fragments: Collection[str], reason: str, now: Seconds) -> None:
+        """The latest first: what follows the words of another must not begin because those end."""
+        for performance in reversed(self._live.values()):
+            if performance.is_over or performance.fragment.id not in fragments:
+                continue
+            if performance.plan is not None:
+                self._requests.cancel(performance.block_id, reason)
+            else:
+                performance.end(now, "interrupted", fault=Fault(reason=reason, where=performance.fragment.id))
+
+    def _abort(self, aborted: Aborted | None, now: Seconds) -> None:
+        """A turn has ended early: so have its fragments, and recognition learns of it."""
+        if aborted is None:
+            return
+        self._arbiter.stop_thinking()
+        self._outcomes.abort(aborted)
+        self._interrupt(aborted.fragments, aborted.reason, now)
+        if not aborted.is_known:
+            return
+        self._signals += 1
+        id = f"turn-aborted-{self._signals}"
+        signal = TurnSignal(id=id, turn=aborted.turn, signal="aborted", actor=aborted.addressee)
+        request = SignalTurn(
+            id=f"{self._session}/{id}", requester=self._bus.name, signal=signal, at=self._bus.stamp(now)
+        )
+        self._requests.send(keys.TURN, request)
