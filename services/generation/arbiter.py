@@ -102,7 +102,7 @@ class Arbiter:
         self._base = NOWHERE
         """Where the base gaze was last sent."""
         self._held = NOWHERE
-        """Where an inhibition with mode hold found the head."""
+        """Where an inhibition with mode hold found the gaze of a fragment."""
         self._failed: tuple[Aim, Seconds] | None = None
         """What the last shift did not reach, and when to try that again."""
         self._shifts = 0
@@ -144,6 +144,8 @@ class Arbiter:
     def inhibit(self, inhibition: Inhibition | None) -> None:
         """The newest lease on gaze, if there is one."""
         self._inhibition = inhibition
+        if self._mode != "hold":
+            self._held = NOWHERE
 
     def fragment_gazes(self, target: str, reason: str = "") -> None:
         """A gaze of a fragment has started."""
@@ -203,8 +205,8 @@ class Arbiter:
         self._owner = self._next_owner(claims, now)
         if self._owner != before:
             self._lapsed = None
-            if before.kind != "inhibition":
-                self._held = Aim(before.target) if before.kind == "fragment" else NOWHERE
+            if self._owner.kind == "inhibition" and self._fragment is not None and self._mode == "hold":
+                self._held = Aim(self._fragment.target)
             if (self._owner.kind, self._owner.target) != (before.kind, before.target):
                 self._since = now
             if self._owner.kind == "glance" != before.kind:
@@ -258,13 +260,15 @@ class Arbiter:
         return Shift(f"{cause}-{self._shifts}", aim.target, glance=owner.kind == "glance", beside=aim.beside)
 
     def _aim(self) -> Aim:
-        mode = self._inhibition.mode if self._inhibition and self._owner.kind == "inhibition" else "target"
-        match mode:
-            case "hold":
-                return self._held
-            case "stare":
-                return Aim(self._landmark(), beside=True)
+        if self._owner.kind == "inhibition" and self._mode == "hold":
+            return self._held
+        if self._owner.kind == "inhibition" and self._mode == "stare":
+            return Aim(self._landmark(), beside=True)
         return Aim(self._owner.target)
+
+    @property
+    def _mode(self) -> str:
+        return self._inhibition.mode if self._inhibition is not None else ""
 
     def _landmark(self) -> str:
         """What the head stares past in the study's condition without gaze: a surface, or else whatever there is."""

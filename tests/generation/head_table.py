@@ -1,0 +1,153 @@
+"""The table of claims on the head once more, slowly: every tick asks every row. The oracle of the arbiter.
+
+It shares no code with the arbiter, keeps no deadlines and looks at one person, one hand and one object at a time.
+Times are multiples of an eighth of a second, which floats hold exactly.
+"""
+
+from dataclasses import dataclass, field
+
+TICK = 0.125
+TIMES = {
+    "dwell": 0.25, "hand_onset": 0.25, "hand_stillness": 0.75, "response_hold": 0.75, "glance_duration": 1.0,
+    "mtbce_prior": 5.75, "face_lost": 2.0,
+}  # fmt: skip
+"""The configuration of both sides."""
+ROWS = ("inhibition", "fragment", "glance", "response", "hands", "face")
+
+Owner = tuple[str, str]
+NOBODY: Owner = ("none", "")
+
+
+@dataclass
+class Answer:
+    target: str
+    until: float = float("inf")
+
+
+@dataclass
+class HeadTable:
+    """Set what is the case, then `ask`. owner: kind and target."""
+
+    now: float = 0.0
+    owner: Owner = NOBODY
+    inhibited: tuple[str, str] | None = None
+    fragment: str | None = None
+    answers: dict[int, Answer] = field(default_factory=dict)
+    fast: bool = False
+    fast_since: float = 0.0
+    acting: bool = False
+    followed: bool = False
+    still_since: float = float("-inf")
+    seen: bool = True
+    seen_until: float = 0.0
+    pace: float = TIMES["mtbce_prior"]
+    quiet_since: float = 0.0
+    on_face: bool = False
+    glance_until: float | None = None
+    let_go: float | None = None
+    base: str = ""
+    held: str = ""
+    changes: list[tuple[float, str, str]] = field(default_factory=list)
+    shifts: list[tuple[float, str]] = field(default_factory=list)
+
+    # -- what is the case -----------------------------------------------------------------------------------------
+
+    def direct(self, event: int, target: str) -> None:
+        self.quiet_since = self.now
+        if self.owner[0] != "fragment" or self.owner[1] in ("", target):
+            self.answers[event] = Answer(target)
+
+    def decide(self, event: int, succeeded: bool) -> None:
+        if event in self.answers and succeeded:
+            self.answers[event].until = self.now + TIMES["response_hold"]
+        else:
+            self.answers.pop(event, None)
+
+    def move_hand(self, fast: bool) -> None:
+        if fast and not self.fast:
+            self.fast_since = self.now
+        if self.fast and not fast:
+            self.still_since = self.now
+        self.fast = fast
+
+    def act(self, acting: bool) -> None:
+        if self.acting and not acting:
+            self.still_since = self.now
+        self.acting = acting
+
+    def see(self, person: bool) -> None:
+        if self.seen and not person:
+            self.seen_until = self.now
+        self.seen = person
+
+    def rest(self) -> None:
+        if self.fragment is not None:
+            self.fragment = self.base
+
+    def inhibit(self, mode: str, target: str) -> None:
+        self.inhibited = (mode, target) if mode else None
+        if mode != "hold":
+            self.held = ""
+
+    # -- what follows ---------------------------------------------------------------------------------------------
+
+    def rows(self) -> dict[str, str]:
+        """Claims by row: where each wants the head."""
+        wants: dict[str, str] = {}
+        if self.inhibited is not None:
+            wants["inhibition"] = self.inhibited[1]
+        if self.fragment is not None:
+            wants["fragment"] = self.fragment
+        there = self.seen or self.now - self.seen_until < TIMES["face_lost"]
+        running = self.glance_until is not None and self.now < self.glance_until
+        due = self.glance_until is None and not self.on_face and self.now - self.quiet_since >= self.pace
+        if there and (running or due):
+            wants["glance"] = "human"
+        self.answers = {event: answer for event, answer in self.answers.items() if self.now < answer.until}
+        if self.answers:
+            wants["response"] = self.answers[max(self.answers)].target
+        if self.acting or (self.fast and self.now - self.fast_since >= TIMES["hand_onset"]):
+            self.followed = True
+        elif not self.fast and self.now - self.still_since >= TIMES["hand_stillness"]:
+            self.followed = False
+        if self.followed:
+            wants["hands"] = "hand"
+        wants["face"] = "human" if there else ""
+        return wants
+
+    def ask(self) -> None:
+        wants = self.rows()
+        best = next(row for row in ROWS if row in wants)
+        kind = self.owner[0]
+        if kind == "none" or ROWS.index(best) < ROWS.index(kind):
+            next_owner = best
+        elif kind in wants:
+            self.let_go, next_owner = None, kind
+        else:
+            self.let_go = self.now if self.let_go is None else self.let_go
+            next_owner = best if self.now - self.let_go >= TIMES["dwell"] else kind
+        if next_owner != kind:
+            self.let_go = None
+            if kind == "glance":
+                self.glance_until, self.quiet_since = None, self.now
+            elif next_owner == "glance":
+                self.glance_until = self.now + TIMES["glance_duration"]
+        owner = (next_owner, wants.get(next_owner, self.owner[1]))
+        if next_owner == "inhibition" != kind and self.inhibited is not None and self.inhibited[0] == "hold":
+            self.held = self.fragment or ""
+        if owner != self.owner:
+            self.owner = owner
+            self.changes.append((self.now, *owner))
+        self._move_head()
+
+    def _move_head(self) -> None:
+        kind, target = self.owner
+        if ((target or self.base) == "human") != self.on_face:
+            self.on_face = not self.on_face
+            self.quiet_since = self.now
+        if kind == "inhibition" and self.inhibited is not None and self.inhibited[0] == "hold":
+            target = self.held
+        ours = kind != "fragment" or target == "human"
+        if self.let_go is None and target not in ("", self.base) and ours:
+            self.base = target
+            self.shifts.append((self.now, target))
