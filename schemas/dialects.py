@@ -71,8 +71,8 @@ def _remaining(operators: Collection[Operator], stays: Callable[[str], bool]) ->
 def spelled(block: Block, dialect: Dialect, elsewhere: Mapping[str, Block] | None = None) -> Block:
     """The block as `dialect` writes it. elsewhere: other blocks that it refers to, by id, however they are spelled.
 
-    In BML 1.0 a gaze knows no `stroke_start`, a synchronize has no `ref`, and speech is not timed at its marks by
-    attribute: points are called by the name of their instant, and what has no attribute becomes a constraint.
+    In BML 1.0 a gaze knows no `stroke_start`, and a synchronize has no `ref`: points are called by the name of their
+    instant, and what is then timed twice becomes a constraint.
     """
     draft = replace(in_draft_spelling(block, block.dialect, elsewhere), dialect="draft")
     if dialect == "draft":
@@ -80,8 +80,7 @@ def spelled(block: Block, dialect: Dialect, elsewhere: Mapping[str, Block] | Non
     named = respelled(draft, _bml_1_0, elsewhere)
     ties = [tie for behavior in named.behaviors for tie in _ties(behavior)]
     behaviors = tuple(
-        replace(behavior, timing=tuple(_attributes(behavior))) if behavior.timing else behavior
-        for behavior in named.behaviors
+        replace(behavior, timing=_inline(behavior)) if behavior.timing else behavior for behavior in named.behaviors
     )
     constraints = tuple(
         replace(constraint, operators=tuple(_without_ref(operator) for operator in constraint.operators))
@@ -97,26 +96,22 @@ def _bml_1_0(sync: str, type: str) -> str:
     return dialect_sync(sync, type, "bml-1.0") or sync
 
 
-def _attributes(behavior: Behavior) -> Iterator[Timing]:
-    """The timing that can stand as attributes: each once, and no marks."""
-    seen: set[str] = set()
-    for timing in behavior.timing:
-        is_mark = isinstance(behavior, Speech) and timing.sync not in ("start", "end")
-        if timing.sync not in seen and not is_mark:
-            seen.add(timing.sync)
-            yield timing
+def _inline(behavior: Behavior) -> tuple[Timing, ...]:
+    """The timing that can stand in the behavior, each point once; that of marks last, as it is written there."""
+    once = {timing.sync: timing for timing in reversed(behavior.timing)}
+    order = [mark.id for mark in behavior.marks] if isinstance(behavior, Speech) else []
+    kept = (timing for timing in behavior.timing if once[timing.sync] is timing)
+    return tuple(sorted(kept, key=lambda timing: order.index(timing.sync) if timing.sync in order else -1))
 
 
 def _ties(behavior: Behavior) -> Iterator[Constraint]:
-    """The rest of the timing."""
-    stands = list(_attributes(behavior))
+    """The rest of the timing: a point that BML 1.0 calls by the name of another is timed twice."""
+    inline = _inline(behavior)
     for timing in behavior.timing:
-        if timing in stands:
-            stands.remove(timing)
-            continue
-        here = str(SyncRef(behavior=behavior.id, sync=timing.sync))
-        tie = Synchronize(syncs=(here, timing.ref), line=behavior.line)
-        yield Constraint(operators=(tie,), required=behavior.required, line=behavior.line)
+        if not any(timing is each for each in inline):
+            here = str(SyncRef(behavior=behavior.id, sync=timing.sync))
+            tie = Synchronize(syncs=(here, timing.ref), line=behavior.line)
+            yield Constraint(operators=(tie,), required=behavior.required, line=behavior.line)
 
 
 def _without_ref(operator: Operator) -> Operator:

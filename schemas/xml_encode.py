@@ -4,6 +4,7 @@ What is written decodes to the equal struct, but for `line`.
 """
 
 import re
+from collections.abc import Sequence
 from typing import Any
 
 from lxml import etree
@@ -16,7 +17,7 @@ from schemas.fragments import TurnFragment
 from schemas.references import type_name
 from schemas.syncref import SYNC_POINTS
 from schemas.xml_source import BML_1_0, DRAFT, EBML
-from schemas.xml_speech import fill
+from schemas.xml_speech import fill, ties
 
 _EXTENSIONS = ("reference", "event", "turn", "unknown")
 _ELSEWHERE = frozenset({
@@ -88,7 +89,8 @@ def _behavior(root: etree._Element, namespace: str, behavior: of.Behavior) -> No
         element.set("type", "POINT")
     if not isinstance(behavior, of.Posture | of.PostureShift):
         _set_fields(element, behavior)
-    _set_timing(element, behavior)
+    tied = ties(behavior, namespace) if isinstance(behavior, of.Speech) else {}
+    _set_timing(element, [timing for timing in behavior.timing if timing.sync not in tied])
     match behavior:
         case of.Speech():
             fill(element, behavior, namespace)
@@ -127,13 +129,13 @@ def _nest_expression(shift: etree._Element) -> None:
             child.set(name, shift.attrib.pop(name))
 
 
-def _set_timing(element: etree._Element, behavior: of.Behavior) -> None:
-    names = [timing.sync for timing in behavior.timing]
+def _set_timing(element: etree._Element, timings: Sequence[of.Timing]) -> None:
+    names = [timing.sync for timing in timings]
     if _INLINE.issuperset(names) and len(set(names)) == len(names):
-        for timing in behavior.timing:
+        for timing in timings:
             element.set(timing.sync, timing.ref)
         return
-    for timing in behavior.timing:
+    for timing in timings:
         etree.SubElement(element, f"{{{EBML}}}timing", {"sync": timing.sync, "ref": timing.ref})
 
 

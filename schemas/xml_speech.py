@@ -101,6 +101,7 @@ class _Reading:
 
     def _mark(self, element: etree._Element) -> None:
         id, ref = element.get("id") or element.get("name") or "", element.get("ref") or ""
+        is_tied = ":" in ref or (id and ref and ref != id)
         if not id and ":" not in ref:
             id = ref
         if not id and ref.partition(":")[0].strip() == self._id:
@@ -108,7 +109,7 @@ class _Reading:
         if not id and not ref:
             raise self._source.refusal("a mark without a name", element, advice='<sync id="m1"/>')
         id = id or f"sync-{len(self._marks) + 1}"
-        if ":" in ref:
+        if is_tied and ref:
             self._timing.append(Timing(id, ref))
         self._marks.append(Mark(id, self._length))
 
@@ -161,11 +162,23 @@ def fill(element: etree._Element, speech: Speech, namespace: str) -> None:
         content.set(f"{{{XML}}}space", "preserve")
     say = _append_text(content)
     position = 0
+    tied = ties(speech, namespace)
     for mark in speech.marks:
         say(speech.text[position : mark.position])
         position = mark.position
-        etree.SubElement(content, f"{{{namespace}}}sync", {"id": mark.id})
+        etree.SubElement(content, f"{{{namespace}}}sync", {"id": mark.id, **tied.get(mark.id, {})})
     say(speech.text[position:])
+
+
+def ties(speech: Speech, namespace: str) -> dict[str, dict[str, str]]:
+    """The timing of marks that can stand where they do, so that it is read again in the same order."""
+    order = [mark.id for mark in speech.marks]
+    timed = [timing.sync for timing in speech.timing if timing.sync in order]
+    ahead = [timing.sync for timing in speech.timing[: len(speech.timing) - len(timed)]]
+    is_last = not set(order).intersection(ahead) and timed == [id for id in order if id in timed]
+    if namespace != BML_1_0 or not is_last or any(timing.sync == timing.ref for timing in speech.timing):
+        return {}
+    return {timing.sync: {"ref": timing.ref} for timing in speech.timing if timing.sync in order}
 
 
 def _append_text(content: etree._Element) -> Callable[[str], None]:
