@@ -205,7 +205,8 @@ class Arbiter:
         self._owner = self._next_owner(claims, now)
         if self._owner != before:
             self._lapsed = None
-            if self._owner.kind == "inhibition" and self._fragment is not None and self._mode == "hold":
+            arrives = self._owner.kind == "inhibition" != before.kind
+            if arrives and self._mode == "hold" and self._fragment is not None:
                 self._held = Aim(self._fragment.target)
             if (self._owner.kind, self._owner.target) != (before.kind, before.target):
                 self._since = now
