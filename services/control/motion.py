@@ -27,8 +27,8 @@ SHARE = 0.6
 MARGIN = 0.97
 """Peaks are found by sampling; what lies between two samples gets this much room."""
 AT_REST = 1e-9
-SLOWEST = 0.25
-"""The least steady rate: slower than this looks like standing still."""
+SLOWEST = 0.01
+"""The least steady rate. A time that its author has fixed is kept, however slow that looks."""
 SAMPLES = np.linspace(0.0, 1.0, 33)
 _STRETCHES = tuple(1.1**step for step in range(40)) + tuple(0.9**step for step in range(1, 12))
 

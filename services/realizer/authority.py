@@ -213,8 +213,11 @@ class Authority(Facts):
             points = self._points.get(behavior, ())
             if self._next.get(behavior) != number or number >= len(points) or self.holds(points[number]):
                 continue
-            until = self.not_before[behavior] = now + (now - expected)
-            self.forecast.overdue(self.plan.at[points[number]], until)
+            expected = max(expected, dict(self.paces.get(behavior, ())).get(points[number].sync, expected))
+            until = expected
+            if expected < now - EPSILON:  # and not slower on purpose
+                until = self.not_before[behavior] = now + (now - expected)
+                self.forecast.overdue(self.plan.at[points[number]], until)
             heapq.heappush(self._arrivals, (until, expected, behavior, number))
         self._conclude()
 
@@ -311,12 +314,11 @@ class Authority(Facts):
         """Its new authority, if that is further than before or asks for another pace."""
         known, before = self._through[behavior], self.paces.get(behavior, ())
         through = self._furthest(behavior, now)
-        after = self.paces[behavior] = pace(behavior, self, now)
+        after = pace(behavior, self, now)
         if through > known or differs(before, after):
+            self.paces[behavior] = after
             self._watch(behavior)
             yield Extend(behavior, self._points[behavior][through].sync, after)
-        else:
-            self.paces[behavior] = before
 
     def _furthest(self, behavior: str, now: Seconds) -> int:
         """The number of the last point that it may go through."""
