@@ -219,9 +219,10 @@ class _Emitter:
         if phrase and preceding:
             operators.append(_after(f"{preceding}:end", f"{phrase}:start"))
         if gaze:
+            # What the author has said of its start replaces this, but nothing begins before the fragment does.
             is_timed = (parts.reference.id, "start") in self.named
-            if preceding and (not is_timed or preceding == self.before.speech):
-                operators.append(_after(f"{preceding}:end", f"{gaze}:start"))
+            if words := self.before.speech if is_timed else preceding:
+                operators.append(_after(f"{words}:end", f"{gaze}:start"))
             if glance:
                 operators.append(_after(f"{glance}:stroke", f"{gaze}:start"))
             if phrase:

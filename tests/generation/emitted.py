@@ -17,6 +17,7 @@ from schemas.fragments import GestureChoice, ReferenceChoice, TurnFragment
 from services.generation.config import GenerationConfig
 from services.generation.emission import Emission, emit
 from services.generation.permits import Permits
+from services.generation.trail import NOTHING, Trail
 from services.generation.turn_policy import plan_turn
 
 POINT: GestureChoice = "directed_gaze_with_pointing"
@@ -39,6 +40,7 @@ def emission(
     profile: str = "check-back",
     permits: Permits | None = None,
     hands: dict[str, str] | None = None,
+    before: Trail = NOTHING,
 ) -> Emission:
     """`made`: gesture and phrase of each reference in document order."""
     references = [behavior for behavior in fragment.behaviors if isinstance(behavior, Reference)]
@@ -50,7 +52,7 @@ def emission(
     ]
     config = GenerationConfig(profile=profile)  # type: ignore[arg-type]
     turn = plan_turn(fragment, "turn", "human")
-    result = emit(fragment, turn, choices, config, permits or Permits(), hands)  # type: ignore[arg-type]
+    result = emit(fragment, turn, choices, config, permits or Permits(), hands, before)  # type: ignore[arg-type]
     check(result.block)  # every reference of the block is sound
     return result
 

@@ -37,6 +37,7 @@ class Robot:
         self.manager = hub.join("manager")
         self.requests = Requester(self.manager)
         self.began = self.bus.now()
+        self._told = asyncio.Event()
         self.reached: dict[str, float] = {}
         """`block:behavior:sync` -> when; `block:start` and `block:end`."""
         self.blocks: dict[str, PerformBlock] = {}
@@ -78,6 +79,7 @@ class Robot:
                         self.warnings.append(warning)
                     case HeadOwner() as owner:
                         self.owners.append((self.now, owner))
+                self._told.set()
 
     def send(self, fragment: TurnFragment) -> Pending:
         request = PerformFragment(id=f"ask-{fragment.id}", requester=self.manager.name, fragment=fragment)
@@ -96,7 +98,8 @@ class Robot:
     async def until(self, point: str) -> float:
         """When the robot gets there."""
         while point not in self.reached:
-            await asyncio.sleep(0.01)
+            self._told.clear()
+            await self._told.wait()
         return self.reached[point]
 
     def words(self) -> list[tuple[str, float, float]]:

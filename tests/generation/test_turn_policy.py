@@ -235,3 +235,75 @@ def test_a_fragment_without_delay_ends_the_thinking() -> None:
         turns.fragment_ended(id, complete=True, now=1.0)
 
     assert turns.averted_to == ""
+
+
+# -- illegal, adversarial -----------------------------------------------------------------------------------------
+
+STATUSES: tuple[TurnStatus, ...] = ("beginning", "middle", "end", "full", "backchannel")
+LEGAL = {"silent": {"beginning", "full", "backchannel"}, "open": {"middle", "end"}, "speaking": {"beginning", "full"}}
+"""What may come: with no turn; within an open one; while the last fragment of a turn is performed."""
+
+
+@pytest.mark.parametrize("index", [1, 2, 3])
+@pytest.mark.parametrize("status", STATUSES)
+@pytest.mark.parametrize("state", LEGAL)
+def test_every_status_and_index_in_every_state(state: str, status: TurnStatus, index: int) -> None:
+    turns = policy()
+    if state != "silent":
+        turns.accept(fragment("a", "beginning" if state == "open" else "full"), "human")
+
+    if status in LEGAL[state]:
+        plan = turns.accept(fragment("x", status, index), "human")
+        assert (plan.turn, plan.closes, plan.backchannel) == (
+            "a" if state == "open" else "x",
+            status in ("end", "full"),
+            status == "backchannel",
+        )
+        assert plan.announces_pair is (index == 1 and status in ("beginning", "full"))
+    else:
+        with pytest.raises(InputRefused):
+            turns.accept(fragment("x", status, index), "human")
+
+
+def test_an_open_turn_stays_open_when_all_that_came_is_performed() -> None:
+    turns = policy()
+    turns.accept(fragment("a", "beginning"), "human")
+    turns.fragment_ended("a", complete=True, now=1.0)
+
+    with pytest.raises(InputRefused, match="holds the turn"):
+        turns.accept(fragment("b", "backchannel"), "human")
+    assert turns.accept(fragment("c", "middle"), "human").turn == "a"
+
+
+def test_a_backchannel_may_come_once_the_end_of_the_turn_is_signalled() -> None:
+    turns = policy()
+    turns.accept(fragment("a", "full"), "human")
+    turns.fragment_begins("a")
+    turns.turn_ended("a")
+
+    assert turns.accept(fragment("b", "backchannel"), "human").backchannel
+    assert turns.accept(fragment("c", "full"), "human").turn == "c"
+
+
+def test_backchannels_may_follow_one_another() -> None:
+    turns = policy()
+
+    assert [turns.accept(fragment(id, "backchannel"), "human").turn for id in "ab"] == ["a", "b"]
+
+
+@pytest.mark.parametrize("id", ["a", "b"])
+def test_the_id_of_a_turn_that_goes_on_is_taken(id: str) -> None:
+    turns = policy()
+    turns.accept(fragment("a", "beginning"), "human")
+    turns.fragment_ended("a", complete=True, now=1.0)
+    turns.accept(fragment("b", "middle"), "human")
+
+    with pytest.raises(InputRefused, match="give every fragment its own id"):
+        turns.accept(fragment(id, "end"), "human")
+
+
+def test_a_turn_may_speak_to_another_person_than_the_one_before() -> None:
+    turns = policy()
+    turns.accept(fragment("a", "full"), "alice")
+
+    assert turns.accept(fragment("b", "full"), "bob").addressee == "bob"
