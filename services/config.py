@@ -3,10 +3,12 @@
 Each service documents its own section in its `config.py`; docs/configuration.md is made from those.
 """
 
+import re
 import tomllib
 from collections.abc import Iterable
+from difflib import get_close_matches
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal, get_args, get_origin, get_type_hints
 
 import msgspec
 from msgspec import Struct
@@ -51,11 +53,46 @@ def load(path: Path | None = None, *, settings: Iterable[str] = (), defaults: It
         _merge(merged, _file(path))
     for setting in settings:
         _merge(merged, _setting(setting))
+    where = str(path) if path else "settings"
+    if key := _not_a_number(merged):
+        raise InputRefused(Fault(reason=f"nan is not a number, in `{key}`", where=where, advice=_ADVICE))
     try:
         return msgspec.convert(merged, Config)
     except msgspec.ValidationError as error:
-        reason = str(error).replace(" - at `$.", ", in `").replace("Object contains", "there is an")
-        raise InputRefused(Fault(reason=reason, where=str(path) if path else "settings", advice=_ADVICE)) from error
+        raise InputRefused(Fault(reason=_explained(error), where=where, advice=_ADVICE)) from error
+
+
+def _explained(error: msgspec.ValidationError) -> str:
+    """What is wrong, what would be right, and the key."""
+    reason, _, place = str(error).partition(" - at `$")
+    key = place.strip("`").lstrip(".")
+    kind: Any = Config
+    for name in key.split(".") if key else ():
+        kind = get_type_hints(kind)[name.partition("[")[0]]
+    if reason.startswith("Invalid enum value"):
+        reason = f"{reason.removeprefix('Invalid enum value ')} is none of {', '.join(map(repr, _choices(kind)))}"
+    elif unknown := re.fullmatch(r"Object contains unknown field `(.*)`", reason):
+        close = get_close_matches(unknown[1], kind.__struct_fields__, n=1)
+        known = f"do you mean `{close[0]}`?" if close else f"known are {', '.join(kind.__struct_fields__)}"
+        reason = f"unknown key `{unknown[1]}`; {known}"
+    return f"{reason}, in `{key}`" if key else reason
+
+
+def _choices(kind: Any) -> list[str]:
+    """The words that a type is made of."""
+    if get_origin(kind) is Literal:
+        return list(get_args(kind))
+    return [choice for part in get_args(kind) for choice in _choices(part)]
+
+
+def _not_a_number(table: dict[str, Any], place: str = "") -> str:
+    """The first key with the value nan: it is in no range, nor out of any."""
+    for name, value in table.items():
+        key = f"{place}{name}"
+        inner = _not_a_number(value, f"{key}.") if isinstance(value, dict) else key if value != value else ""
+        if inner:
+            return inner
+    return ""
 
 
 def _file(path: Path) -> dict[str, Any]:

@@ -1,6 +1,6 @@
 """Every parameter of engagement generation: unit, default, source. Refused at start when it contradicts itself."""
 
-from math import isfinite
+from math import isfinite, pi
 from typing import Literal
 
 from msgspec import Struct
@@ -17,40 +17,41 @@ class GenerationConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=
     """Raises ValueError when a value is outside its range or the reliabilities leave (0, 1) (decision B1)."""
 
     condition: Condition = "operational"
-    """Of the study, thesis chapter 5. degraded-generation: the task's own speech, the head to the upper right."""
+    """Of the study, thesis chapter 5. degraded-generation: the task's own speech, the head to the upper right.
+    degraded-recognition: nothing changes here; the other service is to be configured worse."""
     profile: Profile = "check-back"
     """How a chosen gesture and phrase are synchronized: as in Appendix B, or as in Fig. 3.3."""
 
     # Channel reliabilities, thesis 3.3.2. Defaults: those that give the gestures of Appendix B.
     channel: Channel = "sum"
-    """How gesture and phrase add up: r(j) + r(s) (the thesis), or 1 - (1 - r(j))(1 - r(s))."""
+    """How gesture and phrase add up: r(j) + r(s) < 1 (thesis 3.3.2), or 1 - (1 - r(j))(1 - r(s)) (decision B1)."""
     phrase_reliability: Probability = 0.70
-    """rs: of a spoken phrase."""
+    """rs, in (0, 1): of a spoken phrase. This and the next three: what gives the gestures of Appendix B."""
     gaze_reliability: Probability = 0.10
-    """rG: of a look."""
+    """rG, in (0, rDG): of a look."""
     directed_gaze_reliability: Probability = 0.20
-    """rDG: of a look that waits for the other's."""
+    """rDG, in (rG, rDGP): of a look that waits for the other's."""
     pointing_reliability: Probability = 0.28
-    """rDGP: of a directed gaze with pointing."""
+    """rDGP, in (rDG, 1): of a directed gaze with pointing."""
 
     # Cost, thesis 3.3.2, in seconds (decision B6).
     seconds_per_head_degree: float = 1 / 100
-    """kg, s/degree: 1 / head speed."""
+    """kg, s/degree: 1 / head speed. Cost is in seconds: decision B6."""
     seconds_per_arm_degree: float = 1 / 60
-    """kp, s/degree: 1 / arm speed."""
+    """kp, s/degree: 1 / arm speed. Decision B6."""
     seconds_per_word: float = 0.35
-    """ks, s per unit of a phrase's cost: about one word."""
+    """ks, s per unit of a phrase's cost: about one word. Decision B6."""
     wait_weight: float = 1.0
-    """kw: what a second of waiting for shared gaze costs, in seconds (decision B7)."""
+    """kw, s/s: what a second of waiting for shared gaze costs. Decision B7."""
     expected_delay: Seconds = 0.3
-    """E[delay] of directed gaze: the mean of Table 2.1."""
+    """E[delay] of directed gaze: the mean of Table 2.1 (decision B7)."""
 
     gaze_half_angle: Radians | None = None
-    """Of the robot's gaze cone as people perceive it. None: what the body says of itself."""
+    """Of the robot's gaze cone as people perceive it, < pi/2. None: what the body says of itself. Thesis 3.3.2."""
     pointing_radius: Meters | None = None
-    """Of the cylinder around a pointing forearm. None: what the body says of itself."""
+    """Of the cylinder around a pointing forearm. None: what the body says of itself. Thesis 3.3.2."""
     figure_lead: Seconds = 2.0
-    """From gaze on target to the stroke of the point in profile figure-3.3."""
+    """From gaze on target to the stroke of the point in profile figure-3.3: the figure's own."""
 
     # Phrases for references that come without any: services/generation/phrases.py.
     phrase_attributes: tuple[PhraseAttribute, ...] = ("color", "shape", "feature", "size")
@@ -60,43 +61,44 @@ class GenerationConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=
     """Proposed for what is so near to the robot: "this"; beyond: "that". Ours; both are said as in Appendix B."""
 
     turn_silence: Seconds = 10.0
-    """How long an open turn may lie still before it closes as aborted."""
+    """How long an open turn may lie still before it closes as aborted. Ours."""
     barge_in: Seconds = 0.8
-    """How long the addressee speaks into the robot's speech before it gives up the turn; shorter is a backchannel."""
+    """How long the addressee speaks into the robot's speech before it gives up the turn; shorter is a backchannel,
+    as the longest of Table 2.1."""
     decision_patience: Seconds = 8.0
-    """After a block's end: how long its undecided connection events may delay the fragment's outcome."""
+    """After a block's end: how long its undecided connection events may delay the fragment's outcome. Ours."""
     world_patience: Seconds = 5.0
-    """How long a fragment waits for a first report of the world."""
+    """How long a fragment waits for a first report of the world. Ours."""
     body_patience: Seconds = 5.0
-    """How long a reference waits for a body to say what motions cost."""
+    """How long a reference waits for a body to say what motions cost. Ours."""
 
     # The arbiter of the head: generation, maintenance policy.
     dwell: Seconds = 0.3
-    """How long the head stays after its owner let go, before a lower claim gets it."""
+    """How long the head stays after its owner let go, before a lower claim gets it. Ours."""
     glance_factor: float = 1.0
-    """k: a glance is due after k times the mean time between connection events."""
+    """k, a factor: a glance is due after k times the mean time between connection events. Thesis 3.3.4 has 1."""
     mtbce_prior: Seconds = 5.7
-    """Until `mtbce_events` connection events were seen. Section 2.3."""
+    """The mean until `mtbce_events` connection events were seen. Table 2.1."""
     mtbce_low: Seconds = 3.0
     """The recent mean counts as no shorter than this. Ours."""
     mtbce_high: Seconds = 15.0
     """And as no longer than this. Ours."""
     mtbce_events: int = 5
-    """How many connection events make a mean worth believing. Ours."""
+    """How many connection events, without glances of our own, make a mean worth believing. Ours."""
     glance_duration: Seconds = 0.9
     """How long a glance at the face lasts before the head goes back. Ours."""
     response_hold: Seconds = 0.8
-    """How long shared gaze lasts before the response lets go."""
+    """How long shared gaze lasts before the response lets go. Thesis 3.3.3 names no time; ours."""
     hand_speed: float = 0.05
-    """m/s: a hand is moving above this."""
+    """m/s: a hand is moving above this. Ours."""
     hand_onset: Seconds = 0.2
-    """How long a hand moves before the head tracks it. Section 3.3.4 tracks hands; the numbers are ours."""
+    """How long a hand moves before the head tracks it. Thesis 3.3.4 tracks hands; the number is ours."""
     hand_stillness: Seconds = 0.8
     """How long it is still before the head leaves it. Ours."""
     face_lost: Seconds = 2.0
-    """A face lost for longer is no longer tracked; the head holds its direction."""
+    """A face lost for longer is no longer tracked; the head holds its direction. Ours."""
     retry: Seconds = 1.0
-    """Pause before a gaze shift that failed is tried again."""
+    """Pause before a gaze shift that failed is tried again. Ours."""
 
     def __post_init__(self) -> None:
         gaze, directed, pointing = (
@@ -128,10 +130,10 @@ class GenerationConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=
             raise ValueError(f"phrase_attributes names one twice: {', '.join(self.phrase_attributes)}")
         if self.mtbce_low > self.mtbce_high:
             raise ValueError(f"mtbce_low {self.mtbce_low} is above mtbce_high {self.mtbce_high}")
-        for name in ("gaze_half_angle", "pointing_radius"):
-            value = getattr(self, name)
-            if value is not None and value <= 0:
-                raise ValueError(f"{name} must be positive, not {value}")
+        if self.gaze_half_angle is not None and not 0 < self.gaze_half_angle < pi / 2:
+            raise ValueError(f"gaze_half_angle must be between 0 and pi/2 radians, not {self.gaze_half_angle}")
+        if self.pointing_radius is not None and self.pointing_radius <= 0:
+            raise ValueError(f"pointing_radius must be positive, not {self.pointing_radius}")
 
     @property
     def speech_only(self) -> bool:
@@ -152,5 +154,5 @@ _POSITIVE = (
 _NOT_NEGATIVE = (
     "seconds_per_head_degree", "seconds_per_arm_degree", "seconds_per_word", "wait_weight", "expected_delay",
     "figure_lead", "this_within", "dwell", "hand_speed", "hand_onset", "hand_stillness", "face_lost",
-    "mtbce_events",
+    "mtbce_events", "body_patience",
 )  # fmt: skip

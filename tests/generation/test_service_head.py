@@ -6,12 +6,15 @@ import pytest
 
 from schemas import keys
 from schemas.attention import Inhibit, InhibitionEnded
-from schemas.behaviors import Gaze, GazeShift, Speech
+from schemas.behaviors import Gaze, GazeShift, Pointing, Speech
+from schemas.faults import Fault
 from schemas.fragments import FragmentOutcome, TurnFragment
+from schemas.recognition import Statistics, WindowStatistics
+from schemas.world import Entity, World
 from services.generation.config import GenerationConfig
 from services.memory_bus import MemoryHub
 from services.requests import GRACE, RequestRefused
-from tests.generation.partners import Partners, gaze_targets, stage
+from tests.generation.partners import TABLE, Partners, gaze_targets, stage
 
 LOOK = Gaze(id="look", target="middle")
 SAY = Speech(id="s", text="Look")
@@ -178,3 +181,165 @@ async def test_the_gaze_cannot_be_held_on_what_nobody_knows(hub: MemoryHub) -> N
         await asyncio.sleep(1.0)
 
         assert owners(partners) == [(0.0, "face", "human")]
+
+
+# -- the six claims, one after the other --------------------------------------------------------------------------
+
+
+def moving(speed: float) -> World:
+    hand = Entity(id="hand", kind="hand", owner="human", position=(0.7, 0.1, 0.8), velocity=(speed, 0.0, 0.0))
+    return World(entities=(*TABLE.entities, hand))
+
+
+async def test_six_claims_have_the_head_in_turn_and_say_why_and_what_waits(hub: MemoryHub) -> None:
+    async with stage(hub) as partners:
+        await asyncio.sleep(1.0)
+        partners.see(moving(0.5))  # hands at 1.2
+        await asyncio.sleep(1.0)
+        partners.event("e", "started", initiator="human", responder="robot", objects=("left",))  # response at 2.0
+        pending = partners.send(looks())
+        await partners.fragment_block("f")
+        await asyncio.sleep(7.0)  # glance at 2.0 + 5.7
+        assert partners.owners[-1].owner.kind == "response"  # .9 + .3 later
+        partners.reach("f", "look", "start")  # fragment at 9.0
+        await asyncio.sleep(1.0)
+        lease = inhibit(partners, mode="target", target="table", ttl=60.0)  # inhibition at 10.0
+        await asyncio.sleep(1.0)
+        waiting = [(claim.kind, claim.target, bool(claim.reason)) for claim in partners.owners[-1].waiting]
+        partners.requests.cancel("lease")  # fragment again at 11.3
+        await lease
+        await asyncio.sleep(1.0)
+        partners.end(partners.request("f"))
+        await pending.outcome  # 12.0, and the response at 12.3
+        partners.event("e", "succeeded", initiator="human", responder="robot", objects=("left",))
+        await asyncio.sleep(2.0)  # 12.8 + .3: hands
+        partners.see(moving(0.0))
+        await asyncio.sleep(2.0)
+
+        assert [(round(at, 6), kind, target) for at, kind, target in owners(partners)] == [
+            (0.0, "face", "human"),
+            (1.2, "hands", "hand"),
+            (2.0, "response", "left"),
+            (7.7, "glance", "human"),
+            (8.9, "response", "left"),
+            (9.0, "fragment", "middle"),
+            (10.0, "inhibition", "table"),
+            (11.3, "fragment", "middle"),
+            (12.3, "response", "left"),
+            (13.1, "hands", "hand"),
+            (14.6, "glance", "human"),  # 5.7 after the last ended, while the hand still is the hand's
+            (15.8, "face", "human"),
+        ]
+        assert [kind for kind, _, _ in waiting] == ["fragment", "response", "hands", "face"]
+        assert all(said for *_, said in waiting)
+        assert all(each.owner.reason for each in partners.owners)
+
+
+async def test_a_glance_is_a_shift_that_announces_an_optional_look_at_the_face(hub: MemoryHub) -> None:
+    async with stage(hub) as partners:
+        window = WindowStatistics(events=9, mtbce_without_maintenance=4.0)
+        statistics = Statistics(actor="human", at=partners.bus.stamp(), session=window, recent=window)
+        partners.bus.publish(keys.statistics("human"), statistics)
+        partners.see(moving(0.5))
+        await asyncio.sleep(10.0)
+
+        (glance,) = [each.block for each in partners.blocks if len(each.block.behaviors) == 2][:1]
+        shift, announced = glance.behaviors
+        assert isinstance(shift, GazeShift)
+        assert (announced.kind, announced.responder) == ("mutual_facial_gaze", "human")  # type: ignore[union-attr]
+        assert (announced.cause, announced.optional) == ("maintenance", True)  # type: ignore[union-attr]
+        assert [at for at, kind, _ in owners(partners) if kind == "glance"][:1] == [4.2]
+
+
+async def test_whoever_joins_late_learns_who_has_the_head(hub: MemoryHub) -> None:
+    async with stage(hub) as partners:
+        await asyncio.sleep(5.0)
+        late = hub.join("late")
+        with late.subscribe(keys.HEAD_OWNER) as inbox:
+            message = (await anext(aiter(inbox))).message
+
+            assert message == partners.owners[-1]
+
+
+async def test_a_fragment_keeps_the_head_after_its_gaze_until_its_block_ends(hub: MemoryHub) -> None:
+    async with stage(hub) as partners:
+        pending = partners.send(looks(status="beginning"))
+        await partners.fragment_block("f")
+        partners.reach("f", "look", "start")
+        await asyncio.sleep(1.0)
+        partners.reach("f", "look", "end")
+        await asyncio.sleep(3.0)
+        partners.event("e", "started", initiator="human", responder="robot", objects=("left",))
+        await asyncio.sleep(1.0)
+        partners.end(partners.request("f"))
+        await pending.outcome
+        await asyncio.sleep(1.0)
+
+        assert owners(partners)[1:] == [
+            (0.0, "fragment", "middle"),
+            (1.0, "fragment", "human"),
+            (5.3, "face", "human"),
+        ]
+
+
+async def test_a_shift_that_is_refused_is_asked_for_again_after_a_pause(hub: MemoryHub) -> None:
+    async with stage(hub) as partners:
+        await asyncio.sleep(1.0)
+        partners.refusal = Fault(reason="out of reach")
+        partners.event("e", "started", initiator="human", responder="robot", objects=("left",))
+        await asyncio.sleep(1.5)
+        partners.refusal = None
+        await asyncio.sleep(1.0)
+
+        assert partners.shifts == [("maintenance", "human"), ("response", "left")]  # at 3.0: refused at 1.0 and 2.0
+        assert partners.owners[-1].owner.kind == "response"
+
+
+@pytest.mark.parametrize(
+    ("hand", "part", "aborted"),
+    [
+        ("LEFT_HAND", "point-left", True),
+        ("LEFT_HAND", "point-right", False),
+        ("BOTH_HANDS", "point-right", True),
+        (None, "point-right", True),  # it may be that arm
+        ("BOTH_HANDS", "gaze", False),
+    ],
+)
+@pytest.mark.parametrize("mode", ["release", "hold", "target"])
+async def test_an_inhibited_arm_stops_pointing(
+    hub: MemoryHub, hand: str | None, part: str, aborted: bool, mode: str
+) -> None:
+    async with stage(hub) as partners:
+        point = Pointing(id="point", target="middle", mode=hand)  # type: ignore[arg-type]
+        partners.send(TurnFragment(id="f", turn_status="full", behaviors=(point, SAY)))
+        await partners.fragment_block("f")
+        partners.reach("f", "point", "start")
+        await asyncio.sleep(1.0)
+        assert partners.aborts == []
+        inhibit(partners, part=part, mode=mode, target="table" if mode == "target" else "")
+        await asyncio.sleep(1.0)
+
+        assert [abort.id.rpartition("/")[2] for abort in partners.aborts] == ["point"] * aborted
+
+
+async def test_a_lease_renewed_with_nonsense_is_over_and_the_service_goes_on(hub: MemoryHub) -> None:
+    async with stage(hub) as partners:
+        ask = Inhibit(id="lease", requester=partners.client.name, ttl=60.0)
+        partners.client.publish(keys.INHIBIT, ask)
+        await asyncio.sleep(1.0)
+        assert partners.owners[-1].owner.kind == "inhibition"
+        again = Inhibit(id="lease", requester=partners.client.name, ttl=-1.0, revision=1)
+        partners.client.publish(keys.INHIBIT, again)
+        await asyncio.sleep(100.0)
+
+        assert "ttl -1.0" in partners.faults[0].reason
+        assert owners(partners)[-1] == (1.3, "face", "human")
+
+
+async def test_a_body_that_comes_back_is_told_where_to_look(hub: MemoryHub) -> None:
+    async with stage(hub) as partners:
+        await asyncio.sleep(1.0)
+        hub.kill("control")
+        await asyncio.sleep(1.0)
+
+        assert partners.shifts == [("maintenance", "human"), ("maintenance", "human")]
