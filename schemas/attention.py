@@ -20,7 +20,10 @@ class Claim(Struct, frozen=True, kw_only=True, omit_defaults=True):
 
 
 class HeadOwner(Struct, frozen=True, kw_only=True, tag="head_owner", omit_defaults=True):
-    """state: generation. Published at every change of owner."""
+    """state: generation. Who has the head, since when and why, and which claims wait, the highest first.
+
+    Published at every change of owner, of its target or reason, or of what waits; who joins late gets the last.
+    """
 
     owner: Claim
     since: Stamp
@@ -30,8 +33,9 @@ class HeadOwner(Struct, frozen=True, kw_only=True, tag="head_owner", omit_defaul
 class Inhibit(Request, frozen=True, kw_only=True, tag="inhibit", omit_defaults=True):
     """cmd: anyone -> generation. A lease, renewed by sending it again; ends after `ttl` or with its owner's life.
 
-    Ends in `InhibitionEnded`. mode release: the arbiter gives the part up; hold: it stays as it is;
-    target: the robot keeps looking at `target`.
+    Ends in `InhibitionEnded`. A gaze or point of a fragment that runs is aborted, others are left out. mode, of gaze:
+    release: the head is free and goes back to the base gaze; hold: it stays on what it is on; target: it keeps looking
+    at `target`. Of an arm every mode is the same: it does not point. The newest lease on a part counts.
     """
 
     part: Literal["gaze", "point-left", "point-right"] = "gaze"
