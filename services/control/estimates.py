@@ -53,7 +53,7 @@ def _phases(
     quickest: Mapping[str, Seconds] | None = None,
     slowest: float = 1.0,
 ) -> tuple[Phase, ...]:
-    """From each sync point to the next. A phase that ends where the body can hold has no upper limit.
+    """From each sync point to the next. No upper limit: where it ends at a hold point, or has no way to go.
 
     times: of the points, at natural pace. quickest: in the greatest hurry.
     """
@@ -64,7 +64,7 @@ def _phases(
             to=to.sync,
             shortest=min(least[to.sync] - least[since.sync], natural := times[to.sync] - times[since.sync]),
             natural=natural,
-            longest=None if to.held_with else natural / slowest,
+            longest=None if to.held_with or not natural else natural / slowest,
             hold=to.held_with == to.sync,
         )
         for since, to in pairwise(points)

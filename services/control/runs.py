@@ -98,6 +98,14 @@ class Run:
         coming = (point.sync for point in self.pending if marks.get(point.sync, 0.0) > here + 1e-9)
         return [(sync, planned[sync]) for sync in coming if sync in planned]
 
+    def due(self, point: Point) -> Seconds | None:
+        """When it comes to `point`; None if it may not go so far. Where it rests it is in no hurry to say so."""
+        mark = self.motion.path.marks[point.sync]
+        crossing = self.motion.crossing(mark)
+        if crossing is None or not self.motion.path.at(mark).at_rest:
+            return crossing
+        return max(crossing, self.authority.pace.get(point.sync, crossing))
+
     def limit(self, path: Path) -> Seconds:
         """How far along `path` it may go now."""
         for point in self.pending:

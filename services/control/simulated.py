@@ -208,7 +208,7 @@ class SimulatedBody(Body):
             if not run.holding:
                 self._extend(run)
             point = run.pending[0]
-            due = run.motion.crossing(run.motion.path.marks[point.sync])
+            due = run.due(point)
             if due is None or self._loop.time() < due:
                 await run.bell.heard(inf if due is None else due)
             elif point.sync in (STALL, OVERHEAT):
