@@ -66,8 +66,7 @@ class Oracle(Struct):
     """What is known of the points of a block, as (one, other, seconds): other is no earlier than one + seconds.
 
     natural, extreme: with natural durations (who is to be on target is so just in time), or as short and long as can
-    be. customs: what holds where nobody has
-    said anything else: series of one type, and looks that last.
+    be. customs: what holds where nobody has said anything else: series of one type, and looks that last.
     """
 
     times: dict[str, float]
@@ -176,10 +175,11 @@ def customs(block: Block) -> list[tuple[str, str, float]]:
     points = {
         name
         for kind, one, others in said(block)
-        if kind is not Synchronize or len({one, *others}) > 1
+        if kind is not Synchronize or len({one, *others}) > 1  # to be one with itself does not constrain a point
         for name in (point(text, block)[0] for text in (one, *others))
     }
-    mentioned = {name.partition(":")[0] for name in points}
+    # but it names it.
+    mentioned = {point(text, block)[0].partition(":")[0] for _, one, others in said(block) for text in (one, *others)}
     lasting = {
         each.id
         for each in block.behaviors
