@@ -165,8 +165,6 @@ def instants(classes: Classes, points: Iterable[Point]) -> list[Instant]:
     return found
 
 
-def _instant(
-    classes: Classes, together: list[tuple[Seconds, int, Point]], class_id: int, lowest: Seconds
-) -> Instant:
+def _instant(classes: Classes, together: list[tuple[Seconds, int, Point]], class_id: int, lowest: Seconds) -> Instant:
     points = tuple(point for _, _, point in sorted(together, key=lambda member: member[1]))
     return Instant(points, class_id, round(together[0][0] - lowest, 9), classes.at(points[0]))

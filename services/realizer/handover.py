@@ -54,17 +54,19 @@ def arrange(
     classes: Classes,
     before: Arrangement,
     times: Mapping[Point, Seconds],
+    rounds: Mapping[Point, int],
     barred: Container[tuple[str, Hand]] = (),
 ) -> tuple[Arrangement, list[Conflict]]:
     """Who else takes whose place in a schedule made with `before` and where that would break what was asked for.
 
+    rounds: which comes before which, of points that come at one time.
     barred: hands with which a behavior cannot be done.
     """
     held = relations.held
     mentioned = {point.behavior for point in relations.constrained}
     successors, cuts = dict(before.successors), dict(before.cuts)
     conflicts = []
-    for id, successor in _successors(chains, mentioned, times).items():
+    for id, successor in _successors(chains, mentioned, times, rounds).items():
         chain = chains[id]
         taken = times[Point(successor, "start")]
         first = next((number for number, point in enumerate(chain.points) if times[point] > taken + EPSILON), 0)
@@ -111,7 +113,10 @@ def _is_tied(later: Chain, speech: Chain, classes: Classes) -> bool:
 
 
 def _successors(
-    chains: Mapping[str, Chain], mentioned: Collection[str], times: Mapping[Point, Seconds]
+    chains: Mapping[str, Chain],
+    mentioned: Collection[str],
+    times: Mapping[Point, Seconds],
+    rounds: Mapping[Point, int],
 ) -> dict[str, str]:
     """The next of each behavior on any of its parts. Of those that start together what nobody mentions comes last."""
     users: dict[str, list[str]] = {}
@@ -119,7 +124,8 @@ def _successors(
         for part in chain.parts:
             users.setdefault(part, []).append(id)
     rank = {
-        id: (times[chain.points[0]], id not in mentioned, number) for number, (id, chain) in enumerate(chains.items())
+        id: (times[start := chain.points[0]], rounds[start], id not in mentioned, number)
+        for number, (id, chain) in enumerate(chains.items())
     }
     found: dict[str, str] = {}
     for those in users.values():

@@ -5,7 +5,7 @@ each with a warning: what the body cannot do, and what cannot be on time. Docume
 equals; any other permutation of a block gives the same net.
 """
 
-from collections.abc import Container, Iterable, Mapping
+from collections.abc import Container, Iterable, Mapping, Sequence
 from typing import get_args
 
 from msgspec import Struct
@@ -172,7 +172,8 @@ class _Planner:
         while True:
             assembler, assembly, solution = self._solved(assembler, arrangement, classes)
             times = {point: solution.times[transition] for point, transition in assembly.at.items()}
-            arranged, conflicts = arrange(self.chains, present, classes, arrangement, times, self.barred)
+            rounds = _rounds(assembly, solution.times)
+            arranged, conflicts = arrange(self.chains, present, classes, arrangement, times, rounds, self.barred)
             conflicts = [each for each in conflicts if each.hand or each.turn not in self.overlaps]
             turns = [each.turn for each in conflicts if each.turn and not each.hand]
             if losses := clashes(turns, self.chains, self.relations.required, classes):
@@ -325,6 +326,15 @@ class _Planner:
 
 def _kind(warning: str) -> WarningKind:
     return warning if warning in get_args(WarningKind) else "CANNOT_CREATE_BEHAVIOR"  # type: ignore[return-value]
+
+
+def _rounds(assembly: Assembly, times: Sequence[Seconds]) -> dict[Point, int]:
+    """How many measured events in a row each point waits for at its own time: who waits for one comes after it."""
+    rounds = [0] * len(times)
+    for place in sorted(assembly.net.places, key=lambda place: place.source):  # numbered in firing order
+        if place.kind != "idle" and place.source and times[place.target] - times[place.source] < EPSILON:
+            rounds[place.target] = max(rounds[place.target], rounds[place.source] + 1)
+    return {point: rounds[transition] for point, transition in assembly.at.items()}
 
 
 def _critical(solution: Solution) -> tuple[int, ...]:

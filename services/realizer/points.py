@@ -30,7 +30,7 @@ Performer = Literal["body", "recognition", "clock"]
 Gate = Literal["start", "hold", "prompt", "passive"]
 """How an instant of a behavior can be made to wait: not yet begun, holding there, or not at all.
 
-prompt: holding there too, but it sets out so late that it need not. Who looks at a thing long before it matters misleads.
+prompt: holding there too, but it sets out so late that it need not. Who looks too early misleads.
 """
 
 WITH_STROKE = frozenset({"gesture", "pointing", "head"})
