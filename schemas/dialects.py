@@ -22,8 +22,8 @@ from schemas.behaviors import (
     Unknown,
 )
 from schemas.blocks import Block, Dialect
-from schemas.references import in_draft_spelling, respelled
-from schemas.syncref import SYNC_POINTS, SyncRef, dialect_sync
+from schemas.references import in_draft_spelling, respelled, sites
+from schemas.syncref import BLOCK_ITSELF, SYNC_POINTS, SyncRef, dialect_sync
 
 EXTENSIONS = (Event, TurnSignal, Reference, Unknown)
 """What no other realizer knows."""
@@ -52,8 +52,23 @@ def core(block: Block) -> Block:
         for behavior in block.behaviors
         if behavior.id not in removed
     )
-    constraints = (replace(each, operators=tuple(_remaining(each.operators, stays))) for each in block.constraints)
-    return replace(block, behaviors=behaviors, constraints=tuple(each for each in constraints if each.operators))
+    remaining = (replace(each, operators=tuple(_remaining(each.operators, stays))) for each in block.constraints)
+    constraints = tuple(each for each in remaining if each.operators)
+    made = replace(block, behaviors=behaviors, constraints=constraints)
+    # What nobody mentions waits for the one before it of its type; what only an event mentioned must not.
+    before, after = _mentioned(block), _mentioned(made)
+    freed = [behavior.id for behavior in behaviors if behavior.id in before - after]
+    if not freed:
+        return made
+    start = After(ref=f"{BLOCK_ITSELF}:start", syncs=tuple(f"{id}:start" for id in freed))
+    return replace(made, constraints=(*constraints, Constraint(operators=(start,))))
+
+
+def _mentioned(block: Block) -> set[str]:
+    """Behaviors of which a point is timed or named."""
+    timed = {behavior.id for behavior in block.behaviors if behavior.timing}
+    named = (SyncRef.parse(site.text) for site in sites(block))
+    return timed | {reference.behavior for reference in named if reference.block in ("", block.id)}
 
 
 def _remaining(operators: Collection[Operator], stays: Callable[[str], bool]) -> Iterator[Operator]:

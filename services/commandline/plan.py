@@ -23,13 +23,13 @@ def main(path: Path, format: str, world: Path | None, where: Where) -> int:
     texts = []
     with source.blamed():
         for plan in generated(source.things, around, config, str(path)):
-            estimates = run_virtual(_estimated(plan.block, around, config))
+            estimates = run_virtual(estimated(plan.block, around, config))
             texts.append(write(export.plan_block(plan.block, estimates)))
     print("\n".join(text.rstrip("\n") for text in texts))
     return DONE
 
 
-async def _estimated(block: Block, world: World, config: Config) -> tuple[Estimate, ...]:
+async def estimated(block: Block, world: World, config: Config) -> tuple[Estimate, ...]:
     """What the simulated body expects of the block in that world, from its home position."""
     from services.control.simulated import SimulatedBody
     from services.realizer.points import performer
