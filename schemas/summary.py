@@ -150,7 +150,7 @@ def _sentences(it: Summary) -> Iterable[str]:
     elif it.status != "done":
         yield f"The fragment {'failed' if it.status == 'failed' else 'was interrupted'}."
     if it.said:
-        yield f'{"Only said" if it.cut_short else "Said"}: "{it.said}".'
+        yield f'{"Only said" if it.cut_short else "Said"}: "{it.said}"'
     elif it.status != "refused":
         yield "Nothing was said."
     for each in it.references:

@@ -160,6 +160,10 @@ def play(
     feedback_format: Annotated[
         Literal["json", "xml"] | None, typer.Option(help="Form of the feedback, whatever its file is called.")
     ] = None,
+    outcomes: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Write what became of each fragment, for a language model; - as above."),
+    ] = None,
     robot: Robot = None,
     connect: Connect = None,
     config: ConfigFile = None,
@@ -171,7 +175,7 @@ def play(
 
     where = run.Where(config, robot, tuple(connect or ()), settings=tuple(settings or ()))
     options = play.Options(
-        tuple(files), where, embedded, world, virtual_time, at, events, feedback, quiet, feedback_format
+        tuple(files), where, embedded, world, virtual_time, at, events, feedback, quiet, feedback_format, outcomes
     )
     raise typer.Exit(play.main(options))
 
@@ -230,6 +234,22 @@ def explain(
 
     where = run.Where(config, settings=tuple(settings or ()))
     raise typer.Exit(explain.main(file, format, world, where))
+
+
+@app.command()
+def tool(
+    format: Annotated[
+        Literal["anthropic", "openai", "openai-chat"],
+        typer.Option("--format", help="Of the Messages, Responses, or Chat Completions API."),
+    ] = "anthropic",
+    world: Annotated[
+        Path | None, typer.Option("--world", metavar="FILE", help="JSON of the entities: only their ids are allowed.")
+    ] = None,
+) -> None:
+    """Print the tool by which a language model speaks through the robot, for its API."""
+    from services.commandline import tool
+
+    raise typer.Exit(tool.main(format, world))
 
 
 @app.command()

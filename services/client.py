@@ -18,7 +18,9 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Generic, Literal, Self, TypeVar
 
+import msgspec
 from msgspec import Struct
+from msgspec.structs import replace
 
 from schemas import keys
 from schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost
@@ -34,7 +36,7 @@ from schemas.blocks import (
 )
 from schemas.faults import Fault, InputRefused, NoReply, RunFailed
 from schemas.feedback import Feedback
-from schemas.fragments import FragmentOutcome, PerformFragment, TurnFragment
+from schemas.fragments import FragmentOutcome, PerformFragment, TurnClosed, TurnFragment
 from schemas.json_codec import read
 from schemas.recognition import ConnectionEvent, Statistics
 from schemas.requests import Outcome, Request
@@ -44,8 +46,10 @@ from services.bus import Bus, Hub, Keep, Subscription
 from services.requests import Pending, Requester, RequestRefused
 
 M = TypeVar("M")
-FragmentSource = TurnFragment | str | bytes | Path
-"""A fragment, or EBML or JSON that describes one, or the file it stands in."""
+FragmentSource = TurnFragment | str | bytes | Path | dict[str, Any]
+"""A fragment, or EBML or JSON that describes one (a language model's tool input, too), or the file it stands in."""
+ANSWER_PATIENCE = 20.0
+"""Seconds after a fragment's end: longer than any answer of a person is waited for."""
 
 RENEWALS_PER_LEASE = 3
 """An inhibition is renewed this many times within its time to live, so that two renewals may be lost."""
@@ -125,17 +129,36 @@ class Robot:
 
     # -- requests -----------------------------------------------------------------------------------------------
 
-    async def perform(self, fragment: FragmentSource, *, timeout: Seconds | None = None) -> FragmentOutcome:
+    async def perform(
+        self, fragment: FragmentSource, *, await_answer: bool = False, timeout: Seconds | None = None
+    ) -> FragmentOutcome:
         """Perform a turn fragment; returns when it is done or was interrupted.
 
+        await_answer: if it ends a turn, only when that has been answered, or it is too late; `events` tell.
         timeout: how long to wait for it to be accepted, for example until generation is there.
         Raises InputRefused (nothing has moved), PerformFailed, or RunFailed (generation is gone, or never came).
         """
-        parsed = _fragment(fragment)
+        parsed = _fragment(fragment, f"{self._bus.name}-{next(self._numbers)}")
         request = PerformFragment(id=self._request_id(parsed.id), requester=self._bus.name, fragment=parsed)
+        answered = await_answer and parsed.turn_status in ("end", "full")
+        outcome = await (self._answered(request, timeout) if answered else self._performed(request, timeout))
+        return _unless_failed(outcome, parsed.id)
+
+    async def _performed(self, request: PerformFragment, timeout: Seconds | None) -> FragmentOutcome:
         outcome = await self._ask(keys.FRAGMENT, request, timeout)
         assert isinstance(outcome, FragmentOutcome)
-        return _unless_failed(outcome, parsed.id)
+        return outcome
+
+    async def _answered(self, request: PerformFragment, timeout: Seconds | None) -> FragmentOutcome:
+        with self.turns() as turns:
+            outcome = await self._performed(request, timeout)
+            events = {event.id for event in outcome.events}
+            deadline = self.now() + ANSWER_PATIENCE
+            while (turn := await turns.next(max(0.0, deadline - self.now()))) is not None:
+                # An earlier turn of the same name, told again, has other events.
+                if request.fragment.id in turn.fragments and events <= {event.id for event in turn.events}:
+                    return replace(outcome, events=turn.events)
+        return outcome
 
     async def realize(
         self,
@@ -237,6 +260,10 @@ class Robot:
         """Every change in the life of every connection event, from now on."""
         return self._feed((ConnectionEvent,), keys.CONNECTION_EVENT)
 
+    def turns(self) -> Feed[TurnClosed]:
+        """Each turn of the robot once it is over and answered, or it is too late for an answer."""
+        return self._feed((TurnClosed,), keys.TURN_CLOSED)
+
     def feedback(self) -> Feed[Feedback]:
         """What is told of blocks: progress, sync points as realised, warnings."""
         return self._feed(Feedback.__args__, keys.ANY_FEEDBACK)
@@ -316,8 +343,8 @@ async def _joined(hub: Hub, name: str) -> AsyncIterator[Robot]:
         await bus.leave()
 
 
-def _fragment(source: FragmentSource) -> TurnFragment:
-    """Raises InputRefused with file, line or JSON path."""
+def _fragment(source: FragmentSource, unnamed: str) -> TurnFragment:
+    """unnamed: the id of one that has none. Raises InputRefused with file, line or JSON path."""
     match source:
         case TurnFragment():
             return source
@@ -330,7 +357,9 @@ def _fragment(source: FragmentSource) -> TurnFragment:
             data, place = source.encode(), ""
         case bytes():
             data, place = source, ""
-    things = read(data, place)
+        case dict():
+            data, place = msgspec.json.encode(source), ""
+    things = read(data, place, unnamed)
     match things:
         case (TurnFragment() as fragment,):
             return fragment

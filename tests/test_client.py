@@ -5,20 +5,22 @@ from collections.abc import Awaitable, Callable
 from functools import partial
 from pathlib import Path
 
+import msgspec
 import pytest
+from msgspec.structs import replace
 
 from schemas import keys
 from schemas.attention import Inhibit, InhibitionEnded
 from schemas.behaviors import Speech
 from schemas.blocks import BehaviorInterrupted, Block, BlockOutcome, InterruptBehavior, PerformBlock
 from schemas.faults import Fault, InputRefused, NoReply, RunFailed
-from schemas.fragments import FragmentOutcome, PerformFragment, TurnFragment
+from schemas.fragments import FragmentOutcome, PerformFragment, TurnClosed, TurnFragment
 from schemas.recognition import ConnectionEvent, Statistics, WindowStatistics
 from schemas.requests import Cancel
 from schemas.units import Stamp
 from schemas.world import Entity, World
 from services.bus import Bus
-from services.client import PerformFailed, connect
+from services.client import ANSWER_PATIENCE, PerformFailed, connect
 from services.memory_bus import MemoryHub
 from services.requests import RequestDesk
 from services.runtime import Ready, running
@@ -257,3 +259,56 @@ async def test_world_and_statistics_are_what_was_last_said(hub: MemoryHub) -> No
         assert await robot.statistics("human") == statistics
         with pytest.raises(NoReply, match="no statistics of all within 2 s"):
             await robot.statistics(timeout=2)
+
+
+async def test_a_tool_call_is_performed_under_a_name_of_its_own(hub: MemoryHub) -> None:
+    seen: list[object] = []
+    call = {"turn_status": "full", "parts": [{"say": "Hello"}, {"refer": "cup"}]}
+    async with running(hub, {"generation": partial(server, seen=seen)}), connect(hub=hub, name="model") as robot:
+        await robot.perform(call)
+        await robot.perform(msgspec.json.encode(call))
+
+    ids = [fragment.id for fragment in seen if isinstance(fragment, TurnFragment)]
+    assert len(set(ids)) == 2
+    assert all(id.startswith("model-") for id in ids)
+
+
+async def test_an_answer_is_awaited_where_a_turn_ends_and_belongs_to_its_outcome(hub: MemoryHub) -> None:
+    def pair(id: str, state: str) -> ConnectionEvent:
+        at = Stamp("loop", 0.0)
+        return ConnectionEvent(
+            id=id, kind="adjacency_pair", initiator="robot", responder="ann", state=state, at=at, started=at,  # type: ignore[arg-type]
+        )  # fmt: skip
+
+    async def later(bus: Bus) -> None:
+        for delay, id in ((0.0, "ap-0"), (3.0, "ap-1")):  # the first of an earlier turn of that name
+            await asyncio.sleep(delay)
+            closed = TurnClosed(
+                turn="hello", addressee="ann", status="done", fragments=("hello",), events=(pair(id, "succeeded"),)
+            )
+            bus.publish(keys.TURN_CLOSED, closed)
+
+    async def answer(desk: RequestDesk, request: PerformFragment) -> None:
+        desk.accept(request.id)
+        events = (pair("ap-1", "started"),)
+        desk.end(FragmentOutcome(id=request.id, fragment="hello", status="done", events=events))
+
+    bus = hub.join("generation-too")
+    async with running(hub, {"generation": partial(server, seen=[], answer=answer)}), connect(hub=hub) as robot:
+        asking = asyncio.create_task(later(bus))
+        at_once = await robot.perform(HELLO)
+        begun = await robot.perform(replace(HELLO, turn_status="beginning"), await_answer=True)
+        assert asyncio.get_running_loop().time() == 0.0
+        answered = await robot.perform(HELLO, await_answer=True)
+        await asking
+
+    assert [outcome.events[0].state for outcome in (at_once, begun, answered)] == ["started", "started", "succeeded"]
+    assert asyncio.get_running_loop().time() == 3.0
+
+
+async def test_an_answer_that_nobody_tells_of_is_not_awaited_for_ever(hub: MemoryHub) -> None:
+    async with running(hub, {"generation": partial(server, seen=[])}), connect(hub=hub) as robot:
+        outcome = await robot.perform(HELLO, await_answer=True)
+
+    assert outcome.status == "done"
+    assert asyncio.get_running_loop().time() == ANSWER_PATIENCE

@@ -1,4 +1,6 @@
-"""What `--events` and `--feedback` write, as it comes: JSON lines, or feedback as XML. `-` is standard output."""
+"""What `--events`, `--feedback` and `--outcomes` write, as it comes: JSON lines, or feedback as XML. `-` is standard
+output.
+"""
 
 import sys
 from collections.abc import Callable
@@ -7,6 +9,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Literal, Self, TextIO
 
+import msgspec
 from rich.console import Console
 
 from schemas import lines
@@ -15,6 +18,7 @@ from schemas.feedback import BlockProgress, PredictionFeedback, SyncPointProgres
 from schemas.feedback_xml import HEAD, TAIL, encode_feedback
 from schemas.messages import Message
 from schemas.recognition import ConnectionEvent
+from schemas.summary import Summary
 from schemas.units import Seconds
 
 STDOUT = Path("-")
@@ -40,25 +44,27 @@ class Outputs:
         feedback: Path | None,
         wanted: Callable[[Message], bool] = lambda message: True,
         format: FeedbackFormat | None = None,
+        outcomes: Path | None = None,
     ) -> None:
-        self._paths = (events, feedback)
+        self._paths = (events, feedback, outcomes)
         self.wanted = wanted
         named_xml = feedback is not None and feedback.suffix.lower() == ".xml"
         self._is_xml = format == "xml" or (format is None and named_xml)
         self._files = ExitStack()
         self._events: TextIO | None = None
         self._feedback: TextIO | None = None
+        self._outcomes: TextIO | None = None
 
     def console(self, *, quiet: bool) -> Console:
         """For everything else: standard error if the lines have standard output for themselves."""
         return Terminal(stderr=STDOUT in self._paths, quiet=quiet)
 
     def __enter__(self) -> Self:
-        events, feedback = self._paths
-        if events is not None and events == feedback and self._is_xml:
-            raise InputRefused(Fault(reason="JSON lines and XML cannot share a file", where=str(events)))
-        self._events = self._open(events)
-        self._feedback = self._events if feedback == events else self._open(feedback)
+        events, feedback, outcomes = self._paths
+        if feedback is not None and feedback in (events, outcomes) and self._is_xml:
+            raise InputRefused(Fault(reason="JSON lines and XML cannot share a file", where=str(feedback)))
+        files = {path: self._open(path) for path in dict.fromkeys(self._paths)}
+        self._events, self._feedback, self._outcomes = files[events], files[feedback], files[outcomes]
         if self._is_xml and self._feedback is not None:
             self._feedback.write(HEAD)
         return self
@@ -96,9 +102,16 @@ class Outputs:
             case PredictionFeedback() if self._is_xml:
                 self._write(self._feedback, message, encode_feedback(message, in_stream=True))
 
+    def outcome(self, fragment: str, outcome: Summary) -> None:
+        if self._outcomes is not None:
+            line = {"fragment": fragment, **msgspec.to_builtins(outcome)}
+            self._print(self._outcomes, msgspec.json.encode(line).decode())
+
     def _write(self, file: TextIO | None, message: Message, text: str) -> None:
-        if file is None or not self.wanted(message):
-            return
+        if file is not None and self.wanted(message):
+            self._print(file, text)
+
+    def _print(self, file: TextIO, text: str) -> None:
         try:
             print(text, file=file, flush=True)
         except BrokenPipeError:

@@ -15,6 +15,7 @@ from schemas.faults import EngageError, Fault, InputRefused, NoReply, RunFailed
 from schemas.fragments import FragmentOutcome, TurnFragment
 from schemas.messages import Message
 from schemas.status import AskStatus
+from schemas.summary import summary
 from schemas.units import Seconds
 from schemas.world import World
 from services.bus import Hub
@@ -32,6 +33,7 @@ from services.console.live import Log
 from services.console.log import Telling
 from services.memory_bus import MemoryHub
 from services.runtime import Service, running
+from services.streaming import summary_of
 
 PATIENCE: Seconds = 5.0
 """How long a running system may take to answer at all."""
@@ -50,6 +52,7 @@ class Options(NamedTuple):
     feedback: Path | None = None
     quiet: bool = False
     feedback_format: FeedbackFormat | None = None
+    outcomes: Path | None = None
 
 
 class Job(NamedTuple):
@@ -80,7 +83,9 @@ def main(options: Options) -> int:
         raise InputRefused(Fault(reason="--connect is for a running system", advice="leave out --embedded"))
     config = options.where.load()
     times = submission_times(options.at, len(options.files))
-    with Outputs(options.events, options.feedback, format=options.feedback_format) as outputs:
+    with Outputs(
+        options.events, options.feedback, format=options.feedback_format, outcomes=options.outcomes
+    ) as outputs:
         world = read_world(options.world)
         sources = checking.read_all(options.files, outputs)
         checking.check(sources, world if options.embedded else None, config.robot, outputs)
@@ -192,7 +197,11 @@ async def _perform(job: Job, source: Source, robot: Robot, patience: Seconds | N
         except EngageError as error:
             print(readable(error.fault, source.path), file=sys.stderr)
             worst = max(worst, REFUSED if isinstance(error, InputRefused) else FAILED)
+            if isinstance(thing, TurnFragment):
+                job.outputs.outcome(thing.id, summary_of(error))
             continue
+        if isinstance(outcome, FragmentOutcome):
+            job.outputs.outcome(thing.id, summary(outcome))
         code = job.played.exit_code(outcome)
         if code != DONE:
             print(f"{source.path}: {thing.id} was {outcome.status}", file=sys.stderr)

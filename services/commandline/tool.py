@@ -1,0 +1,16 @@
+"""`engage tool`: the definition of the tool by which a language model speaks through the robot."""
+
+from pathlib import Path
+
+import msgspec
+
+from schemas.tool import Format, definition
+from services.commandline.process import DONE
+from services.commandline.sources import read_world
+
+
+def main(format: Format, world: Path | None) -> int:
+    """world: its objects and people are the only ids that the schema allows."""
+    made = definition(format, None if world is None else read_world(world))
+    print(msgspec.json.format(msgspec.json.encode(made), indent=2).decode())
+    return DONE

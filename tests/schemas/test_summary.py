@@ -1,0 +1,140 @@
+"""What a language model gets to read of its fragments."""
+
+import json
+
+from schemas.blocks import SpokenText
+from schemas.faults import Fault
+from schemas.fragments import FragmentOutcome, GestureChoice, ReferenceChoice
+from schemas.recognition import ConnectionEvent, EventState
+from schemas.summary import LONGEST_PROBLEM, Summary, refusal, summary
+from schemas.units import Stamp
+
+POINT: GestureChoice = "directed_gaze_with_pointing"
+
+
+def event(kind: str, state: EventState, block: str = "f", **fields: object) -> ConnectionEvent:
+    at = Stamp("loop", float(fields.pop("at", 0.0)))  # type: ignore[arg-type]
+    values = {"id": f"{kind}-{block}", "initiator": "robot", "responder": "ann", **fields}
+    return ConnectionEvent(kind=kind, state=state, block=block, at=at, started=at, **values)  # type: ignore[arg-type]
+
+
+def looked(reference: str, state: EventState, **fields: object) -> ConnectionEvent:
+    return event("directed_gaze", state, id=f"dg-{reference}", behavior=f"{reference}-event", **fields)
+
+
+def choice(reference: str, gesture: GestureChoice = POINT, phrase: str = "that cup") -> ReferenceChoice:
+    return ReferenceChoice(
+        reference=reference, target="cup", gesture=gesture, phrase=phrase, reliability=0.9, cost=1.0
+    )  # fmt: skip
+
+
+def outcome(id: str = "f", status: str = "done", **fields: object) -> FragmentOutcome:
+    return FragmentOutcome(id=f"ask-{id}", fragment=id, status=status, **fields)  # type: ignore[arg-type]
+
+
+def said(*texts: str, complete: bool = True) -> tuple[SpokenText, ...]:
+    return tuple(SpokenText(behavior=f"s{index}", text=text, complete=complete) for index, text in enumerate(texts))
+
+
+DONE = outcome(
+    spoken=said("Please take", "that cup", "away."),
+    choices=(choice("r"),),
+    events=(
+        event("adjacency_pair", "succeeded", response="act", delay=-0.204, turn="f"),
+        looked("r", "completed", delay=0.4151),
+        event("mutual_facial_gaze", "failed", delay=1.9),
+    ),
+)
+
+
+def test_a_good_fragment_is_told_in_a_few_hundred_characters() -> None:
+    told = summary(DONE)
+
+    assert json.loads(told.json) == {
+        "status": "done",
+        "said": "Please take that cup away.",
+        "references": [{"object": "cup", "phrase": "that cup", "by": "pointing", "looked": True, "delay": 0.42}],
+        "eye_contact": False,
+        "answer": "act",
+        "answer_delay": -0.2,
+    }
+    assert len(told.json) < 300
+    assert told.text == (
+        'Said: "Please take that cup away." cup: that cup, by pointing; they looked after 0.42 s. '
+        "At the end they did not look at the robot. Answered by: act, after -0.2 s."
+    )
+
+
+def test_what_was_interrupted_tells_the_words_really_spoken_and_why() -> None:
+    cut = outcome(
+        status="interrupted",
+        spoken=(*said("Please take"), *said("that", complete=False)),
+        fault=Fault(reason="ann took the floor", where="f"),
+    )
+
+    told = summary(cut)
+
+    assert (told.status, told.said, told.cut_short) == ("interrupted", "Please take that", True)
+    assert told.problems == ("f: ann took the floor",)
+    assert told.text == (
+        'The fragment was interrupted. Only said: "Please take that" Problems: f: ann took the floor.'
+    )
+
+
+def test_who_did_not_look_and_who_was_not_waited_for() -> None:
+    choices = (choice("a"), choice("b", "gaze", "it"), choice("c", "none", "the cup"), choice("d"), choice("e"))
+    events = (looked("a", "failed", delay=2.5), looked("d", "superseded"), looked("e", "started"))
+
+    references = summary(outcome(choices=choices, events=events)).references
+
+    assert [(each.by, each.looked, each.delay) for each in references] == [
+        ("pointing", False, None), ("a look", None, None), ("words alone", None, None),
+        ("pointing", None, None), ("pointing", None, None),
+    ]  # fmt: skip
+
+
+def test_an_answer_is_pending_none_or_none_expected() -> None:
+    answers = [
+        summary(outcome(events=events)).answer
+        for events in (
+            (event("adjacency_pair", "started"),),
+            (event("adjacency_pair", "failed", delay=1.5),),
+            (event("adjacency_pair", "withdrawn"),),
+            (event("adjacency_pair", "succeeded", response="speak", delay=0.3),),
+            (),
+        )
+    ]
+
+    assert answers == ["pending", "none", "none", "speak", None]
+
+
+def test_the_fragments_of_a_turn_are_told_together_each_event_in_its_last_state() -> None:
+    begun = event("adjacency_pair", "started", "f-1", id="pair")
+    first = outcome("f-1", spoken=said("So,"), events=(begun,), warnings=("late", "late"))
+    decided = event("adjacency_pair", "succeeded", "f-1", id="pair", response="nod", delay=0.5)
+    contact = event("mutual_facial_gaze", "succeeded", "f-2", delay=0.0)
+    last = outcome("f-2", "failed", spoken=said("take it."), events=(decided, contact), fault=Fault(reason="stuck"))
+
+    told = summary(first, last)
+
+    assert (told.status, told.said, told.answer, told.eye_contact) == ("failed", "So, take it.", "nod", True)
+    assert told.problems == ("late", "stuck")
+
+
+def test_a_refusal_says_why_and_that_nothing_happened() -> None:
+    told = refusal(Fault(reason="no 'cop'", where="$.parts[1].refer", advice="did you mean 'cup'?"))
+
+    assert told == Summary(status="refused", problems=("$.parts[1].refer: no 'cop' (did you mean 'cup'?)",))
+    assert told.text.startswith("Refused, nothing was said or done. Problems: ")
+
+
+def test_many_long_problems_stay_short() -> None:
+    told = summary(outcome(warnings=tuple(f"{index} {'x' * 500}" for index in range(9))))
+
+    assert [len(problem) for problem in told.problems] == [LONGEST_PROBLEM] * 4 + [len("and 5 more")]
+    assert len(told.json) < 800
+
+
+def test_nothing_is_told_of_nothing() -> None:
+    assert summary() == Summary(status="done")
+    assert summary().text == "Nothing was said."

@@ -1,0 +1,91 @@
+"""Text as it comes, cut where it can be spoken."""
+
+import re
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from schemas.tool import Gesture, Part, Refer, Say
+from services.chunking import Chunk, Chunker
+
+
+def chunks(*pieces: str | Part, **settings: int) -> list[Chunk]:
+    chunker = Chunker(**settings)
+    made = [chunk for piece in pieces for chunk in chunker.feed(piece)]
+    return [*made, *filter(None, [chunker.rest()])]
+
+
+def words(*pieces: str | Part, **settings: int) -> list[str]:
+    """Each chunk as a line."""
+    return [
+        " ".join(part.say if isinstance(part, Say) else f"<{part.refer}>" for part in chunk)  # type: ignore[union-attr]
+        for chunk in chunks(*pieces, **settings)
+    ]
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("Hello there. How are you? Fine", ["Hello there.", "How are you?", "Fine"]),
+        ("Well, yes", ["Well, yes"]),
+        ("If you have a moment, look here", ["If you have a moment,", "look here"]),
+        ("It weighs 3.5 kg, or so; see e.g. this", ["It weighs 3.5 kg,", "or so; see e.g.", "this"]),
+        ("Mr. Bean and Dr. Who met J. Smith. Then", ["Mr. Bean and Dr. Who met J. Smith.", "Then"]),
+        ('"Really?" she said... "Yes!" No', ['"Really?"', "she said...", '"Yes!"', "No"]),
+        ("One\n\nTwo \n \n three", ["One", "Two", "three"]),
+        ("line one\nline two", ["line one line two"]),
+        ("Take [a]. And [b], please, now", ["Take <a>", "And <b> please,", "now"]),
+        ("[a] [b] [c]", ["<a> <b> <c>"]),
+        ("an [open bracket. And [] more", ["an [open bracket.", "And [] more"]),
+        ("   ", []),
+        ("... !", []),
+    ],
+)
+def test_text_is_cut_at_ends_of_sentences_and_of_clauses_that_are_long_enough(text: str, expected: list[str]) -> None:
+    assert words(text) == expected
+
+
+def test_a_chunk_comes_as_soon_as_the_next_character_shows_that_it_is_complete() -> None:
+    chunker = Chunker()
+
+    assert list(chunker.feed("Hello.")) == []  # it might be 3.5
+    assert list(chunker.feed(" ")) == [(Say(say="Hello."),)]
+    assert chunker.rest() == ()
+
+
+def test_references_may_be_certain() -> None:
+    assert chunks("see [a!]") == [(Say(say="see"), Refer(refer="a", certainty="high"))]
+
+
+def test_parts_stand_where_they_stand() -> None:
+    nod = Gesture(gesture="nod")
+
+    assert chunks("Yes, ", nod, "it is [a") == [(Say(say="Yes,"), nod, Say(say="it is [a"))]
+
+
+def test_how_long_a_clause_must_be_can_be_set() -> None:
+    assert words("one, two, three", clause_words=1) == ["one,", "two,", "three"]
+
+
+texts = st.text(st.sampled_from(list("ab .,!?[]\n\"'DrM")), max_size=60) | st.lists(
+    st.sampled_from(["[a]", "[b!]", "Dr. ", "word ", "end. ", "so, ", "\n\n", "3.5 ", "e.g. "]), max_size=15
+).map("".join)
+
+
+@settings(max_examples=200)
+@given(texts, st.data())
+def test_it_does_not_matter_in_what_bits_the_text_comes(text: str, data: st.DataObject) -> None:
+    cuts = sorted(data.draw(st.lists(st.integers(0, len(text)), max_size=8)))
+    bits = [text[start:end] for start, end in zip([0, *cuts], [*cuts, len(text)], strict=True)]
+
+    assert chunks(*bits) == chunks(text) == chunks(*text)
+
+
+@settings(max_examples=100)
+@given(texts)
+def test_no_word_is_lost(text: str) -> None:
+    spoken = " ".join(words(text))
+    plain = re.sub(r"\[([^\[\]\s!]+)!?\]", r" <\1> ", text)
+
+    assert re.findall(r"\w+", spoken) == re.findall(r"\w+", plain)

@@ -1,0 +1,52 @@
+"""The examples do what they show."""
+
+import asyncio
+import sys
+from asyncio.subprocess import PIPE
+from importlib.util import module_from_spec, spec_from_file_location
+from pathlib import Path
+from types import ModuleType
+
+import pytest
+
+EXAMPLES = Path(__file__).parents[1] / "examples"
+
+
+def example(name: str) -> ModuleType:
+    spec = spec_from_file_location(name, EXAMPLES / f"{name}.py")
+    assert spec is not None
+    assert spec.loader is not None
+    module = module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+async def test_a_streaming_model_learns_that_nobody_looked_and_makes_itself_clear(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    streaming = example("stream_from_generator")
+    async with streaming.embedded() as robot:
+        greeting, repeated, request, goodbye = await streaming.converse(robot)
+
+    assert greeting.said.startswith("Hello! I could use your help")
+    assert [(each.by, each.looked) for each in greeting.references] == [("a look", False)]
+    assert [(each.object, each.by, each.looked) for each in repeated.references] == [("red-square", "pointing", True)]
+    assert request.said.startswith("Good. Please move this so that")
+    assert (request.answer, request.references[0].looked) == ("act", True)
+    assert goodbye.said == streaming.GOODBYE
+    assert {each.status for each in (greeting, repeated, request, goodbye)} == {"done"}
+    printed = capsys.readouterr().out
+    assert printed.count("model:  ") == 4
+    assert all(len(line) < 500 for line in printed.splitlines())
+
+
+@pytest.mark.real_time
+async def test_the_streaming_example_runs_by_itself() -> None:
+    running = await asyncio.create_subprocess_exec(
+        *(sys.executable, str(EXAMPLES / "stream_from_generator.py"), "--embedded", "--virtual-time"),
+        stdout=PIPE, stderr=PIPE,
+    )  # fmt: skip
+    out, err = await running.communicate()
+
+    assert (running.returncode, err) == (0, b"")
+    assert b'"answer":"act"' in out
