@@ -121,7 +121,8 @@ class Run:
         """Wait there no longer; the sync points that it leaves. Where it stands may be another hold point, too."""
         passed = [point.sync for point in self.pending if point.held_with == hold]
         self.pending = [point for point in self.pending if point.held_with != hold]
-        following, here = self.pending[0], self.motion.s(now) + 1e-9
+        following = next(point for point in self.pending if point.sync not in (STALL, OVERHEAT))
+        here = self.motion.s(now) + 1e-9
         is_here = following.held_with and self.motion.path.marks[following.sync] <= here
         self.holding = self.stands(now) and bool(is_here)
         return passed
