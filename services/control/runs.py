@@ -21,7 +21,7 @@ STALL, OVERHEAT = "(stall)", "(overheat)"
 class Run:
     """`course` under `authority`. Its bell rings when the authority changes or another behavior takes over.
 
-    cut_at: when a later behavior took its parts. holding: it waits at a hold point, where it stands or comes to stand.
+    cut_at: when a later behavior took its parts. holding: it waits at a hold point, and stands there soon.
     """
 
     def __init__(
@@ -113,9 +113,10 @@ class Run:
                 return path.marks.get(point.stands_at or point.sync, inf)
         return inf
 
-    def stands(self, now: Seconds) -> bool:
+    @property
+    def stands(self) -> bool:
         """Has it come to a stop where it has to wait?"""
-        return self.holding and now >= self.motion.end
+        return self.holding and self.bell.is_past(self.motion.end)
 
     def leave(self, hold: str, now: Seconds) -> list[str]:
         """Wait there no longer; the sync points that it leaves. Where it stands may be another hold point, too."""
@@ -124,7 +125,7 @@ class Run:
         following = next(point for point in self.pending if point.sync not in (STALL, OVERHEAT))
         here = self.motion.s(now) + 1e-9
         is_here = following.held_with and self.motion.path.marks[following.sync] <= here
-        self.holding = self.stands(now) and bool(is_here)
+        self.holding = self.stands and bool(is_here)
         return passed
 
     def with_faults(self, legs: tuple[Leg, ...]) -> tuple[Leg, ...]:

@@ -91,8 +91,9 @@ class SimulatedBody(Body):
         if "head" in going:
             self._attention.stay(tracks.HOME["head"])
         self._relax(tuple(sorted(going)))
-        while (until := max((self._tracks[part].motion.end for part in going), default=0.0)) > self._loop.time():
-            await Bell().heard(until)
+        bell = Bell()
+        while not bell.is_past(until := max((self._tracks[part].motion.end for part in going), default=0.0)):
+            await bell.heard(until)
 
     def state(self) -> BodyState:
         now = self._loop.time()
@@ -209,7 +210,7 @@ class SimulatedBody(Body):
                 self._extend(run)
             point = run.pending[0]
             due = run.due(point)
-            if due is None or self._loop.time() < due:
+            if due is None or not run.bell.is_past(due):
                 await run.bell.heard(inf if due is None else due)
             elif point.sync in (STALL, OVERHEAT):
                 await self._fail_or_stall(run, point)
@@ -234,9 +235,9 @@ class SimulatedBody(Body):
             run.pending.clear()
 
     def _leave_hold(self, run: Run, hold: str) -> list[str]:
-        """Go on, if it stands: what is left of the path is planned afresh from rest. The sync points that it leaves."""
+        """Go on: where it stands, what is left is planned afresh from rest. Returns the sync points it leaves."""
         now = self._loop.time()
-        stood, passed = run.stands(now), run.leave(hold, now)
+        stood, passed = run.stands, run.leave(hold, now)
         if stood and not run.holding:
             legs = run.motion.path.after(run.motion.s(now))
             if run.course.parts == ("head",):
@@ -260,7 +261,7 @@ class SimulatedBody(Body):
             raise BodyFailed(_fault(run.behavior, f"the motor of the {run.course.parts[0]} is overheated"))
         assert run.stall is not None
         until = inf if run.stall.seconds is None else self._loop.time() + run.stall.seconds
-        while not run.is_over and self._loop.time() < until:
+        while not run.is_over and not run.bell.is_past(until):
             await run.bell.heard(until)
         run.pending.remove(point)
 
@@ -268,7 +269,7 @@ class SimulatedBody(Body):
         run.motion.brake(self._loop.time())
         self._attention.expect("", 0.0, self._loop.time())
         until = run.motion.end + FREEZE
-        while run.cut_at is None and self._owns(run) and self._loop.time() < until:
+        while run.cut_at is None and self._owns(run) and not run.bell.is_past(until):
             await run.bell.heard(until)
 
     def _owns(self, run: Run) -> bool:
@@ -322,7 +323,7 @@ class SimulatedBody(Body):
             course = choreography.plan(run.behavior, scene)
         except Impossible:
             return
-        if run.stands(now):
+        if run.stands:
             head.turn(track, tuple(course.on_target.values()), now)
         elif (path := head.retargeted(run, course, track, now)) is not None:
             run.course = course

@@ -22,7 +22,7 @@ async def speak(behavior: Speech, authority: Authority, pace: float = 1.0) -> As
     unwatch = authority.watch(bell.ring)
     try:
         for progress in _score(behavior, utterance):
-            while bell.now() < begin + progress.at and authority.revoked is None:
+            while not bell.is_past(begin + progress.at) and authority.revoked is None:
                 await bell.heard(begin + progress.at)
             arrived = at = begin + progress.at
             if isinstance(progress, Reached) and progress.sync in gaps and not authority.covers(progress.sync):
@@ -37,7 +37,7 @@ async def speak(behavior: Speech, authority: Authority, pace: float = 1.0) -> As
         since = bell.now() - begin
         for word in utterance.words:
             if authority.revoked is not None and word.start < since < word.end:
-                while bell.now() < begin + word.end:
+                while not bell.is_past(begin + word.end):
                     await bell.heard(begin + word.end)
                 yield Spoke(word.text, word.position, begin + word.end)
     finally:
@@ -58,7 +58,7 @@ async def wait(behavior: Wait, authority: Authority) -> AsyncGenerator[Progress,
     unwatch = authority.watch(bell.ring)
     try:
         yield Reached("start", begin, begin)
-        while bell.now() < due and authority.revoked is None:
+        while not bell.is_past(due) and authority.revoked is None:
             await bell.heard(due)
         left = due
         if authority.revoked is None and not authority.covers("end"):

@@ -5,6 +5,9 @@ from math import inf
 
 from schemas.units import Seconds
 
+EARLY: Seconds = 1e-9
+"""A loop runs its timers by up to this too early; who then found an instant still to come would wait for ever."""
+
 
 class Bell:
     """One task waits with `heard`; anybody may `ring`, before or while it waits. And it knows what time it is."""
@@ -17,12 +20,15 @@ class Bell:
         """Loop time."""
         return self._loop.time()
 
+    def is_past(self, at: Seconds) -> bool:
+        return self._loop.time() >= at - EARLY
+
     def ring(self) -> None:
         self._rung.set()
 
     async def heard(self, until: Seconds) -> None:
         """Return once the bell has been rung since the last time, or at loop time `until` (inf: never)."""
-        if self._loop.time() >= until:
+        if self.is_past(until):
             return
         timer = None if until == inf else self._loop.call_at(until, self._rung.set)
         try:

@@ -281,8 +281,8 @@ class Authority(Facts):
         arrival = self._arrival(member)
         if arrival is None or (transition, member.behavior) in self._granted:
             return
-        if arrival - self.config.lead > now + EPSILON:
-            self._wake(transition, arrival - self.config.lead)
+        if arrival - self.config.gap > now + EPSILON:
+            self._wake(transition, arrival - self.config.gap)
         elif due <= arrival + self.config.skew:
             self._grant(transition, member)
 
@@ -393,8 +393,3 @@ class Authority(Facts):
         """When each instant will be: what the forecast kept up to date says of those it keeps, and all others."""
         facts = (self.reached, self.arrived, self._instants)
         return full_forecast(self.plan, self.began, self.experience.factor, *facts)
-
-    @property
-    def has_overdue(self) -> bool:
-        """Is anybody expected later than facts alone would say?"""
-        return bool(self.not_before)

@@ -12,6 +12,7 @@ class RealizerConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
     late, late_factor: a phase may take this much longer than natural before the realizer warns. Ours.
     stall, stall_factor: and this much before its behavior counts as failed. Motors of 1x-4x must pass. Ours.
     lead: how long before an instant a behavior is told to pass it that will come just then; more than braking takes.
+    gap: the same of an utterance at a word gap: more than a message takes. The later, the more is known of others.
     skew: a sync point that misses its instant by more is reported as LATE. Below what people notice (0.1 s).
     estimate: how long the body may take to answer what it expects of a block.
     abort: how long the body may take to end what was aborted before the block ends without it.
@@ -26,6 +27,7 @@ class RealizerConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
     stall: Seconds = 3.0
     stall_factor: float = 5.0
     lead: Seconds = 0.3
+    gap: Seconds = 0.05
     skew: Seconds = 0.1
     estimate: Seconds = 2.0
     abort: Seconds = 5.0

@@ -46,7 +46,7 @@ class Wiring:
 
 
 def _is_predictive(plan: Plan) -> bool:
-    """Is anything constrained that cannot wait, or had better not, or bounded from above? Else nothing need be."""
+    """Is anything bounded from above, or constrained and cannot or should not wait? Else prediction is not needed."""
     if any(bound.kind != "phase" for bound in plan.bounds):
         return True
     constrained = _constrained(plan)

@@ -152,7 +152,7 @@ async def test_with_an_offset_the_eyes_are_beside_the_target_and_on_nothing():
 
 
 async def test_standing_on_target_is_one_stop_however_its_authority_comes():
-    """Told to leave before it stands, it never stops; told late, it leaves from where it stands, which is on target."""
+    """Told to leave before it stands, it never stops; told late, it leaves from where it stands, on target."""
     gaze = Gaze(id="g", target="far-left")
     free = SimulatedBody()
     free.see(WORLD)

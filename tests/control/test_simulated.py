@@ -28,6 +28,7 @@ from schemas.body import NoPointZone
 from schemas.world import Entity, World
 from services.control.body import Arrived, BehaviorRefused, sync_points
 from services.control.simulated import SimulatedBody
+from services.control.waiting import Bell
 from services.virtual_time import run_virtual
 from tests.control.contract import WORLD, Stage, default, performed, times
 from tests.control.motions import recorded, stops, violations
@@ -320,3 +321,14 @@ def test_no_story_breaks_a_limit_or_leaves_an_arm_in_the_air(story: list[tuple[B
             assert angle.angle == pytest.approx(there.angle, abs=1e-6), angle.joint
 
     run_virtual(tell())
+
+
+async def test_an_instant_that_rounding_puts_behind_its_timer_is_waited_for_once():
+    """A loop runs its timers a nanosecond early; who looked again would find his instant still to come, for ever."""
+    bell = Bell()
+    await asyncio.sleep(1.0)
+    almost = 1.0 + 2**-52
+
+    assert bell.now() < almost
+    assert bell.is_past(almost)
+    await bell.heard(almost)
