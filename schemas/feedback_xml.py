@@ -6,8 +6,9 @@
         <gaze id="block-1:gaze-1" start="0.0" ready="0.5"/></predictionFeedback>
     <warningFeedback id="block-1:gaze-9" type="NO_SUCH_TARGET">nobody knows it</warningFeedback>
 
-What BML has no word for (skew, source, status, who stamped the time) stands in attributes of our own namespace. A
-point whose name can't be that of an attribute is an `ebml:point`. A stream of feedback is one `<ebml:feedback>`.
+What BML has no word for (skew, source, status, who stamped the time, when a warning was given) stands in attributes
+of our own namespace. Marks of a speech are in its text: `<text><sync id="m1" ref="1.2"/></text>`. A point whose name
+can't be that of an attribute is an `ebml:point`. A stream of feedback is one `<ebml:feedback>`.
 """
 
 import re
@@ -34,6 +35,9 @@ HEAD = f'<?xml version="1.0" encoding="UTF-8"?>\n<ebml:feedback xmlns:ebml="{EBM
 TAIL = "</ebml:feedback>\n"
 """What stands before and behind the elements of a stream."""
 _ATTRIBUTE = re.compile(r"(?!xml|id$|type$)[A-Za-z_][A-Za-z0-9_.-]*", re.IGNORECASE)
+_OURS = ("event", "turn", "unknown")
+_GLOBAL_TIME = f"{{{EBML}}}globalTime"
+"""Of a warning: there BML knows no time."""
 _UNWRITABLE = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 
 
@@ -82,10 +86,15 @@ def _prediction(message: PredictionFeedback) -> etree._Element:
         block.set("globalEnd", _number(message.at.seconds + last))
         _set(block, clock=message.at.clock)
     for (behavior, type), points in groupby(message.points, lambda point: (point.behavior, point.type)):
-        tag = f"{{{BML_1_0}}}{type}" if _ATTRIBUTE.fullmatch(type) else f"{{{EBML}}}behavior"
+        is_known = _ATTRIBUTE.fullmatch(type) is not None
+        tag = f"{{{EBML if type in _OURS else BML_1_0}}}{type}" if is_known else f"{{{EBML}}}behavior"
         child = etree.SubElement(element, tag, {"id": _clean(f"{message.block}:{behavior}")})
         for point in points:
-            if _ATTRIBUTE.fullmatch(point.sync) and point.sync not in child.attrib:
+            if type == "speech" and point.sync not in ("start", "end"):
+                text = child[0] if len(child) else etree.SubElement(child, f"{{{BML_1_0}}}text")
+                written = {"id": _clean(point.sync), "ref": _number(point.time)}
+                etree.SubElement(text, f"{{{BML_1_0}}}sync", written)
+            elif _ATTRIBUTE.fullmatch(point.sync) and point.sync not in child.attrib:
                 child.set(point.sync, _number(point.time))
             else:
                 written = {"sync": _clean(point.sync), "time": _number(point.time)}
@@ -100,7 +109,7 @@ def _warning(message: WarningFeedback) -> etree._Element:
         element.set("id", _clean(id))
     element.set("type", message.kind)
     if message.at is not None:
-        _set_global_time(element, message.at)
+        _set(element, globalTime=message.at.seconds, clock=message.at.clock)
     element.text = _clean(message.message)
     return element
 
@@ -165,7 +174,7 @@ def _read_block_progress(element: etree._Element) -> BlockProgress:
 
 
 def _read_sync_point_progress(element: etree._Element) -> SyncPointProgress:
-    block, behavior, sync = str(element.attrib["id"]).split(":")
+    block, behavior, sync = str(element.attrib["id"]).split(":", 2)
     fields = {"type": "sync_point_progress", "block": block, "behavior": behavior, "sync": sync, "at": _at(element)}
     fields |= {"time": element.attrib["time"]} | _extra(element, "predicted", "arrived", "skew", "source")
     return msgspec.convert(fields, SyncPointProgress, strict=False)
@@ -178,12 +187,19 @@ def _read_prediction(element: etree._Element) -> PredictionFeedback:
         namespace, type = split(str(child.tag))
         behavior = str(child.attrib["id"]).rpartition(":")[2]
         timed = [(str(name), str(time)) for name, time in child.items() if name != "id"]
-        timed += [(str(point.attrib["sync"]), str(point.attrib["time"])) for point in child]
-        type = "" if namespace == EBML else type
+        timed += [_named(point) for point in child.iter("{*}sync", "{*}point")]
+        timed.sort(key=lambda point: type == "speech" and point[0] == "end")
+        type = "" if namespace == EBML and type == "behavior" else type
         points += [PlannedPoint(behavior=behavior, sync=sync, time=float(time), type=type) for sync, time in timed]
     at = Stamp(_clock(about), float(about.attrib["globalStart"])) if "globalStart" in about.attrib else None
     block = str(about.attrib["id"])
     return PredictionFeedback(block=block, points=tuple(points), at=at, character_id=element.get("characterId", ""))
+
+
+def _named(point: etree._Element) -> tuple[str, str]:
+    """A mark of a speech, or a point of our own."""
+    name, time = ("id", "ref") if split(str(point.tag))[1] == "sync" else ("sync", "time")
+    return str(point.attrib[name]), str(point.attrib[time])
 
 
 def _read_warning(element: etree._Element) -> WarningFeedback:
@@ -194,13 +210,14 @@ def _read_warning(element: etree._Element) -> WarningFeedback:
         "behavior": behavior,
         "kind": element.attrib["type"],
         "message": element.text or "",
-        "at": _at(element) if "globalTime" in element.attrib else None,
+        "at": _at(element) if {"globalTime", _GLOBAL_TIME} & set(element.attrib) else None,
     }
     return msgspec.convert(fields | _extra(element), WarningFeedback, strict=False)
 
 
 def _at(element: etree._Element) -> Stamp:
-    return Stamp(_clock(element), float(element.attrib["globalTime"]))
+    seconds = element.attrib.get(_GLOBAL_TIME) or element.attrib["globalTime"]
+    return Stamp(_clock(element), float(seconds))
 
 
 def _clock(element: etree._Element) -> str:

@@ -12,6 +12,7 @@ from schemas.blocks import Block, BlockOutcome, PerformBlock
 from schemas.dialects import core, spelled
 from schemas.faults import InputRefused
 from schemas.feedback import BlockProgress, Feedback, SyncPointProgress, WarningFeedback
+from schemas.feedback_xml import encode_feedback
 from schemas.fragments import TurnFragment
 from schemas.references import type_name
 from schemas.syncref import SyncRef, dialect_sync
@@ -166,6 +167,7 @@ def test_without_the_extension_every_block_is_bml_1_0_and_plays(
         reached = [each for each in feedback if isinstance(each, SyncPointProgress) and each.behavior == behavior.id]
         known = [dialect_sync(sync, type_name(behavior), "bml-1.0") for sync in sync_points(behavior)]
         assert [each.sync for each in reached] == [sync for sync in known if sync is not None]
+    assert [each for each in feedback if violations(encode_feedback(each), "bml-1.0-feedback.rng")] == []
     (end,) = [each.time for each in feedback if isinstance(each, BlockProgress) and each.progress == "end"]
     assert end <= longest + MISESTIMATED
 

@@ -58,7 +58,7 @@ def behaviors(draw: st.DrawFn, id: str, reference: st.SearchStrategy[str], *, in
             distractors=st.lists(words, max_size=2).map(tuple),
             deictic=st.booleans(),
         )
-        options = st.lists(option, min_size=1, max_size=3).map(tuple)
+        options = st.none() | st.lists(option, min_size=1, max_size=3).map(tuple)
         reliability = st.floats(0, 1, exclude_min=True, exclude_max=True)
         kinds.append(
             st.builds(of.Reference, id=st.just(id), target=words, minimum_reliability=reliability, options=options)

@@ -303,6 +303,27 @@ def test_a_bad_fragment_is_refused_with_its_line(old: str, new: str, line: int, 
     assert fault.line == line
 
 
+ALONE = '<ebml xmlns="edu.wpi.ebml" id="f"><reference id="r" target="t" minReliability=".5" propose="true"'
+
+
+@pytest.mark.parametrize("value", ["true", "1", " True "])
+def test_phrases_may_be_left_to_generation(value: str) -> None:
+    (reference,) = decode_xml(ALONE.replace("true", value) + "/></ebml>").behaviors
+
+    assert isinstance(reference, Reference)
+    assert reference.options is None
+
+
+def test_phrases_are_either_offered_or_proposed() -> None:
+    fault = refused(ALONE + '><speechOption text="it" cost="1"/></reference></ebml>')
+    nobody = refused(ALONE.replace("true", "false") + "/></ebml>")
+    elsewhere = refused('<ebml xmlns="edu.wpi.ebml" id="f"><event id="e" propose="true"/></ebml>')
+
+    assert (fault.reason, fault.line) == ("phrases are to be proposed, and offered", 1)
+    assert (nobody.reason, 'propose="true"' in nobody.advice) == ("no phrase to choose from", True)
+    assert elsewhere.reason == "<event> has no attribute 'propose'"
+
+
 def test_no_phrase_at_all_is_refused() -> None:
     fault = refused('<ebml xmlns="edu.wpi.ebml" id="f"><reference id="r" target="t" minReliability=".5"/></ebml>')
 
