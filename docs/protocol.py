@@ -193,14 +193,16 @@ for reply in session.get("robot/{keys.of_class("state")}?format=json"):
 
 ## Blocks and fragments in files
 
-`engage play` and `schemas.json_codec.read` take XML or JSON; a JSON file may hold an array of several. In JSON the
+`engage play` and `schemas.json_codec.read` take XML or JSON; a JSON file may hold an array of several. An object with
+`parts` is what a language model writes (docs/language-models.md, `perform_turn_fragment.tool.json`). In JSON else the
 form is that of `TurnFragment` and `Block` below; `type` may be left out where the content makes it plain, and an
 unknown key is refused. In XML:
 
 - a block is `<bml>` in the namespace `org.mindmakers.bml` (the thesis' draft), in none, or in that of BML 1.0;
 - a turn fragment is `<ebml:ebml xmlns:ebml="edu.wpi.ebml">` around the same elements, with the attributes `turnIndex`,
   `turnStatus`, `addressee`, `delay`, `delayTarget`, `accept` (separated by spaces), and with
-  `<ebml:reference target minReliability>` of `<speechOption text cost deictic>` of `<distractor object>`;
+  `<ebml:reference target minReliability>` of `<speechOption text cost deictic>` of `<distractor object>`, or with
+  `propose="true"` of none (in JSON: without `options`);
 - connection events inside a block are `<ebml:event kind responder cause optional accept limit turn>` with
   `<ebml:object id>` and `<ebml:anchor ref>`; what becomes of a turn is `<ebml:turn turn signal actor>`;
 - marks of a speech are `<sync id>`, `<sync ref>`, `<tm id>` or `<mark name>`; other elements inside its text are

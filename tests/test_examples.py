@@ -1,15 +1,23 @@
 """The examples do what they show."""
 
+import ast
 import asyncio
+import re
 import sys
 from asyncio.subprocess import PIPE
 from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 from types import ModuleType
 
+import msgspec
 import pytest
 
-EXAMPLES = Path(__file__).parents[1] / "examples"
+from schemas.json_codec import decode_json
+from schemas.summary import Summary
+from schemas.tool import ToolInput
+
+ROOT = Path(__file__).parents[1]
+EXAMPLES = ROOT / "examples"
 
 
 def example(name: str) -> ModuleType:
@@ -50,3 +58,17 @@ async def test_the_streaming_example_runs_by_itself() -> None:
 
     assert (running.returncode, err) == (0, b"")
     assert b'"answer":"act"' in out
+
+
+def test_what_the_page_on_language_models_shows_is_so() -> None:
+    page = (ROOT / "docs" / "language-models.md").read_text()
+    call, result = re.findall("```json\n(.*?)```", page, re.DOTALL)
+    fields = re.findall(r"^\| `(\w+)` \|", page, re.MULTILINE)
+
+    fragment = decode_json(call)
+    told = msgspec.json.decode(result, type=Summary, strict=True)
+    assert [each.id for each in fragment.behaviors] == ["say-1", "refer-2", "say-3", "refer-4"]
+    assert msgspec.json.decode(told.json) == msgspec.json.decode(result)
+    assert set(fields) == {*ToolInput.__struct_fields__, *Summary.__struct_fields__} - {"cut_short", "answer_delay"}
+    for snippet in re.findall("```python\n(.*?)```", page, re.DOTALL):
+        compile(snippet, "language-models.md", "exec", flags=ast.PyCF_ALLOW_TOP_LEVEL_AWAIT)

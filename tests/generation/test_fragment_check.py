@@ -19,6 +19,14 @@ def reference(**fields: object) -> Reference:
 GOOD = TurnFragment(id="f", behaviors=(Speech(id="s", text="Take"), reference()))
 
 
+def test_phrases_are_optional_but_the_object_is_not() -> None:
+    alone = TurnFragment(id="f", behaviors=(reference(options=None),))
+
+    assert checked(alone, TABLE, "robot").behaviors == alone.behaviors
+    with pytest.raises(InputRefused, match="did you mean 'middle'"):
+        checked(TurnFragment(id="f", behaviors=(reference(options=None, target="midle"),)), TABLE, "robot")
+
+
 def test_a_sound_fragment_passes_and_knows_its_addressee() -> None:
     assert checked(GOOD, TABLE, "robot").addressee == "human"
 
