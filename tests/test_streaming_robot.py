@@ -1,0 +1,122 @@
+"""Streams on a whole robot, before a person who does not do what a model expects."""
+
+import asyncio
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from typing import NamedTuple
+
+from schemas import keys
+from schemas.actions import ActionBegan, ActionEnded
+from schemas.summary import Summary, summary
+from schemas.tool import ToolInput
+from services.bus import Bus
+from services.client import Robot, connect
+from services.commandline import roster
+from services.commandline.sources import still
+from services.config import load
+from services.memory_bus import MemoryHub
+from services.runtime import running
+from services.simulation.still import tangram_world
+from services.streaming import perform_call, stream
+
+
+class Stage(NamedTuple):
+    """person: the bus on which the person is perceived."""
+
+    robot: Robot
+    person: Bus
+
+    def speaks(self, began: bool) -> None:
+        kind = ActionBegan if began else ActionEnded
+        self.person.publish(
+            keys.PERCEIVED_ACTION, kind(actor="human", action="speak", at=self.person.stamp())
+        )  # fmt: skip
+
+
+@asynccontextmanager
+async def stage() -> AsyncIterator[Stage]:
+    services = {name: roster.service(name, load()) for name in roster.ROBOT}
+    services["simulation"] = still(tangram_world())
+    async with MemoryHub() as hub, running(hub, services), connect(hub=hub) as robot:
+        yield Stage(robot, hub.join("perception-too"))
+
+
+async def writing(*pieces: str, pause: float = 0.1) -> AsyncIterator[str]:
+    for piece in pieces:
+        yield piece
+        await asyncio.sleep(pause)
+
+
+async def told(robot: Robot, pieces: AsyncIterator[str], **settings: object) -> Summary:
+    return summary(*await stream(robot, pieces, id="t", **settings))  # type: ignore[arg-type]
+
+
+async def test_who_takes_the_floor_stops_the_writer_and_the_model_learns_how_far_it_got() -> None:
+    written: list[int] = []
+
+    async def endless() -> AsyncIterator[str]:
+        for number in range(1000):
+            await asyncio.sleep(0.5)
+            written.append(number)
+            yield f"This is sentence number {number}. "
+
+    async with stage() as here:
+        speaking = asyncio.create_task(told(here.robot, endless()))
+        await asyncio.sleep(4.0)
+        here.speaks(True)
+        result = await speaking
+        ended = here.robot.now()
+        here.speaks(False)
+
+    assert (result.status, result.cut_short) == ("interrupted", True)
+    assert result.said.startswith("This is sentence number 0. This is sentence")
+    assert len(result.said.split(".")) < len(written) < 12
+    assert any("human took the floor" in problem for problem in result.problems)
+    assert ended < 6.0
+
+
+async def test_a_misspelled_object_ends_the_turn_with_a_proper_look_and_the_nearest_id() -> None:
+    async with stage() as here:
+        with here.robot.turns() as turns:
+            result = await told(here.robot, writing("Hello there. ", "See [blue-squere]? ", "Then go. "))
+            closed = await turns.next()
+
+    assert (result.status, result.said) == ("failed", "Hello there.")
+    assert "did you mean 'blue-square'" in result.problems[0]
+    assert closed is not None
+    assert (closed.status, closed.fragments) == ("done", ("t-1", "t-3"))
+
+
+async def test_a_writer_who_is_silent_for_too_long_has_lost_the_turn() -> None:
+    async with stage() as here:
+        result = await told(here.robot, writing("Let me think. ", "Well. ", pause=30.0))
+
+    assert (result.status, result.said) == ("failed", "Let me think.")
+    assert "no turn open" in result.problems[0]
+
+
+async def test_the_robot_looks_away_while_the_writer_thinks() -> None:
+    thinking = ToolInput(turn_status="full", parts=(), thinking=True)
+    owners = []
+    async with stage() as here:
+        with here.robot.head_owners() as heads:
+            result = await told(here.robot, writing("Let me think. ", "Yes", pause=4.0), turn=thinking)
+            while (head := await heads.next(0.0)) is not None:
+                owners.append((head.owner.kind, head.owner.target))
+
+    assert result.said == "Let me think. Yes"
+    assert ("fragment", "table") in owners
+
+
+async def test_a_call_that_the_world_does_not_bear_out_is_a_result() -> None:
+    async with stage() as here:
+        nobody = await perform_call(
+            here.robot, {"turn_status": "full", "addressee": "ann", "parts": [{"say": "Hello"}]}
+        )  # fmt: skip
+        at_once = await perform_call(here.robot, {"turn_status": "end", "parts": [{"say": "And so on"}]})
+        person = await perform_call(here.robot, {"turn_status": "full", "parts": [{"refer": "human"}]})
+
+    assert [each.status for each in (nobody, at_once, person)] == ["refused"] * 3
+    assert "does not know the person 'ann' (people: human)" in nobody.problems[0]
+    assert "begin a turn with 'beginning' or 'full'" in at_once.problems[0]
+    assert "does not know the object 'human'" in person.problems[0]
