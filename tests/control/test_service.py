@@ -189,6 +189,22 @@ async def test_actions_follow_from_real_motion(hub: MemoryHub):
     ]  # fmt: skip
 
 
+async def test_a_look_begins_as_it_is_on_target_though_its_stroke_waits(hub: MemoryHub):
+    gaze = Gaze(id="gaze", target="near-right")
+    async with robot(hub) as client:
+        pending = client.perform(gaze, "start")
+        await asyncio.sleep(2.0)
+        client.perform(gaze, "end")
+        await client.outcome(pending)
+
+    arrived = next(item for item in client.of(SyncPointArrived) if item.sync == "stroke")  # type: ignore[attr-defined]
+    assert arrived.at.seconds < client.reached("gaze")["stroke"] == 2.0  # type: ignore[attr-defined]
+    assert client.actions() == [
+        ("began", "look", ("near-right",), arrived.at.seconds),  # type: ignore[attr-defined]
+        ("ended", "look", ("near-right",), 2.0),
+    ]
+
+
 async def test_an_action_ends_with_an_aborted_behavior(hub: MemoryHub):
     async with robot(hub) as client:
         pending = client.perform(POINT, "stroke")
