@@ -85,9 +85,9 @@ class Robot(Struct):
 
     def sample(self) -> None:
         now = asyncio.get_running_loop().time()
-        for run in set(self.body._runs.values()):
-            joints = np.concatenate([self.body._tracks[part].at(now).v for part in run.course.parts])
-            self.speeds.setdefault(run.behavior.id, []).append((now, float(np.linalg.norm(joints))))
+        for part, run in self.body._runs.items():
+            speed = float(np.linalg.norm(self.body._tracks[part].at(now).v))
+            self.speeds.setdefault(run.behavior.id, []).append((now, speed))
 
     def unnecessary_stops(self) -> list[str]:
         """Instants at which a behavior stood still that need not have."""
