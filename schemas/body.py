@@ -2,7 +2,8 @@
 
 Movement authority. `PerformBehavior.through` names the last sync point the body may pass without asking; it
 holds at the hold point before the next one and says so (`SyncPointArrived`). The realizer extends the authority
-by sending the request again, same id, with a later `through`. Authority never shrinks.
+by sending the request again, same id, with a later `through`. Authority never shrinks. Where each type can hold is in
+docs/control.md: before and after the stroke of an arm or a nod, on target (`stroke` and `relax`) what lasts there.
 """
 
 from typing import Literal
