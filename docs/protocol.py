@@ -30,17 +30,23 @@ from schemas import (
     units,
     world,
 )
+from schemas.messages import COMMANDS
 from services.zenoh_order import KEPT
 
 PAGE = Path(__file__).parent / "protocol.md"
 
+
+def _taken(key: str) -> str:
+    return ", ".join(f"`{kind.__name__}`" for kind in COMMANDS[key])
+
+
 KEYS: tuple[tuple[str, str, str], ...] = (
-    (keys.FRAGMENT, "manager → generation", "`PerformFragment`"),
-    (keys.INHIBIT, "anyone → generation", "`Inhibit`"),
-    (keys.BLOCK, "manager, generation → realizer", "`PerformBlock`, `InterruptBehavior`"),
-    (keys.EVENT, "realizer → recognition", "`RequestEvent`"),
-    (keys.TURN, "realizer, generation → recognition", "`SignalTurn`"),
-    (keys.BEHAVIOR, "realizer → control", "`PerformBehavior`, `AbortBehavior`, `GoHome`"),
+    (keys.FRAGMENT, "manager → generation", _taken(keys.FRAGMENT)),
+    (keys.INHIBIT, "anyone → generation", _taken(keys.INHIBIT)),
+    (keys.BLOCK, "manager, generation → realizer", _taken(keys.BLOCK)),
+    (keys.EVENT, "realizer → recognition", _taken(keys.EVENT)),
+    (keys.TURN, "realizer, generation → recognition", _taken(keys.TURN)),
+    (keys.BEHAVIOR, "realizer → control", _taken(keys.BEHAVIOR)),
     (keys.cancel("<server>"), "requester → the request's server", "`Cancel`"),
     (
         keys.request_state("<server>"),

@@ -15,7 +15,7 @@ from msgspec.structs import replace
 from schemas.behaviors import Behavior, Event, Head, Reference, Speech, Wait
 from schemas.faults import Fault, InputRefused
 from schemas.fragments import TurnFragment
-from schemas.references import Input, marks, sites
+from schemas.references import AnyInput, Input, disambiguated, marks, sites
 from schemas.syncref import BLOCK_ITSELF, LONGEST_ID, SYNC_POINTS, SyncRef, canonical_sync, is_id, is_sync_point
 
 _SYNC_ADVICE = "write behavior:sync, behavior:sync+seconds, or seconds from the block's start"
@@ -29,6 +29,16 @@ class Problem(Struct, frozen=True):
     name: str = ""
     line: int = 0
     advice: str = ""
+
+
+def sound(thing: AnyInput, source: str = "", *, prefix: str = "$", paths: bool = False, line: int = 0) -> AnyInput:
+    """The same, with marks that look like offsets made explicit: the gate for whatever did not come as XML.
+
+    Raises InputRefused as `check` does.
+    """
+    thing = disambiguated(thing)
+    check(thing, source, prefix=prefix, paths=paths, line=line)
+    return thing
 
 
 def check(thing: Input, source: str = "", *, prefix: str = "$", paths: bool = False, line: int = 0) -> None:

@@ -10,10 +10,9 @@ import msgspec
 from msgspec import Struct
 
 from schemas.blocks import Block
-from schemas.check import check
+from schemas.check import sound
 from schemas.faults import Fault, InputRefused
 from schemas.fragments import TurnFragment
-from schemas.references import disambiguated
 from schemas.tool_call import from_tool, is_tool_input
 from schemas.xml_codec import decode_xml
 from schemas.xml_names import snake
@@ -125,9 +124,7 @@ def _converted(parsed: dict[str, Any], kind: type[T], source: str, path: str) ->
     except RecursionError as error:
         raise _refusal("nested too deep", path, source) from error
     _refuse_unknown_keys(parsed, thing, path, source)
-    thing = disambiguated(thing)
-    check(thing, source, prefix=path, paths=True)
-    return thing
+    return sound(thing, source, prefix=path, paths=True)
 
 
 def _refuse_unknown_keys(parsed: Any, decoded: Any, path: str, source: str) -> None:

@@ -1,9 +1,11 @@
 """Every message of the bus in one tagged union, and its two encodings."""
 
+from collections.abc import Mapping
 from typing import Any
 
 import msgspec
 
+from schemas import keys
 from schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost
 from schemas.attention import HeadOwner, Inhibit, InhibitionEnded
 from schemas.blocks import BehaviorInterrupted, BlockOutcome, InterruptBehavior, PerformBlock
@@ -34,7 +36,7 @@ from schemas.recognition import (
     Statistics,
     TurnOutcome,
 )
-from schemas.requests import Accepted, Cancel, Refused, Unreadable
+from schemas.requests import Accepted, Cancel, Refused, Request, Unreadable
 from schemas.status import AskStatus, Status
 from schemas.world import World
 
@@ -53,6 +55,16 @@ Message = (
     | AskStatus | Status | PeerAlive | PeerGone
 )  # fmt: skip
 """What may travel. A union of tagged structs: the `type` field of the encoded form says which."""
+
+COMMANDS: Mapping[str, tuple[type[Request], ...]] = {
+    keys.FRAGMENT: (PerformFragment,),
+    keys.INHIBIT: (Inhibit,),
+    keys.BLOCK: (PerformBlock, InterruptBehavior),
+    keys.EVENT: (RequestEvent,),
+    keys.TURN: (SignalTurn,),
+    keys.BEHAVIOR: (PerformBehavior, AbortBehavior, GoHome),
+}
+"""What each command key is for. A `Cancel` is understood on any of its server's."""
 
 _msgpack_encoder = msgspec.msgpack.Encoder()
 _json_encoder = msgspec.json.Encoder()

@@ -19,7 +19,7 @@ import msgspec
 
 from schemas import keys
 from schemas.faults import EngageError, Fault, RunFailed
-from schemas.messages import Message
+from schemas.messages import COMMANDS, Message
 from schemas.presence import PeerAlive, PeerGone
 from schemas.requests import Accepted, Cancel, Outcome, Refused, Request, Unreadable
 from schemas.units import Seconds
@@ -264,14 +264,22 @@ class RequestDesk:
             case Request() as request if keys.matches(keys.commands(self._server), received.key):
                 if received.past and request.requester in self._runs:
                     return None
+                if (fault := _misplaced(request, received.key)) is not None:
+                    self._refuse_unseen(request.id, fault)
+                    return None
                 return self._take_cancel(request) if isinstance(request, Cancel) else self._take(request)
-            case Unreadable(id=id, fault=fault) if id and id not in self._live:
-                self._bus.publish(keys.request_state(self._server), Refused(id=id, fault=fault))
+            case Unreadable(id=id, fault=fault) if id:
+                self._refuse_unseen(id, fault)
             case PeerGone(participant=requester):
                 self._requester_gone(requester)
             case PeerAlive(participant=requester, run=run):
                 self._requester_back(requester, run)
         return None
+
+    def _refuse_unseen(self, id: str, fault: Fault) -> None:
+        """What was no request of ours. A live one of that id is somebody else's, and goes on."""
+        if id not in self._live:
+            self._bus.publish(keys.request_state(self._server), Refused(id=id, fault=fault))
 
     def _take(self, request: Request) -> Request | None:
         record = self._live.get(request.id) or self._ended.get(request.id)
@@ -364,6 +372,21 @@ class RequestDesk:
         for record in self._live.values():
             if record.doom is not None:
                 record.doom.cancel()
+
+
+def _misplaced(request: Request, key: str) -> Fault | None:
+    """What is wrong with sending this request there; nothing on a key that we know nothing of."""
+    expected = COMMANDS.get(key)
+    if expected is None or isinstance(request, (Cancel, *expected)):
+        return None
+    name = type(request).__name__
+    home = next((known for known, kinds in COMMANDS.items() if isinstance(request, kinds)), "")
+    return Fault(
+        reason=f"{name} came on {key}, which takes {' and '.join(kind.__name__ for kind in expected)}",
+        where=request.id,
+        service=keys.server_of(key),
+        advice=f"send it on {home}" if home else "",
+    )
 
 
 def _as_message(request: Request) -> Message:

@@ -6,10 +6,9 @@ from difflib import get_close_matches
 from msgspec.structs import replace
 
 from schemas.behaviors import Gaze, GazeShift, HeadDirectionShift, Pointing, Reference
-from schemas.check import check as check_form
+from schemas.check import sound
 from schemas.faults import Fault, InputRefused
 from schemas.fragments import TurnFragment
-from schemas.references import disambiguated
 from schemas.syncref import SyncRef
 from schemas.world import Entity, World
 
@@ -20,8 +19,7 @@ def checked(fragment: TurnFragment, world: World, robot: str) -> TurnFragment:
     robot: its actor id, which may be a target too. Raises InputRefused with JSON path and XML line of the first
     thing that is wrong, by itself or with regard to the world.
     """
-    fragment = disambiguated(fragment)
-    check_form(fragment)
+    fragment = sound(fragment)
     known = {entity.id: entity for entity in world.entities}
     for path, target, line in _targets(fragment):
         if target not in known and target != robot:

@@ -101,7 +101,6 @@ class _Planner:
         self.block = block
         self.lines = {behavior.id: behavior.line for behavior in block.behaviors}
         self.estimates = estimates
-        self._check_ids()
         self.barred = barred
         self.relations = relations(block, elsewhere)
         self.problems = list(self.relations.problems)
@@ -126,16 +125,6 @@ class _Planner:
                 self._drop(behavior.id, _kind(estimate.warning), str(estimate.fault or "the body cannot do it"))
             else:
                 self.chains[behavior.id] = chain(behavior, estimate)
-
-    def _check_ids(self) -> None:
-        if not self.block.id:
-            raise BlockRefused(Fault(reason="a block needs an id", where="block"))
-        seen: set[str] = set()
-        for behavior in self.block.behaviors:
-            if not behavior.id or behavior.id == "bml" or ":" in behavior.id or behavior.id in seen:
-                why = "is used twice" if behavior.id in seen else "is not a usable id"
-                raise BlockRefused(Fault(reason=f"{behavior.id!r} {why}", where=self.block.id, line=behavior.line))
-            seen.add(behavior.id)
 
     def _refuse_if_required(self, id: str, reason: str, kind: WarningKind) -> None:
         if id in self.relations.required:

@@ -18,6 +18,7 @@ from schemas.body import (
     SyncPointReached,
     WordSpoken,
 )
+from schemas.check import sound
 from schemas.faults import EngageError, Fault, NoReply
 from schemas.feedback import WarningFeedback
 from schemas.presence import PeerAlive, PeerGone
@@ -136,6 +137,7 @@ class _Realizer:
             reason = f"{held} behaviors, marks and sync references; at most {self.config.most} can be planned in time"
             raise BlockRefused(Fault(reason=reason, where=block.id, advice="send several, each with APPEND"))
         relations(block, elsewhere)  # A bad reference is seen without asking the body.
+        block = sound(block)
         barred: set[tuple[str, Hand]] = set()
         chosen, estimates = block, await self._estimates(block, {})
         first, is_asked_again = estimates, False

@@ -2,6 +2,7 @@
 
 import asyncio
 
+import msgspec
 import pytest
 
 from schemas import keys
@@ -11,6 +12,7 @@ from services.commandline.roster import service
 from services.config import Config
 from services.memory_bus import MemoryHub
 from services.runtime import running
+from tests.realizer.stage import stage
 
 
 async def _said_of(payload: bytes, encoding: str) -> list[object]:
@@ -52,3 +54,53 @@ async def test_a_bad_block_with_an_id_is_refused_by_it_and_warned_of_once(conten
     assert (refused.id, refused.fault.line) == ("b", 2)
     assert (warning.block, warning.kind) == ("b", "PARSING_FAILURE")
     assert "line 2" in warning.message
+
+
+def _wait(id: str, **fields: object) -> dict[str, object]:
+    return {"type": "wait", "id": id, "duration": 0.5, **fields}
+
+
+@pytest.mark.parametrize("form", ["json", "msgpack"])
+@pytest.mark.parametrize(
+    ("behaviors", "reason"),
+    [
+        ([_wait("a"), _wait("a")], "duplicate id 'a'"),
+        ([_wait("a b")], "may hold neither spaces"),
+        ([_wait("")], "no id"),
+        ([_wait("bml")], "reserved"),
+        ([_wait("a", duration=-1)], "duration -1.0 is negative"),
+        ([_wait("a", timing=[{"sync": "start", "ref": "1"}, {"sync": "start", "ref": "2"}])], "timed twice"),
+        ([_wait("a", timing=[{"sync": "", "ref": "1"}])], "not a sync point"),
+        ([_wait("a", timing=[{"sync": "start", "ref": "a:b:c:d:e"}])], "more than four parts"),
+        ([{"type": "head", "id": "h", "lexeme": "NOD", "repetition": 0}], "repetition 0"),
+        ([{"type": "speech", "id": "s", "text": "a", "marks": [{"id": "m", "position": 9}]}], "outside the text"),
+        ([{"type": "speech", "id": "s", "text": "a", "marks": [{"id": "end", "position": 0}]}], "can't name a mark"),
+    ],
+)
+async def test_what_is_wrong_with_a_block_is_the_same_however_it_is_sent(
+    behaviors: list[dict[str, object]], reason: str, form: str
+) -> None:
+    request = {"type": "perform_block", "id": "r", "requester": "me", "block": {"id": "b", "behaviors": behaviors}}
+    encode = msgspec.json.encode if form == "json" else msgspec.msgpack.encode
+    said = await _said_of(encode(request), f"application/{form};engage.PerformBlock/1")
+
+    (refused,) = [each for each in said if isinstance(each, Refused)]
+    (warning,) = [each for each in said if isinstance(each, WarningFeedback)]
+    assert len(said) == 2
+    assert refused.id == "r"
+    assert reason in refused.fault.reason
+    assert (warning.block, warning.kind) == ("b", "PARSING_FAILURE")
+
+
+async def test_a_mark_that_looks_like_an_offset_is_known_as_such_however_it_is_sent() -> None:
+    speech = {"type": "speech", "id": "s", "text": "one two", "marks": [{"id": "word-2", "position": 4}]}
+    wait = {"type": "wait", "id": "w", "duration": 0, "timing": [{"sync": "start", "ref": "s:word-2"}]}
+    block = {"id": "b", "behaviors": [speech, wait]}
+    request = msgspec.json.encode({"type": "perform_block", "id": "r", "requester": "me", "block": block})
+    async with stage() as seen:
+        seen.hub.inject(keys.BLOCK, request, "application/json")
+        await asyncio.sleep(10)
+
+    times = seen.times()
+    assert times["w:start"] == pytest.approx(times["s:word-2"])
+    assert seen.warnings() == []
