@@ -44,14 +44,14 @@ STEP = 0.01
 
 
 class Robot(Struct):
-    """Everything seen of it. speeds: of each part that a behavior moves, over time."""
+    """Everything seen of it. speeds: of what each behavior moves, over time."""
 
     body: SimulatedBody
     bus: Bus
     requests: Requester
     first: dict[str, float]
     feedback: list[object] = field(default_factory=list)
-    speeds: dict[tuple[str, str], list[tuple[float, float]]] = field(default_factory=dict)
+    speeds: dict[str, list[tuple[float, float]]] = field(default_factory=dict)
 
     def ask(self, block: Block) -> Pending:
         return self.requests.send(keys.BLOCK, PerformBlock(id=f"r-{block.id}", requester="test", block=block))
@@ -85,14 +85,14 @@ class Robot(Struct):
 
     def sample(self) -> None:
         now = asyncio.get_running_loop().time()
-        for part, run in self.body._runs.items():
-            speed = float(np.linalg.norm(self.body._tracks[part].at(now).v))
-            self.speeds.setdefault((run.behavior.id, part), []).append((now, speed))
+        for run in set(self.body._runs.values()):
+            joints = np.concatenate([self.body._tracks[part].at(now).v for part in run.course.parts])
+            self.speeds.setdefault(run.behavior.id, []).append((now, float(np.linalg.norm(joints))))
 
     def unnecessary_stops(self) -> list[str]:
         """Instants at which a behavior stood still that need not have."""
         found, times = [], self.times()
-        for (behavior, part), samples in self.speeds.items():
+        for behavior, samples in self.speeds.items():
             progress = [each for each in times.values() if each.behavior == behavior]
             began = {each.sync: each.at.seconds for each in progress}
             if "end" not in began:
@@ -111,7 +111,7 @@ class Robot(Struct):
                 times_slow = [at for at, _ in group]
                 first, last = times_slow[0] - STEP, times_slow[-1] + STEP
                 if is_slow and not any(since <= last and first <= until for since, until in holds):
-                    found.append(f"{behavior} with its {part} at {times_slow[0]:.2f}")
+                    found.append(f"{behavior} at {times_slow[0]:.2f}")
         return found
 
 
