@@ -68,6 +68,10 @@ def arrange(
     conflicts = []
     for id, successor in _successors(chains, mentioned, times, rounds).items():
         chain = chains[id]
+        if before.successors.get(successor, ("",))[0] == id:
+            # Cut short by the other, each comes first. So nobody is: the one that was to be the later waits.
+            conflicts.append(Conflict((id, chains[successor].points[-1]), None))
+            continue
         taken = times[Point(successor, "start")]
         first = next((number for number, point in enumerate(chain.points) if times[point] > taken + EPSILON), 0)
         is_natural = id in before.natural
