@@ -4,6 +4,8 @@ The form is that of the structs, as in the exported schemas, or what a language 
 keys are refused: a misspelled `turn_status` must not silently become a full turn.
 """
 
+import json
+from collections import Counter
 from typing import Any, TypeVar
 
 import msgspec
@@ -63,12 +65,27 @@ def _parsed(data: bytes | str, source: str) -> Any:
     raw = raw.removeprefix(b"\xef\xbb\xbf")
     try:
         raw.decode()  # msgspec, too, refuses what is not UTF-8, but counts from the start of the string it is in
-        return msgspec.json.decode(raw)
+        parsed = msgspec.json.decode(raw)
+        # Of a key that stands twice msgspec silently keeps the last: half of what was meant would be performed.
+        json.loads(raw, object_pairs_hook=_each_once, parse_int=str, parse_float=str)
+        return parsed
     except RecursionError as error:
         raise InputRefused(Fault(reason="nested too deep", where=source)) from error
+    except _Doubled as error:
+        raise InputRefused(Fault(reason=str(error), where=source, advice="an object has each key once")) from error
     except (msgspec.DecodeError, UnicodeDecodeError) as error:
         line = _line(raw, error)
         raise InputRefused(Fault(reason=str(error), where=source, line=line, advice="a JSON object")) from error
+
+
+class _Doubled(Exception):
+    pass
+
+
+def _each_once(pairs: list[tuple[str, Any]]) -> None:
+    for key, times in Counter(key for key, _ in pairs).items():
+        if times > 1:
+            raise _Doubled(f"key {key!r} stands {times} times in one object")
 
 
 def _line(raw: bytes, error: msgspec.DecodeError | UnicodeDecodeError) -> int:

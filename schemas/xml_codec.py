@@ -154,6 +154,9 @@ class _Document:
     ) -> tuple[list[of.Behavior], list[of.Constraint]]:
         behaviors: list[of.Behavior] = []
         constraints: list[of.Constraint] = []
+        texts = [parent.text, *(child.tail for child in parent)]
+        if words := " ".join(text.strip() for text in texts if text and text.strip()):
+            self._note(f"text {words[:40]!r} outside of speech", parent, "")
         for element, namespace, local in ours(parent):
             self._speaks_1_0 |= namespace == BML_1_0
             if local in ("description", "participant"):

@@ -162,3 +162,16 @@ def test_an_id_holds_no_control_characters(id: str) -> None:
 def test_a_key_in_camel_case_is_known_for_what_it_was_meant_to_be() -> None:
     with pytest.raises(InputRefused, match="did you mean 'turn_status'"):
         decode_json('{"id": "f", "turnStatus": "full"}')
+
+
+@pytest.mark.parametrize(
+    "form",
+    [
+        '{"id": "b", "behaviors": [], "behaviors": []}',
+        '[{"id": "b", "behaviors": [{"type": "wait", "id": "w", "duration": 1, "duration": 2}]}]',
+        '{"id": "b", "i\\u0064": "c"}',
+    ],
+)
+def test_a_key_that_stands_twice_is_refused_instead_of_half_the_input_ignored(form: str) -> None:
+    with pytest.raises(InputRefused, match="key '(behaviors|duration|id)' stands 2 times in one object"):
+        read(form.encode())

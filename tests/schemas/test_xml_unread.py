@@ -19,6 +19,7 @@ from tests.schemas.test_xml_codec import BML_1_0, DRAFT, behavior, block
             '<gaze id="g" target="t"><speed/></gaze>',
             Unread(message="unknown element <speed> in <gaze>", behavior="g"),
         ),
+        ('Well, <gaze id="g" target="t"/> hello', Unread(message="text 'Well, hello' outside of speech")),
         ('<gaze id="g" target="t" speed="9"/>', Unread(message="<gaze> has no attribute 'speed'", behavior="g")),
         ('<speech id="s" text="?">Hi</speech>', Unread(message="<speech> has no attribute 'text'", behavior="s")),
         ('<constraint><during ref="1"/></constraint>', Unread(message="unknown element <during> in a constraint")),
