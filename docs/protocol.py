@@ -52,8 +52,8 @@ KEYS: tuple[tuple[str, str, str], ...] = (
         keys.request_state("<server>"),
         "server → requester",
         "`Accepted`, `Refused`; from generation `FragmentOutcome`, `InhibitionEnded`; from the realizer"
-        " `BlockOutcome`, `BehaviorInterrupted`; from control `BehaviorOutcome`, `HomeReached`; from recognition `EventOutcome`,"
-        " `TurnOutcome`",
+        " `BlockOutcome`, `BehaviorInterrupted`; from control `BehaviorOutcome`, `HomeReached`; from recognition"
+        " `EventOutcome`, `TurnOutcome`",
     ),
     (
         keys.FEEDBACK,

@@ -34,8 +34,8 @@ class Inhibit(Request, frozen=True, kw_only=True, tag="inhibit", omit_defaults=T
     """cmd: anyone -> generation. A lease, renewed by sending it again; ends after `ttl` or with its owner's life.
 
     Ends in `InhibitionEnded`. A gaze or point of a fragment that runs is aborted, others are left out. mode, of gaze:
-    release: the head is free and goes back to the base gaze; hold: it stays on what it is on; target: it keeps looking
-    at `target`. Of an arm every mode is the same: it does not point. The newest lease on a part counts.
+    release: the head is free and goes back to the base gaze; hold: it stays on what it is on; target: it keeps to
+    `target`. Of an arm every mode is the same: it does not point. The newest lease on a part counts.
     """
 
     part: Literal["gaze", "point-left", "point-right"] = "gaze"

@@ -89,7 +89,7 @@ class FragmentOutcome(Outcome, frozen=True, kw_only=True, tag="fragment_outcome"
 
 
 class TurnClosed(Struct, frozen=True, kw_only=True, tag="turn_closed", omit_defaults=True):
-    """evt: generation. Once for each turn of the robot: all its fragments have ended, and its adjacency pair is decided.
+    """evt: generation. Once for each turn of the robot, when all its fragments have ended and its pair is decided.
 
     turn: id of the fragment that opened it. aborted: barge-in, fault, cancellation or silence ended it; `reason`.
     """

@@ -169,7 +169,7 @@ class TurnPolicy:
         return None
 
     def fragment_refused(self, id: str, now: Seconds) -> Aborted | None:
-        """The realizer has found it impossible: it never was. Its turn goes on, unless that has nothing else to it."""
+        """The realizer found it impossible: it never was. Its turn goes on, unless that has nothing else to it."""
         plan = self._live.get(id)
         if plan is None:
             return None

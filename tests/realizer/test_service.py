@@ -31,8 +31,8 @@ async def test_a_refused_block_moves_nothing_and_the_next_is_performed() -> None
 
 async def test_a_block_too_big_to_be_planned_in_time_is_refused() -> None:
     async with stage(config=RealizerConfig(most=3)) as seen:
+        wait = Wait(id="w", duration=1.0, timing=(Timing("start", "s:end"),))
         with pytest.raises(RequestRefused, match="big: 4 behaviors, marks and sync references; at most 3"):
-            wait = Wait(id="w", duration=1.0, timing=(Timing("start", "s:end"),))
             await seen.ask(block((STORY, wait), id="big")).outcome
         outcome = await seen.perform(block((STORY,)))
 

@@ -173,5 +173,5 @@ def test_a_key_in_camel_case_is_known_for_what_it_was_meant_to_be() -> None:
     ],
 )
 def test_a_key_that_stands_twice_is_refused_instead_of_half_the_input_ignored(form: str) -> None:
-    with pytest.raises(InputRefused, match="key '(behaviors|duration|id)' stands 2 times in one object"):
+    with pytest.raises(InputRefused, match=r"key '(behaviors|duration|id)' stands 2 times in one object"):
         read(form.encode())
