@@ -138,3 +138,15 @@ async def test_an_arm_that_is_overdue_is_not_told_to_take_its_time() -> None:
         await seen.perform(block((Pointing(id="p", target="a"), story), together("p:stroke", "s:m")))
 
     assert seen.times()["p:ready"] == 3 * 0.5
+
+
+async def test_who_is_too_late_for_what_came_before_it_says_so() -> None:
+    """The other half of a constraint: the word was predicted to come half a second after the stroke, and was there."""
+    late = FakeBody({"p": Script(durations=(0.5, 0.25, 1.25, 0.25, 0.25, 0.5))})
+    async with stage(late) as seen:
+        await seen.perform(block((Pointing(id="p", target="a"), STORY), together("p:stroke+0.5", "s:m")))
+
+    assert (seen.times()["p:stroke"], seen.times()["s:m"]) == (2.0, 1.75)
+    assert [(each.kind, each.behavior, each.message) for each in seen.warnings()] == [
+        ("LATE", "p", "stroke came 0.75 s later than it should")
+    ]
