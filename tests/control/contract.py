@@ -69,6 +69,13 @@ HOLDS = {
     "head": ("stroke_start", "stroke_end"),
 }  # fmt: skip
 """Where each type can wait, as the realizer knows it."""
+_LASTING = (("ready", "stroke_start", "stroke"), ("stroke_end", "relax"))
+ONE_INSTANT = {
+    "gaze": (("start", "ready", "stroke_start"), ("stroke_end", "relax")),
+    "faceLexeme": _LASTING,
+    "posture": _LASTING,
+}
+"""Points of a type that always coincide, as the realizer knows it."""
 PATIENCE = 30.0
 
 
@@ -175,6 +182,17 @@ class BodyContract:
                 left = next(item for item in progress if isinstance(item, Reached) and item.sync == hold)
                 arrived = next(item for item in progress if isinstance(item, Arrived) and item.sync == hold)
                 assert left.arrived == arrived.at < left.at, behavior.id
+
+    async def test_points_that_are_one_instant_are_reported_as_one(self, body: Body):
+        for behavior in self.able(body):
+            for through in ("end", "start"):
+                stage = Stage(body, behavior, through)
+                await asyncio.sleep(5.0)
+                stage.authority.extend("end")
+                realized = times(await stage.over())
+
+                for points in ONE_INSTANT.get(type_name(behavior), ()):
+                    assert len({realized[sync] for sync in points}) == 1, (behavior.id, points)
 
     async def test_stands_still_while_it_holds(self, body: Body):
         for behavior in self.able(body):

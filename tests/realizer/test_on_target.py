@@ -7,6 +7,7 @@ from schemas.body import PerformBehavior
 from services.control.config import Displaced, Slow, Stall, Variability
 from tests.realizer.fake_body import FakeBody, Script
 from tests.realizer.planning import at, plan, timed
+from tests.realizer.puppet import BML_1_0, bml
 from tests.realizer.stage import after, before, block, stage, together
 from tests.realizer.test_simulated_body import Robot, robot
 
@@ -78,6 +79,17 @@ async def test_with_a_fixed_start_it_waits_on_target_and_nobody_is_slower_for_it
     assert (stroke.arrived, stroke.time) == (0.25 if looks.id == "f" else 0.5, 1.25)
     assert seen.warnings() == []
     assert not any(request.pace for request in asked)
+
+
+async def test_the_peak_of_a_face_is_when_it_is_on_target() -> None:
+    """BML 1.0 names no stroke of a face."""
+    tied = """<faceLexeme id="f" lexeme="SMILE" attackPeak="p:stroke"/>
+              <pointing id="p" target="a" mode="RIGHT_HAND"/>"""
+    async with stage(FakeBody({"p": Script(slow=2.0)})) as seen:
+        await seen.perform(bml(tied, dialect=BML_1_0))
+
+    assert seen.times()["f:attackPeak"] == seen.times()["p:stroke"] == 2.5
+    assert "f:stroke" in seen.body.stops
 
 
 def test_a_fixed_start_and_a_later_stroke_cost_nobody_his_place() -> None:
