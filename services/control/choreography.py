@@ -41,6 +41,10 @@ NOD_RESERVE = radians(18.0)
 """Kept free of the neck's range by gaze, so that a nod finds room anywhere."""
 SAME = 0.3
 """Degrees: a gaze that would turn less does not move."""
+THERE = 0.8
+"""Degrees: a torso that has less to go stays; twice what it drifts on target."""
+SHAPED = 0.04
+"""The same of a face, as a share of its joints' ranges."""
 SETTLE: Seconds = 0.08
 SLIDE: Seconds = 0.2
 
@@ -206,7 +210,8 @@ def _gesture(lexeme: str, mode: str | None, scene: Scene) -> Course:
     )
     here, home = _angles(joints, scene.pose), _angles(joints, scene.rest)
     stops = (here, ready, stroke, after, home)
-    seconds = (_time(here, ready, 0.3, 130), _time(ready, stroke, 0.3, 120), _time(stroke, after, 0.25, 100),
+    # So slow a stroke takes no longer from rest, where it waited for something: estimates hold either way.
+    seconds = (_time(here, ready, 0.3, 130), _time(ready, stroke, 0.36, 100), _time(stroke, after, 0.25, 100),
                max(0.4, return_time(after, home)))  # fmt: skip
     velocities = [
         tuple(
@@ -363,5 +368,5 @@ def _time(start: tuple[float, ...], goal: tuple[float, ...], least: Seconds, spe
 def _moving_time(part: str, start: tuple[float, ...], goal: tuple[float, ...]) -> Seconds:
     if part == "face":
         way = max(abs(b - a) for a, b in zip(start, goal, strict=True))
-        return 0.0 if way < 1e-3 else 0.15 + 0.25 * way
-    return 0.0 if kinematics.degrees_between(start, goal) < SAME else 2 * return_time(start, goal)
+        return 0.0 if way < SHAPED else 0.15 + 0.25 * way
+    return 0.0 if kinematics.degrees_between(start, goal) < THERE else 2 * return_time(start, goal)

@@ -123,9 +123,16 @@ async def test_authority_that_comes_in_time_costs_no_stop():
     assert stops(recording, at["start"], at["end"]) == 0
 
 
-async def test_a_hold_stops_once_per_hold_and_goes_on_at_its_natural_times():
+@pytest.mark.parametrize(
+    "behavior",
+    [
+        Pointing(id="p", target="far-left"),
+        Gesture(id="p", lexeme="BEAT"),
+        Gesture(id="p", lexeme="WAVE", mode="BOTH_HANDS"),
+    ],
+)
+async def test_a_hold_stops_once_per_hold_and_goes_on_at_its_natural_times(behavior: BlockBehavior):
     body = body_in()
-    behavior = Pointing(id="p", target="far-left")
     natural = {phase.to: phase.natural for phase in body.estimate(behavior, None, WORLD).phases}
     async with recorded(body) as recording:
         stage = Stage(body, behavior)
@@ -137,6 +144,17 @@ async def test_a_hold_stops_once_per_hold_and_goes_on_at_its_natural_times():
     assert at["stroke"] - at["stroke_start"] == pytest.approx(natural["stroke"], abs=1e-9)
     assert stops(recording, at["start"], at["end"]) == 1
     assert violations(recording, body.capabilities.joints) == []
+
+
+@pytest.mark.parametrize("kind", [FaceLexeme, Posture])
+async def test_who_takes_over_on_target_is_there_at_once(kind: type[FaceLexeme | Posture]):
+    body = body_in()
+    lexeme = "FROWN" if kind is FaceLexeme else "LEAN_FORWARD"
+    Stage(body, kind(id="one", lexeme=lexeme))
+    await asyncio.sleep(2.0)
+    at = times(await performed(body, kind(id="two", lexeme=lexeme)))
+
+    assert at["start"] == at["stroke"] == 2.0
 
 
 async def test_an_arm_that_holds_points_at_its_target():
