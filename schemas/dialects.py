@@ -4,7 +4,6 @@ What is respelled means the same, point for point: `tests/conformance` plans bot
 """
 
 from collections.abc import Callable, Collection, Iterator, Mapping
-from typing import TypeVar
 
 from msgspec.structs import replace
 
@@ -27,7 +26,6 @@ from schemas.syncref import BLOCK_ITSELF, SYNC_POINTS, SyncRef, dialect_sync
 
 EXTENSIONS = (Event, TurnSignal, Reference, Unknown)
 """What no other realizer knows."""
-AnyBehavior = TypeVar("AnyBehavior", bound=Behavior)
 Operator = Synchronize | Before | After
 
 _FACE = {"stroke_start": "ready", "stroke": "ready", "stroke_end": "relax"}
