@@ -95,12 +95,15 @@ class LongestPaths:
                 self._set(arc.target, at, number)
                 moves += 1
                 if moves & (moves - 1) == 0 and (cycle := self._circle(arc.target)):
-                    self._touch(here)
+                    self._see_again([number, *violated])
                     raise Circle(cycle)
-        # Seen again when one has been made way for.
-        for number in violated:
-            self._touch(self._arcs[number].source)
+        self._see_again(violated)
         return violated[-1] if violated else None
+
+    def _see_again(self, numbers: Sequence[int]) -> None:
+        """Look at these arcs again once way has been made for one."""
+        for number in numbers:
+            self._touch(self._arcs[number].source)
 
     def _set(self, transition: int, at: Seconds, cause: int) -> None:
         self._old.setdefault(transition, self.times[transition])
