@@ -268,7 +268,7 @@ class Conductor:
         if aborted is None:
             return
         self._arbiter.stop_thinking()
-        self._outcomes.abort(aborted)
+        self._outcomes.abort(aborted, now)
         self._interrupt(aborted.fragments, aborted.reason, now)
         if not aborted.is_known:
             return

@@ -51,7 +51,7 @@ class TurnEvents:
 
 
 class _Record(Struct):
-    """spoken: by fragment, in the order in which they came. ended: when its last fragment was over."""
+    """spoken: by fragment, in the order in which they came. ended: when its last fragment was, or it was aborted."""
 
     addressee: str
     spoken: dict[str, tuple[SpokenText, ...]] = {}
@@ -95,9 +95,10 @@ class TurnOutcomes:
             record.spoken[outcome.fragment] = outcome.spoken
             record.ended = now
 
-    def abort(self, aborted: Aborted) -> None:
+    def abort(self, aborted: Aborted, now: Seconds) -> None:
+        """Recognition has yet to withdraw what the turn left open."""
         if record := self._records.get(aborted.turn):
-            record.status, record.reason = "aborted", aborted.reason
+            record.status, record.reason, record.ended = "aborted", aborted.reason, now
 
     @property
     def deadline(self) -> Seconds | None:

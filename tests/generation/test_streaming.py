@@ -83,6 +83,14 @@ async def test_silence_is_counted_from_where_the_last_block_has_ended(stage: Rob
     assert [(at, closed.reason) for at, closed in stage.closed] == [(14.054904, "silence for 10 s")]
 
 
+async def test_a_turn_that_silence_has_ended_tells_that_its_pair_was_withdrawn(stage: Robot) -> None:
+    stage.send(says("a", "beginning"))
+    await asyncio.sleep(15.0)
+
+    (closed,) = [closed for _, closed in stage.closed]
+    assert [(event.kind, event.state) for event in closed.events] == [("adjacency_pair", "withdrawn")]
+
+
 async def test_the_next_turn_waits_for_the_whole_turn_before(stage: Robot) -> None:
     stage.send(shows("a", "full"))
     for id, status in (("b", "beginning"), ("c", "end")):
