@@ -2,6 +2,7 @@
 
 import asyncio
 from pathlib import Path
+from typing import Literal
 
 import msgspec
 from msgspec import Struct
@@ -9,6 +10,7 @@ from msgspec import Struct
 from schemas import keys
 from schemas.actions import ActorFound
 from schemas.faults import Fault, InputRefused
+from schemas.units import Stamp
 from schemas.world import Entity, World
 from services.bus import Bus
 from services.runtime import Ready
@@ -20,7 +22,11 @@ EXAMPLE = '{"entities": [{"id": "cup", "kind": "object", "position": [0.5, 0.1, 
 
 
 class _File(Struct, frozen=True, forbid_unknown_fields=True):
+    """As a `World` on the bus, so that one from there can be kept in a file."""
+
     entities: tuple[Entity, ...]
+    type: Literal["world"] = "world"
+    at: Stamp | None = None
 
 
 async def show_world(bus: Bus, ready: Ready, world: World) -> None:

@@ -3,10 +3,12 @@
 from functools import partial
 from pathlib import Path
 
+import msgspec
 import pytest
 
 from schemas import keys
 from schemas.faults import InputRefused
+from schemas.units import Stamp
 from schemas.world import World
 from services.client import connect
 from services.memory_bus import MemoryHub
@@ -24,6 +26,14 @@ def test_a_world_is_a_list_of_entities(tmp_path: Path) -> None:
 
     assert [entity.id for entity in world.objects] == ["cup"]
     assert [entity.position for entity in world.people] == [(1.3, 0.0, 1.2)]
+
+
+def test_a_world_of_the_bus_can_be_kept_in_a_file(tmp_path: Path) -> None:
+    world = msgspec.structs.replace(tangram_world(), at=Stamp(clock="loop", seconds=3.0))
+    file = tmp_path / "world.json"
+    file.write_bytes(msgspec.json.encode(world))
+
+    assert load_world(file).entities == world.entities
 
 
 @pytest.mark.parametrize(
