@@ -63,6 +63,9 @@ def arrange(
     barred: hands with which a behavior cannot be done.
     """
     held = relations.held
+    awaited: dict[str, set[Point]] = {}
+    for order in relations.orders:
+        awaited.setdefault(order.later.point.behavior, set()).add(order.earlier.point)
     mentioned = {point.behavior for point in relations.constrained}
     successors, cuts = dict(before.successors), dict(before.cuts)
     conflicts = []
@@ -76,7 +79,10 @@ def arrange(
         first = next((number for number, point in enumerate(chain.points) if times[point] > taken + EPSILON), 0)
         is_natural = id in before.natural
         if first and not (chain.type == "speech" and _is_tied(chains[successor], chain, classes)):
-            last = _not_given_up(chain, first, held, is_natural, is_asked=successor in mentioned)
+            # Cut short, what the successor itself is to come after would come at once.
+            own = awaited.get(successor, set())
+            kept = {point for point in chain.points if point in held or point in own}
+            last = _not_given_up(chain, first, kept, is_natural, is_asked=successor in mentioned)
             turn = (successor, chain.points[last]) if last is not None else None
             # Who has made his stroke hands over; else the other arm is better, if that is free.
             is_worth_it = turn is not None or first <= _STROKE_END
@@ -95,14 +101,14 @@ def arrange(
 
 
 def _not_given_up(
-    chain: Chain, first: int, held: frozenset[Point], is_natural: bool, *, is_asked: bool
+    chain: Chain, first: int, kept: Collection[Point], is_natural: bool, *, is_asked: bool
 ) -> int | None:
     """The last of its points from number `first` on that a successor must wait for.
 
     What shares an instant with others or waits for them; and all of it, if nobody has asked for the successor now.
     Words are never given up.
     """
-    broken = [number for number in range(first, len(chain.points)) if chain.points[number] in held]
+    broken = [number for number in range(first, len(chain.points)) if chain.points[number] in kept]
     if not is_asked or chain.type == "speech":
         broken.append(_STROKE if is_natural else len(chain.points) - 1)
     if not broken or broken[-1] < first:
