@@ -75,10 +75,12 @@ def arrange(
             # Cut short by the other, each comes first. So nobody is: the one that was to be the later waits.
             conflicts.append(Conflict((id, chains[successor].points[-1]), None))
             continue
+        if chain.type == "speech" and _is_tied(chains[successor], chain, classes):
+            continue
         taken = times[Point(successor, "start")]
         first = next((number for number, point in enumerate(chain.points) if times[point] > taken + EPSILON), 0)
         is_natural = id in before.natural
-        if first and not (chain.type == "speech" and _is_tied(chains[successor], chain, classes)):
+        if first:
             # Cut short, what the successor itself is to come after would come at once.
             own = awaited.get(successor, set())
             kept = {point for point in chain.points if point in held or point in own}
