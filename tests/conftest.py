@@ -1,13 +1,21 @@
-"""Every async test runs on the virtual clock unless it asks for real time, and fails if it leaves a task behind."""
+"""Every async test runs on the virtual clock unless it asks for real time, and fails if it leaves a task behind.
+
+Property tests try the same examples each time. To search for new ones: `pytest --hypothesis-profile=search`.
+"""
 
 import asyncio
 from collections.abc import AsyncIterator, Callable, Mapping
 
 import pytest
 import pytest_asyncio
+from hypothesis import settings
 
 from services.memory_bus import MemoryHub
 from services.virtual_time import VirtualTimeLoop
+
+settings.register_profile("same", derandomize=True, database=None)
+settings.register_profile("search", parent=settings.get_profile("default"))
+settings.load_profile("same")
 
 LONGEST_TEST = 24 * 3600.0
 """Virtual seconds; then a test waits for something that never comes."""
