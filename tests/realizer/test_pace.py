@@ -141,7 +141,7 @@ async def test_an_arm_that_is_overdue_is_not_told_to_take_its_time() -> None:
 
 
 async def test_who_is_too_late_for_what_came_before_it_says_so() -> None:
-    """The other half of a constraint: the word was predicted to come half a second after the stroke, and was there."""
+    """The other half of a constraint: the word was to come half a second after the stroke, and was there."""
     late = FakeBody({"p": Script(durations=(0.5, 0.25, 1.25, 0.25, 0.25, 0.5))})
     async with stage(late) as seen:
         await seen.perform(block((Pointing(id="p", target="a"), STORY), together("p:stroke+0.5", "s:m")))
