@@ -10,7 +10,7 @@ demo: $(READY)
 	@$(BIN)/engage demo $(ARGS)
 
 test: lint
-	@$(BIN)/pytest $(ARGS)
+	@$(BIN)/pytest -n auto --dist loadfile $(ARGS)
 
 lint: $(READY)
 	@$(BIN)/ruff check --quiet .
