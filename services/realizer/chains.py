@@ -6,8 +6,9 @@ from msgspec import Struct
 
 from schemas.behaviors import BlockBehavior, Gesture, Head, Pointing
 from schemas.body import Estimate
+from schemas.references import type_name
 from schemas.units import Seconds
-from services.realizer.points import ON_TARGET, Point, Segment, family, segments, type_of
+from services.realizer.points import ON_TARGET, Point, Segment, family, segments
 from services.realizer.relations import Relations
 
 _ARMS = {"LEFT_HAND": ("left_arm",), "RIGHT_HAND": ("right_arm",), "BOTH_HANDS": ("left_arm", "right_arm")}
@@ -37,7 +38,7 @@ def chain(behavior: BlockBehavior, estimate: Estimate | None) -> Chain:
         parts = _stroke_by_stroke(parts, estimate)
     return Chain(
         behavior,
-        type_of(behavior),
+        type_name(behavior),
         tuple([Point(behavior.id, sync) for sync in ("start", *(part.to for part in parts))]),
         parts,
         tuple([longest.get((part.since, part.to)) for part in parts]) if longest else (None,) * len(parts),
@@ -60,7 +61,7 @@ def _stroke_by_stroke(parts: tuple[Segment, ...], estimate: Estimate) -> tuple[S
 
 
 def _parts(behavior: BlockBehavior, estimate: Estimate | None) -> tuple[str, ...]:
-    type = type_of(behavior)
+    type = type_name(behavior)
     if type not in _SHARED:
         return ()
     if isinstance(behavior, Pointing | Gesture) and behavior.mode is not None:

@@ -7,10 +7,11 @@ from msgspec import Struct
 
 from schemas.behaviors import Event, Speech
 from schemas.blocks import Block
+from schemas.references import type_name
 from schemas.syncref import SyncRef, canonical_sync
 from schemas.units import Seconds
 from services.realizer.config import RealizerConfig
-from services.realizer.points import Point, type_of
+from services.realizer.points import Point
 from services.realizer.schedule import EPSILON
 
 
@@ -108,5 +109,5 @@ def _point(text: str, block: Block) -> Point:
     behavior = next((each for each in block.behaviors if each.id == ref.behavior), None)
     if isinstance(behavior, Speech):
         ref = SyncRef.parse(text, [mark.id for mark in behavior.marks])
-    sync = canonical_sync(ref.sync, type_of(behavior) if behavior else "", block.dialect)
+    sync = canonical_sync(ref.sync, type_name(behavior) if behavior else "", block.dialect)
     return Point(ref.behavior, sync)

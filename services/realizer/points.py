@@ -9,6 +9,7 @@ from typing import Literal, NamedTuple
 
 from schemas.behaviors import Behavior, Event, Mark, Speech, TurnSignal, Wait
 from schemas.body import Estimate
+from schemas.references import type_name
 from schemas.syncref import SYNC_POINTS
 from schemas.units import Seconds
 
@@ -69,13 +70,8 @@ class Segment(NamedTuple):
     hold: bool
 
 
-def type_of(behavior: Behavior) -> str:
-    """Its element name in BML."""
-    return str(behavior.__struct_config__.tag)
-
-
 def performer(behavior: Behavior) -> Performer:
-    return _PERFORMERS.get(type_of(behavior), "body")
+    return _PERFORMERS.get(type_name(behavior), "body")
 
 
 def family(type: str) -> str:
@@ -91,7 +87,7 @@ def sync_points(behavior: Behavior) -> tuple[str, ...]:
     """The default points of a behavior, in order."""
     if isinstance(behavior, Speech):
         return ("start", *(mark.id for mark in marks_in_order(behavior)), "end")
-    type = type_of(behavior)
+    type = type_name(behavior)
     return SYNC_POINTS if type in WITH_STROKE or type in ON_TARGET else ("start", "end")
 
 
@@ -132,7 +128,7 @@ def gate_point(type: str, syncs: tuple[str, ...]) -> str:
 
 def segments(behavior: Behavior, estimate: Estimate | None) -> tuple[Segment, ...]:
     """The phases of a behavior: as the body estimates them, nominal where it does not."""
-    points, holds = sync_points(behavior), hold_points(type_of(behavior))
+    points, holds = sync_points(behavior), hold_points(type_name(behavior))
     nominal = _nominal(behavior, points)
     known = {(phase.since, phase.to): phase for phase in estimate.phases} if estimate else {}
     total = sum(phase.natural for phase in known.values())
@@ -162,7 +158,7 @@ def _nominal(behavior: Behavior, points: tuple[str, ...]) -> tuple[Seconds, ...]
         case TurnSignal():
             return (0.0,)
     if len(points) == 2:
-        return (0.0 if type_of(behavior) == "emit" else NOMINAL_SHIFT,)
-    if type_of(behavior) == "gaze":
+        return (0.0 if type_name(behavior) == "emit" else NOMINAL_SHIFT,)
+    if type_name(behavior) == "gaze":
         return NOMINAL_GAZE
-    return NOMINAL_ON_TARGET if type_of(behavior) in ON_TARGET else NOMINAL_STROKE
+    return NOMINAL_ON_TARGET if type_name(behavior) in ON_TARGET else NOMINAL_STROKE

@@ -12,9 +12,10 @@ from schemas.behaviors import After, Before, Behavior, Head, Speech, Synchronize
 from schemas.blocks import Block
 from schemas.faults import Fault, InputRefused
 from schemas.feedback import WarningKind
+from schemas.references import type_name
 from schemas.syncref import BLOCK_ITSELF, SyncRef, canonical_sync, dialect_sync
 from schemas.units import Seconds
-from services.realizer.points import ORIGIN, Point, sync_points, type_of
+from services.realizer.points import ORIGIN, Point, sync_points
 
 
 class BlockRefused(InputRefused):
@@ -126,17 +127,19 @@ class _Reader:
         behavior = self.behaviors.get(ref.behavior)
         if behavior is None:
             raise self.refusal(f"unknown behavior {ref.behavior!r}", where, line, self._advice())
-        sync = canonical_sync(ref.sync, type_of(behavior), self.block.dialect)
+        sync = canonical_sync(ref.sync, type_name(behavior), self.block.dialect)
         if isinstance(behavior, Unknown):
             return Term(Point(behavior.id, sync), ref.offset, text, line)  # It will vanish with its behavior.
         strokes = behavior.repetition if isinstance(behavior, Head) else 1
         if not self._has(behavior, sync) or ref.repetition > strokes:
-            return Problem("PARSING_FAILURE", f"{where}: {type_of(behavior)} has no sync point {text!r}", behavior.id)
+            return Problem(
+                "PARSING_FAILURE", f"{where}: {type_name(behavior)} has no sync point {text!r}", behavior.id
+            )
         return Term(Point(behavior.id, sync), ref.offset, text, line, ref.repetition)
 
     def _has(self, behavior: Behavior, sync: str) -> bool:
         """BML 1.0 knows fewer points than the drafts. Of an unknown element any may be."""
-        spelled = dialect_sync(sync, type_of(behavior), self.block.dialect)
+        spelled = dialect_sync(sync, type_name(behavior), self.block.dialect)
         is_known = spelled is not None and sync in self.points[behavior.id]
         return is_known or isinstance(behavior, Unknown)
 
@@ -146,7 +149,7 @@ class _Reader:
         known = {each.id: each for each in other.behaviors} if other else {}
         if isinstance(behavior := known.get(ref.behavior), Speech):
             ref = SyncRef.parse(text, [mark.id for mark in behavior.marks])
-        sync = canonical_sync(ref.sync, type_of(behavior) if behavior else "", self.block.dialect)
+        sync = canonical_sync(ref.sync, type_name(behavior) if behavior else "", self.block.dialect)
         if other is None or ref.behavior in ("", BLOCK_ITSELF):
             is_there = ref.block in self.elsewhere
         else:
@@ -200,11 +203,11 @@ class _Reader:
         for behavior in self.block.behaviors:
             relations: list[Equal] = []
             for timing in behavior.timing:
-                sync = canonical_sync(timing.sync, type_of(behavior), self.block.dialect)
+                sync = canonical_sync(timing.sync, type_name(behavior), self.block.dialect)
                 own = f"{behavior.id}:{timing.sync}"
                 problem: Problem | None = None
                 if not self._has(behavior, sync):
-                    problem = Problem("PARSING_FAILURE", f"{type_of(behavior)} has no sync point {timing.sync!r}")
+                    problem = Problem("PARSING_FAILURE", f"{type_name(behavior)} has no sync point {timing.sync!r}")
                 else:
                     other = self.term(timing.ref, behavior.id, behavior.line)
                     if isinstance(other, Problem):

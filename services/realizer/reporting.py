@@ -13,12 +13,13 @@ from schemas.feedback import (
     WarningFeedback,
     WarningKind,
 )
+from schemas.references import type_name
 from schemas.syncref import dialect_sync
 from schemas.units import Seconds
 from services.bus import Bus
 from services.realizer.authority import Authority
 from services.realizer.planner import Plan
-from services.realizer.points import Point, type_of
+from services.realizer.points import Point
 
 NOTICEABLE: Seconds = 0.1
 """What people notice between what they see and what they hear; a prediction that moves less is not worth telling."""
@@ -70,7 +71,7 @@ class Reporter:
         points = []
         for point, time in times.items():
             if (sync := _spelled(point, plan)) is not None:
-                type = type_of(plan.chains[point.behavior].behavior)
+                type = type_name(plan.chains[point.behavior].behavior)
                 points.append(PlannedPoint(behavior=point.behavior, sync=sync, time=time, type=type))
         prediction = PredictionFeedback(
             block=self._block, points=tuple(points), at=self._bus.stamp(began), character_id=self._character
@@ -143,5 +144,5 @@ def _points(plan: Plan) -> Iterable[Point]:
 def _spelled(point: Point, plan: Plan) -> str | None:
     """As the block's dialect has it; None of what feedback does not tell: what is no default point there."""
     is_repetition = point.sync.startswith("stroke:")
-    type = type_of(plan.chains[point.behavior].behavior)
+    type = type_name(plan.chains[point.behavior].behavior)
     return None if is_repetition else dialect_sync(point.sync, type, plan.block.dialect)

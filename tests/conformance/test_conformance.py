@@ -15,6 +15,7 @@ from schemas.blocks import Block, BlockOutcome, PerformBlock
 from schemas.faults import InputRefused
 from schemas.feedback import BlockProgress, PredictionFeedback, SyncPointProgress, WarningFeedback
 from schemas.json_codec import read
+from schemas.references import type_name
 from schemas.syncref import SyncRef, canonical_sync, dialect_sync
 from schemas.units import Seconds
 from services.bus import Bus
@@ -22,7 +23,7 @@ from services.commandline.roster import service
 from services.commandline.sources import still
 from services.config import Config, load
 from services.memory_bus import MemoryHub
-from services.realizer.points import sync_points, type_of
+from services.realizer.points import sync_points
 from services.requests import Requester, RequestRefused
 from services.runtime import Service, running
 from services.simulation.still import tangram_world
@@ -50,7 +51,7 @@ class Seen(Struct):
             match message:
                 case SyncPointProgress(block=id, behavior=behavior, sync=sync, at=at):
                     block = self.blocks[id]
-                    type = next(type_of(each) for each in block.behaviors if each.id == behavior)
+                    type = next(type_name(each) for each in block.behaviors if each.id == behavior)
                     found[id, behavior, canonical_sync(sync, type, block.dialect)] = at.seconds
                 case BlockProgress(block=str(id), progress=progress, at=at):
                     found[id, "bml", progress] = at.seconds
@@ -155,7 +156,7 @@ def _require_orderly(seen: Seen, id: str, block: Block, *, is_done: bool) -> Non
     assert isinstance(ours[0], BlockProgress)
     for behavior in block.behaviors:
         reported = [each for each in seen.progress(id) if each.behavior == behavior.id]
-        known = [dialect_sync(sync, type_of(behavior), block.dialect) for sync in sync_points(behavior)]
+        known = [dialect_sync(sync, type_name(behavior), block.dialect) for sync in sync_points(behavior)]
         points = [sync for sync in known if sync is not None]
         assert [each.sync for each in reported] == points[: len(reported)]
         assert [each.time for each in reported] == sorted(each.time for each in reported)
