@@ -23,6 +23,7 @@ from schemas import (
     feedback,
     fragments,
     keys,
+    perception,
     presence,
     recognition,
     requests,
@@ -69,7 +70,16 @@ KEYS: tuple[tuple[str, str, str], ...] = (
         "perception → recognition",
         "`ActionBegan`, `ActionEnded`, `ActorFound`, `ActorLost`",
     ),
-    (keys.CONNECTION_EVENT, "recognition → all", "`ConnectionEvent`"),
+    (
+        keys.RECOGNIZED_ACTION,
+        "recognition → all",
+        "the same, made from raw perception where perception does not say it itself",
+    ),
+    (
+        keys.connection_event("<person>", "<kind>"),
+        "recognition → all",
+        "`ConnectionEvent`, whoever began it; kind: `directed_gaze`, `mutual_facial_gaze`, `adjacency_pair`, `backchannel`",
+    ),
     (
         keys.fault("<service>"),
         "any service → all",
@@ -80,6 +90,8 @@ KEYS: tuple[tuple[str, str, str], ...] = (
     (keys.HEAD_OWNER, "generation → all", "`HeadOwner`"),
     (keys.statistics("<actor>"), "recognition → all", "`Statistics`, one per person, and `all`"),
     (keys.ROBOT_STATE, "control → all", "`RobotState`"),
+    (keys.head_pose("<person>"), "perception → recognition", "`HeadPose`, some 10 to 30 times a second"),
+    (keys.voice_activity("<person>"), "perception → recognition", "`VoiceActivity`, as often"),
     (keys.ESTIMATE, "generation, realizer ask control", "`EstimateBehaviors`, answered with `Estimates`"),
     (keys.DESCRIBE, "anyone asks control", "`DescribeBody`, answered with `Capabilities`"),
     (keys.status("<participant>"), "anyone asks a service", "`AskStatus`, answered with `Status`"),
@@ -87,8 +99,8 @@ KEYS: tuple[tuple[str, str, str], ...] = (
 )
 
 MODULES: tuple[ModuleType, ...] = (
-    fragments, blocks, behaviors, feedback, recognition, attention, actions, world, body, requests, faults, presence,
-    status, units,
+    fragments, blocks, behaviors, feedback, recognition, attention, actions, perception, world, body, requests, faults,
+    presence, status, units,
 )  # fmt: skip
 
 HEAD = f"""\

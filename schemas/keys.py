@@ -33,12 +33,16 @@ TURN_CLOSED = f"{PREFIX}/evt/generation/turn"
 SYNC_POINT = f"{PREFIX}/evt/control/sync_point"
 ROBOT_ACTION = f"{PREFIX}/evt/control/action"
 PERCEIVED_ACTION = f"{PREFIX}/evt/perception/action"
-CONNECTION_EVENT = f"{PREFIX}/evt/recognition/connection_event"
+RECOGNIZED_ACTION = f"{PREFIX}/evt/recognition/action"
+"""What recognition makes of raw perception; the same messages as `PERCEIVED_ACTION`."""
+ANY_CONNECTION_EVENT = f"{PREFIX}/evt/recognition/connection_event/*/*"
 
 WORLD = f"{PREFIX}/state/perception/world"
 HEAD_OWNER = f"{PREFIX}/state/generation/head_owner"
 
 ROBOT_STATE = f"{PREFIX}/stream/control/robot_state"
+ANY_HEAD_POSE = f"{PREFIX}/stream/perception/head/*"
+ANY_VOICE_ACTIVITY = f"{PREFIX}/stream/perception/voice/*"
 
 ESTIMATE = f"{PREFIX}/rpc/control/estimate"
 DESCRIBE = f"{PREFIX}/rpc/control/describe"
@@ -82,6 +86,19 @@ def status(participant: str) -> str:
 def statistics(actor: str) -> str:
     """actor: a person's id, or `all`."""
     return f"{PREFIX}/state/recognition/statistics/{actor}"
+
+
+def connection_event(actor: str, kind: str) -> str:
+    """actor: the person's id, whoever began; kind: an `EventKind`. Either may be `*`."""
+    return f"{PREFIX}/evt/recognition/connection_event/{actor}/{kind}"
+
+
+def head_pose(actor: str) -> str:
+    return f"{PREFIX}/stream/perception/head/{actor}"
+
+
+def voice_activity(actor: str) -> str:
+    return f"{PREFIX}/stream/perception/voice/{actor}"
 
 
 def alive(participant: str) -> str:

@@ -27,6 +27,7 @@ from schemas.body import (
 from schemas.faults import Fault, InputRefused
 from schemas.feedback import BlockProgress, PredictionFeedback, SyncPointProgress, WarningFeedback
 from schemas.fragments import FragmentOutcome, PerformFragment, TurnClosed
+from schemas.perception import HeadPose, VoiceActivity
 from schemas.presence import PeerAlive, PeerGone
 from schemas.recognition import (
     ConnectionEvent,
@@ -50,7 +51,7 @@ Message = (
     | PerformBehavior | AbortBehavior | GoHome | HomeReached | BehaviorOutcome
     | SyncPointArrived | SyncPointReached | WordSpoken | RobotState
     | DescribeBody | Capabilities | EstimateBehaviors | Estimates
-    | ActionBegan | ActionEnded | ActorFound | ActorLost | World
+    | ActionBegan | ActionEnded | ActorFound | ActorLost | World | HeadPose | VoiceActivity
     | RequestEvent | EventOutcome | SignalTurn | TurnOutcome | ConnectionEvent | Statistics
     | AskStatus | Status | PeerAlive | PeerGone
 )  # fmt: skip

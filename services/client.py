@@ -258,7 +258,7 @@ class Robot:
 
     def connection_events(self) -> Feed[ConnectionEvent]:
         """Every change in the life of every connection event, from now on."""
-        return self._feed((ConnectionEvent,), keys.CONNECTION_EVENT)
+        return self._feed((ConnectionEvent,), keys.ANY_CONNECTION_EVENT)
 
     def turns(self) -> Feed[TurnClosed]:
         """Each turn of the robot once it is over and answered, or it is too late for an answer."""

@@ -216,7 +216,7 @@ async def test_connection_events_come_from_the_moment_they_are_asked_for(hub: Me
     )  # fmt: skip
     async with connect(hub=hub) as robot:
         with robot.connection_events() as events:
-            recognition.publish(keys.CONNECTION_EVENT, event)
+            recognition.publish(keys.connection_event("human", event.kind), event)
 
             assert await events.next() == event
             assert await events.next(timeout=1.0) is None

@@ -15,7 +15,7 @@ FOLLOWED = (
     keys.ANY_FEEDBACK,
     keys.SYNC_POINT,
     keys.ANY_ACTION,
-    keys.CONNECTION_EVENT,
+    keys.ANY_CONNECTION_EVENT,
     keys.ANY_STATISTICS,
     keys.HEAD_OWNER,
     keys.ANY_REQUEST_STATE,

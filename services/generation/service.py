@@ -25,7 +25,7 @@ from services.runtime import Ready
 
 NAME = "generation"
 PATTERNS = (
-    *RequestDesk.patterns(NAME), keys.ANY_REQUEST_STATE, keys.FEEDBACK, keys.CONNECTION_EVENT, keys.WORLD,
+    *RequestDesk.patterns(NAME), keys.ANY_REQUEST_STATE, keys.FEEDBACK, keys.ANY_CONNECTION_EVENT, keys.WORLD,
     keys.ANY_ACTION, keys.ROBOT_STATE, keys.ANY_STATISTICS,
 )  # fmt: skip
 

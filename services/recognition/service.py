@@ -90,13 +90,16 @@ class _Recognition:
                 stamp = observation.at
         return arrived if stamp is None else min(self._bus.local(stamp), self._bus.now())
 
+    def _person_in(self, event: ConnectionEvent) -> str:
+        return event.responder if event.initiator == self._bus.robot else event.initiator
+
     def _tell(self, effects: Iterable[Effect]) -> None:
         events = []
         for effect in effects:
             match effect:
                 case ConnectionEvent():
                     events.append(effect)
-                    self._bus.publish(keys.CONNECTION_EVENT, effect)
+                    self._bus.publish(keys.connection_event(self._person_in(effect), effect.kind), effect)
                 case Accepted(id=id):
                     self.desk.accept(id)
                 case Refused(id=id, fault=fault):

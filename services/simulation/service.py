@@ -25,7 +25,7 @@ async def simulate(bus: Bus, ready: Ready, config: SimulationConfig) -> None:
     human = _human(config.human, bus.robot, lambda: chance.uniform(-config.jitter, config.jitter))
     scene = Scene(human, table, robot=bus.robot, frame=config.frame, stamp=bus.stamp)
     with bus.subscribe(
-        keys.ANY_ALIVE, keys.FEEDBACK, keys.SYNC_POINT, keys.ROBOT_ACTION, keys.CONNECTION_EVENT
+        keys.ANY_ALIVE, keys.FEEDBACK, keys.SYNC_POINT, keys.ROBOT_ACTION, keys.ANY_CONNECTION_EVENT
     ) as inbox:
         bus.publish(keys.WORLD, scene.world(bus.now()))
         ready()

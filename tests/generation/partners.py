@@ -184,7 +184,8 @@ class Partners:
     def event(self, id: str, state: Any, **fields: Any) -> None:
         now = self.bus.stamp()
         fields = {"kind": "directed_gaze", "initiator": "robot", "responder": "human", **fields}
-        self.bus.publish(keys.CONNECTION_EVENT, ConnectionEvent(id=id, state=state, at=now, started=now, **fields))
+        event = ConnectionEvent(id=id, state=state, at=now, started=now, **fields)
+        self.bus.publish(keys.connection_event("human", event.kind), event)
 
     def speaks(self, actor: str) -> None:
         key = keys.ROBOT_ACTION if actor == "robot" else keys.PERCEIVED_ACTION

@@ -120,7 +120,7 @@ async def test_statistics_are_there_for_a_late_joiner(hub: MemoryHub):
         robot_look = ActionBegan(actor=ROBOT, action="look", at=bus.stamp(), targets=(HUMAN,))
         bus.publish(keys.ROBOT_ACTION, robot_look)
         perceive(bus, ROBOT)
-        with bus.subscribe(keys.CONNECTION_EVENT) as inbox:
+        with bus.subscribe(keys.ANY_CONNECTION_EVENT) as inbox:
             received = await inbox.next()
         with hub.join("console").subscribe(keys.ANY_STATISTICS) as late:
             statistics = [await late.next(), await late.next()]
@@ -138,7 +138,7 @@ async def test_only_the_body_says_what_the_robot_does(hub: MemoryHub):
         bus.publish(keys.WORLD, world())
         bus.publish(keys.PERCEIVED_ACTION, ActionBegan(actor=ROBOT, action="look", at=bus.stamp(), targets=(HUMAN,)))
         perceive(bus, ROBOT)
-        with bus.subscribe(keys.CONNECTION_EVENT) as inbox:
+        with bus.subscribe(keys.ANY_CONNECTION_EVENT) as inbox:
             first, second = await inbox.next(), await inbox.next()
 
     assert first is not None
@@ -152,7 +152,7 @@ async def test_the_death_of_the_requester_withdraws_its_events(hub: MemoryHub):
     async with running(hub, recognition()):
         realizer.publish(keys.WORLD, world())
         realizer.publish(keys.EVENT, request(realizer, "directed_gaze", "blue-square", anchors=("gaze-1:stroke",)))
-        with watcher.subscribe(keys.CONNECTION_EVENT) as inbox:
+        with watcher.subscribe(keys.ANY_CONNECTION_EVENT) as inbox:
             started = await inbox.next()
             hub.kill("realizer")
             ended = await inbox.next()
@@ -184,7 +184,7 @@ async def test_bad_names_never_end_the_service(hub: MemoryHub):
             )
             bus.publish(keys.PERCEIVED_ACTION, ActionEnded(actor=actor, action="look", at=bus.stamp()))
         bus.publish(keys.PERCEIVED_ACTION, ActionBegan(actor="ann", action="look", at=bus.stamp(), targets=(ROBOT,)))
-        with bus.subscribe(keys.CONNECTION_EVENT) as inbox:
+        with bus.subscribe(keys.ANY_CONNECTION_EVENT) as inbox:
             received = await inbox.next()
 
     assert received is not None
