@@ -78,7 +78,8 @@ KEYS: tuple[tuple[str, str, str], ...] = (
     (
         keys.connection_event("<person>", "<kind>"),
         "recognition → all",
-        "`ConnectionEvent`, whoever began it; kind: `directed_gaze`, `mutual_facial_gaze`, `adjacency_pair`, `backchannel`",
+        "`ConnectionEvent`, whoever began it; kind: `directed_gaze`, `mutual_facial_gaze`, `adjacency_pair` or"
+        " `backchannel`",
     ),
     (
         keys.fault("<service>"),
@@ -99,8 +100,8 @@ KEYS: tuple[tuple[str, str, str], ...] = (
 )
 
 MODULES: tuple[ModuleType, ...] = (
-    fragments, blocks, behaviors, feedback, recognition, attention, actions, perception, world, body, requests, faults,
-    presence, status, units,
+    fragments, blocks, behaviors, feedback, recognition, attention, actions, perception, world, body, requests,
+    faults, presence, status, units,
 )  # fmt: skip
 
 HEAD = f"""\

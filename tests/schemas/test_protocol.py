@@ -53,8 +53,11 @@ def test_every_key_is_in_the_table(protocol: ModuleType) -> None:
         for name, value in vars(keys).items()
         if name.isupper() and isinstance(value, str) and value.startswith(keys.PREFIX) and not name.startswith("ANY_")
     }
-    makers = (keys.cancel, keys.request_state, keys.fault, keys.statistics, keys.status, keys.alive)
-    made = {make("x") for make in makers}
+    makers = (
+        keys.cancel, keys.request_state, keys.fault, keys.statistics, keys.status, keys.alive, keys.head_pose,
+        keys.voice_activity,
+    )  # fmt: skip
+    made = {make("x") for make in makers} | {keys.connection_event("x", "x")}
 
     assert table == (constants | made) - {keys.PREFIX, keys.EVERYTHING}
 
