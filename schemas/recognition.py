@@ -8,7 +8,20 @@ from schemas.behaviors import Action, Cause, Event, EventKind, TurnSignal
 from schemas.requests import Outcome, Request
 from schemas.units import Probability, Seconds, Stamp
 
-EventState = Literal["started", "succeeded", "failed", "preempted", "withdrawn", "superseded", "completed"]
+EventState = Literal[
+    "started", "succeeded", "failed", "preempted", "withdrawn", "superseded", "completed", "lost"
+]
+"""`lost`: recognition has died with the event open. Never sent: made for its readers, as `PeerGone` is."""
+ENDINGS: frozenset[EventState] = frozenset({"failed", "preempted", "withdrawn", "superseded", "completed", "lost"})
+"""The last state of an event: nothing follows it."""
+
+
+def session_of(run: str) -> str:
+    """What the ids of events begin with, up to the first `-`: from which life of recognition they are.
+
+    run: as on its liveliness token.
+    """
+    return run[:8]
 
 
 class ConnectionEvent(Struct, frozen=True, kw_only=True, tag="connection_event", omit_defaults=True):
@@ -36,10 +49,33 @@ class ConnectionEvent(Struct, frozen=True, kw_only=True, tag="connection_event",
     """How long the responder has, when `started`."""
     response: Action | None = None
     """Adjacency pair: which action answered."""
+    confidence: Probability = 1.0
+    """The least of the observations of the person that began and answered it; so far, when `started`."""
     block: str = ""
     behavior: str = ""
     """Robot-initiated: the block and the event behavior that asked for it."""
     turn: str = ""
+
+    def person(self, robot: str) -> str:
+        """Who takes part in it with the robot; an actor's id."""
+        return self.responder if self.initiator == robot else self.initiator
+
+    @property
+    def session(self) -> str:
+        return self.id.partition("-")[0]
+
+
+class OpenEvents(Struct, frozen=True, kw_only=True, tag="open_events", omit_defaults=True):
+    """state: recognition. All events with a person that have not ended, each with its last change, oldest first.
+
+    Follows each change on the stream of events, in the same moment: whoever has read it knows every change that came
+    before it. session: what the ids begin with.
+    """
+
+    actor: str
+    session: str
+    at: Stamp
+    events: tuple[ConnectionEvent, ...] = ()
 
 
 class RequestEvent(Request, frozen=True, kw_only=True, tag="request_event", omit_defaults=True):

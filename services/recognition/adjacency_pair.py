@@ -5,7 +5,7 @@ that comes while the turn still goes on is known at once, but decided only when 
 """
 
 from schemas.behaviors import Action
-from schemas.units import Seconds
+from schemas.units import Probability, Seconds
 from services.recognition.machine import IDLE, Ledger, Machine, Row, UnderWay, table
 
 ROBOT_WAITING, HUMAN_WAITING = "robot_waiting", "human_waiting"
@@ -154,10 +154,11 @@ class AdjacencyPair(Machine):
 
     # -- second turn --------------------------------------------------------------------------------------------
 
-    def human_begins(self, action: Action, at: Seconds) -> bool:
+    def human_begins(self, action: Action, at: Seconds, confidence: Probability = 1.0) -> bool:
         """A person's action as the answer to the robot's turn; False if it is none."""
         if self.event is None or self.state != ROBOT_WAITING or action not in self.event.accept:
             return False
+        self.event.rests_on(confidence)
         self._answer("human_answers", action, at)
         return True
 

@@ -12,7 +12,7 @@ from msgspec import Struct
 from schemas.behaviors import Action, Cause, EventKind
 from schemas.recognition import ConnectionEvent, EventOutcome, EventState, TurnOutcome
 from schemas.requests import Accepted, Refused
-from schemas.units import Seconds, Stamp
+from schemas.units import Probability, Seconds, Stamp
 
 Effect = ConnectionEvent | EventOutcome | TurnOutcome | Accepted | Refused
 IDLE = "idle"
@@ -77,7 +77,13 @@ class UnderWay(Struct, kw_only=True):
     delay: Seconds | None = None
     duration: Seconds | None = None
     response: Action | None = None
+    confidence: Probability = 1.0
+    """The least of the observations it rests on."""
     changed: Seconds | None = None
+
+    def rests_on(self, confidence: Probability) -> None:
+        """One more observation has contributed."""
+        self.confidence = min(self.confidence, confidence)
 
 
 class Ledger:
@@ -115,7 +121,7 @@ class Ledger:
                 at=self.stamp(at), started=self.stamp(event.started), objects=event.objects, cause=event.cause,
                 optional=event.optional, delay=None if begins else event.delay,
                 duration=event.duration if ends else None, limit=event.limit if begins else None,
-                response=None if begins else event.response,
+                response=None if begins else event.response, confidence=event.confidence,
                 block=event.block, behavior=event.behavior, turn=event.turn,
             )
         )  # fmt: skip

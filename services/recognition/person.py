@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
 from schemas.behaviors import Action, Cause, EventKind
-from schemas.units import Seconds
+from schemas.units import Probability, Seconds
 from services.recognition.adjacency_pair import AdjacencyPair
 from services.recognition.backchannel import BRIEF, UNDECIDED, Backchannel
 from services.recognition.config import RecognitionConfig
@@ -41,6 +41,7 @@ class Person:
         self.speaks_since: Seconds | None = None
         self.silent_since: Seconds | None = None
         self.acts_since: Seconds | None = None
+        self._speech_confidence: Probability = 1.0
         self.others_silent_since: Seconds | None = float("-inf")
         """Since when nobody else speaks; None while somebody does. Kept by the session."""
         self.directed: list[DirectedGaze] = []
@@ -66,7 +67,7 @@ class Person:
             (self._gone_at, self._gone),
             *((one.deadline, lambda at, one=one: self._expire_directed(one, at)) for one in self.directed),
             (self.facial.deadline, self.facial.expire),
-            (own.deadline, lambda at: self._human_turn(own.takes_floor("limit", at))),
+            (own.deadline, lambda at: self._takes_floor("limit", at)),
             (robot.deadline, lambda at: self.pair.robot_begins("speak", robot.takes_floor("limit", at))),
             (self.pair.deadline, self.pair.expire),
             (self._look_directs_at, self._look_directs),
@@ -122,13 +123,9 @@ class Person:
     def on_robots_face(self) -> bool:
         return self._scene.robot in self.gaze.targets
 
-    @property
-    def on_face_since(self) -> Seconds | None:
-        return self.gaze.since if self.on_robots_face else None
-
-    def looks(self, targets: tuple[str, ...], at: Seconds) -> None:
+    def looks(self, targets: tuple[str, ...], at: Seconds, confidence: Probability = 1.0) -> None:
         was_on_face = self.on_robots_face
-        if not self.gaze.begin(targets, at):
+        if not self.gaze.begin(targets, at, confidence):
             return
         self.gaze_changed(at)
         if self.on_robots_face and not was_on_face and self.facial.state == IDLE:
@@ -142,12 +139,15 @@ class Person:
 
     def gaze_changed(self, at: Seconds) -> None:
         """The person's or the robot's gaze is elsewhere now."""
-        self.facial.gazes(robot_on=self._scene.robot_looks_at((self.id,)), human_on=self.on_robots_face, at=at)
+        confidence = self.gaze.confidence
+        robot_on = self._scene.robot_looks_at((self.id,))
+        self.facial.gazes(robot_on=robot_on, human_on=self.on_robots_face, at=at, confidence=confidence)
         for one in self.directed:
             human_on = self._scene.person_looks_at(self.gaze, one.objects)
             if human_on and one.event is not None and one.event.cause != "human":
                 self.gaze.spent = True
-            one.gazes(robot_on=self._scene.robot_looks_at(one.objects), human_on=human_on, at=at)
+            robot_on = self._scene.robot_looks_at(one.objects)
+            one.gazes(robot_on=robot_on, human_on=human_on, at=at, confidence=confidence)
         self.forget_idle(at)
         if any(
             self._scene.person_looks_at(self.gaze, past.objects) and at - past.at <= self._config.after_robot_directed
@@ -170,7 +170,7 @@ class Person:
 
     def _human_looks_at_face(self, at: Seconds) -> None:
         limit = self._config.mutual_facial_gaze_limit
-        event = self._by_human("mutual_facial_gaze", at, limit)
+        event = self._by_human("mutual_facial_gaze", at, limit, self.gaze.confidence)
         self.facial.human_begins(
             event,
             LimitClock(at, limit),
@@ -182,22 +182,23 @@ class Person:
 
     # -- directed gaze ------------------------------------------------------------------------------------------
 
-    def points(self, targets: tuple[str, ...], at: Seconds) -> None:
+    def points(self, targets: tuple[str, ...], at: Seconds, confidence: Probability = 1.0) -> None:
         objects = tuple(filter(self._scene.is_object, targets))
         if objects:
-            self._human_directs(objects, at, at)
+            self._human_directs(objects, at, at, confidence)
+        self.pair.human_begins("point", at, confidence)
 
     def _look_directs(self, at: Seconds) -> None:
         self.gaze.spent = True
         objects = tuple(filter(self._scene.is_object, self.gaze.targets))
-        self._human_directs(objects, at - self._config.direct_by_look, at)
+        self._human_directs(objects, at - self._config.direct_by_look, at, self.gaze.confidence)
 
-    def _human_directs(self, objects: tuple[str, ...], since: Seconds, at: Seconds) -> None:
+    def _human_directs(self, objects: tuple[str, ...], since: Seconds, at: Seconds, confidence: Probability) -> None:
         """since: start of the pointing, or of the look that has become a direction at `at`."""
         if any(set(one.objects) & set(objects) for one in self.directed):
             return
         limit = self._config.directed_gaze_limit
-        event = self._by_human("directed_gaze", since, limit, objects)
+        event = self._by_human("directed_gaze", since, limit, confidence, objects)
         in_vain = self._scene.fragment_looks_elsewhere(objects)
         robot_since = self._scene.robot_since(objects)
         if robot_since is not None or not in_vain:
@@ -221,7 +222,7 @@ class Person:
         there = self._scene.person_looks_at(self.gaze, event.objects)
         self.gaze.spent = self.gaze.spent or there
         robot_on = self._scene.robot_looks_at(event.objects)
-        one.robot_begins(event, clock, robot_on=robot_on, human_since=self.gaze.since if there else None)
+        one.robot_begins(event, clock, robot_on=robot_on, look=self.gaze if there else None)
         self.forget_idle(event.started)
         return one
 
@@ -243,7 +244,7 @@ class Person:
     def robot_looks_at_face(self, event: UnderWay, clock: LimitClock) -> None:
         self.facial.supersede(event.started)
         robot_on = self._scene.robot_looks_at((self.id,))
-        self.facial.robot_begins(event, clock, robot_on=robot_on, human_since=self.on_face_since)
+        self.facial.robot_begins(event, clock, robot_on=robot_on, look=self.gaze if self.on_robots_face else None)
 
     # -- speech and gestures ------------------------------------------------------------------------------------
 
@@ -255,14 +256,15 @@ class Person:
     def holds_floor(self) -> bool:
         return self.speaks_since is not None
 
-    def speaks(self, at: Seconds) -> None:
+    def speaks(self, at: Seconds, confidence: Probability = 1.0) -> None:
         if self.speaks_since is not None:
             return
         self.speaks_since, self.silent_since = at, None
+        self._speech_confidence = confidence
         if self.robot_holds_floor:
-            self.own_backchannel.speaks(self._backchannel(self._scene.robot, self.id, at))
+            self.own_backchannel.speaks(self._backchannel(self._scene.robot, self.id, at, confidence))
         else:
-            self._human_turn(at)
+            self._human_turn(at, "speak", confidence)
 
     def falls_silent(self, at: Seconds) -> None:
         if self.speaks_since is None:
@@ -272,37 +274,38 @@ class Person:
         self._floor_is_free(at)
         self.pair.ends("speak", at, by_robot=False)
 
-    def gestures(self, action: Action, at: Seconds) -> None:
+    def gestures(self, action: Action, at: Seconds, confidence: Probability = 1.0) -> None:
         """A nod or a shake."""
         if self.robot_holds_floor and self.own_backchannel.state != UNDECIDED:
-            self.own_backchannel.gestures(self._backchannel(self._scene.robot, self.id, at))
+            self.own_backchannel.gestures(self._backchannel(self._scene.robot, self.id, at, confidence))
         else:
-            self.pair.human_begins(action, at)
+            self.pair.human_begins(action, at, confidence)
 
     def gesture_ends(self, action: Action, at: Seconds) -> None:
         if self.own_backchannel.state == BRIEF:
             self.own_backchannel.ends(at)
         self.pair.ends(action, at, by_robot=False)
 
-    def manipulates(self, at: Seconds) -> None:
+    def manipulates(self, at: Seconds, confidence: Probability = 1.0) -> None:
         if self.acts_since is None:
             self.acts_since = at
-            self._human_turn(at, "act")
+            self._human_turn(at, "act", confidence)
 
     def manipulation_ends(self, at: Seconds) -> None:
         self.acts_since = None
         self.gaze.spent = True
         self.pair.ends("act", at, by_robot=False)
 
-    def _human_turn(self, at: Seconds, action: Action = "speak") -> None:
+    def _human_turn(self, at: Seconds, action: Action, confidence: Probability) -> None:
         """Speech that is no backchannel, or a manipulation: an answer, more of the same turn, or a first turn."""
         pair = self.pair
-        if pair.human_begins(action, at) or pair.human_goes_on(action, at):
+        if pair.human_begins(action, at, confidence) or pair.human_goes_on(action, at):
             pass
         elif action == "speak" and pair.is_third_turn(self.id, at):
             pair.third_turn(at)
         elif pair.state == IDLE:
-            pair.human_asks(self._by_human("adjacency_pair", at, self._config.adjacency_pair_limit), action)
+            event = self._by_human("adjacency_pair", at, self._config.adjacency_pair_limit, confidence)
+            pair.human_asks(event, action)
         if action == "speak" and self.speaks_since is None and self.silent_since is not None:
             pair.ends("speak", self.silent_since, by_robot=False)
 
@@ -344,9 +347,13 @@ class Person:
     def _floor_is_free(self, at: Seconds) -> None:
         """Speech that outlasts the turn in which it began is a turn of its own."""
         if self.own_backchannel.state == UNDECIDED and not self.robot_holds_floor:
-            self._human_turn(self.own_backchannel.takes_floor("outlasts_turn", at))
+            self._takes_floor("outlasts_turn", at)
         if self.robot_backchannel.state == UNDECIDED and not self.holds_floor:
             self.pair.robot_begins("speak", self.robot_backchannel.takes_floor("outlasts_turn", at))
+
+    def _takes_floor(self, given: str, at: Seconds) -> None:
+        """The person's speech is no backchannel after all, but a turn since it began."""
+        self._human_turn(self.own_backchannel.takes_floor(given, at), "speak", self._speech_confidence)
 
     def abort(self, at: Seconds, *, turn: str) -> None:
         """The robot's turn was cut off: what it asked for is taken back."""
@@ -378,11 +385,16 @@ class Person:
 
     # -- new events ---------------------------------------------------------------------------------------------
 
-    def _by_human(self, kind: EventKind, at: Seconds, limit: Seconds, objects: tuple[str, ...] = ()) -> UnderWay:
+    def _by_human(
+        self, kind: EventKind, at: Seconds, limit: Seconds, confidence: Probability, objects: tuple[str, ...] = ()
+    ) -> UnderWay:
         return UnderWay(
-            kind=kind, initiator=self.id, responder=self._scene.robot, started=at, limit=limit, objects=objects
-        )
+            kind=kind, initiator=self.id, responder=self._scene.robot, started=at, limit=limit, objects=objects,
+            confidence=confidence,
+        )  # fmt: skip
 
-    def _backchannel(self, speaker: str, listener: str, at: Seconds) -> UnderWay:
+    def _backchannel(self, speaker: str, listener: str, at: Seconds, confidence: Probability = 1.0) -> UnderWay:
         cause: Cause = "human" if listener == self.id else "turn"
-        return UnderWay(kind="backchannel", initiator=speaker, responder=listener, started=at, cause=cause)
+        return UnderWay(
+            kind="backchannel", initiator=speaker, responder=listener, started=at, cause=cause, confidence=confidence
+        )

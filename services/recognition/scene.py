@@ -3,7 +3,7 @@
 from msgspec import Struct
 
 from schemas.attention import Claim
-from schemas.units import Seconds
+from schemas.units import Probability, Seconds
 from schemas.world import World
 from services.recognition.config import GazeResolution
 
@@ -17,10 +17,11 @@ class Gaze(Struct):
     targets: tuple[str, ...] = ()
     since: Seconds = 0.0
     ended: Seconds | None = None
+    confidence: Probability = 1.0
     spent: bool = False
     """This look answers the robot, or has directed it already: it directs nothing (any more)."""
 
-    def begin(self, targets: tuple[str, ...], at: Seconds) -> bool:
+    def begin(self, targets: tuple[str, ...], at: Seconds, confidence: Probability = 1.0) -> bool:
         """A look at `targets`; True if that is a change. What is older than the present look is ignored."""
         if at < self.since:
             return False
@@ -28,6 +29,7 @@ class Gaze(Struct):
             self.ended = None
             return False
         self.targets, self.since, self.ended, self.spent = targets, at, None, False
+        self.confidence = confidence
         return True
 
     def end(self, targets: tuple[str, ...], at: Seconds) -> None:

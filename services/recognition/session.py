@@ -173,22 +173,22 @@ class Session:
 
     def _person_begins(self, person: Person, began: ActionBegan, at: Seconds) -> None:
         person.seen(at)
+        confidence = began.confidence
         if began.action == "look":
-            person.looks(began.targets, at)
+            person.looks(began.targets, at, confidence)
             return
         if self._is_over(began, at):
             return
         match began.action:
             case "point":
-                person.points(began.targets, at)
-                person.pair.human_begins("point", at)
+                person.points(began.targets, at, confidence)
             case "speak":
-                person.speaks(at)
+                person.speaks(at, confidence)
                 self._speakers_changed(at)
             case "nod" | "shake":
-                person.gestures(began.action, at)
+                person.gestures(began.action, at, confidence)
             case "act":
-                person.manipulates(at)
+                person.manipulates(at, confidence)
 
     def _person_ends(self, person: Person, ended: ActionEnded, at: Seconds) -> None:
         if ended.action == "look":

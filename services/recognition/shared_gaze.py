@@ -5,9 +5,10 @@ Which names the states and inputs have is data of the subclasses; what follows f
 
 from typing import ClassVar
 
-from schemas.units import Seconds
+from schemas.units import Probability, Seconds
 from services.recognition.limits import LimitClock
 from services.recognition.machine import IDLE, Ledger, Machine, UnderWay
+from services.recognition.scene import Gaze
 
 
 class SharedGaze(Machine):
@@ -41,15 +42,14 @@ class SharedGaze(Machine):
     def expire(self, at: Seconds) -> None:
         self.step("limit", at)
 
-    def robot_begins(
-        self, event: UnderWay, clock: LimitClock, *, robot_on: bool, human_since: Seconds | None
-    ) -> None:
-        """The robot's request. human_since: since when the person looks there already, None if elsewhere."""
-        self._begin(event, clock, by_robot=True, robot_on=robot_on, human_on=human_since is not None)
-        if human_since is None:
+    def robot_begins(self, event: UnderWay, clock: LimitClock, *, robot_on: bool, look: Gaze | None) -> None:
+        """The robot's request. look: the person's, if it is there already."""
+        self._begin(event, clock, by_robot=True, robot_on=robot_on, human_on=look is not None)
+        if look is None:
             self.step(self.ROBOT_BEGINS, event.started)
         else:
-            self._join(f"{self.ROBOT_BEGINS}_{self.TOGETHER}", max(event.started, human_since))
+            given = f"{self.ROBOT_BEGINS}_{self.TOGETHER}"
+            self._join(given, max(event.started, look.since), confidence=look.confidence)
 
     def human_begins(
         self,
@@ -77,15 +77,15 @@ class SharedGaze(Machine):
         self._robot_on = self._robot_came = robot_on
         self._human_on, self._shared_since = human_on, None
 
-    def gazes(self, *, robot_on: bool, human_on: bool, at: Seconds) -> None:
-        """Somebody's gaze has changed: who looks there now."""
+    def gazes(self, *, robot_on: bool, human_on: bool, at: Seconds, confidence: Probability = 1.0) -> None:
+        """Somebody's gaze has changed: who looks there now. confidence: of the person's look."""
         if self.event is None:
             return
         robot_left, human_left = self._robot_on and not robot_on, self._human_on and not human_on
         self._robot_on, self._human_on = robot_on, human_on
         self._robot_came = self._robot_came or robot_on
         if self.state == self.ROBOT_WAITS and human_on:
-            self._join(self.HUMAN_JOINS, at)
+            self._join(self.HUMAN_JOINS, at, confidence=confidence)
         elif self.state == self.HUMAN_WAITS and robot_on:
             self._join(self.ROBOT_JOINS, at)
         elif self.state == self.ROBOT_WAITS and robot_left:
@@ -95,9 +95,10 @@ class SharedGaze(Machine):
         elif self.state == self.TOGETHER:
             self._share(at)
 
-    def _join(self, given: str, at: Seconds, came: Seconds | None = None) -> None:
-        """The responder is there; came: since when, if not `at`."""
+    def _join(self, given: str, at: Seconds, came: Seconds | None = None, confidence: Probability = 1.0) -> None:
+        """The responder is there; came: since when, if not `at`. confidence: of the look that says so."""
         assert self.event is not None
+        self.event.rests_on(confidence)
         self.event.delay = max(0.0, (at if came is None else came) - self.event.started)
         self.step(given, at)
         self._share(at)
