@@ -1,0 +1,45 @@
+"""Chance as pure code sees it, and delays drawn by it as Table 2.1 of the thesis has them."""
+
+from collections.abc import MutableSequence, Sequence
+from typing import Any, Protocol, TypeVar
+
+from msgspec import Struct
+
+from schemas.units import Seconds
+
+T = TypeVar("T")
+CONCENTRATION = 3.0
+"""Sum of the two parameters of each Beta. The table tells only least, mean and most; with 3 the tails are broad."""
+
+
+class Chance(Protocol):
+    """What is used of `random.Random`; the service makes one from the seed."""
+
+    def random(self) -> float: ...
+    def uniform(self, a: float, b: float) -> float: ...
+    def gauss(self, mu: float, sigma: float) -> float: ...
+    def betavariate(self, alpha: float, beta: float) -> float: ...
+    def expovariate(self, lambd: float) -> float: ...
+    def choice(self, seq: Sequence[T]) -> T: ...
+    def shuffle(self, x: MutableSequence[Any]) -> None: ...
+
+
+class Delays(Struct, frozen=True):
+    """A Beta distribution stretched from `least` to `most` with the given mean, in seconds."""
+
+    least: Seconds
+    mean: Seconds
+    most: Seconds
+
+    def __post_init__(self) -> None:
+        if not (0 <= self.least < self.mean < self.most or 0 <= self.least == self.mean == self.most):
+            raise ValueError(
+                f"0 <= least < mean < most, or all equal, does not hold: {self.least}, {self.mean}, {self.most}"
+            )
+
+    def draw(self, chance: Chance) -> Seconds:
+        width = self.most - self.least
+        if width == 0:
+            return self.mean
+        part = (self.mean - self.least) / width
+        return self.least + width * chance.betavariate(CONCENTRATION * part, CONCENTRATION * (1 - part))

@@ -1,0 +1,299 @@
+"""Two people at a table, drawn from Table 2.1: what recognition would observe, and which events that should make.
+
+    plan = draw(random.Random(seed))
+    for observation, at in observations(plan): ...
+
+Pure. One person sits in the robot's place: their events are asked for with requests, which can say how long is
+waited; the other's are only seen. Who explains sits in the robot's place, so backchannels are the other's,
+and so are failures to look or to answer, whose delay only a request can set.
+
+A Poisson stream with the table's mean almost never pauses for 70 s. So there are two regimes: engaged, and busy,
+when the other person follows a request by a detailed task and hardly answers anything else (thesis 2.3).
+"""
+
+from collections.abc import Iterable, Iterator, Sequence
+
+import msgspec
+from msgspec import Struct
+
+from schemas.actions import ActionBegan, ActionEnded, ActorFound
+from schemas.behaviors import Action, Event, EventKind, TurnSignal
+from schemas.recognition import RequestEvent, SignalTurn
+from schemas.units import Probability, Seconds, Stamp
+from schemas.world import Entity, World
+from services.simulation.chance import Chance
+from services.simulation.table_2_1 import DELAYS, EVENTS, LONGEST_GAP, MTBCE, TABLE
+
+Observation = World | ActorFound | ActionBegan | ActionEnded | RequestEvent | SignalTurn
+
+EXPLAINER, LISTENER = "robot", "human"
+OBJECTS = ("cracker", "knife", "cheese", "olives", "peppers", "plate", "salmon")
+"""Directed to in turn, so that none is meant again while the last time still counts."""
+SHARED: Seconds = 0.5
+"""How long a gaze is shared once both look there."""
+TURN: tuple[Seconds, Seconds] = (0.6, 1.8)
+"""Of the first turn of an adjacency pair, uniform. One that fails so early that it can't be so long takes half."""
+ANSWER: Seconds = 0.6
+"""How long the second turn of an adjacency pair lasts."""
+LEAD: Seconds = 0.5
+"""How long the explainer has been speaking when a backchannel comes."""
+THIRD_TURN: Seconds = 1.6
+"""After the answer the asker's next words could still be the third turn of the same pair (1.5 s)."""
+BETWEEN: Seconds = 0.6
+"""Least time from the end of an event to the start of the next; longer than `LEAD`."""
+
+
+class Pace(Struct, frozen=True, kw_only=True):
+    """When events come. The defaults give a mean of 5.7 s and a longest gap of about 70 s in nine minutes."""
+
+    pause: Seconds = 2.15
+    """Engaged: mean (exponential) from the end of an event to the next, beyond the least time."""
+    detailed: Probability = 0.13
+    """Share of the explainer's answered adjacency pairs that are answered by a detailed task: the busy regime."""
+    busy: tuple[Seconds, Seconds] = (25.0, 85.0)
+    """Busy: between two starts, uniform."""
+    busy_lasts: Probability = 0.3
+    """That the task is still not done when the next event begins."""
+    busy_answers: Probability = 0.25
+    """Busy: how much of the table's success rates is left."""
+
+
+class Planned(Struct, frozen=True, kw_only=True):
+    """An event to come. delay: of a failed one from its start, of an answered pair from the end of its first turn,
+    which is `turn` long; None for backchannels. task_until: when the manipulation that answers this pair is done.
+    """
+
+    kind: EventKind
+    initiator: str
+    start: Seconds
+    succeeds: bool
+    delay: Seconds | None = None
+    turn: Seconds = 0.0
+    object: str = ""
+    task_until: Seconds | None = None
+
+    @property
+    def by_explainer(self) -> bool:
+        return self.initiator == EXPLAINER
+
+    @property
+    def decided(self) -> Seconds:
+        """When the responder begins, or fails to."""
+        return self.start + (self.turn if self.succeeds else 0.0) + (self.delay or 0.0)
+
+    @property
+    def over(self) -> Seconds:
+        """When the next event may begin to be prepared."""
+        if self.kind != "adjacency_pair":
+            return self.decided + SHARED
+        answered = self.decided + ANSWER if self.succeeds else self.decided
+        return answered if self.by_explainer else answered + THIRD_TURN
+
+
+# -- the plan ---------------------------------------------------------------------------------------------------
+
+
+USUAL = Pace()
+
+
+def draw(chance: Chance, pace: Pace = USUAL) -> tuple[Planned, ...]:
+    """A session of as many events of each kind as the table has, in random order."""
+    kinds = [kind for kind, row in TABLE.items() for _ in range(row.count)]
+    chance.shuffle(kinds)
+    plan: list[Planned] = []
+    task: int | None = None
+    """Index of the event whose answer keeps the listener busy."""
+    start = 1.0
+    while kinds:
+        busy = task is not None
+        event = _event(_next_kind(kinds, busy=busy), len(plan), start, chance, pace.busy_answers if busy else None)
+        plan.append(event)
+        may_be_task = event.kind == "adjacency_pair" and event.by_explainer and event.succeeds and not busy
+        if may_be_task and chance.random() < pace.detailed:
+            task = len(plan) - 1
+        if task is None:
+            start = event.over + BETWEEN + chance.expovariate(1 / pace.pause)
+            continue
+        start += chance.uniform(*pace.busy)
+        if not kinds or chance.random() >= pace.busy_lasts:
+            plan[task] = msgspec.structs.replace(plan[task], task_until=start - BETWEEN)
+            task = None
+    return tuple(plan)
+
+
+def _next_kind(kinds: list[EventKind], *, busy: bool) -> EventKind:
+    """The first; somebody busy gives no backchannels as long as there is anything else."""
+    index = next((index for index, kind in enumerate(kinds) if not (busy and kind == "backchannel")), 0)
+    return kinds.pop(index)
+
+
+def _event(kind: EventKind, number: int, start: Seconds, chance: Chance, answers: Probability | None) -> Planned:
+    """answers: of a busy listener, who begins nothing either; None: they are engaged."""
+    row = TABLE[kind]
+    succeeds = kind == "backchannel" or chance.random() < row.success * (1.0 if answers is None else answers)
+    only_explainer = answers is not None or kind == "backchannel" or (not succeeds and kind != "mutual_facial_gaze")
+    by_explainer = only_explainer or chance.random() < 0.5
+    delay = None if kind == "backchannel" else (row.delays if succeeds else row.failed_delays).draw(chance)
+    turn = chance.uniform(*TURN) if kind == "adjacency_pair" else 0.0
+    return Planned(
+        kind=kind,
+        initiator=EXPLAINER if by_explainer else LISTENER,
+        start=start,
+        succeeds=succeeds,
+        delay=delay,
+        turn=_turn(turn, succeeds, delay),
+        object=OBJECTS[number % len(OBJECTS)] if kind == "directed_gaze" else "",
+    )
+
+
+def exactly() -> tuple[Planned, ...]:
+    """The session whose statistics are those of Table 2.1 to the last digit. Nothing is drawn.
+
+    Its events come evenly, but for one: a request that somebody busy with another does not answer for 7.4 s, and
+    nothing else for 70.
+    """
+    events = [(kind, ok, delay) for (kind, ok), delays in DELAYS.items() for delay in delays]
+    task, unanswered = events.index(("adjacency_pair", True, 0.4)), events.index(("adjacency_pair", False, 7.4))
+    two = [events[task], events[unanswered]]
+    rest: list[tuple[EventKind, bool, Seconds | None]] = [
+        event for index, event in enumerate(events) if index not in (task, unanswered)
+    ]
+    rest += [("backchannel", True, None)] * TABLE["backchannel"].count
+    # Kinds are mixed by a stride that is prime to their number.
+    mixed = [rest[index * 31 % len(rest)] for index in range(len(rest))]
+    middle = len(mixed) // 2
+    between = ((EVENTS - 1) * MTBCE - LONGEST_GAP) / (EVENTS - 2)
+    plan, start = [], 1.0
+    for number, (kind, ok, delay) in enumerate([*mixed[:middle], *two, *mixed[middle:]]):
+        answers_request = (ok and kind != "backchannel") or kind == "mutual_facial_gaze"
+        plan.append(
+            Planned(
+                kind=kind,
+                initiator=LISTENER if answers_request and number % 2 and number != middle else EXPLAINER,
+                start=start,
+                succeeds=ok,
+                delay=delay,
+                turn=_turn(TURN[0], ok, delay) if kind == "adjacency_pair" else 0.0,
+                object=OBJECTS[number % len(OBJECTS)] if kind == "directed_gaze" else "",
+                task_until=start + between + LONGEST_GAP - BETWEEN if number == middle else None,
+            )
+        )
+        start += LONGEST_GAP if number == middle + 1 else between
+    return tuple(plan)
+
+
+def _turn(drawn: Seconds, succeeds: bool, delay: Seconds | None) -> Seconds:
+    """Length of a pair's first turn, which ends before the pair fails."""
+    return drawn if succeeds or delay is None else min(drawn, delay / 2)
+
+
+# -- what is observed of it -------------------------------------------------------------------------------------
+
+
+def observations(plan: Sequence[Planned], clock: str = "loop") -> list[tuple[Observation, Seconds]]:
+    """What happens in the session, in order, each with its time. clock: of the stamps."""
+    seen = [*_arrival(clock)]
+    for number, event in enumerate(plan, start=1):
+        seen += _Performance(event, number, clock).observations()
+    return sorted(seen, key=lambda observation: observation[1])
+
+
+def _arrival(clock: str) -> Iterator[tuple[Observation, Seconds]]:
+    things = (Entity(id=name, kind="object", position=(0.6, 0.1 * y - 0.3, 0.7)) for y, name in enumerate(OBJECTS))
+    table = Entity(id="table", kind="surface", position=(0.6, 0.0, 0.7))
+    listener = Entity(id=LISTENER, kind="person", position=(1.3, 0.0, 1.2))
+    yield World(entities=(table, *things, listener), at=Stamp(clock, 0.0)), 0.0
+    yield ActorFound(actor=LISTENER, at=Stamp(clock, 0.0)), 0.0
+
+
+class _Performance:
+    """How one planned event looks to recognition. Gazes come from and go back to nowhere."""
+
+    def __init__(self, event: Planned, number: int, clock: str) -> None:
+        self._event = event
+        self._number = number
+        self._clock = clock
+
+    def observations(self) -> Iterable[tuple[Observation, Seconds]]:
+        match self._event.kind:
+            case "directed_gaze":
+                return self._gaze(self._event.object, self._event.object)
+            case "mutual_facial_gaze":
+                return self._gaze(self._other(self._event.initiator), self._event.initiator)
+            case "adjacency_pair":
+                return self._adjacency_pair()
+            case "backchannel":
+                return self._backchannel()
+
+    def _gaze(self, target: str, answer: str) -> Iterator[tuple[Observation, Seconds]]:
+        """The initiator looks at `target`, the responder (if at all) at `answer`."""
+        event = self._event
+        initiator, responder = event.initiator, self._other(event.initiator)
+        if event.by_explainer:
+            yield self._request()
+        # Who is not answered looks away: a person when they give up, the explainer when the request has failed.
+        gives_up = event.decided + (SHARED if event.succeeds or event.by_explainer else 0.0)
+        yield from self._does(initiator, "look", event.start, gives_up, target)
+        if event.kind == "directed_gaze" and not event.by_explainer:
+            yield from self._does(initiator, "point", event.start, gives_up, target)
+        if event.succeeds:
+            yield from self._does(responder, "look", event.decided, event.decided + SHARED, answer)
+
+    def _adjacency_pair(self) -> Iterator[tuple[Observation, Seconds]]:
+        event = self._event
+        turn_ends = event.start + event.turn
+        if event.by_explainer:
+            yield self._request()
+        yield from self._does(event.initiator, "speak", event.start, turn_ends)
+        if event.by_explainer:
+            ended = TurnSignal(id="ended", turn=self._name, signal="ended", actor=LISTENER)
+            yield (
+                SignalTurn(id=f"{self._name}-ended", requester=EXPLAINER, signal=ended, at=self._at(turn_ends)),
+                turn_ends,
+            )
+        if not event.succeeds:
+            return
+        responder = self._other(event.initiator)
+        if event.task_until is not None:
+            yield from self._does(responder, "act", event.decided, event.task_until, OBJECTS[0])
+        else:
+            answer: Action = "nod" if event.by_explainer and self._number % 3 == 0 else "speak"
+            yield from self._does(responder, answer, event.decided, event.decided + ANSWER)
+
+    def _backchannel(self) -> Iterator[tuple[Observation, Seconds]]:
+        """A nod, or a brief word, while the explainer speaks."""
+        event = self._event
+        yield from self._does(EXPLAINER, "speak", event.start - LEAD, event.start + SHARED)
+        sign: Action = "nod" if self._number % 2 else "speak"
+        yield from self._does(LISTENER, sign, event.start, event.start + SHARED / 2)
+
+    def _request(self) -> tuple[Observation, Seconds]:
+        event = self._event
+        wanted = Event(
+            id="event", kind=event.kind, responder=LISTENER, objects=(event.object,) if event.object else (),
+            limit=None if event.succeeds else event.decided - event.start - event.turn,
+            turn=self._name if event.turn else "",
+            accept=() if event.task_until is None else ("act",),
+        )  # fmt: skip
+        request = RequestEvent(
+            id=self._name, requester=EXPLAINER, block=self._name, event=wanted, at=self._at(event.start)
+        )
+        return request, event.start
+
+    def _does(
+        self, actor: str, action: Action, since: Seconds, until: Seconds, target: str = ""
+    ) -> Iterator[tuple[Observation, Seconds]]:
+        targets = (target,) if target else ()
+        yield ActionBegan(actor=actor, action=action, targets=targets, at=self._at(since)), since
+        yield ActionEnded(actor=actor, action=action, targets=targets, at=self._at(until)), until
+
+    def _at(self, at: Seconds) -> Stamp:
+        return Stamp(self._clock, at)
+
+    @property
+    def _name(self) -> str:
+        return f"event-{self._number}"
+
+    @staticmethod
+    def _other(actor: str) -> str:
+        return LISTENER if actor == EXPLAINER else EXPLAINER

@@ -1,0 +1,58 @@
+"""Table 2.1 of the thesis: nine minutes of two people making canapés, as numbers to draw from and to compare with."""
+
+from collections.abc import Mapping
+
+from msgspec import Struct
+
+from schemas.behaviors import EventKind
+from schemas.units import Seconds
+from services.simulation.chance import Delays
+
+
+class Row(Struct, frozen=True, kw_only=True):
+    """One kind of connection event. delays: of the succeeded; failed_delays: from the start of one to its failure.
+
+    A backchannel has neither: it cannot fail.
+    """
+
+    succeeded: int
+    failed: int = 0
+    delays: Delays = Delays(0.0, 0.0, 0.0)
+    failed_delays: Delays = Delays(0.0, 0.0, 0.0)
+
+    @property
+    def count(self) -> int:
+        return self.succeeded + self.failed
+
+    @property
+    def success(self) -> float:
+        """Share of the events that succeeded."""
+        return self.succeeded / self.count
+
+
+TABLE: Mapping[EventKind, Row] = {
+    "directed_gaze": Row(
+        succeeded=13, delays=Delays(0.0, 0.3, 2.0), failed=1, failed_delays=Delays(1.5, 1.5, 1.5)
+    ),
+    "mutual_facial_gaze": Row(
+        succeeded=11, delays=Delays(0.0, 0.7, 1.5), failed=13, failed_delays=Delays(0.3, 0.6, 1.8)
+    ),
+    "adjacency_pair": Row(
+        succeeded=30, delays=Delays(0.0, 0.4, 1.1), failed=14, failed_delays=Delays(0.1, 1.2, 7.4)
+    ),
+    "backchannel": Row(succeeded=15),
+}  # fmt: skip
+EVENTS = sum(row.count for row in TABLE.values())
+MTBCE: Seconds = 5.7
+"""Mean time between the starts of successive connection events."""
+LONGEST_GAP: Seconds = 70.0
+
+DELAYS: Mapping[tuple[EventKind, bool], tuple[Seconds, ...]] = {
+    ("directed_gaze", True): (*[0.0] * 4, *[0.1] * 6, 0.65, 0.65, 2.0),
+    ("directed_gaze", False): (1.5,),
+    ("mutual_facial_gaze", True): (0.0, *[0.7] * 8, 0.6, 1.5),
+    ("mutual_facial_gaze", False): (0.3, *[0.5] * 10, 0.7, 1.8),
+    ("adjacency_pair", True): (0.0, *[0.4] * 27, 0.1, 1.1),
+    ("adjacency_pair", False): (0.1, *[0.7] * 11, 1.6, 7.4),
+}
+"""Single delays, by kind and success, that have the table's counts, extremes and means. They are ours."""
