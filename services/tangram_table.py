@@ -55,9 +55,12 @@ class Person(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
 
 
 class Surface(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """free: where nothing is ever laid; people who look at the table and at no piece look there."""
+
     id: str
     center: Vector
     footprint: tuple[Point, ...]
+    free: Vector
 
 
 class TangramTable(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):

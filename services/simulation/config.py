@@ -4,9 +4,55 @@ from typing import Literal
 
 from msgspec import Struct
 
-from schemas.units import Meters, Seconds
+from schemas.units import Degrees, Meters, Probability, Seconds
 
 HumanKind = Literal["scripted", "misplacing", "listening", "none"]
+
+
+class PerceptionFaults(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """What cameras and microphones get wrong (thesis 5.4.2), drawn from `simulation.seed`. All off by default.
+
+    With any fault in what is seen the cameras report at every `frame`, not only when something moves. Messages that
+    come twice, late or never are the bus' faults.
+    """
+
+    gaze: Degrees = 0.0
+    """`raw`: standard deviation of the head's direction, about each axis, anew in each frame."""
+    wrong_look: Probability = 0.0
+    """`symbolic`: how often a look is reported at the nearest other thing."""
+    missed_look: Probability = 0.0
+    """`symbolic`: how often a look is not reported at all."""
+    dropped_frames: Probability = 0.0
+    """Share of the frames that never come, of camera and microphone each by itself."""
+    lost_faces: float = 0.0
+    """How often a minute the face is lost."""
+    lost_for: tuple[Seconds, Seconds] = (0.1, 0.4)
+    """Shortest and longest time that it then takes to find it again."""
+    occlusion: Meters = 0.0
+    """How near a hand's center has to be to that of a piece to cover it; 0: hands are transparent."""
+    covered: Literal["faint", "missing"] = "faint"
+    """What becomes of a covered piece in the world: it stays as last seen, with a confidence of 0.3, or is gone."""
+    position: Meters = 0.0
+    """Standard deviation of x and y of each piece, anew in each frame. 0.005 is what edge detection gives."""
+    yaw: Degrees = 0.0
+    """The same of its angle. From 12 degrees on, "top" is now and then "top left"."""
+    dropped_speech: Probability = 0.0
+    """How often an utterance of the person is not heard."""
+
+    def __post_init__(self) -> None:
+        for name in ("gaze", "lost_faces", "occlusion", "position", "yaw"):
+            if not getattr(self, name) >= 0:
+                raise ValueError(f"simulation.faults.{name} must not be negative, not {getattr(self, name)}")
+        for name in ("wrong_look", "missed_look", "dropped_frames", "dropped_speech"):
+            if not 0 <= getattr(self, name) <= 1:
+                raise ValueError(f"simulation.faults.{name} must be in 0..1, not {getattr(self, name)}")
+        if not 0 <= self.lost_for[0] <= self.lost_for[1]:
+            raise ValueError(f"simulation.faults.lost_for must be shortest and longest, not {self.lost_for}")
+
+    @property
+    def unsteady(self) -> bool:
+        """Does what is seen differ from frame to frame by itself?"""
+        return any((self.dropped_frames, self.lost_faces, self.occlusion, self.position, self.yaw))
 
 
 class SimulationConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -17,7 +63,7 @@ class SimulationConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=
 
     human: HumanKind = "scripted"
     seed: int = 0
-    """Of the person's reaction times."""
+    """Of the person's reaction times and of what perception gets wrong."""
     jitter: Seconds = 0.03
     """Reaction times vary by up to this, either way. The scenario's order has room for 0.1 s."""
     await_participants: tuple[str, ...] = ("control", "generation", "realizer", "recognition")
@@ -25,7 +71,14 @@ class SimulationConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=
     entrance: Seconds = 1.0
     """From then until the person comes."""
     frame: Seconds = 1 / 15
-    """Between two reports of the world while something moves. Perception cameras give 10..30 per second."""
+    """Between two reports of the world while something moves, and of raw perception all the while the person sits
+    there. Perception cameras give 10..30 per second."""
+    perception: Literal["symbolic", "raw"] = "symbolic"
+    """`symbolic`: looks, speech and manipulations are reported as such. `raw`: only the head's pose, the voice, hands
+    and pieces; what that means is for recognition to find out."""
+    head_turn: Seconds = 0.2
+    """`raw`: how long the head takes to face something else."""
+    faults: PerceptionFaults = PerceptionFaults()
     hand_speed: Meters = 0.45
     """m/s, mean over a movement. Unhurried reaching at a table is about 0.4..0.8 m/s."""
     shortest_movement: Seconds = 0.6
@@ -35,6 +88,6 @@ class SimulationConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=
         for name in ("frame", "hand_speed", "shortest_movement"):
             if getattr(self, name) <= 0:
                 raise ValueError(f"simulation.{name} must be positive, not {getattr(self, name)}")
-        for name in ("entrance", "jitter"):
+        for name in ("entrance", "jitter", "head_turn"):
             if getattr(self, name) < 0:
                 raise ValueError(f"simulation.{name} must not be negative, not {getattr(self, name)}")

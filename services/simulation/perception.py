@@ -1,6 +1,7 @@
-"""What the simulated cameras report: the person and the table put together, as messages.
+"""What happens at the table: the person and the pieces put together, as exact messages.
 
-Pure. A look is reported while the person sits at the table; `act` while a piece really moves.
+Pure. A look is told of while the person sits at the table; `act` while a piece really moves. What perception makes of
+it is in `cameras.py`.
 """
 
 from collections.abc import Callable, Iterator
@@ -17,7 +18,7 @@ Stamper = Callable[[Seconds], Stamp]
 
 
 class Scene:
-    """A person at the table. `feed` it with what the robot does; `advance` gives what perception reports by `now`.
+    """A person at the table. `feed` it with what the robot does; `advance` gives what has happened by `now`.
 
     frame: seconds between two reports of the world while something moves.
     """

@@ -2,15 +2,20 @@
 
 import random
 from collections.abc import Callable
+from functools import partial
 
 from schemas import keys
+from schemas.messages import Message
+from schemas.perception import HeadPose, VoiceActivity
 from schemas.presence import PeerAlive
 from schemas.units import Seconds
 from schemas.world import World
 from services.bus import Bus, Subscription
 from services.runtime import Ready
 from services.simulation.appendix_b import misplacing_rules, rules
+from services.simulation.cameras import Cameras
 from services.simulation.config import HumanKind, SimulationConfig
+from services.simulation.head import Sightlines
 from services.simulation.human import Human
 from services.simulation.listening import ListeningHuman
 from services.simulation.perception import Scene
@@ -24,21 +29,40 @@ async def simulate(bus: Bus, ready: Ready, config: SimulationConfig) -> None:
     chance = random.Random(config.seed)
     human = _human(config.human, bus.robot, lambda: chance.uniform(-config.jitter, config.jitter))
     scene = Scene(human, table, robot=bus.robot, frame=config.frame, stamp=bus.stamp)
+    cameras = Cameras(scene, Sightlines(table, bus.robot), config, bus.stamp, partial(_chance, config.seed))
     with bus.subscribe(
-        keys.ANY_ALIVE, keys.FEEDBACK, keys.SYNC_POINT, keys.ROBOT_ACTION, keys.ANY_CONNECTION_EVENT
-    ) as inbox:
-        bus.publish(keys.WORLD, scene.world(bus.now()))
+        keys.ANY_ALIVE, keys.FEEDBACK, keys.SYNC_POINT, keys.ROBOT_ACTION, keys.ANY_CONNECTION_EVENT,
+        *([keys.ROBOT_STATE] if config.perception == "raw" else []),
+    ) as inbox:  # fmt: skip
+        bus.publish(keys.WORLD, cameras.world(bus.now()))
         ready()
         await _wait_for(set(config.await_participants), inbox)
         if config.human != "none":
-            scene.enter(bus.now() + config.entrance)
+            cameras.enter(bus.now() + config.entrance)
         while True:
-            received = await inbox.next(scene.deadline)
+            received = await inbox.next(cameras.deadline)
             now = bus.now()
             if received is not None:
-                scene.feed(received.message, now)
-            for message in scene.advance(now):
-                bus.publish(keys.WORLD if isinstance(message, World) else keys.PERCEIVED_ACTION, message)
+                cameras.feed(received.message, now)
+            for message in cameras.advance(now):
+                bus.publish(_key(message), message)
+
+
+def _key(message: Message) -> str:
+    match message:
+        case World():
+            return keys.WORLD
+        case HeadPose(actor=actor):
+            return keys.head_pose(actor)
+        case VoiceActivity(actor=actor):
+            return keys.voice_activity(actor)
+        case _:
+            return keys.PERCEIVED_ACTION
+
+
+def _chance(seed: int, name: str) -> random.Random:
+    """A source of its own for each thing that may go wrong."""
+    return random.Random(f"{seed} {name}")
 
 
 def _human(kind: HumanKind, robot: str, vary: Callable[[], Seconds]) -> Human:

@@ -32,9 +32,8 @@ class Movement(Struct, frozen=True, kw_only=True):
     yaw_end: float = 0.0
 
     def progress(self, now: Seconds) -> float:
-        """0..1, minimum jerk."""
-        part = min(1.0, max(0.0, (now - self.since) / (self.until - self.since)))
-        return part**3 * (10.0 - 15.0 * part + 6.0 * part**2)
+        """0..1."""
+        return minimum_jerk((now - self.since) / (self.until - self.since))
 
     def position(self, now: Seconds) -> Vector:
         done = self.progress(now)
@@ -180,6 +179,12 @@ class Table:
             for side in self._rest
         )
         return (*seen, Entity(id=person.id, kind="person", position=person.face), *hands)
+
+
+def minimum_jerk(part: float) -> float:
+    """How much of the way is done, 0..1, after `part` of the time: the way people move."""
+    part = min(1.0, max(0.0, part))
+    return part**3 * (10.0 - 15.0 * part + 6.0 * part**2)
 
 
 def _between(start: Vector, end: Vector, part: float) -> Vector:
