@@ -32,6 +32,11 @@ def pace(usual: Seconds, recent: Seconds | None, open: Seconds) -> Probability:
     return 1.0 if longest <= usual else usual / longest
 
 
+def share_of_good(failed: int, judged: int) -> Probability:
+    """Quality: 1 while nothing has been decided."""
+    return 1.0 - failed / judged if judged else 1.0
+
+
 def next_level(level: Level, value: Probability, config: RecognitionConfig) -> Level:
     """The level of `value`; it changes only when the value has passed a threshold by the hysteresis."""
     margin = config.hysteresis
@@ -53,22 +58,27 @@ class Engagement:
         self._busy_until: Seconds = float("-inf")
 
     def update(self, now: Seconds, *, busy: bool) -> Estimate:
-        """The estimate now. busy: with a task, so that it stays as it was."""
+        """The estimate now. busy: with a task, so that it stays as it was when that began."""
         if self.busy and not busy:
             self._busy_until = now
+        if not (self.busy and busy) and self._tally.starts.last is not None:
+            self.estimate = self._estimate(now, max(0.0, now - self._silent_since))
+        if busy and not self.busy:
+            reasons = ("busy with a task: estimate frozen", *self.estimate.reasons)
+            self.estimate = self.estimate._replace(reasons=reasons)
         self.busy = busy
-        last = self._tally.starts.last
-        if busy:
-            kept = [reason for reason in self.estimate.reasons if not reason.startswith("busy")]
-            self.estimate = self.estimate._replace(reasons=("busy with a task: estimate frozen", *kept))
-        elif last is not None:
-            self.estimate = self._estimate(now, max(0.0, now - max(last, self._busy_until)))
         return self.estimate
+
+    @property
+    def _silent_since(self) -> Seconds:
+        """The last start, or the end of the last task, whichever was later."""
+        last = self._tally.starts.last
+        return self._busy_until if last is None else max(last, self._busy_until)
 
     def _estimate(self, now: Seconds, open: Seconds) -> Estimate:
         usual, recent = self._usual, self._recent(now)
         failed, judged = self._tally.judged(now)
-        quality = 1.0 - failed / judged if judged else 1.0
+        quality = share_of_good(failed, judged)
         speed = pace(usual, recent, open)
         value = speed * quality
         between = f"{recent:.1f} s between recent events" if recent is not None else "no recent pace"
@@ -88,21 +98,32 @@ class Engagement:
             return self._config.reference_mtbce
         return mean
 
+    @property
+    def _recent_from(self) -> Seconds:
+        """From when on the recent window holds no time in which the actor was busy."""
+        return self._busy_until + self._config.window
+
     def _recent(self, now: Seconds) -> Seconds | None:
-        """Recent mean time between events; None while the window holds time in which somebody was busy."""
-        return self._tally.recent(now).mtbce if now - self._tally.window > self._busy_until else None
+        return self._tally.recent_mean(now) if now >= self._recent_from else None
 
     def next_change(self, now: Seconds) -> Seconds | None:
-        """When the level falls if nothing happens any more; None if it can't, or is frozen."""
-        last = self._tally.starts.last
+        """When the estimate changes otherwise than by getting less, or its level falls, if nothing happens any more.
+
+        None if neither will, or if it is frozen. The tally's own `next_change` may come first.
+        """
+        if self.busy or self._tally.starts.last is None:
+            return None
+        changes = (self._recent_from, self._level_falls(now))
+        return min((at for at in changes if at is not None and at > now), default=None)
+
+    def _level_falls(self, now: Seconds) -> Seconds | None:
+        """When silence alone will have passed the next threshold."""
         level = self.estimate.level
-        if self.busy or last is None or level not in ("engaged", "weakening"):
+        if level not in ("engaged", "weakening"):
             return None
         threshold = self._config.engaged_from if level == "engaged" else self._config.disengaged_below
         threshold -= self._config.hysteresis
-        failed, judged = self._tally.judged(now)
-        quality = 1.0 - failed / judged if judged else 1.0
+        quality = share_of_good(*self._tally.judged(now))
         if threshold <= 0.0 or quality <= threshold:
             return None
-        at = max(last, self._busy_until) + self._usual * quality / threshold + JUST_AFTER
-        return at if at > now else None
+        return self._silent_since + self._usual * quality / threshold + JUST_AFTER

@@ -2,32 +2,32 @@
 
 The time between events is the difference of successive *starts*, of all kinds and both initiators, failures
 included. Starts may become known late (a backchannel shows only at its end), so recent ones are kept sorted and
-gaps are final only after `SETTLED`.
+gaps are final only after `SETTLED`. What is kept is bounded by what happens in that time and in the recent window.
 """
 
-from bisect import insort
-from collections.abc import Iterable
-from itertools import pairwise
+from bisect import bisect_left, bisect_right, insort
+from collections.abc import Iterable, Sequence
+from operator import sub
 from typing import get_args
 
 from msgspec import Struct
 
 from schemas.behaviors import EventKind
-from schemas.recognition import ConnectionEvent, KindStatistics, WindowStatistics
+from schemas.recognition import ENDINGS, ConnectionEvent, KindStatistics, WindowStatistics
 from schemas.units import Seconds, Stamp
-from services.recognition.machine import ENDINGS
 
 SETTLED: Seconds = 120.0
-"""No start becomes known later than this."""
+"""No start becomes known later than this: one that does is counted, but splits no gap."""
 KINDS: tuple[EventKind, ...] = get_args(EventKind)
 
 
 class Count(Struct):
-    """One kind of event. failed: without the optional ones."""
+    """One kind of event. failed: without the optional ones. judged: successes and failures without those."""
 
     count: int = 0
     succeeded: int = 0
     failed: int = 0
+    judged: int = 0
     delays: int = 0
     delay_sum: Seconds = 0.0
     delay_min: Seconds = float("inf")
@@ -40,6 +40,7 @@ class Count(Struct):
         """Count a success or a failure; nothing else changes the rates."""
         if event.state == "succeeded":
             self.succeeded += 1
+            self.judged += not event.optional
             if event.delay is not None:
                 self.delays += 1
                 self.delay_sum += event.delay
@@ -47,6 +48,7 @@ class Count(Struct):
                 self.delay_max = max(self.delay_max, event.delay)
         elif event.state == "failed" and not event.optional:
             self.failed += 1
+            self.judged += 1
             delay = event.delay or 0.0
             self.failed_delay_sum += delay
             self.failed_delay_min = min(self.failed_delay_min, delay)
@@ -66,111 +68,195 @@ class Count(Struct):
         )  # fmt: skip
 
 
+def _counted(events: Iterable[ConnectionEvent]) -> Count:
+    count = Count()
+    for event in events:
+        count.count += 1
+        count.decide(event)
+    return count
+
+
 class Starts:
-    """The starts of a session: their number, mean and largest difference, in bounded memory."""
+    """The starts of connection events, in order: their number, mean and largest difference.
+
+    A session settles the old ones, the recent window forgets them.
+    """
 
     def __init__(self) -> None:
-        self.count = 0
-        self.first: Seconds = float("inf")
-        self._unsettled: list[Seconds] = []
-        self._largest_settled: Seconds | None = None
+        self._kept: list[Seconds] = []
+        self._settled = 0
+        """How many are counted and no longer kept."""
+        self._first: Seconds = float("inf")
+        """Of the settled."""
+        self._largest_settled: Seconds = float("-inf")
+        self._largest: Seconds | None = None
+        """None: to be found anew."""
 
     def add(self, start: Seconds) -> None:
-        self.count += 1
-        self.first = min(self.first, start)
-        insort(self._unsettled, start)
-        horizon = self._unsettled[-1] - SETTLED
-        while len(self._unsettled) > 1 and self._unsettled[1] < horizon:
-            gap = self._unsettled[1] - self._unsettled[0]
-            self._largest_settled = gap if self._largest_settled is None else max(self._largest_settled, gap)
-            del self._unsettled[0]
+        kept = self._kept
+        if self._settled and start < kept[0]:
+            self._settled += 1
+            self._first = min(self._first, start)
+            return
+        if self._largest is not None and start >= kept[-1]:
+            self._largest = max(self._largest, start - kept[-1])
+        else:
+            self._largest = None
+        insort(kept, start)
+
+    def settle(self, horizon: Seconds) -> None:
+        """Of what came before `horizon` keep only what can be said of it; and the last, for the next difference."""
+        settled = bisect_left(self._kept, horizon) - 1
+        if settled > 0:
+            self._first = min(self._first, self._kept[0])
+            self._largest_settled = max(self._largest_settled, *_differences(self._kept[: settled + 1]))
+            self._settled += settled
+            del self._kept[:settled]
+
+    def forget(self, number: int) -> None:
+        """Drop the oldest."""
+        if number:
+            del self._kept[:number]
+            self._largest = None
+
+    @property
+    def count(self) -> int:
+        return self._settled + len(self._kept)
 
     @property
     def last(self) -> Seconds | None:
-        return self._unsettled[-1] if self._unsettled else None
+        return self._kept[-1] if self._kept else None
 
     @property
     def mean_difference(self) -> Seconds | None:
-        return (self._unsettled[-1] - self.first) / (self.count - 1) if self.count > 1 else None
+        if self.count < 2:
+            return None
+        return (self._kept[-1] - min(self._first, self._kept[0])) / (self.count - 1)
 
     @property
     def largest_difference(self) -> Seconds | None:
-        known = [] if self._largest_settled is None else [self._largest_settled]
-        return max([*known, *_differences(self._unsettled)], default=None)
+        if self.count < 2:
+            return None
+        if self._largest is None:
+            self._largest = max(self._largest_settled, *_differences(self._kept))
+        return self._largest
 
 
-class _Recent(Struct, order=True):
-    """An event of the recent window, by start."""
-
-    start: Seconds
-    id: str
-    event: ConnectionEvent
+def _differences(starts: Sequence[Seconds]) -> list[Seconds]:
+    return list(map(sub, starts[1:], starts))
 
 
-class Tally:
-    """Statistics of one actor's events, or of all. window: length of the recent window. clock: of the stamps."""
+class _Window:
+    """What is counted of the session, or of the recent part of it."""
 
-    def __init__(self, window: Seconds, clock: str = "loop") -> None:
-        self.window = window
-        self._clock = clock
+    def __init__(self) -> None:
+        self.counts = {kind: Count() for kind in KINDS}
         self.starts = Starts()
         self.own_starts = Starts()
         """Without the glances that the maintenance policy caused."""
-        self._counts = {kind: Count() for kind in KINDS}
-        self._recent: list[_Recent] = []
+
+    def begin(self, event: ConnectionEvent) -> None:
+        self.counts[event.kind].count += 1
+        self.starts.add(event.started.seconds)
+        if _is_own(event):
+            self.own_starts.add(event.started.seconds)
+
+    def statistics(self, clock: str) -> WindowStatistics:
+        starts, own = self.starts, self.own_starts
+        return WindowStatistics(
+            kinds=tuple(count.statistics(kind) for kind, count in self.counts.items()),
+            mtbce=starts.mean_difference, mtbce_without_maintenance=own.mean_difference,
+            max_gap=starts.largest_difference, events=starts.count,
+            last_start=None if starts.last is None else Stamp(clock, starts.last),
+            last_start_without_maintenance=None if own.last is None else Stamp(clock, own.last),
+        )  # fmt: skip
+
+
+def _is_own(event: ConnectionEvent) -> bool:
+    return event.cause != "maintenance"
+
+
+def _order(event: ConnectionEvent) -> tuple[Seconds, str]:
+    return event.started.seconds, event.id
+
+
+class Tally:
+    """Statistics of one actor's events, or of all. window: length of the recent window. clock: of the stamps.
+
+    The recent window holds the events that started in the last `window` seconds, as they have been decided since.
+    """
+
+    def __init__(self, window: Seconds, clock: str = "loop") -> None:
+        self._length = window
+        self._clock = clock
+        self._session = _Window()
+        self._recent = _Window()
+        self._recent_events: dict[EventKind, list[ConnectionEvent]] = {kind: [] for kind in KINDS}
+        """In the order of their starts: started, or decided."""
         self._open: set[str] = set()
         self._decided: set[str] = set()
 
     def feed(self, event: ConnectionEvent) -> None:
         """Count one change of an event. Repeated and unknown ones change nothing."""
-        start = event.started.seconds
         if event.state == "started":
             if event.id in self._open:
                 return
             self._open.add(event.id)
-            self._counts[event.kind].count += 1
-            self.starts.add(start)
-            if event.cause != "maintenance":
-                self.own_starts.add(start)
-            insort(self._recent, _Recent(start, event.id, event), key=lambda recent: (recent.start, recent.id))
+            self._session.begin(event)
+            self._recent.begin(event)
+            insort(self._recent_events[event.kind], event, key=_order)
+            for starts in (self._session.starts, self._session.own_starts):
+                starts.settle(event.started.seconds - SETTLED)
         elif event.id in self._open:
             if event.id not in self._decided and event.state != "completed":
                 self._decided.add(event.id)
-                self._counts[event.kind].decide(event)
-                for recent in self._recent:
-                    if recent.id == event.id:
-                        recent.event = event
+                self._decide(event)
             if event.state in ENDINGS:
                 self._open.discard(event.id)
                 self._decided.discard(event.id)
 
+    def _decide(self, event: ConnectionEvent) -> None:
+        self._session.counts[event.kind].decide(event)
+        events = self._recent_events[event.kind]
+        index = bisect_left(events, _order(event), key=_order)
+        if index < len(events) and events[index].id == event.id:
+            events[index] = event
+            self._recent.counts[event.kind].decide(event)
+
+    @property
+    def starts(self) -> Starts:
+        """Of the session."""
+        return self._session.starts
+
     @property
     def next_change(self) -> Seconds | None:
         """When the oldest event leaves the recent window."""
-        return self._recent[0].start + self.window if self._recent else None
+        return min((self._leaves(events[0]) for events in self._recent_events.values() if events), default=None)
+
+    def _leaves(self, event: ConnectionEvent) -> Seconds:
+        return event.started.seconds + self._length
 
     def forget(self, now: Seconds) -> None:
         """Drop what has left the recent window."""
-        while self._recent and self._recent[0].start + self.window <= now:
-            del self._recent[0]
+        for kind, events in self._recent_events.items():
+            if events and self._leaves(events[0]) <= now:
+                gone = events[: bisect_right(events, now, key=self._leaves)]
+                del events[: len(gone)]
+                self._recent.counts[kind] = _counted(events)
+                self._recent.starts.forget(len(gone))
+                self._recent.own_starts.forget(sum(map(_is_own, gone)))
 
     def session(self) -> WindowStatistics:
-        kinds = tuple(count.statistics(kind) for kind, count in self._counts.items())
-        return self._window(kinds, self.starts, self.own_starts)
+        return self._session.statistics(self._clock)
 
     def recent(self, now: Seconds) -> WindowStatistics:
         self.forget(now)
-        events = [recent.event for recent in self._recent]
-        counts = {kind: Count() for kind in KINDS}
-        starts, own = Starts(), Starts()
-        for event in events:
-            counts[event.kind].count += 1
-            counts[event.kind].decide(event)
-            starts.add(event.started.seconds)
-            if event.cause != "maintenance":
-                own.add(event.started.seconds)
-        kinds = tuple(count.statistics(kind) for kind, count in counts.items())
-        return self._window(kinds, starts, own)
+        return self._recent.statistics(self._clock)
+
+    def recent_mean(self, now: Seconds) -> Seconds | None:
+        """Mean time between the events of the recent window."""
+        self.forget(now)
+        return self._recent.starts.mean_difference
 
     def judged(self, now: Seconds) -> tuple[int, int]:
         """Recent failures, and recent decisions that tell of engagement.
@@ -178,19 +264,5 @@ class Tally:
         Those are neither optional ones nor what was preempted, withdrawn or superseded.
         """
         self.forget(now)
-        states = [recent.event.state for recent in self._recent if not recent.event.optional]
-        return states.count("failed"), states.count("failed") + states.count("succeeded")
-
-    def _window(self, kinds: tuple[KindStatistics, ...], starts: Starts, own: Starts) -> WindowStatistics:
-        return WindowStatistics(
-            kinds=kinds, mtbce=starts.mean_difference, mtbce_without_maintenance=own.mean_difference,
-            max_gap=starts.largest_difference, events=starts.count, last_start=self._stamp(starts.last),
-            last_start_without_maintenance=self._stamp(own.last),
-        )  # fmt: skip
-
-    def _stamp(self, at: Seconds | None) -> Stamp | None:
-        return None if at is None else Stamp(self._clock, at)
-
-
-def _differences(starts: Iterable[Seconds]) -> list[Seconds]:
-    return [later - earlier for earlier, later in pairwise(starts)]
+        counts = self._recent.counts.values()
+        return sum(count.failed for count in counts), sum(count.judged for count in counts)
