@@ -31,7 +31,7 @@ from schemas import (
     units,
     world,
 )
-from schemas.messages import COMMANDS
+from schemas.messages import COMMANDS, OUTWARD
 from services.zenoh_order import KEPT
 
 PAGE = Path(__file__).parent / "protocol.md"
@@ -89,6 +89,11 @@ KEYS: tuple[tuple[str, str, str], ...] = (
     ),
     (keys.WORLD, "perception → all", "`World`"),
     (keys.HEAD_OWNER, "generation → all", "`HeadOwner`"),
+    (
+        keys.open_events("<person>"),
+        "recognition → all",
+        "`OpenEvents`, for those who come late ([connection-events.md](connection-events.md))",
+    ),
     (keys.statistics("<actor>"), "recognition → all", "`Statistics`, one per person, and `all`"),
     (keys.ROBOT_STATE, "control → all", "`RobotState`"),
     (keys.head_pose("<person>"), "perception → recognition", "`HeadPose`, some 10 to 30 times a second"),
@@ -120,7 +125,7 @@ Everything that services say to one another, and what any other program needs to
 |---|---|---|
 | `cmd` | requests to a server | each, in order; a late subscriber gets the last {keys.HISTORY_MAX_AGE:g} s; idempotent by id |
 | `evt` | request states, feedback, sync points, actions, connection events, faults | as `cmd` |
-| `state` | world, statistics, owner of the head | the last value, also for a late subscriber |
+| `state` | world, statistics, open events, owner of the head | the last value, also for a late subscriber |
 | `stream` | the robot's posture | the newest only; may be dropped |
 | `rpc` | short questions | a Zenoh query; no reply within its timeout is a failure |
 | `alive` | who is there | liveliness tokens |
@@ -131,7 +136,8 @@ includes them.
 
 ## Payloads
 
-Engage sends MessagePack and understands JSON as well. The encoding of a sample names form, message and major version:
+Engage sends MessagePack, and JSON where programs of others read most: OUTWARD. It
+understands both everywhere. The encoding of a sample names form, message and major version:
 `application/msgpack;engage.SyncPointReached/1`, `application/json;engage.PerformFragment/1`; the part after `;` may be
 missing. Another major version is refused by name. A payload is one struct; its field `type` says which. Fields at
 their default are left out. Unknown fields are ignored on the bus (a newer peer may send them).
@@ -183,8 +189,8 @@ with zenoh.open(config) as session:
         print(sample.encoding, sample.payload.to_bytes())
 ```
 
-What is published comes as MessagePack. `mode` `client` suits a visitor: Zenoh forwards it everything through the one
-it connects to.
+What is published comes as MessagePack, but for those named above. `mode` `client` suits a visitor: Zenoh forwards it
+everything through the one it connects to.
 
 A subscriber of Zenoh hears what is said from now on. What was said before, every process hands out to an ordinary
 query, as it was published: same encoding, attachment and timestamp.
@@ -194,7 +200,7 @@ query, as it was published: same encoding, attachment and timestamp.
 | `<robot>/{keys.of_class("state")}` | the last value of every state, from each process that is there |
 | `<robot>/{keys.of_class("evt")}`, `<robot>/{keys.of_class("cmd")}`, or any part of them | the last {keys.HISTORY_MAX_AGE:g} s, of each process in its order |
 
-- Parameters of the selector, joined by `;`: `format=json` for JSON instead of MessagePack; `age=60` for the events and
+- Parameters of the selector, joined by `;`: `format=json` for JSON whatever it was published in, or `format=msgpack`; `age=60` for the events and
   commands of the last 60 s (a process keeps its last {KEPT}).
 - Pass `consolidation=zenoh.ConsolidationMode.NONE` for events and commands: by default Zenoh keeps only the newest
   reply of each key, which is right for states alone.
@@ -255,7 +261,13 @@ instants of the bus clock.
 
 
 def page() -> str:
-    return HEAD.replace("KEYS\n", _key_table(), 1) + "\n".join(_module(module) for module in MODULES)
+    head = HEAD.replace("KEYS\n", _key_table(), 1).replace("OUTWARD", _outward(), 1)
+    return head + "\n".join(_module(module) for module in MODULES)
+
+
+def _outward() -> str:
+    *most, last = (f"`{kind.__name__}`" for kind in OUTWARD)
+    return f"{', '.join(most)} and {last}"
 
 
 def _key_table() -> str:

@@ -6,7 +6,7 @@
 |--------|-----|-----|
 | cmd    | requests to a server | each, in order; late subscribers get the last 2 s; idempotent by id |
 | evt    | request states, feedback, sync points, actions, connection events, faults | as cmd |
-| state  | posture, world, statistics, claims | last value, also for a late subscriber |
+| state  | world, statistics, open events, claims | last value, also for a late subscriber |
 | stream | joints, raw perception | newest only, may be dropped |
 | rpc    | short reads | query, short timeout, no reply = failure |
 | alive  | who is there | liveliness; delivered as `PeerAlive` and `PeerGone` |
@@ -51,6 +51,7 @@ ANY_REQUEST_STATE = f"{PREFIX}/evt/*/request"
 ANY_FEEDBACK = f"{PREFIX}/evt/*/feedback"
 ANY_FAULT = f"{PREFIX}/evt/*/fault"
 ANY_ACTION = f"{PREFIX}/evt/*/action"
+ANY_OPEN_EVENTS = f"{PREFIX}/state/recognition/open_events/*"
 ANY_STATISTICS = f"{PREFIX}/state/recognition/statistics/*"
 ANY_ALIVE = f"{PREFIX}/alive/*"
 EVERYTHING = f"{PREFIX}/**"
@@ -91,6 +92,11 @@ def statistics(actor: str) -> str:
 def connection_event(actor: str, kind: str) -> str:
     """actor: the person's id, whoever began; kind: an `EventKind`. Either may be `*`."""
     return f"{PREFIX}/evt/recognition/connection_event/{actor}/{kind}"
+
+
+def open_events(actor: str) -> str:
+    """actor: the person's id."""
+    return f"{PREFIX}/state/recognition/open_events/{actor}"
 
 
 def head_pose(actor: str) -> str:

@@ -32,6 +32,7 @@ from schemas.presence import PeerAlive, PeerGone
 from schemas.recognition import (
     ConnectionEvent,
     EventOutcome,
+    OpenEvents,
     RequestEvent,
     SignalTurn,
     Statistics,
@@ -52,7 +53,7 @@ Message = (
     | SyncPointArrived | SyncPointReached | WordSpoken | RobotState
     | DescribeBody | Capabilities | EstimateBehaviors | Estimates
     | ActionBegan | ActionEnded | ActorFound | ActorLost | World | HeadPose | VoiceActivity
-    | RequestEvent | EventOutcome | SignalTurn | TurnOutcome | ConnectionEvent | Statistics
+    | RequestEvent | EventOutcome | SignalTurn | TurnOutcome | ConnectionEvent | OpenEvents | Statistics
     | AskStatus | Status | PeerAlive | PeerGone
 )  # fmt: skip
 """What may travel. A union of tagged structs: the `type` field of the encoded form says which."""
@@ -66,6 +67,10 @@ COMMANDS: Mapping[str, tuple[type[Request], ...]] = {
     keys.BEHAVIOR: (PerformBehavior, AbortBehavior, GoHome),
 }
 """What each command key is for. A `Cancel` is understood on any of its server's."""
+
+OUTWARD = (ConnectionEvent, OpenEvents, Statistics)
+"""What recognition tells programs of others, a few times a second at most: published as JSON, which all can read.
+Everything else is MessagePack."""
 
 _msgpack_encoder = msgspec.msgpack.Encoder()
 _json_encoder = msgspec.json.Encoder()
@@ -84,6 +89,13 @@ def encode(message: Message) -> bytes:
 
 def encode_json(message: Message) -> bytes:
     return _json_encoder.encode(message)
+
+
+def published(message: Message) -> tuple[bytes, str]:
+    """Payload and encoding in the form in which this message is published."""
+    if isinstance(message, OUTWARD):
+        return encode_json(message), encoding_of(message, "json")
+    return encode(message), encoding_of(message)
 
 
 def decode(payload: bytes, encoding: str = "application/msgpack") -> Message:

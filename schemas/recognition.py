@@ -8,9 +8,7 @@ from schemas.behaviors import Action, Cause, Event, EventKind, TurnSignal
 from schemas.requests import Outcome, Request
 from schemas.units import Probability, Seconds, Stamp
 
-EventState = Literal[
-    "started", "succeeded", "failed", "preempted", "withdrawn", "superseded", "completed", "lost"
-]
+EventState = Literal["started", "succeeded", "failed", "preempted", "withdrawn", "superseded", "completed", "lost"]
 """`lost`: recognition has died with the event open. Never sent: made for its readers, as `PeerGone` is."""
 ENDINGS: frozenset[EventState] = frozenset({"failed", "preempted", "withdrawn", "superseded", "completed", "lost"})
 """The last state of an event: nothing follows it."""

@@ -10,7 +10,7 @@ from msgspec import Struct
 
 from schemas import keys
 from schemas.faults import EngageError, Fault, InputRefused, NoReply
-from schemas.messages import Message, decode, encode
+from schemas.messages import Message, decode, encode, published
 from schemas.presence import PeerAlive, PeerGone
 from schemas.status import BusHealth
 from schemas.units import Probability, Seconds, Stamp
@@ -79,7 +79,7 @@ class MemoryHub(Hub):
     # -- for MemoryBus ------------------------------------------------------------------------------------------
 
     def send(self, sender: str, key: str, message: Message) -> None:
-        self._pass_on(sender, Received(key, decode(encode(message)), sender, self._loop.time()))
+        self._pass_on(sender, Received(key, decode(*published(message)), sender, self._loop.time()))
 
     def inject(self, key: str, payload: bytes, encoding: str) -> None:
         """A payload from outside, as another program would send it. A bad one is answered with a Fault."""
@@ -170,7 +170,9 @@ class MemoryHub(Hub):
         self._askers.clear()
 
     def forget(self, name: str) -> None:
+        """A process takes its states with it; the events of the last seconds are kept here."""
         self._buses.pop(name, None)
+        self._state = {key: past for key, past in self._state.items() if past.received.source != name}
 
 
 class MemoryBus(Bus):

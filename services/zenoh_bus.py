@@ -15,7 +15,7 @@ import zenoh
 
 from schemas import keys
 from schemas.faults import EngageError, Fault, InputRefused, NoReply
-from schemas.messages import Message, decode, encode, encoding_of
+from schemas.messages import Message, decode, encode, encoding_of, published
 from schemas.status import BusHealth
 from schemas.units import Seconds, Stamp
 from services.bus import Answer, Bus, Hub, Keep, Received, Subscription
@@ -127,7 +127,7 @@ class ZenohHub(Hub):
     def publish(self, bus: "ZenohBus", key: str, message: Message) -> None:
         ordered = keys.key_class(key) != "stream"
         now = self._loop.time()
-        payload, encoding = encode(message), encoding_of(message)
+        payload, encoding = published(message)
         stamp = self.session.new_timestamp()
         if ordered:
             written = self._ledger.write(key, encoding, payload, bus.name, self.clocks.own, now)

@@ -52,7 +52,7 @@ class Visitors:
 
     def _asked(self, query: zenoh.Query) -> None:
         try:
-            form, oldest = form_asked(query), self._loop.time() - _age(query.parameters)
+            form, oldest = form_asked(query, ""), self._loop.time() - _age(query.parameters)
         except InputRefused as error:
             refuse(query, error.fault, "json")
             finish(query)
@@ -70,7 +70,7 @@ class Visitors:
         for _ in range(min(BATCH, len(waiting)) if self._open else 0):
             written, stamp = waiting.popleft()
             payload, encoding = written.payload, written.encoding
-            if form == "json":
+            if form and not encoding.startswith(f"application/{form}"):
                 payload, encoding = in_form(decode(payload, encoding), form)
             attachment = pack(written.envelope)
             query.reply(written.key, payload, encoding=encoding, attachment=attachment, timestamp=stamp)
@@ -80,11 +80,11 @@ class Visitors:
             finish(query)
 
 
-def form_asked(query: zenoh.Query) -> str:
+def form_asked(query: zenoh.Query, otherwise: str = "msgpack") -> str:
     """`json` or `msgpack`: what the selector asks for, or else what the question is in. Raises InputRefused."""
     form = query.parameters.get("format")
     if form is None:
-        return "json" if str(query.encoding).startswith("application/json") else "msgpack"
+        return "json" if str(query.encoding).startswith("application/json") else otherwise
     if form not in ("json", "msgpack"):
         raise InputRefused(Fault(reason=f"format {form!r}", where="selector", advice="json or msgpack"))
     return form

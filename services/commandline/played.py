@@ -8,11 +8,10 @@ from schemas.blocks import Block, BlockOutcome
 from schemas.feedback import BlockProgress, PredictionFeedback, SyncPointProgress, WarningFeedback
 from schemas.fragments import FragmentOutcome, TurnFragment
 from schemas.messages import Message
-from schemas.recognition import ConnectionEvent
+from schemas.recognition import ENDINGS, ConnectionEvent
 from schemas.units import Seconds
 from services.commandline.process import DONE, FAILED
 from services.commandline.sources import Thing
-from services.recognition.machine import ENDINGS
 
 GRACE: Seconds = 0.5
 """How long after its limit the end of an event may take to get here."""

@@ -17,9 +17,6 @@ from schemas.units import Probability, Seconds, Stamp
 Effect = ConnectionEvent | EventOutcome | TurnOutcome | Accepted | Refused
 IDLE = "idle"
 DECISIONS: frozenset[EventState] = frozenset({"succeeded", "failed", "preempted", "withdrawn", "superseded"})
-ENDINGS: frozenset[EventState] = frozenset({"failed", "preempted", "withdrawn", "superseded", "completed"})
-"""The last state of an event: nothing follows it."""
-
 PREFIX: Mapping[EventKind, str] = {
     "directed_gaze": "dg", "mutual_facial_gaze": "mfg", "adjacency_pair": "ap", "backchannel": "bc",
 }  # fmt: skip

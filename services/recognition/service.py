@@ -5,13 +5,14 @@ from collections.abc import Iterable
 from schemas import keys
 from schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost
 from schemas.attention import HeadOwner
-from schemas.recognition import ConnectionEvent, EventOutcome, RequestEvent, SignalTurn, TurnOutcome
+from schemas.recognition import ConnectionEvent, EventOutcome, RequestEvent, SignalTurn, TurnOutcome, session_of
 from schemas.requests import Accepted, Cancel, Refused
 from schemas.units import Seconds, Stamp
 from schemas.world import World
 from services.bus import Bus, Received
 from services.recognition.config import RecognitionConfig
 from services.recognition.machine import Effect
+from services.recognition.open_events import OpenBook
 from services.recognition.session import Observation, Session
 from services.recognition.standings import Standings
 from services.requests import RequestDesk
@@ -42,9 +43,9 @@ class _Recognition:
     def __init__(self, bus: Bus, config: RecognitionConfig) -> None:
         self.desk = RequestDesk(bus, "recognition", self._cancel)
         self._bus = bus
-        # Loop time in milliseconds: no restarted service can have begun in the same one.
-        name = f"{round(bus.now() * 1000):x}-"
-        self._session = Session(bus.robot, config, clock=bus.clock, name=name)
+        session = session_of(bus.run)
+        self._session = Session(bus.robot, config, clock=bus.clock, name=f"{session}-")
+        self._open = OpenBook(bus.robot, session)
         self._standings = Standings(bus.robot, config, bus.clock)
 
     @property
@@ -90,22 +91,21 @@ class _Recognition:
                 stamp = observation.at
         return arrived if stamp is None else min(self._bus.local(stamp), self._bus.now())
 
-    def _person_in(self, event: ConnectionEvent) -> str:
-        return event.responder if event.initiator == self._bus.robot else event.initiator
-
     def _tell(self, effects: Iterable[Effect]) -> None:
         events = []
         for effect in effects:
             match effect:
                 case ConnectionEvent():
                     events.append(effect)
-                    self._bus.publish(keys.connection_event(self._person_in(effect), effect.kind), effect)
+                    self._bus.publish(keys.connection_event(effect.person(self._bus.robot), effect.kind), effect)
                 case Accepted(id=id):
                     self.desk.accept(id)
                 case Refused(id=id, fault=fault):
                     self.desk.refuse(id, fault)
                 case EventOutcome() | TurnOutcome():
                     self.desk.end(effect)
+        for book in self._open.feed(events, self._bus.stamp()):
+            self._bus.publish(keys.open_events(book.actor), book)
         busy = {person.id for person in self._session.persons.values() if person.acts_since is not None}
         for statistics in self._standings.feed(events, busy, self._bus.now()):
             if statistics.actor != "all":  # a person of that name would pass for everybody

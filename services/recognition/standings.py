@@ -37,8 +37,7 @@ class Standings:
         """Count what happened; the statistics that are new. busy: persons with a task in hand."""
         touched = {actor for actor, one in self._standings.items() if one.due is not None and one.due <= now}
         for event in events:
-            actor = event.responder if event.initiator == self._robot else event.initiator
-            for name in (actor, EVERYBODY):
+            for name in (event.person(self._robot), EVERYBODY):
                 self._standing(name).tally.feed(event)
                 touched.add(name)
         if busy != self._busy:

@@ -13,10 +13,10 @@ from schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost
 from schemas.attention import Claim, HeadOwner
 from schemas.behaviors import TurnSignal
 from schemas.feedback import BlockProgress, SyncPointProgress
-from schemas.recognition import ConnectionEvent, EventOutcome, SignalTurn, TurnOutcome
+from schemas.recognition import ENDINGS, ConnectionEvent, EventOutcome, SignalTurn, TurnOutcome
 from schemas.requests import Accepted, Cancel, Refused
 from services.recognition.config import RecognitionConfig
-from services.recognition.machine import DECISIONS, ENDINGS
+from services.recognition.machine import DECISIONS
 from services.recognition.session import Observation, Session
 from services.recognition.standings import Standings
 from services.recognition.statistics import KINDS

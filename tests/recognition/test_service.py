@@ -127,7 +127,7 @@ async def test_statistics_are_there_for_a_late_joiner(hub: MemoryHub):
 
     assert received is not None
     assert isinstance(received.message, ConnectionEvent)
-    assert (received.message.id, received.message.state) == ("0-mfg-1", "started")
+    assert (received.message.id, received.message.state) == ("2-mfg-1", "started")
     assert {one.key for one in statistics if one} == {keys.statistics("all"), keys.statistics(HUMAN)}
     assert all(isinstance(one.message, Statistics) and one.message.session.events == 1 for one in statistics if one)
 

@@ -5,11 +5,11 @@ from pathlib import Path
 import pytest
 
 from schemas.behaviors import EventKind
+from schemas.recognition import ENDINGS
 from services.recognition import adjacency_pair, backchannel, directed_gaze, mutual_facial_gaze
 from services.recognition.config import RecognitionConfig
 from services.recognition.machine import (
     DECISIONS,
-    ENDINGS,
     IDLE,
     Ledger,
     Row,

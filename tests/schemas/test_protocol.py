@@ -55,7 +55,7 @@ def test_every_key_is_in_the_table(protocol: ModuleType) -> None:
     }
     makers = (
         keys.cancel, keys.request_state, keys.fault, keys.statistics, keys.status, keys.alive, keys.head_pose,
-        keys.voice_activity,
+        keys.voice_activity, keys.open_events,
     )  # fmt: skip
     made = {make("x") for make in makers} | {keys.connection_event("x", "x")}
 

@@ -1,0 +1,31 @@
+"""Which events are open, for those who come late: one message per person, made anew at each change."""
+
+from collections.abc import Iterable
+
+from schemas.recognition import ENDINGS, ConnectionEvent, OpenEvents
+from schemas.units import Stamp
+
+
+class OpenBook:
+    """robot: whoever else takes part in an event is the person it counts for. session: as in the ids."""
+
+    def __init__(self, robot: str, session: str) -> None:
+        self._robot = robot
+        self._session = session
+        self._open: dict[str, dict[str, ConnectionEvent]] = {}
+
+    def feed(self, changes: Iterable[ConnectionEvent], at: Stamp) -> list[OpenEvents]:
+        """Enter what happened; the messages of the persons it happened with. at: now."""
+        touched = set()
+        for change in changes:
+            person = change.person(self._robot)
+            touched.add(person)
+            events = self._open.setdefault(person, {})
+            if change.state in ENDINGS:
+                events.pop(change.id, None)
+            else:
+                events[change.id] = change
+        return [
+            OpenEvents(actor=person, session=self._session, at=at, events=tuple(self._open[person].values()))
+            for person in sorted(touched)
+        ]
