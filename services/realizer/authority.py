@@ -15,41 +15,30 @@ from schemas.units import Seconds
 from services.realizer.assembly import Member
 from services.realizer.config import RealizerConfig
 from services.realizer.effects import Begin, Effect, Extend
-from services.realizer.experience import Experience
-from services.realizer.facts import Facts
-from services.realizer.forecast import Forecast, full_forecast
-from services.realizer.pacing import Pace, differs, pace
+from services.realizer.outlook import SURPRISE, Outlook
+from services.realizer.pacing import differs, pace
 from services.realizer.patience import Patience
 from services.realizer.planner import Plan
 from services.realizer.points import Point, performer
 from services.realizer.schedule import EPSILON
 
-SURPRISE: Seconds = 0.1
-"""What comes as far from when it was expected as this moves what depends on it noticeably."""
 
-
-class Authority(Facts):
+class Authority(Outlook):
     """The state of one performance. began: loop time of the block's start; all times are of that clock."""
 
     def __init__(self, plan: Plan, began: Seconds, config: RealizerConfig) -> None:
-        super().__init__(began)
+        super().__init__(plan, began)
         self.config = config
-        self.experience = Experience(plan.estimates)
         self.patience = Patience(config)
         self._through: dict[str, int] = {}
         self._granted_at: dict[str, Seconds] = {}
-        self.paces: dict[str, Pace] = {}
-        self.not_before: dict[str, Seconds] = {}
-        """When a behavior that is overdue is expected at its next point."""
-        self._expected = {point: began + plan.predicted(point) for point in plan.at}
         self.replan(plan)
         self.is_surprised = False
-        """Has something come at another time than was last expected?"""
 
     def replan(self, plan: Plan) -> None:
         """Go on with another plan of the same block, from the same facts: something was dropped."""
         self._set_plan(plan)
-        self.is_surprised = True
+        self._look_ahead()
         size = len(plan.net.transitions)
         self._unmet = [len(sources) for sources in self._wiring.waits_for]
         """Of each transition: what has not been measured that it waits for, and who has not begun that is to come."""
@@ -58,11 +47,7 @@ class Authority(Facts):
         self._unreached = [len(members) for members in plan.members]
         self._granted: set[tuple[int, str]] = set()
         self._wakes: list[tuple[Seconds, int]] = []
-        self._arrivals: list[tuple[Seconds, Seconds, str, int]] = []
-        """Until when and since when each behavior is expected at its next point: overdue from there."""
         self._touched: set[str] = set()
-        # None: nothing in this block needs one.
-        self.forecast = Forecast(plan, self.began, self.experience.factor) if self._wiring.is_predictive else None
         self._unended = {id for id in plan.waited_for if not self.has_ended(id)}
         self._dirty: set[int] = set()
         for transition in [each for each in range(size) if not self._unmet[each]]:
@@ -145,18 +130,6 @@ class Authority(Facts):
         if self.forecast is not None:
             self.forecast.require(transition)
 
-    def _learn(self, point: Point, at: Seconds) -> None:
-        """Correct what is expected of the same parts by how long a phase took that nobody has hurried or held up."""
-        chain = self.plan.chains.get(point.behavior)
-        number = self._next.get(point.behavior, 0)
-        if chain is None or number == 0 or chain.points[number] != point or self.paces.get(point.behavior):
-            return
-        if performer(chain.behavior) == "body":
-            took = at - self.reached[chain.points[number - 1]]
-            changed = self.experience.learn(point.behavior, chain.segments[number - 1].natural, took)
-            if self.forecast is not None:
-                self.forecast.relearn(changed)
-
     @property
     def is_over(self) -> bool:
         """Has everything ended that the block waits for?"""
@@ -166,7 +139,7 @@ class Authority(Facts):
 
     def advance(self, now: Seconds) -> list[Effect]:
         """What to do now. Extensions come before beginnings: who hands over leaves before his successor comes."""
-        self._predict(now)
+        self._conclude(now)
         while self._wakes and self._wakes[0][0] <= now + EPSILON:
             self._dirty.add(heapq.heappop(self._wakes)[1])
         beginning = self._decide_all(now)
@@ -194,7 +167,7 @@ class Authority(Facts):
                 self._decide(transition, now, beginning)
             for behavior in beginning[count:]:
                 self.begun[behavior] = now
-                self._follow(behavior)
+                self._follow(behavior, now)
             count = len(beginning)
         return beginning
 
@@ -204,26 +177,9 @@ class Authority(Facts):
         wake = self._wakes[0][0] if self._wakes else None
         return min((at for at in (wake, self.patience.deadline) if at is not None), default=None)
 
-    def _predict(self, now: Seconds) -> None:
-        """Who is overdue is expected to be late by as much again. What that changes is decided anew."""
-        if self.forecast is None:
-            return
-        while self._arrivals and self._arrivals[0][0] < now - EPSILON:
-            _, expected, behavior, number = heapq.heappop(self._arrivals)
-            points = self._points.get(behavior, ())
-            if self._next.get(behavior) != number or number >= len(points) or self.holds(points[number]):
-                continue
-            expected = max(expected, dict(self.paces.get(behavior, ())).get(points[number].sync, expected))
-            until = expected
-            if expected < now - EPSILON:  # and not slower on purpose
-                until = self.not_before[behavior] = now + (now - expected)
-                self.forecast.overdue(self.plan.at[points[number]], until)
-            heapq.heappush(self._arrivals, (until, expected, behavior, number))
-        self._conclude()
-
-    def _conclude(self) -> None:
-        assert self.forecast is not None
-        for transition in self.forecast.update():
+    def _conclude(self, now: Seconds) -> None:
+        """What is expected at another time than before is decided anew."""
+        for transition in self._changes(now):
             if transition < len(self.plan.members):
                 if not self._unmet[transition]:
                     self._dirty.add(transition)
@@ -263,7 +219,7 @@ class Authority(Facts):
         """Is it of a behavior that has not even begun, and later than its start?"""
         return member.kind != "start" and member.behavior in self._points and member.behavior not in self.begun
 
-    def _follow(self, behavior: str) -> None:
+    def _follow(self, behavior: str, now: Seconds) -> None:
         """It begins: when its points are to be matters from now on."""
         for transition in {self.plan.at[point] for point in self._points.get(behavior, ())}:
             member = next(each for each in self.plan.members[transition] if each.behavior == behavior)
@@ -273,8 +229,7 @@ class Authority(Facts):
                     self._open(transition)
             if self.forecast is not None:
                 self.forecast.require(transition)
-        if self.forecast is not None:
-            self._conclude()
+        self._conclude(now)
 
     def _decide_pause(self, transition: int, member: Member, due: Seconds, now: Seconds) -> None:
         """An utterance goes through a word gap unless it would be noticeably early; it is told just before."""
@@ -290,25 +245,6 @@ class Authority(Facts):
         if (transition, member.behavior) not in self._granted:
             self._granted.add((transition, member.behavior))
             self._touched.add(member.behavior)
-
-    def _arrival(self, member: Member) -> Seconds | None:
-        """When a behavior under way will come to its hold point; None if it has not begun."""
-        points, number = self._points[member.behavior], self._next.get(member.behavior, 0)
-        if not number:
-            return None
-        at = self.reached[points[number - 1]]
-        for each in range(number, points.index(member.point) + 1):
-            at += self._phase(member.behavior, each)
-            if each == number:
-                at = max(at, self.not_before.get(member.behavior, at))
-        return at
-
-    def _phase(self, behavior: str, number: int) -> Seconds:
-        """How long it is expected to take from the point before to the one of that number."""
-        if self.forecast is None:
-            return self.plan.chains[behavior].segments[number - 1].natural * self.experience.factor(behavior)
-        before, here = (self.plan.at[point] for point in self._points[behavior][number - 1 : number + 1])
-        return 0.0 if before == here else self.forecast.phase(behavior, here)
 
     def _extension(self, behavior: str, now: Seconds) -> Iterable[Extend]:
         """Its new authority, if that is further than before or asks for another pace."""
@@ -359,37 +295,27 @@ class Authority(Facts):
             return
         since = self.reached[points[number - 1]] if number else self.begun[behavior]
         natural = chain.segments[number - 1].natural if number else 0.0
-        asked = dict(self.paces.get(behavior, ())).get(points[number].sync, since + natural)
+        asked = self._asked(points[number], since + natural)
         expected = max(since + natural, asked, self._granted_at[behavior] if is_there else 0.0)
         self.patience.expect(behavior, points[number].sync, expected, natural)
 
     def _await(self, behavior: str) -> None:
-        """What is expected of it next, now that it has come so far; and from when on it is overdue."""
-        points, number = self._points[behavior], self._next.get(behavior, 0)
-        for each in range(number, len(points)):
+        """What is expected of it next, now that it has come so far."""
+        points = self._points[behavior]
+        for point in points[self._next.get(behavior, 0) :]:
             # Whether it comes on time to where it must ask next can be told only now that it is under way.
-            if not self.may_pass(points[each]):
-                self._dirty.add(self.plan.at[points[each]])
+            if not self.may_pass(point):
+                self._dirty.add(self.plan.at[point])
                 break
-        if self.forecast is not None and 0 < number < len(points):
-            self.not_before.pop(behavior, None)
-            expected = self.reached[points[number - 1]] + self._phase(behavior, number)
-            heapq.heappush(self._arrivals, (expected, expected, behavior, number))
+        self._expect_next(behavior)
 
-    # -- what is told of it --------------------------------------------------------------------------------------
+    # -- other blocks --------------------------------------------------------------------------------------------
 
-    def expected(self, now: Seconds) -> dict[Point, Seconds]:
-        """When each point of the block that is still to come is expected, seconds from the block's start."""
-        forecast = self.from_scratch()
-        for transition in range(len(self.plan.members)):
-            forecast.overdue(transition, now)
-        forecast.update()
-        coming = {point for points in self._points.values() for point in points} - self.reached.keys()
-        self._expected |= {point: max(now, forecast.times[self.plan.at[point]]) for point in coming}
-        self.is_surprised = False
-        return {point: self._expected[point] - self.began for point in coming}
-
-    def from_scratch(self) -> Forecast:
-        """When each instant will be: what the forecast kept up to date says of those it keeps, and all others."""
-        facts = (self.reached, self.arrived, self._instants)
-        return full_forecast(self.plan, self.began, self.experience.factor, *facts)
+    def follow(self, points: Iterable[Point]) -> None:
+        """Others want to know when these are to be: see `ahead`."""
+        self._followed.update(points)
+        if self.forecast is None:
+            self.replan(self.plan)
+            return
+        for point in self._followed & self.plan.at.keys():
+            self.forecast.require(self.plan.at[point])

@@ -21,10 +21,12 @@ REPAIRS = 200
 class Forecast(LongestPaths):
     """times: of each transition that was measured, that is required, or that those depend on.
 
-    factor: how much longer than estimated a behavior takes, by its id.
+    factor: how much longer than estimated a behavior takes, by its id. foreseen: points of other blocks.
     """
 
-    def __init__(self, plan: Plan, began: Seconds, factor: Callable[[str], float]) -> None:
+    def __init__(
+        self, plan: Plan, began: Seconds, factor: Callable[[str], float], foreseen: Mapping[Point, Seconds]
+    ) -> None:
         net = plan.net
         size = len(net.transitions)
         super().__init__(size, began)
@@ -57,8 +59,19 @@ class Forecast(LongestPaths):
             behavior = bound.behavior if bound.kind == "phase" else ""
             least = bound.lag if not behavior else -inf if bound.stretch is None else bound.lag - bound.stretch
             self._add(bound.source, bound.target, bound.lag, least, behavior, is_bound=True)
+        self._elsewhere: dict[int, int] = {}
+        """Of instants with points of other blocks: the arc that keeps them to what those foresee."""
+        for point in plan.foreign:
+            transition = plan.at[point]
+            if transition not in self._elsewhere:
+                node = self._new_node()
+                self.times[node] = began
+                self._elsewhere[transition] = self._add(node, transition, 0.0, 0.0, "")
         self._drop_idle_bounds()
         self.fix(0, began)
+        for point, at in foreseen.items():
+            if point in plan.at:
+                self.foresee(plan.at[point], at)
 
     def _add(
         self, source: int, target: int, asked: Seconds, least: Seconds, behavior: str, *, is_bound: bool = False
@@ -162,6 +175,15 @@ class Forecast(LongestPaths):
         if not self._is_fact[transition]:
             self._raise_base(transition, at)
 
+    def foresee(self, transition: int, at: Seconds) -> None:
+        """Another block expects its point there at `at` now."""
+        number = self._elsewhere[transition]
+        node = self._arcs[number].source
+        before, self.times[node] = self.times[node], at
+        if at < before:
+            self._loosen(number)
+        self._touch(node)
+
     def relearn(self, behaviors: Iterable[str]) -> None:
         """The factors of these have changed."""
         for behavior in behaviors:
@@ -264,12 +286,13 @@ def full_forecast(
     plan: Plan,
     began: Seconds,
     factor: Callable[[str], float],
+    foreseen: Mapping[Point, Seconds],
     reached: Mapping[Point, Seconds],
     arrived: Mapping[Point, Seconds],
     instants: Mapping[int, Seconds],
 ) -> Forecast:
     """Of every instant, from scratch: points that are reached or arrived at, and instants that are over."""
-    forecast = Forecast(plan, began, factor)
+    forecast = Forecast(plan, began, factor, foreseen)
     for point, at in reached.items():
         if point in plan.at:
             forecast.passed(point.behavior, plan.at[point], at)

@@ -68,6 +68,11 @@ class Plan(Struct, frozen=True, kw_only=True):
         return self.schedule[self.at[point]]
 
     @property
+    def foreign(self) -> tuple[Point, ...]:
+        """Points of other blocks that this one is tied to."""
+        return tuple([point for point in self.at if ":" in point.behavior])
+
+    @property
     def bounds(self) -> tuple[Bound, ...]:
         return self.net.bounds
 
