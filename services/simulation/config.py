@@ -6,7 +6,7 @@ from msgspec import Struct
 
 from schemas.units import Degrees, Meters, Probability, Seconds
 
-HumanKind = Literal["scripted", "misplacing", "listening", "none"]
+HumanKind = Literal["scripted", "misplacing", "listening", "stochastic", "none"]
 
 
 class PerceptionFaults(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -55,10 +55,75 @@ class PerceptionFaults(Struct, frozen=True, kw_only=True, forbid_unknown_fields=
         return any((self.dropped_frames, self.lost_faces, self.occlusion, self.position, self.yaw))
 
 
+class Habits(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """What the stochastic person does, how fast and how well. Delays are least, mean and longest, in seconds."""
+
+    follows_point: Probability = 0.929
+    """How often they look where the robot points. Table 2.1, directed gaze."""
+    follows_look: Probability = 0.8
+    """The same where it only looks. Ours: the table does not tell gaze with pointing from gaze without."""
+    follow_delay: tuple[Seconds, Seconds, Seconds] = (0.0, 0.3, 2.0)
+    """From the robot's look or point to theirs. Table 2.1."""
+    answers_look: Probability = 0.458
+    """How often they look back when the robot looks at their face, times `propensity`. Table 2.1: facial gaze."""
+    look_delay: tuple[Seconds, Seconds, Seconds] = (0.0, 0.7, 1.5)
+    """From the robot's look to theirs. Table 2.1."""
+    answers_turn: Probability = 0.682
+    """How often they answer a turn, or begin what it asks for, in time. Table 2.1, adjacency pair. Where they don't
+    they study the pieces first, if the turn was a request."""
+    answer_delay: tuple[Seconds, Seconds, Seconds] = (0.0, 0.4, 1.1)
+    """From the end of the turn. Table 2.1."""
+    study: tuple[Seconds, Seconds, Seconds] = (4.0, 9.0, 60.0)
+    """How long they study the pieces: the busy regime. Thesis 2.3 has it; the numbers are ours."""
+    busy_answers: Probability = 0.25
+    """What is left of these three, and of what they do of their own accord, while they study or move pieces. Ours."""
+    search: tuple[Seconds, Seconds, Seconds] = (0.3, 1.5, 6.0)
+    """How long they look for a piece that they have not seen the robot point or look at. Ours."""
+    hears: Probability = 0.97
+    """How often they hear what the robot says. Ours."""
+    guesses: Probability = 0.5
+    """How often they take some piece for "this" or "that" when they have not seen which; else they ask. Ours."""
+    confuses: Probability = 0.06
+    """How often they then take another one of the same color or shape. Ours."""
+    confuses_shown: Probability = 0.01
+    """The same where they have seen it. Ours."""
+    misplaces: Probability = 0.05
+    """How often they lay a piece on another side of the landmark than asked. Ours."""
+    backchannels: Probability = 0.03
+    """After each word they hear: how often they nod, or say a brief word. Ours."""
+    speaks: Probability = 0.3
+    """Share of backchannels and answers that are words; the others are nods. Ours."""
+    looks_up_every: Seconds = 12.0
+    """Mean time between looks at the robot's face of their own accord, at a `propensity` of 1. Ours."""
+    directs_every: Seconds = 45.0
+    """Mean time between looks or points at a piece of their own accord. Ours."""
+    points: Probability = 0.4
+    """Share of those that are points. Ours."""
+    glance: Seconds = 1.2
+    """How long they look at a face or a thing. Ours."""
+    reports: Probability = 0.7
+    """How often they look up at the robot's face when a piece is laid, times `propensity`. Ours."""
+    reciprocity: Probability = 0.08
+    """How much an answered look at the robot's face moves their propensity for such looks from 1 toward 2, and an
+    unanswered one toward 0. Our assumption, after hypothesis 11 of the thesis; 0: eye contact changes nothing."""
+
+    def __post_init__(self) -> None:
+        for name in self.__struct_fields__:
+            value = getattr(self, name)
+            if isinstance(value, tuple):
+                if not 0 <= value[0] < value[1] < value[2]:
+                    raise ValueError(f"simulation.stochastic.{name}: 0 <= least < mean < longest, not {value}")
+            elif name in ("looks_up_every", "directs_every", "glance"):
+                if not value > 0:
+                    raise ValueError(f"simulation.stochastic.{name} must be positive, not {value}")
+            elif not 0 <= value <= 1:
+                raise ValueError(f"simulation.stochastic.{name} must be in 0..1, not {value}")
+
+
 class SimulationConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """human: `scripted` follows Appendix B by the ids of the robot's blocks; `misplacing` does too, but lays one
-    piece wrongly; `listening` does what the robot's words say, whatever the manager's plan; `none` leaves the
-    table alone.
+    piece wrongly; `listening` does what the robot's words say, whatever the manager's plan; `stochastic` too, with
+    the habits, pace and mistakes of `stochastic`; `none` leaves the table alone.
     """
 
     human: HumanKind = "scripted"
@@ -79,6 +144,7 @@ class SimulationConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=
     head_turn: Seconds = 0.2
     """`raw`: how long the head takes to face something else."""
     faults: PerceptionFaults = PerceptionFaults()
+    stochastic: Habits = Habits()
     hand_speed: Meters = 0.45
     """m/s, mean over a movement. Unhurried reaching at a table is about 0.4..0.8 m/s."""
     shortest_movement: Seconds = 0.6

@@ -66,7 +66,21 @@ class Pause(Struct, frozen=True):
     seconds: Seconds
 
 
-Act = LookAt | Sit | Leave | Grab | Lay | Withdraw | Pause
+class Start(Struct, frozen=True):
+    """Begin to speak, nod, shake the head, or point at `target`."""
+
+    action: Action
+    target: str = ""
+
+
+class Stop(Struct, frozen=True):
+    """End what the same `Start` began."""
+
+    action: Action
+    target: str = ""
+
+
+Act = LookAt | Sit | Leave | Grab | Lay | Withdraw | Pause | Start | Stop
 
 
 # -- when they do it --------------------------------------------------------------------------------------------

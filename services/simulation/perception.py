@@ -7,10 +7,11 @@ it is in `cameras.py`.
 from collections.abc import Callable, Iterator
 
 from schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost
+from schemas.behaviors import Action
 from schemas.messages import Message
 from schemas.units import Seconds, Stamp
 from schemas.world import Entity, World
-from services.simulation.human import FACE, Act, Grab, Human, Lay, Leave, LookAt, Pause, Sit, Withdraw
+from services.simulation.human import FACE, Act, Grab, Human, Lay, Leave, LookAt, Pause, Sit, Start, Stop, Withdraw
 from services.simulation.table import Table
 from services.tangram_table import Pose, overlap, poses_touching
 
@@ -56,9 +57,9 @@ class Scene:
         changed = self._table.moving and self._last_world is not None and now >= self._last_world + self._frame
         for moved in self._table.settle(now):
             changed = True
-            yield self._act(ActionEnded, moved.piece, moved.at)
+            yield self._does(ActionEnded, "act", moved.piece, moved.at)
         while acts := self._human.due(now):
-            changed = changed or not isinstance(acts[0], LookAt | Pause)
+            changed = changed or not isinstance(acts[0], LookAt | Pause | Start | Stop)
             yield from self._do(acts[0], acts[1:], now)
         if changed:
             yield self.world(now)
@@ -72,10 +73,10 @@ class Scene:
                 self._table.seated = True
                 yield ActorFound(actor=self._actor, at=self._stamp(now))
                 if self._look is not None:
-                    yield self._looking(ActionBegan, self._look, now)
+                    yield self._does(ActionBegan, "look", self._look, now)
             case Leave():
                 if self._look is not None:
-                    yield self._looking(ActionEnded, self._look, now)
+                    yield self._does(ActionEnded, "look", self._look, now)
                 self._table.seated, self._look = False, None
                 yield ActorLost(actor=self._actor, at=self._stamp(now))
             case Grab() | Lay() if self._table.carrying:
@@ -87,11 +88,15 @@ class Scene:
             case Lay(piece=piece) as lay:
                 if pose := self._place_for(lay, now):
                     following = self._table.carry(piece, pose, now)
-                    yield self._act(ActionBegan, piece, now)
+                    yield self._does(ActionBegan, "act", piece, now)
             case Withdraw():
                 self._table.withdraw(now)
             case Pause(seconds=seconds):
                 following = now + seconds
+            case Start(action=action, target=target):
+                yield self._does(ActionBegan, action, target, now)
+            case Stop(action=action, target=target):
+                yield self._does(ActionEnded, action, target, now)
         self._human.go_on(then, following)
 
     def _looks_at(self, target: str, now: Seconds) -> Iterator[Message]:
@@ -99,15 +104,12 @@ class Scene:
             return
         if self._table.seated:
             if self._look is not None:
-                yield self._looking(ActionEnded, self._look, now)
-            yield self._looking(ActionBegan, target, now)
+                yield self._does(ActionEnded, "look", self._look, now)
+            yield self._does(ActionBegan, "look", target, now)
         self._look = target
 
-    def _looking(self, kind: type[ActionBegan] | type[ActionEnded], target: str, now: Seconds) -> Message:
-        return kind(actor=self._actor, action="look", targets=(target,) if target else (), at=self._stamp(now))
-
-    def _act(self, kind: type[ActionBegan] | type[ActionEnded], piece: str, at: Seconds) -> Message:
-        return kind(actor=self._actor, action="act", targets=(piece,), at=self._stamp(at))
+    def _does(self, kind: type[ActionBegan] | type[ActionEnded], action: Action, target: str, at: Seconds) -> Message:
+        return kind(actor=self._actor, action=action, targets=(target,) if target else (), at=self._stamp(at))
 
     def _place_for(self, lay: Lay, now: Seconds) -> Pose | None:
         """The first place with room, or the first if there is none; None if no edges fit."""

@@ -1,7 +1,6 @@
 """The simulated human at the tangram table, instead of cameras: publishes the world and what the person does."""
 
 import random
-from collections.abc import Callable
 from functools import partial
 
 from schemas import keys
@@ -14,11 +13,12 @@ from services.bus import Bus, Subscription
 from services.runtime import Ready
 from services.simulation.appendix_b import misplacing_rules, rules
 from services.simulation.cameras import Cameras
-from services.simulation.config import HumanKind, SimulationConfig
+from services.simulation.config import SimulationConfig
 from services.simulation.head import Sightlines
 from services.simulation.human import Human
 from services.simulation.listening import ListeningHuman
 from services.simulation.perception import Scene
+from services.simulation.stochastic import StochasticHuman
 from services.simulation.table import Table
 from services.tangram_table import tangram_table
 
@@ -26,8 +26,7 @@ from services.tangram_table import tangram_table
 async def simulate(bus: Bus, ready: Ready, config: SimulationConfig) -> None:
     """Serve until cancelled. The person comes when everybody the configuration names is on the bus."""
     table = Table(tangram_table(), hand_speed=config.hand_speed, shortest_movement=config.shortest_movement)
-    chance = random.Random(config.seed)
-    human = _human(config.human, bus.robot, lambda: chance.uniform(-config.jitter, config.jitter))
+    human = _human(config, bus.robot, random.Random(config.seed))
     scene = Scene(human, table, robot=bus.robot, frame=config.frame, stamp=bus.stamp)
     cameras = Cameras(scene, Sightlines(table, bus.robot), config, bus.stamp, partial(_chance, config.seed))
     with bus.subscribe(
@@ -65,14 +64,19 @@ def _chance(seed: int, name: str) -> random.Random:
     return random.Random(f"{seed} {name}")
 
 
-def _human(kind: HumanKind, robot: str, vary: Callable[[], Seconds]) -> Human:
-    match kind:
+def _human(config: SimulationConfig, robot: str, chance: random.Random) -> Human:
+    def vary() -> Seconds:
+        return chance.uniform(-config.jitter, config.jitter)
+
+    match config.human:
         case "scripted":
             return Human(rules(), robot, vary)
         case "misplacing":
             return Human(misplacing_rules(), robot, vary)
         case "listening":
             return ListeningHuman(tangram_table(), robot, vary)
+        case "stochastic":
+            return StochasticHuman(tangram_table(), config.stochastic, chance, robot)
         case "none":
             return Human((), robot, vary)
 

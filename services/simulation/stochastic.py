@@ -1,0 +1,332 @@
+"""A person as Table 2.1 of the thesis has them: looks, answers and errs by chance, and is sometimes busy.
+
+Pure; chance comes from outside. What they know of the robot is what can be heard and seen: its words, where it looks
+and points, as realised. What they do and don't do is in `Habits`, each number with its source.
+"""
+
+from collections.abc import Callable
+from heapq import heappop, heappush
+
+from msgspec import Struct
+
+from schemas.actions import ActionBegan, ActionEnded
+from schemas.behaviors import Action
+from schemas.body import WordSpoken
+from schemas.messages import Message
+from schemas.units import Probability, Seconds
+from services.simulation.chance import Chance, Delays
+from services.simulation.config import Habits
+from services.simulation.hearing import Hearing, Utterance, wanted
+from services.simulation.human import (
+    FACE,
+    TABLE,
+    Act,
+    Human,
+    Lay,
+    Leave,
+    LookAt,
+    Pause,
+    Sit,
+    Start,
+    Stop,
+    Withdraw,
+)
+from services.simulation.listening import COMES, GOES, moves
+from services.tangram_table import SIDES, TangramTable, poses_touching
+
+PATIENCE: Seconds = 1.9
+"""How long a look at the robot's face waits to be returned; as recognition counts it."""
+NOD: Seconds = 0.5
+WORD: Seconds = 0.5
+"""Of a spoken backchannel or answer; shorter than 0.8 s, with which speech would be a change of floor."""
+QUESTION: Seconds = 1.0
+""" "Which one?" """
+GLANCE_UP: Seconds = 0.2
+"""From laying a piece down to looking up."""
+THINKING = "ummmm"
+"""Said by a robot that will go on: nothing to answer."""
+
+
+class _Thought(Struct, order=True):
+    """Something to decide at `at`."""
+
+    at: Seconds
+    number: int
+    decide: Callable[[Seconds], None]
+
+
+class StochasticHuman(Human):
+    """Does what the robot asks for, in their own time and not without mistakes."""
+
+    def __init__(self, table: TangramTable, habits: Habits, chance: Chance, robot: str = "robot") -> None:
+        super().__init__((), robot)
+        self._table = table
+        self._habits = habits
+        self._chance = chance
+        self._pieces = frozenset(piece.id for piece in table.pieces)
+        self._hearing = Hearing(robot)
+        self._thoughts: list[_Thought] = []
+        self._thought = 0
+        self._seated = False
+        self._gaze = ""
+        self._looks = 0
+        """How many looks there were: who finds another number has been overtaken."""
+        self._robot_gaze = ""
+        self._shown: set[str] = set()
+        """Pieces that they saw the robot look or point at during its present turn."""
+        self._task: Lay | None = None
+        """What they are at, or about to be: the busy regime."""
+        self._next_task: Lay | None = None
+        self._gesture_until: Seconds = 0.0
+        self._awaits_eyes = 0
+        """Which look at the robot's face has not been returned yet; 0: none."""
+        self.propensity = 1.0
+        """For looks at the robot's face, 0..2."""
+
+    # -- time ---------------------------------------------------------------------------------------------------
+
+    @property
+    def deadline(self) -> Seconds | None:
+        times = [super().deadline, self._thoughts[0].at if self._thoughts else None]
+        return min((time for time in times if time is not None), default=None)
+
+    def due(self, now: Seconds) -> tuple[Act, ...]:
+        while self._thoughts and self._thoughts[0].at <= now:
+            heappop(self._thoughts).decide(now)
+        acts = super().due(now)
+        if acts:
+            self._notice(acts[0], now)
+        return acts
+
+    def _later(self, at: Seconds, decide: Callable[[Seconds], None]) -> None:
+        self._thought += 1
+        heappush(self._thoughts, _Thought(at, self._thought, decide))
+
+    def _notice(self, act: Act, now: Seconds) -> None:
+        """What doing this changes for them."""
+        match act:
+            case LookAt(target=target):
+                self._gaze = target
+                self._looks += 1
+                if target == FACE:
+                    self._looks_at_face(now)
+            case Sit():
+                self._seated = True
+                self._plan_look_up(now)
+                self._plan_direction(now)
+            case Leave():
+                self._seated = False
+                self._thoughts.clear()
+                self._due.clear()
+            case Withdraw():
+                self._finish(now)
+
+    # -- what they perceive -------------------------------------------------------------------------------------
+
+    def enter(self, now: Seconds) -> None:
+        self.go_on((*COMES, Pause(self._habits.glance), LookAt(TABLE)), now)
+
+    def feed(self, message: Message, now: Seconds) -> None:
+        if not self._seated:
+            return
+        match message:
+            case ActionBegan(actor=self._robot, action="look", targets=targets):
+                self._robot_gaze = targets[0] if targets else ""
+                if self._robot_gaze == self._table.person.id:
+                    self._robot_looks_at_them(now)
+                elif self._robot_gaze in self._pieces:
+                    self._is_directed(self._robot_gaze, self._habits.follows_look, now)
+            case ActionEnded(actor=self._robot, action="look"):
+                self._robot_gaze = ""
+            case ActionBegan(actor=self._robot, action="point", targets=(target,)) if target in self._pieces:
+                self._is_directed(target, self._habits.follows_point, now)
+            case WordSpoken() if self._happens(self._habits.backchannels) and not self._task:
+                self._utter(now + 0.2)
+        utterance = self._hearing.feed(message)
+        if utterance is not None:
+            self._respond(utterance, now)
+            self._shown.clear()
+
+    def _happens(self, probability: Probability) -> bool:
+        return self._chance.random() < probability
+
+    def _answers(self, probability: Probability) -> bool:
+        return self._happens(probability * (self._habits.busy_answers if self._task else 1.0))
+
+    def _drawn(self, delays: tuple[Seconds, Seconds, Seconds]) -> Seconds:
+        return Delays(*delays).draw(self._chance)
+
+    # -- gaze ---------------------------------------------------------------------------------------------------
+
+    def _glances(self, target: str, at: Seconds) -> None:
+        """Look there, and after a while back at the table, unless something else has drawn the eyes away."""
+        self._later(at, lambda now: self._glance(target, now))
+
+    def _glance(self, target: str, now: Seconds) -> None:
+        if self._gaze != target:
+            self.go_on((LookAt(target),), now)
+            self._look_back(self._looks + 1, now)
+
+    def _look_back(self, look: int, now: Seconds) -> None:
+        def back(now: Seconds) -> None:
+            if self._looks == look:
+                self.go_on((LookAt(TABLE),), now)
+
+        self._later(now + self._habits.glance, back)
+
+    def _is_directed(self, piece: str, follows: Probability, now: Seconds) -> None:
+        """The robot looks or points at a piece. Once they have noticed, a point after the look changes nothing."""
+        if piece not in self._shown and self._answers(follows):
+            self._shown.add(piece)
+            self._glances(piece, now + self._drawn(self._habits.follow_delay))
+
+    def _robot_looks_at_them(self, now: Seconds) -> None:
+        if self._awaits_eyes:
+            self._learn(answered=True)
+        elif self._gaze != FACE and self._answers(min(1.0, self._habits.answers_look * self.propensity)):
+            self._glances(FACE, now + self._drawn(self._habits.look_delay))
+
+    # -- eye contact --------------------------------------------------------------------------------------------
+
+    def _looks_at_face(self, now: Seconds) -> None:
+        """They look at the robot's face. Whether it looks back tells how soon they will do it again."""
+        if self._robot_gaze == self._table.person.id:
+            self._learn(answered=True)
+            return
+        self._awaits_eyes = look = self._looks
+
+        def give_up(now: Seconds) -> None:
+            if self._awaits_eyes == look:
+                self._learn(answered=False)
+
+        self._later(now + PATIENCE, give_up)
+
+    def _learn(self, *, answered: bool) -> None:
+        self._awaits_eyes = 0
+        self.propensity += self._habits.reciprocity * ((2.0 if answered else 0.0) - self.propensity)
+
+    # -- of their own accord ------------------------------------------------------------------------------------
+
+    def _plan_look_up(self, now: Seconds) -> None:
+        """Now and then look at the robot's face, the more seldom the less it looks back."""
+
+        def look_up(now: Seconds) -> None:
+            if self._answers(self.propensity / 2):
+                self._glance(FACE, now)
+            self._plan_look_up(now)
+
+        # Twice as often as at a propensity of 1, which half of the times come to nothing.
+        self._later(now + self._chance.expovariate(2 / self._habits.looks_up_every), look_up)
+
+    def _plan_direction(self, now: Seconds) -> None:
+        """Now and then look or point at some piece."""
+
+        def direct(now: Seconds) -> None:
+            if self._answers(1.0):
+                piece = self._chance.choice(sorted(self._pieces))
+                self._glance(piece, now)
+                if self._happens(self._habits.points):
+                    self._gestures("point", self._habits.glance, now, piece)
+            self._plan_direction(now)
+
+        self._later(now + self._chance.expovariate(1 / self._habits.directs_every), direct)
+
+    # -- turns --------------------------------------------------------------------------------------------------
+
+    def _respond(self, utterance: Utterance, now: Seconds) -> None:
+        """The robot has said something."""
+        habits = self._habits
+        if utterance.words == THINKING or not self._happens(habits.hears):
+            return
+        at = now + self._drawn(habits.answer_delay)
+        if "goodbye" in utterance.words:
+            self.go_on(GOES, at)
+        elif utterance.is_request:
+            self._take_up(self._understood(utterance), at)
+        elif self._answers(habits.answers_turn):
+            self._utter(at)
+
+    def _understood(self, utterance: Utterance) -> Lay | None:
+        """What they are to do as they understand it, which may be wrong; None if they cannot tell."""
+        habits = self._habits
+        if utterance.pointed not in self._shown:
+            guess = self._chance.choice(sorted(self._pieces)) if self._happens(habits.guesses) else ""
+            utterance = Utterance(utterance.words, guess)
+        asked = wanted(utterance, self._table)
+        if asked is None:
+            return None
+        if self._happens(habits.confuses_shown if asked.piece in self._shown else habits.confuses):
+            return self._one_of(self._other_pieces(asked), asked)
+        if self._happens(habits.misplaces):
+            return self._one_of(self._other_sides(asked), asked)
+        return asked
+
+    def _one_of(self, mistakes: list[Lay], asked: Lay) -> Lay:
+        return self._chance.choice(mistakes) if mistakes else asked
+
+    def _other_pieces(self, asked: Lay) -> list[Lay]:
+        """The same with a piece of the same color or shape, where that fits."""
+        right = self._table.piece(asked.piece)
+        others = (
+            Lay(piece.id, asked.side, asked.landmark)
+            for piece in self._table.pieces
+            if piece is not right and (piece.color == right.color or piece.shape == right.shape)
+        )
+        return [lay for lay in others if lay.piece != asked.landmark and self._fits(lay)]
+
+    def _other_sides(self, asked: Lay) -> list[Lay]:
+        others = (Lay(asked.piece, side, asked.landmark) for side in SIDES if side != asked.side)
+        return [lay for lay in others if self._fits(lay)]
+
+    def _fits(self, lay: Lay) -> bool:
+        """Has the landmark such an edge there? As it lies in the figure."""
+        piece, landmark = self._table.piece(lay.piece), self._table.piece(lay.landmark)
+        there = self._table.lying(landmark, landmark.goal)
+        return any(True for _ in poses_touching(self._table.lying(piece, piece.start), there, lay.side))
+
+    def _take_up(self, task: Lay | None, at: Seconds) -> None:
+        """Do it, once they have found the piece, and perhaps not before they have studied all of them."""
+        if task is None:
+            self._glances(FACE, at)
+            self._gestures("speak", QUESTION, at)
+            return
+        if task == self._task:
+            return
+        if task.piece not in self._shown:
+            at += self._drawn(self._habits.search)
+        if not self._happens(self._habits.answers_turn):
+            at += self._drawn(self._habits.study)
+        if self._task is None:
+            self._begin(task, at)
+        else:
+            self._next_task = task
+
+    def _begin(self, task: Lay, at: Seconds) -> None:
+        self._task = task
+        self.go_on(moves(task), at)
+
+    def _finish(self, now: Seconds) -> None:
+        """The piece lies there: go on with what they were asked meanwhile, or look up."""
+        self._task, following = None, self._next_task
+        self._next_task = None
+        if following is not None:
+            self._begin(following, now)
+            return
+        self.go_on((LookAt(TABLE),), now)
+        if self._answers(min(1.0, self._habits.reports * self.propensity)):
+            self._glances(FACE, now + GLANCE_UP)
+
+    # -- voice and gestures -------------------------------------------------------------------------------------
+
+    def _utter(self, at: Seconds) -> None:
+        """A brief word or a nod: an answer, or while the robot speaks a backchannel."""
+        if self._happens(self._habits.speaks):
+            self._gestures("speak", WORD, at)
+        else:
+            self._gestures("nod", NOD, at)
+
+    def _gestures(self, action: Action, seconds: Seconds, at: Seconds, target: str = "") -> None:
+        """Speak, nod or point; one at a time."""
+        if at >= self._gesture_until:
+            self._gesture_until = at + seconds
+            self.go_on((Start(action, target), Pause(seconds), Stop(action, target)), at)
