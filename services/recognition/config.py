@@ -5,9 +5,58 @@ from typing import Literal
 from msgspec import Struct
 
 from schemas.behaviors import Action
-from schemas.units import Probability, Seconds
+from schemas.units import Degrees, Meters, Probability, Seconds, Vector
 
 GazeResolution = Literal["object", "table"]
+
+
+class Sensing(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """How raw perception becomes looks, speech and manipulations. Raises ValueError for what is out of range."""
+
+    gaze_half_angle: Degrees = 5.0
+    """Of the gaze cone: what is farther off the head's direction is not looked at. Right for eye trackers; where only
+    the nose is seen take 10, and `gaze_resolution` `table`."""
+    gaze_margin: Degrees = 1.0
+    """How much nearer to the direction another target must be than the present one before it takes over."""
+    dwell: Seconds = 0.15
+    """How long the gaze stays on a target before that is a look, and off it before the look is over."""
+    face_radius: Meters = 0.12
+    """Of people and of the robot, around the point between the eyes."""
+    robot_face: Vector = (0.05, 0.0, 1.17)
+    """Where the robot's eyes are as long as its `RobotState` does not say it."""
+    memory: Seconds = 10.0
+    """In which the confidence in the place of a covered thing halves."""
+    voice_onset: Seconds = 0.1
+    """Shorter sounds are no speech."""
+    voice_pause: Seconds = 0.25
+    """A shorter silence does not end speech."""
+    voice_lost: Seconds = 0.5
+    """Without news of the voice for this long, speech has ended with the last."""
+    hand_reach: Meters = 0.1
+    """How near the center of a hand comes to that of a piece that it moves."""
+    moved: Meters = 0.025
+    """How far a piece has gone from its place, with a hand, before it is manipulated."""
+    tremor: Meters = 0.01
+    """Within this of its place a piece rests: the noise of vision."""
+    smoothing: Seconds = 0.15
+    """Over which places of pieces are averaged."""
+    rest: Seconds = 0.3
+    """How long a piece rests before its manipulation is over."""
+    oldest: Seconds = 0.5
+    """A head pose or a voice level that arrives later than this after its stamp is ignored."""
+    settling: Seconds = 0.35
+    """How long events wait, at most, for raw perception that has not made up its mind. Shorter than the realizer's
+    `event_grace`."""
+
+    def __post_init__(self) -> None:
+        for name in ("gaze_half_angle", "face_radius", "memory", "voice_lost", "hand_reach", "rest", "oldest"):
+            if not getattr(self, name) > 0:
+                raise ValueError(f"sensing.{name} must be greater than 0, not {getattr(self, name)}")
+        for name in ("gaze_margin", "dwell", "voice_onset", "voice_pause", "smoothing", "settling"):
+            if not getattr(self, name) >= 0:
+                raise ValueError(f"sensing.{name} must not be negative, but is {getattr(self, name)}")
+        if not 0 <= self.tremor < self.moved:
+            raise ValueError("sensing.tremor must be less than sensing.moved, and not negative")
 
 
 class RecognitionConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -33,6 +82,10 @@ class RecognitionConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields
     """How long a person looks at an object before that directs the robot's gaze."""
     after_robot_directed: Seconds = 2.0
     """A look that follows a robot's directed gaze to the same object so closely is no direction of its own."""
+    least_confidence: Probability = 0.4
+    """What is observed to begin with less is ignored, and a thing in the world with less counts as covered. Ours."""
+    sensing: Sensing = Sensing()
+    """For raw perception."""
     lost_face_grace: Seconds = 0.5
     """A face lost for less has not gone."""
     window: Seconds = 30.0

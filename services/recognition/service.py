@@ -5,15 +5,15 @@ from collections.abc import Iterable
 from schemas import keys
 from schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost
 from schemas.attention import HeadOwner
+from schemas.perception import HeadPose, VoiceActivity
 from schemas.recognition import ConnectionEvent, EventOutcome, RequestEvent, SignalTurn, TurnOutcome, session_of
 from schemas.requests import Accepted, Cancel, Refused
 from schemas.units import Seconds, Stamp
 from schemas.world import World
 from services.bus import Bus, Received
 from services.recognition.config import RecognitionConfig
-from services.recognition.machine import Effect
 from services.recognition.open_events import OpenBook
-from services.recognition.session import Observation, Session
+from services.recognition.recognizer import Perceived, Recognizer, Result
 from services.recognition.standings import Standings
 from services.requests import RequestDesk
 from services.runtime import Ready
@@ -24,6 +24,7 @@ async def recognize(bus: Bus, ready: Ready, config: RecognitionConfig) -> None:
     recognition = _Recognition(bus, config)
     patterns = (
         keys.ROBOT_ACTION, keys.PERCEIVED_ACTION, keys.FEEDBACK, keys.HEAD_OWNER, keys.WORLD,
+        keys.ANY_HEAD_POSE, keys.ANY_VOICE_ACTIVITY, keys.ROBOT_STATE,
         *RequestDesk.patterns("recognition"),
     )  # fmt: skip
     with bus.subscribe(*patterns) as inbox:
@@ -44,42 +45,49 @@ class _Recognition:
         self.desk = RequestDesk(bus, "recognition", self._cancel)
         self._bus = bus
         session = session_of(bus.run)
-        self._session = Session(bus.robot, config, clock=bus.clock, name=f"{session}-")
+        self._recognizer = Recognizer(bus.robot, config, clock=bus.clock, name=f"{session}-")
         self._open = OpenBook(bus.robot, session)
         self._standings = Standings(bus.robot, config, bus.clock)
 
     @property
     def deadline(self) -> Seconds | None:
-        times = (self._session.deadline, self._standings.deadline)
+        times = (self._recognizer.deadline, self._standings.deadline)
         return min((at for at in times if at is not None), default=None)
 
     def advance(self) -> None:
-        self._tell(self._session.advance(self._bus.now()))
+        self._tell(self._recognizer.advance(self._bus.now()))
 
     def take(self, received: Received) -> None:
         request = self.desk.take(received)
         observation = request or received.message
         if isinstance(observation, RequestEvent | SignalTurn | Cancel) and request is None:
             return
-        if isinstance(observation, Observation) and self._is_credible(received):
-            self._tell(self._session.feed(observation, self._when(observation, received.at)))
+        if isinstance(observation, Perceived) and self._is_credible(received):
+            self._feed(observation, self._when(observation, received.at))
 
     def _cancel(self, cancel: Cancel) -> None:
-        self._tell(self._session.feed(cancel, self._bus.now()))
+        self._feed(cancel, self._bus.now())
+
+    def _feed(self, observation: Perceived, at: Seconds) -> None:
+        self._tell(self._recognizer.feed(observation, at, self._bus.now()))
 
     def _is_credible(self, received: Received) -> bool:
         """Only the robot's body says what the robot does, and only perception what others do."""
         match received.message:
             case ActionBegan(actor=actor) | ActionEnded(actor=actor):
                 by_robot = actor == self._bus.robot
-                return _is_name(actor) and by_robot == (received.key == keys.ROBOT_ACTION)
+                return keys.is_chunk(actor) and by_robot == (received.key == keys.ROBOT_ACTION)
             case ActorFound(actor=actor) | ActorLost(actor=actor):
-                return _is_name(actor) and actor != self._bus.robot
+                return keys.is_chunk(actor) and actor != self._bus.robot
+            case HeadPose(actor=actor):
+                return actor != self._bus.robot and received.key == keys.head_pose(actor)
+            case VoiceActivity(actor=actor):
+                return actor != self._bus.robot and received.key == keys.voice_activity(actor)
             case World(entities=entities):
-                return all(_is_name(entity.id) for entity in entities)
+                return all(keys.is_chunk(entity.id) for entity in entities)
         return True
 
-    def _when(self, observation: Observation, arrived: Seconds) -> Seconds:
+    def _when(self, observation: Perceived, arrived: Seconds) -> Seconds:
         """Local time of what happened. A stamp from the future is not believed."""
         stamp: Stamp | None
         match observation:
@@ -91,13 +99,15 @@ class _Recognition:
                 stamp = observation.at
         return arrived if stamp is None else min(self._bus.local(stamp), self._bus.now())
 
-    def _tell(self, effects: Iterable[Effect]) -> None:
+    def _tell(self, effects: Iterable[Result]) -> None:
         events = []
         for effect in effects:
             match effect:
                 case ConnectionEvent():
                     events.append(effect)
                     self._bus.publish(keys.connection_event(effect.person(self._bus.robot), effect.kind), effect)
+                case ActionBegan() | ActionEnded() | ActorFound() | ActorLost():
+                    self._bus.publish(keys.RECOGNIZED_ACTION, effect)
                 case Accepted(id=id):
                     self.desk.accept(id)
                 case Refused(id=id, fault=fault):
@@ -106,12 +116,7 @@ class _Recognition:
                     self.desk.end(effect)
         for book in self._open.feed(events, self._bus.stamp()):
             self._bus.publish(keys.open_events(book.actor), book)
-        busy = {person.id for person in self._session.persons.values() if person.acts_since is not None}
+        busy = {person.id for person in self._recognizer.session.persons.values() if person.acts_since is not None}
         for statistics in self._standings.feed(events, busy, self._bus.now()):
             if statistics.actor != "all":  # a person of that name would pass for everybody
                 self._bus.publish(keys.statistics(statistics.actor or "all"), statistics)
-
-
-def _is_name(actor: str) -> bool:
-    """Fit to be a chunk of a key expression."""
-    return bool(actor) and not any(letter in "/*$?#" for letter in actor)

@@ -1,0 +1,94 @@
+"""All of recognition as one pure machine: symbolic and raw observations in; effects and derived actions out.
+
+Raw perception makes up its mind late about what has happened, so observations wait in the order of their times until
+nothing that came before them can still become known. With symbolic perception alone nothing ever waits.
+"""
+
+import heapq
+import math
+from itertools import count
+
+from schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost
+from schemas.body import RobotState
+from schemas.perception import HeadPose, VoiceActivity
+from schemas.units import Seconds
+from schemas.world import World
+from services.recognition.attention import Attention, Symbolic
+from services.recognition.config import RecognitionConfig
+from services.recognition.machine import Effect
+from services.recognition.session import Observation, Session
+
+Perceived = Observation | HeadPose | VoiceActivity | RobotState
+Result = Effect | Symbolic
+"""Actions among them are what raw perception means; they have been taken already."""
+
+
+class Recognizer:
+    """robot, clock, name: as of `Session` and `Attention`."""
+
+    def __init__(self, robot: str, config: RecognitionConfig, *, clock: str = "loop", name: str = "") -> None:
+        self.session = Session(robot, config, clock=clock, name=name)
+        self._robot = robot
+        self._config = config
+        self._attention = Attention(robot, config, clock)
+        self._waiting: list[tuple[Seconds, int, Observation]] = []
+        self._numbers = count()
+
+    @property
+    def deadline(self) -> Seconds | None:
+        """When `advance` has something to do, unless an observation comes first."""
+        times = [self._attention.deadline]
+        since = self._attention.undecided_since
+        if self._waiting and since is not None:
+            times.append(since + self._config.sensing.settling)
+        due = self.session.deadline
+        if due is not None:
+            times.append(due if since is None or due < since else max(due, since + self._config.sensing.settling))
+        return min((at for at in times if at is not None), default=None)
+
+    def feed(self, observation: Perceived, at: Seconds, now: Seconds) -> list[Result]:
+        """Take what happened at `at`, before or at `now`."""
+        derived: list[Symbolic] = []
+        match observation:
+            case HeadPose() | VoiceActivity():
+                if now - at <= self._config.sensing.oldest:
+                    derived = self._attention.feed(observation, at)
+            case RobotState():
+                derived = self._attention.feed(observation, at)
+            case World():
+                derived = self._attention.feed(observation, at)
+                self._wait(observation, at)
+            case ActionBegan(confidence=confidence) if confidence < self._config.least_confidence:
+                pass
+            case ActionBegan() | ActionEnded() | ActorFound() | ActorLost():
+                if observation.actor != self._robot:
+                    self._attention.believe(observation, at)
+                self._wait(observation, at)
+            case _:
+                self._wait(observation, at)
+        return self._take(derived, now)
+
+    def advance(self, now: Seconds) -> list[Result]:
+        """What happens by itself up to and including `now`."""
+        results = self._take(self._attention.advance(now), now)
+        settled = self._settled(now)
+        # What is due at the very moment from which on things are undecided has to wait, too.
+        return [*results, *self.session.advance(now if settled > now else math.nextafter(settled, -math.inf))]
+
+    def _take(self, derived: list[Symbolic], now: Seconds) -> list[Result]:
+        for action in derived:
+            self._wait(action, action.at.seconds)
+        settled = self._settled(now)
+        results: list[Result] = [*derived]
+        while self._waiting and self._waiting[0][0] <= settled:
+            at, _, observation = heapq.heappop(self._waiting)
+            results += self.session.feed(observation, at)
+        return results
+
+    def _wait(self, observation: Observation, at: Seconds) -> None:
+        heapq.heappush(self._waiting, (at, next(self._numbers), observation))
+
+    def _settled(self, now: Seconds) -> Seconds:
+        """Nothing from before this can still become known; at the latest after the time to settle."""
+        since = self._attention.undecided_since
+        return math.inf if since is None or now >= since + self._config.sensing.settling else since
