@@ -145,6 +145,7 @@ class SimulationConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=
     """`raw`: how long the head takes to face something else."""
     faults: PerceptionFaults = PerceptionFaults()
     stochastic: Habits = Habits()
+    """Of the person `stochastic`."""
     hand_speed: Meters = 0.45
     """m/s, mean over a movement. Unhurried reaching at a table is about 0.4..0.8 m/s."""
     shortest_movement: Seconds = 0.6
