@@ -1,10 +1,10 @@
 """When a time limit starts to run: sync points of blocks as realised, and the clock that waits for its anchors."""
 
-from collections import OrderedDict
 from collections.abc import Iterable
 
 from schemas.syncref import BLOCK_ITSELF, SyncRef, canonical_sync
 from schemas.units import Seconds
+from services.recognition.latest import Latest
 
 BLOCKS_KEPT = 64
 """Blocks whose realised points are remembered, for a request that arrives after them."""
@@ -32,21 +32,19 @@ class Blocks:
     """What is known of the blocks that run or ran recently: realised points by `anchor`, and when they ended."""
 
     def __init__(self) -> None:
-        self._points: OrderedDict[str, dict[str, Seconds]] = OrderedDict()
-        self._ended: OrderedDict[str, Seconds] = OrderedDict()
+        self._points: Latest[str, dict[str, Seconds]] = Latest(BLOCKS_KEPT)
+        self._ended: Latest[str, Seconds] = Latest(BLOCKS_KEPT)
 
     def realised(self, block: str, behavior: str, sync: str, at: Seconds) -> str:
         """Remember a point; its anchor."""
         name = _name(behavior, sync)
-        self._points.setdefault(block, {})[name] = at
-        if len(self._points) > BLOCKS_KEPT:
-            self._points.popitem(last=False)
+        points = self._points.get(block, {})
+        points[name] = at
+        self._points[block] = points
         return name
 
     def end(self, block: str, at: Seconds) -> None:
         self._ended[block] = at
-        if len(self._ended) > BLOCKS_KEPT:
-            self._ended.popitem(last=False)
 
     def ended(self, block: str) -> Seconds | None:
         return self._ended.get(block)

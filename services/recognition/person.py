@@ -1,6 +1,7 @@
 """One person and the robot: what each does becomes input of the four recognizers between them."""
 
 from collections.abc import Callable, Iterator
+from functools import partial
 from typing import NamedTuple
 
 from schemas.behaviors import Action, Cause, EventKind
@@ -12,6 +13,7 @@ from services.recognition.directed_gaze import HUMAN_DIRECTING, DirectedGaze
 from services.recognition.limits import LimitClock
 from services.recognition.machine import IDLE, Ledger, UnderWay
 from services.recognition.mutual_facial_gaze import HUMAN_WAITING, MutualFacialGaze
+from services.recognition.presence import Presence
 from services.recognition.scene import Gaze, Scene
 from services.recognition.shared_gaze import SharedGaze
 
@@ -35,15 +37,12 @@ class Person:
 
     def __init__(self, id: str, scene: Scene, config: RecognitionConfig, ledger: Ledger, *, strict: bool) -> None:
         self.id = id
-        self.present = True
-        self.lost_at: Seconds | None = None
+        self.presence = Presence(config.lost_face_grace)
         self.gaze = Gaze()
         self.speaks_since: Seconds | None = None
         self.silent_since: Seconds | None = None
         self.acts_since: Seconds | None = None
         self._speech_confidence: Probability = 1.0
-        self.others_silent_since: Seconds | None = float("-inf")
-        """Since when nobody else speaks; None while somebody does. Kept by the session."""
         self.directed: list[DirectedGaze] = []
         self.facial = MutualFacialGaze(ledger, strict=strict)
         self.pair = AdjacencyPair(
@@ -59,53 +58,37 @@ class Person:
 
     # -- time ---------------------------------------------------------------------------------------------------
 
-    def due(self) -> Iterator[Due]:
-        """All that will happen by itself, unless something comes in between."""
-        own, robot = self.own_backchannel, self.robot_backchannel
-        candidates: list[tuple[Seconds | None, Callable[[Seconds], None]]] = [
-            (self.gaze.deadline, lambda at: self._gaze_expires()),
-            (self._gone_at, self._gone),
-            *((one.deadline, lambda at, one=one: self._expire_directed(one, at)) for one in self.directed),
+    def first_due(self) -> Due | None:
+        """What will happen by itself first, unless something comes in between."""
+        first: Due | None = None
+        candidates: tuple[tuple[Seconds | None, Callable[[Seconds], None]], ...] = (
+            (self.gaze.deadline, self._gaze_expires),
+            (self.presence.deadline, self._gone),
+            *((one.deadline, partial(self._expire_directed, one)) for one in self.directed),
             (self.facial.deadline, self.facial.expire),
-            (own.deadline, lambda at: self._takes_floor("limit", at)),
-            (robot.deadline, lambda at: self.pair.robot_begins("speak", robot.takes_floor("limit", at))),
+            (self.own_backchannel.deadline, self._takes_floor),
+            (self.robot_backchannel.deadline, self._robot_takes_floor),
             (self.pair.deadline, self.pair.expire),
             (self._look_directs_at, self._look_directs),
-        ]
+        )
         for at, happen in candidates:
-            if at is not None:
-                yield Due(at, happen)
-
-    @property
-    def _gone_at(self) -> Seconds | None:
-        return None if self.lost_at is None else self.lost_at + self._config.lost_face_grace
+            if at is not None and (first is None or at < first.at):
+                first = Due(at, happen)
+        return first
 
     @property
     def _look_directs_at(self) -> Seconds | None:
         """When this look will have lasted long enough to direct the robot's, if nothing changes."""
         if self.gaze.spent or self.gaze.ended is not None or self.acts_since is not None:
             return None
-        if self.others_silent_since is None or not any(map(self._scene.is_object, self.gaze.targets)):
+        if not any(map(self._scene.is_object, self.gaze.targets)):
             return None
-        return max(self.gaze.since, self.others_silent_since) + self._config.direct_by_look
-
-    # -- presence -----------------------------------------------------------------------------------------------
-
-    def seen(self, at: Seconds) -> None:
-        """There is an observation of this person, so it is there."""
-        if self.lost_at is not None and at < self.lost_at:
-            return
-        self.present, self.lost_at = True, None
-
-    def lost(self, at: Seconds) -> None:
-        if self.present and self.lost_at is None:
-            self.lost_at = at
+        silent_since = self._scene.others_silent_since(self.id)
+        return None if silent_since is None else max(self.gaze.since, silent_since) + self._config.direct_by_look
 
     def _gone(self, at: Seconds) -> None:
         """Close whatever is open with this person."""
-        until, self.lost_at = self.lost_at, None
-        assert until is not None
-        self.present = False
+        until = self.presence.leave()
         for one in self.directed:
             one.person_gone(at, until)
         self.forget_idle(at)
@@ -116,6 +99,7 @@ class Person:
         self.gaze = Gaze(since=until)
         self.speaks_since = self.acts_since = None
         self.silent_since = until
+        self._scene.falls_silent(self.id, until)
 
     # -- gaze ---------------------------------------------------------------------------------------------------
 
@@ -134,7 +118,7 @@ class Person:
     def looks_away(self, targets: tuple[str, ...], at: Seconds) -> None:
         self.gaze.end(targets, at)
 
-    def _gaze_expires(self) -> None:
+    def _gaze_expires(self, at: Seconds) -> None:
         self.gaze_changed(self.gaze.expire())
 
     def gaze_changed(self, at: Seconds) -> None:
@@ -260,6 +244,7 @@ class Person:
         if self.speaks_since is not None:
             return
         self.speaks_since, self.silent_since = at, None
+        self._scene.speaks(self.id)
         self._speech_confidence = confidence
         if self.robot_holds_floor:
             self.own_backchannel.speaks(self._backchannel(self._scene.robot, self.id, at, confidence))
@@ -270,6 +255,7 @@ class Person:
         if self.speaks_since is None:
             return
         self.speaks_since, self.silent_since = None, at
+        self._scene.falls_silent(self.id, at)
         self._backchannel_speech_ends(self.own_backchannel, at)
         self._floor_is_free(at)
         self.pair.ends("speak", at, by_robot=False)
@@ -347,11 +333,14 @@ class Person:
     def _floor_is_free(self, at: Seconds) -> None:
         """Speech that outlasts the turn in which it began is a turn of its own."""
         if self.own_backchannel.state == UNDECIDED and not self.robot_holds_floor:
-            self._takes_floor("outlasts_turn", at)
+            self._takes_floor(at, "outlasts_turn")
         if self.robot_backchannel.state == UNDECIDED and not self.holds_floor:
-            self.pair.robot_begins("speak", self.robot_backchannel.takes_floor("outlasts_turn", at))
+            self._robot_takes_floor(at, "outlasts_turn")
 
-    def _takes_floor(self, given: str, at: Seconds) -> None:
+    def _robot_takes_floor(self, at: Seconds, given: str = "limit") -> None:
+        self.pair.robot_begins("speak", self.robot_backchannel.takes_floor(given, at))
+
+    def _takes_floor(self, at: Seconds, given: str = "limit") -> None:
         """The person's speech is no backchannel after all, but a turn since it began."""
         self._human_turn(self.own_backchannel.takes_floor(given, at), "speak", self._speech_confidence)
 

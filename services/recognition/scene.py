@@ -57,13 +57,13 @@ class Scene:
         self.resolution = resolution
         self.gaze = Gaze()
         self.robot_speaks_since: Seconds | None = None
-        self.robot_silent_since: Seconds | None = None
-        """When the robot fell silent; None while it speaks or if it never spoke."""
         self.head_owner = Claim(kind="none", priority=0)
         self.people_in_world: frozenset[str] = frozenset()
         self._objects: set[str] = set()
         self._surfaces: set[str] = {"table"}
         self._others: set[str] = set()
+        self._speakers: set[str] = set()
+        self._fell_silent: dict[str, Seconds] = {}
 
     def see(self, world: World) -> None:
         """Objects once seen stay known: a covered piece has not gone (thesis 5.4.2)."""
@@ -71,6 +71,20 @@ class Scene:
         self._surfaces.update(entity.id for entity in world.entities if entity.kind == "surface")
         self._others.update(entity.id for entity in world.entities if entity.kind in ("person", "hand"))
         self.people_in_world = frozenset(person.id for person in world.people) - {self.robot}
+
+    def speaks(self, actor: str) -> None:
+        self._speakers.add(actor)
+
+    def falls_silent(self, actor: str, at: Seconds) -> None:
+        if actor in self._speakers:
+            self._speakers.discard(actor)
+            self._fell_silent[actor] = at
+
+    def others_silent_since(self, actor: str) -> Seconds | None:
+        """Since when nobody but `actor` speaks; None while somebody does."""
+        if self._speakers - {actor}:
+            return None
+        return max((at for other, at in self._fell_silent.items() if other != actor), default=float("-inf"))
 
     def knows(self, entity: str) -> bool:
         """Has it ever been seen? Without any world nobody can tell, so yes."""

@@ -8,7 +8,6 @@ Everything is decided by the times of the observations, not of their arrival: wh
 happens before it, at its own time. An answer at the very limit still counts.
 """
 
-from collections import OrderedDict
 from collections.abc import Iterator
 
 from schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost
@@ -21,9 +20,11 @@ from schemas.requests import Accepted, Cancel, Refused
 from schemas.units import Seconds
 from schemas.world import World
 from services.recognition.config import RecognitionConfig
-from services.recognition.limits import Blocks, LimitClock
+from services.recognition.latest import Latest
+from services.recognition.limits import BLOCKS_KEPT, Blocks, LimitClock
 from services.recognition.machine import Effect, Ledger, Machine, UnderWay
 from services.recognition.person import Due, Person
+from services.recognition.presence import NEVER
 from services.recognition.scene import Scene
 from services.recognition.shared_gaze import SharedGaze
 
@@ -52,40 +53,43 @@ class Session:
         self._config = config
         self._strict = strict
         self._ledger = Ledger(clock, name)
-        self._ended_turns: OrderedDict[str, Seconds] = OrderedDict()
+        self._due: Due | None = None
+        self._ended_turns: Latest[str, Seconds] = Latest(TURNS_KEPT)
         self._robot_speech: set[str] = set()
         self._live: dict[str, tuple[Person, Machine]] = {}
         """Undecided requests."""
-        self._answering_blocks: dict[str, Person] = {}
-        self._over: OrderedDict[tuple[str, Action, str], Seconds] = OrderedDict()
-        """When actions ended: a `began` that is older comes too late to be believed."""
+        self._answering_blocks: Latest[str, Person] = Latest(BLOCKS_KEPT)
+        self._performed: Latest[tuple[str, Action, str, tuple[str, ...]], tuple[Seconds, Seconds]]
+        self._performed = Latest(ACTIONS_KEPT)
+        """When actions last began and ended: what is older, or comes again, is no news."""
 
     # -- time ---------------------------------------------------------------------------------------------------
 
     @property
     def deadline(self) -> Seconds | None:
         """When `advance` has something to do, unless an observation comes first."""
-        first = self._first_due()
-        return None if first is None else first.at
+        return None if self._due is None else self._due.at
 
     def advance(self, now: Seconds) -> list[Effect]:
         """What happens by itself up to and including `now`."""
-        while (due := self._first_due()) is not None and due.at <= now:
-            due.happen(due.at)
+        while self._due is not None and self._due.at <= now:
+            self._due.happen(self._due.at)
+            self._due = self._first_due()
         return self._take()
 
     def _advance_before(self, at: Seconds) -> None:
-        while (due := self._first_due()) is not None and due.at < at:
-            due.happen(due.at)
+        while self._due is not None and self._due.at < at:
+            self._due.happen(self._due.at)
+            self._due = self._first_due()
 
     def _first_due(self) -> Due | None:
-        return min(self._all_due(), key=lambda due: due.at, default=None)
-
-    def _all_due(self) -> Iterator[Due]:
-        if self.scene.gaze.deadline is not None:
-            yield Due(self.scene.gaze.deadline, lambda at: self._robot_gaze_expires())
+        deadline = self.scene.gaze.deadline
+        first = None if deadline is None else Due(deadline, self._robot_gaze_expires)
         for person in self.persons.values():
-            yield from person.due()
+            due = person.first_due()
+            if due is not None and (first is None or due.at < first.at):
+                first = due
+        return first
 
     # -- observations -------------------------------------------------------------------------------------------
 
@@ -102,9 +106,9 @@ class Session:
             case ActionEnded() if observation.actor in self.persons:
                 self._person_ends(self.persons[observation.actor], observation, at)
             case ActorFound(actor=actor) if actor != self.robot:
-                self._person(actor).seen(at)
+                self._person(actor).presence.found(at)
             case ActorLost(actor=actor) if actor in self.persons:
-                self.persons[actor].lost(at)
+                self.persons[actor].presence.lost(at)
             case RequestEvent():
                 self._request(observation, at)
             case SignalTurn():
@@ -126,6 +130,7 @@ class Session:
                 self.scene.see(observation)
                 for person_id in sorted(self.scene.people_in_world):
                     self._person(person_id)
+        self._due = self._first_due()
         return self._take()
 
     def _take(self) -> list[Effect]:
@@ -138,7 +143,7 @@ class Session:
     # -- what actors do -----------------------------------------------------------------------------------------
 
     def _robot_begins(self, began: ActionBegan, at: Seconds) -> None:
-        if self._is_over(began, at):
+        if not self._is_news(began, at):
             return
         match began.action:
             case "look":
@@ -148,15 +153,16 @@ class Session:
                 self._robot_speech.add(began.behavior)
                 if self.scene.robot_speaks_since is None:
                     self.scene.robot_speaks_since = at
+                    self.scene.speaks(self.robot)
                     for person in self.persons.values():
                         person.robot_speaks(at)
-                self._speakers_changed(at)
             case "nod" | "shake" | "point":
                 for person in self.persons.values():
                     person.robot_gestures(began.action, at)
 
     def _robot_ends(self, ended: ActionEnded, at: Seconds) -> None:
-        self._remember_end(ended, at)
+        if not self._is_news(ended, at):
+            return
         match ended.action:
             case "look":
                 self.scene.gaze.end(ended.targets, at)
@@ -164,77 +170,65 @@ class Session:
                 self._robot_speech.discard(ended.behavior)
                 if self.scene.robot_speaks_since is not None and not self._robot_speech:
                     self.scene.robot_speaks_since = None
+                    self.scene.falls_silent(self.robot, at)
                     for person in self.persons.values():
                         person.robot_falls_silent(at)
-                self._speakers_changed(at)
             case "nod" | "shake" | "point":
                 for person in self.persons.values():
                     person.robot_gesture_ends(ended.action, at)
 
     def _person_begins(self, person: Person, began: ActionBegan, at: Seconds) -> None:
-        person.seen(at)
+        if not person.presence.seen(at) or not self._is_news(began, at):
+            return
         confidence = began.confidence
-        if began.action == "look":
-            person.looks(began.targets, at, confidence)
-            return
-        if self._is_over(began, at):
-            return
         match began.action:
+            case "look":
+                person.looks(began.targets, at, confidence)
             case "point":
                 person.points(began.targets, at, confidence)
             case "speak":
                 person.speaks(at, confidence)
-                self._speakers_changed(at)
             case "nod" | "shake":
                 person.gestures(began.action, at, confidence)
             case "act":
                 person.manipulates(at, confidence)
 
     def _person_ends(self, person: Person, ended: ActionEnded, at: Seconds) -> None:
-        if ended.action == "look":
-            person.looks_away(ended.targets, at)
+        if not self._is_news(ended, at):
             return
-        self._remember_end(ended, at)
         match ended.action:
+            case "look":
+                person.looks_away(ended.targets, at)
             case "point":
                 person.pair.ends("point", at, by_robot=False)
             case "speak":
                 person.falls_silent(at)
-                self._speakers_changed(at)
             case "nod" | "shake":
                 person.gesture_ends(ended.action, at)
             case "act":
                 person.manipulation_ends(at)
 
-    def _is_over(self, began: ActionBegan, at: Seconds) -> bool:
-        """Has its end been reported already? Then it came out of order, or twice."""
-        if began.action == "look":
-            return False
-        return at < self._over.get((began.actor, began.action, began.behavior), float("-inf"))
+    def _is_news(self, action: ActionBegan | ActionEnded, at: Seconds) -> bool:
+        """Did it neither come twice nor too late, after something newer of the same kind? Looks order themselves."""
+        if action.action == "look":
+            return True
+        key = (action.actor, action.action, action.behavior, action.targets)
+        began, ended = self._performed.get(key, (NEVER, NEVER))
+        if isinstance(action, ActionBegan):
+            news = at > began and at >= ended
+            began = at if news else began
+        else:
+            news = at > ended and at >= began
+            ended = at if news else ended
+        self._performed[key] = (began, ended)
+        return news
 
-    def _remember_end(self, ended: ActionEnded, at: Seconds) -> None:
-        key = (ended.actor, ended.action, ended.behavior)
-        self._over[key] = max(at, self._over.get(key, at))
-        self._over.move_to_end(key)
-        if len(self._over) > ACTIONS_KEPT:
-            self._over.popitem(last=False)
-
-    def _robot_gaze_expires(self) -> None:
+    def _robot_gaze_expires(self, at: Seconds) -> None:
         self._robot_gaze_changed(self.scene.gaze.expire())
 
     def _robot_gaze_changed(self, at: Seconds) -> None:
         for person in self.persons.values():
             person.gaze_changed(at)
-
-    def _speakers_changed(self, at: Seconds) -> None:
-        """A look directs only while nobody but the looker speaks."""
-        robot = self.scene.robot_speaks_since is not None
-        for person in self.persons.values():
-            others = any(other.speaks_since is not None for other in self.persons.values() if other is not person)
-            if robot or others:
-                person.others_silent_since = None
-            elif person.others_silent_since is None:
-                person.others_silent_since = at
 
     # -- requests -----------------------------------------------------------------------------------------------
 
@@ -278,7 +272,7 @@ class Session:
         if person is None:
             known = ", ".join(sorted(self.persons)) or "nobody"
             return Fault(reason=f"unknown actor {event.responder!r}", where=where, advice=f"known: {known}")
-        if not person.present:
+        if not person.presence.here:
             return Fault(reason=f"{event.responder!r} has gone", where=where)
         if event.kind == "directed_gaze" and not event.objects:
             return Fault(reason="directed gaze without objects", where=where)
@@ -339,8 +333,6 @@ class Session:
         match signal.signal:
             case "ended":
                 self._ended_turns[signal.turn] = at
-                if len(self._ended_turns) > TURNS_KEPT:
-                    self._ended_turns.popitem(last=False)
                 for person in self._addressees(signal):
                     if person.pair.is_turn(signal.turn):
                         person.turn_ends(at)
@@ -373,10 +365,7 @@ class Session:
 
     def _person(self, id: str) -> Person:
         if id not in self.persons:
-            person = Person(id, self.scene, self._config, self._ledger, strict=self._strict)
-            if self.scene.robot_speaks_since is not None:
-                person.others_silent_since = None
-            self.persons[id] = person
+            self.persons[id] = Person(id, self.scene, self._config, self._ledger, strict=self._strict)
         return self.persons[id]
 
     def _gaze_machines(self) -> Iterator[SharedGaze]:

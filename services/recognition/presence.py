@@ -1,0 +1,43 @@
+"""Is a person there? Faces get lost and found again, and reports of it may come late or twice."""
+
+from schemas.units import Seconds
+
+NEVER: Seconds = float("-inf")
+
+
+class Presence:
+    """Of one person. grace: a face that is lost for less has not gone."""
+
+    def __init__(self, grace: Seconds) -> None:
+        self.here = True
+        self._grace = grace
+        self._lost_at: Seconds | None = None
+        self._found_last = self._lost_last = self._left_at = NEVER
+
+    @property
+    def deadline(self) -> Seconds | None:
+        """When the person will have gone, unless it is seen again; then `leave`."""
+        return None if self._lost_at is None else self._lost_at + self._grace
+
+    def seen(self, at: Seconds) -> bool:
+        """There is an observation of the person, so it is there; False if that is from before it left."""
+        if at < self._left_at:
+            return False
+        if self._lost_at is None or at >= self._lost_at:
+            self.here, self._lost_at = True, None
+        return True
+
+    def found(self, at: Seconds) -> None:
+        self._found_last = max(at, self._found_last)
+        self.seen(at)
+
+    def lost(self, at: Seconds) -> None:
+        """The face is lost. Nothing new if that was known, or if it has been found since."""
+        if self.here and self._lost_at is None and at >= self._found_last and at > self._lost_last:
+            self._lost_at = self._lost_last = at
+
+    def leave(self) -> Seconds:
+        """The person has gone; when it was last there."""
+        assert self._lost_at is not None
+        self.here, self._left_at, self._lost_at = False, self._lost_at, None
+        return self._left_at
