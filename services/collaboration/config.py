@@ -15,8 +15,12 @@ class CollaborationConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fiel
     """How long the person has to place a piece before the robot asks again."""
     attempts: int = 3
     """How often the robot asks for one placement before it goes on without."""
-    settle: Seconds = 1.6
-    """After a placement, before the robot speaks: the person looks up, and their gaze is returned (limit 1.9 s)."""
+    steady: Seconds = 0.5
+    """How long a piece must rest in view, no hand over it, before the robot believes where it lies."""
+    patience: Seconds = 2.0
+    """How long the robot waits for a hand to go away before it judges what lies where."""
+    settle: Seconds = 0.75
+    """From when a placement is seen until the robot speaks: the person looks up, and the robot looks back."""
     pause: Seconds = 0.4
     """Between two turns of the robot."""
     thinking: Seconds = 1.0
@@ -31,7 +35,7 @@ class CollaborationConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fiel
     """Rmin of a landmark, and of the rectangle when introduced."""
 
     def __post_init__(self) -> None:
-        for name in ("placement", "settle", "pause", "thinking", "arrival", "farewell"):
+        for name in ("placement", "steady", "patience", "settle", "pause", "thinking", "arrival", "farewell"):
             if getattr(self, name) < 0:
                 raise ValueError(f"collaboration.{name} must not be negative, not {getattr(self, name)}")
         if self.attempts < 1:

@@ -26,11 +26,16 @@ class Perform(Struct, frozen=True):
 
 
 class Observe(Struct, frozen=True):
-    """Answer: the objects that perception sees now."""
+    """Look until the place of each piece is certain. Answer: the pieces, without confidence where it is not.
+
+    patience: at most this long.
+    """
+
+    patience: Seconds
 
 
 class AwaitPlacement(Struct, frozen=True):
-    """Wait until the piece has been moved from where it was `before`, and rests. Answer: the objects, or None."""
+    """Wait until the piece has been moved from where it was `before`, and rests. Answer: whether it has."""
 
     piece: str
     before: tuple[Entity, ...]
@@ -103,18 +108,25 @@ class Manager:
         Returns whether it was right in the end.
         """
         asked = self._request(id, instruction)
+        pieces = yield from self.observe()
         for attempt in range(1, self.config.attempts + 1):
-            before = yield Observe()
-            assert isinstance(before, tuple)
             yield Perform(asked)
-            after = yield AwaitPlacement(instruction.wanted.piece, before, self.config.placement)
+            placed = yield AwaitPlacement(instruction.wanted.piece, pieces, self.config.placement)
             yield Pause(self.config.settle)
-            suffix = "fix" if after is not None else "again"
-            if isinstance(after, tuple) and check(instruction, after).right:
+            pieces = yield from self.observe()
+            verdict = check(instruction, pieces)
+            if verdict.right:
                 return True
+            fix = placed is True and verdict.seen
             number = f"-{attempt}" if attempt > 1 else ""
-            asked = self._request(f"{id}-{suffix}{number}", instruction, fix=suffix == "fix")
+            asked = self._request(f"{id}-{'fix' if fix else 'again'}{number}", instruction, fix=fix)
         return False
+
+    def observe(self) -> Plan[tuple[Entity, ...]]:
+        """The pieces as they lie."""
+        pieces = yield Observe(self.config.patience)
+        assert isinstance(pieces, tuple)
+        return pieces
 
     def farewell(self) -> Plan[None]:
         yield AwaitDeparture(self.config.farewell)
@@ -176,8 +188,7 @@ def task(manager: Manager) -> Plan[None]:
     given_up: set[str] = set()
     number = 0
     while True:
-        pieces = yield Observe()
-        assert isinstance(pieces, tuple)
+        pieces = yield from manager.observe()
         instruction = manager.goal.next(pieces, given_up)
         if instruction is None:
             break

@@ -1,16 +1,22 @@
 """The collaboration manager of the tangram: performs its plan through the public client alone."""
 
 import asyncio
+import math
+from collections.abc import AsyncIterable, Callable
+from contextlib import suppress
 
 from schemas import keys
 from schemas.faults import EngageError
-from schemas.world import Entity, World
+from schemas.units import Seconds
+from schemas.world import World
 from services.bus import Bus
-from services.client import Feed, Robot
+from services.client import Robot
 from services.collaboration import plans
 from services.collaboration.appendix_b import turns
 from services.collaboration.config import CollaborationConfig
 from services.collaboration.placement import has_been_placed
+from services.collaboration.sight import Sight
+from services.feeds import Feed
 from services.runtime import Ready
 from services.tangram_table import tangram_table
 
@@ -19,10 +25,13 @@ async def collaborate(bus: Bus, ready: Ready, config: CollaborationConfig) -> No
     """Play the tangram once, with whoever comes; returns after the goodbye."""
     manager = plans.Manager(config, tangram_table())
     plan = plans.script(manager, turns(manager)) if config.mode == "scripted" else plans.task(manager)
-    async with Robot.on(bus) as robot:
+    async with Robot.on(bus) as robot, asyncio.TaskGroup() as tasks:
+        engine = _Engine(robot, bus, Sight(config.steady))
         with robot.worlds() as worlds:
+            watching = tasks.create_task(engine.watch(worlds), name="watch the table")
             ready()
-            await _follow(plan, _Engine(robot, worlds, bus))
+            await _follow(plan, engine)
+            watching.cancel()
 
 
 async def _follow(plan: plans.Plan[None], engine: "_Engine") -> None:
@@ -36,15 +45,21 @@ async def _follow(plan: plans.Plan[None], engine: "_Engine") -> None:
 
 
 class _Engine:
-    """Does what a plan wishes. Keeps the world as last perceived."""
+    """Does what a plan wishes, and watches the table all the while."""
 
-    def __init__(self, robot: Robot, worlds: Feed[World], bus: Bus) -> None:
+    def __init__(self, robot: Robot, bus: Bus, sight: Sight) -> None:
         self._robot = robot
-        self._worlds = worlds
         self._bus = bus
-        self._world = World(entities=())
+        self._sight = sight
+        self._seen = asyncio.Event()
+
+    async def watch(self, worlds: AsyncIterable[World]) -> None:
+        async for world in worlds:
+            self._sight.see(world, self._robot.now())
+            self._seen.set()
 
     async def grant(self, wish: plans.Wish) -> plans.Answer:
+        now, sight = self._robot.now(), self._sight
         match wish:
             case plans.Perform(fragment=fragment):
                 try:
@@ -52,41 +67,29 @@ class _Engine:
                 except EngageError as error:
                     self._bus.publish(keys.fault(self._bus.name), error.fault)
                     return None
-            case plans.Observe():
-                return (await self._now()).objects
+            case plans.Observe(patience=patience):
+                await self._until(sight.is_steady, now + patience)
+                return sight.pieces(self._robot.now())
             case plans.AwaitPlacement(piece=piece, before=before, timeout=timeout):
-                return await self._placement(piece, before, self._robot.now() + timeout)
+                return await self._until(lambda at: has_been_placed(piece, before, sight.pieces(at)), now + timeout)
             case plans.AwaitPerson():
-                while not (await self._now()).people:
-                    await self._next(None)
-                return self._world.people[0].id
+                await self._until(lambda at: sight.person(at) is not None, math.inf)
+                return sight.person(self._robot.now())
             case plans.AwaitDeparture(timeout=timeout):
-                deadline = self._robot.now() + timeout
-                while (await self._now()).people:
-                    if not await self._next(deadline):
-                        return False
-                return True
+                return await self._until(lambda at: sight.person(at) is None, now + timeout)
             case plans.Pause(seconds=seconds):
                 await asyncio.sleep(seconds)
                 return None
 
-    async def _placement(self, piece: str, before: tuple[Entity, ...], deadline: float) -> tuple[Entity, ...] | None:
-        while not has_been_placed(piece, before, (await self._now()).objects):
-            if not await self._next(deadline):
-                return None
-        return self._world.objects
-
-    async def _now(self) -> World:
-        """The newest world there is, without waiting."""
-        while await self._next(self._robot.now()):
-            pass
-        return self._world
-
-    async def _next(self, deadline: float | None) -> bool:
-        """Wait for a newer world. False: none came by `deadline`."""
-        timeout = None if deadline is None else max(0.0, deadline - self._robot.now())
-        world = await self._worlds.next(timeout)
-        if world is None:
-            return False
-        self._world = world
+    async def _until(self, holds: Callable[[Seconds], bool], deadline: Seconds) -> bool:
+        """Wait until the table is seen to be so. False: it was not by `deadline`."""
+        while not holds(now := self._robot.now()):
+            if now >= deadline:
+                return False
+            change = self._sight.deadline(now)
+            again = deadline if change is None else min(change, deadline)
+            self._seen.clear()
+            with suppress(TimeoutError):
+                async with asyncio.timeout_at(again if again < math.inf else None):
+                    await self._seen.wait()
         return True

@@ -9,6 +9,7 @@ from collections.abc import Collection, Iterable
 from msgspec import Struct
 
 from schemas.world import Entity
+from services.collaboration.placement import TRUSTED
 from services.collaboration.relations import Relation, relation, relations
 from services.tangram_table import TangramTable
 
@@ -25,10 +26,14 @@ class Instruction(Struct, frozen=True, kw_only=True):
 
 
 class Placement(Struct, frozen=True):
-    """What became of an instruction. found: how the piece lies to others now, `wanted` among them if it is right."""
+    """What became of an instruction. found: how the piece lies to others now, `wanted` among them if it is right.
+
+    seen: the piece is in view. What is right was seen to be so before it was covered.
+    """
 
     right: bool
     found: tuple[Relation, ...] = ()
+    seen: bool = True
 
 
 def check(instruction: Instruction, pieces: Iterable[Entity]) -> Placement:
@@ -36,9 +41,10 @@ def check(instruction: Instruction, pieces: Iterable[Entity]) -> Placement:
     lying = {piece.id: piece for piece in pieces}
     piece = lying.pop(instruction.wanted.piece, None)
     if piece is None:
-        return Placement(False)
+        return Placement(False, seen=False)
     found = tuple(rel for other in lying.values() if (rel := relation(piece, other)) is not None)
-    return Placement(any(rel in found for rel in (instruction.wanted, *instruction.also)), found)
+    right = any(rel in found for rel in (instruction.wanted, *instruction.also))
+    return Placement(right, found, seen=piece.confidence >= TRUSTED)
 
 
 class Goal:

@@ -74,10 +74,10 @@ class Player:
     def _seen(self) -> tuple[Entity, ...]:
         return tuple(self.pieces.values())
 
-    def _place(self, piece: str) -> tuple[Entity, ...] | None:
+    def _place(self, piece: str) -> bool:
         if self._idle:
             self._idle -= 1
-            return None
+            return False
         landmark = [it.target for it in self.performed[-1].behaviors if isinstance(it, Reference)][1]
         side = next(s for s in sides(spoken(self.performed[-1])))
         if self._wrong:
@@ -86,7 +86,7 @@ class Player:
         poses = list(poses_touching(self.pieces[piece], self.pieces[landmark], side))  # type: ignore[arg-type]
         if poses:
             self.pieces[piece] = TABLE.lying(TABLE.piece(piece), poses[0])
-        return self._seen()
+        return True
 
 
 def sides(words: str) -> Iterator[str]:
