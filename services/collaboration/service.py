@@ -2,7 +2,7 @@
 
 import asyncio
 import math
-from collections.abc import AsyncIterable, Callable
+from collections.abc import Callable
 from contextlib import suppress
 
 from schemas import keys
@@ -53,7 +53,7 @@ class _Engine:
         self._sight = sight
         self._seen = asyncio.Event()
 
-    async def watch(self, worlds: AsyncIterable[World]) -> None:
+    async def watch(self, worlds: Feed[World]) -> None:
         async for world in worlds:
             self._sight.see(world, self._robot.now())
             self._seen.set()
