@@ -8,22 +8,19 @@ from rich.console import Console
 
 from schemas.messages import Message
 from schemas.units import Seconds
-from services.bus import Bus
-from services.commandline import roster
 from services.commandline.outputs import Outputs
 from services.commandline.process import DONE, run
 from services.commandline.run import Where
+from services.commandline.tangram import play_tangram
 from services.config import Config
 from services.console import tally
-from services.console.follow import Sink, following
+from services.console.follow import Sink
 from services.console.live import LiveView, Log
 from services.console.log import Telling
-from services.memory_bus import MemoryHub
-from services.runtime import Ready, Service, running
 
 DEFAULTS = ("recognition.gaze_resolution=table",)
 """The transcript was annotated by people who saw that a look went to the table, rarely to which piece."""
-HUMANS = {"appendix-b": "scripted", "misplacing": "misplacing", "listening": "listening"}
+HUMANS = {"appendix-b": "scripted", "misplacing": "misplacing", "listening": "listening", "stochastic": "stochastic"}
 
 
 class Options(NamedTuple):
@@ -67,23 +64,10 @@ def main(options: Options) -> int:
 
 async def demonstrate(config: Config, outputs: Sink, console: Console, live: bool) -> tally.Tally:
     """Run everything until the task is over; the tally of what happened."""
-    finished = asyncio.Event()
-
-    def ending(service: Service) -> Service:
-        async def collaborate(bus: Bus, ready: Ready) -> None:
-            await service(bus, ready)
-            finished.set()
-
-        return collaborate
-
-    async with MemoryHub(config.robot) as hub:
-        bus = hub.join("console")
-        services = {name: roster.service(name, config) for name in roster.NAMES}
-        services["collaboration"] = ending(services["collaboration"])
-        tallying = Tallying(bus.now())
-        with shown(console, config.robot, bus.now(), live) as show:
-            async with following(bus, (show, tallying, outputs)), running(hub, services):
-                await finished.wait()
+    began = asyncio.get_running_loop().time()
+    tallying = Tallying(began)
+    with shown(console, config.robot, began, live) as show:
+        await play_tangram(config, (show, tallying, outputs))
     return tallying.tally
 
 

@@ -32,7 +32,7 @@ def pause_after(previous: Seconds | None, lived: Seconds) -> Seconds:
 
 
 @contextmanager
-def _without_threads() -> Iterator[None]:
+def without_threads() -> Iterator[None]:
     """Python 3.11 watches each child with a thread unless told to use what Linux offers, as later ones do."""
     if sys.version_info >= (3, 12) or sys.platform != "linux":
         yield
@@ -72,7 +72,7 @@ class Child:
             if code == 2:
                 raise ChildRefused(self.name)
             pause = pause_after(pause, loop.time() - began)
-            self._tell(self.name, f"ended with {_ending(code)}; starting it again in {pause:g} s")
+            self._tell(self.name, f"ended with {ending(code)}; starting it again in {pause:g} s")
             await asyncio.sleep(pause)
 
     async def _life(self) -> int:
@@ -124,14 +124,15 @@ async def _line(stream: asyncio.StreamReader) -> bytes:
         return b"(a line too long to show)\n"
 
 
-def _ending(code: int) -> str:
+def ending(code: int) -> str:
+    """How a process ended, from its return code as asyncio has it."""
     return f"signal {-code}" if code < 0 else f"exit code {code}"
 
 
 @asynccontextmanager
 async def supervised(children: Mapping[str, Child]) -> AsyncIterator[None]:
     """Keep the children running while the body of `async with` runs; at its end all have ended, last first."""
-    with _without_threads():
+    with without_threads():
         async with asyncio.TaskGroup() as group:
             tasks = [group.create_task(child.keep(), name=f"child {name}") for name, child in children.items()]
             try:

@@ -1,0 +1,29 @@
+"""The anchor tangram from the person's coming to their leaving, with everything in this process."""
+
+import asyncio
+from collections.abc import Iterable
+
+from services.bus import Bus
+from services.commandline import roster
+from services.config import Config
+from services.console.follow import Sink, following
+from services.memory_bus import MemoryHub
+from services.runtime import Ready, Service, running
+
+
+async def play_tangram(config: Config, sinks: Iterable[Sink]) -> None:
+    """Run all services until the task is over. sinks: who is told all that happens, with instants of this loop."""
+    finished = asyncio.Event()
+
+    def ending(service: Service) -> Service:
+        async def collaborate(bus: Bus, ready: Ready) -> None:
+            await service(bus, ready)
+            finished.set()
+
+        return collaborate
+
+    async with MemoryHub(config.robot) as hub:
+        services = {name: roster.service(name, config) for name in roster.NAMES}
+        services["collaboration"] = ending(services["collaboration"])
+        async with following(hub.join("console"), sinks), running(hub, services):
+            await finished.wait()
