@@ -53,7 +53,7 @@ Listen = Annotated[
     list[str] | None, typer.Option(metavar="ENDPOINT", help="Zenoh endpoint to listen on; may be repeated.")
 ]
 Human = Annotated[
-    Literal["appendix-b", "misplacing", "listening"] | None,
+    Literal["appendix-b", "misplacing", "listening", "stochastic"] | None,
     typer.Option(help="How the scripted human behaves: the transcript, or one who misplaces a piece."),
 ]
 Resolution = Annotated[
@@ -250,6 +250,53 @@ def tool(
     from services.commandline import tool
 
     raise typer.Exit(tool.main(format, world))
+
+
+@app.command()
+def simulate(
+    out: Annotated[Path, typer.Option(metavar="DIR", help="Where the results go.", show_default=False)],
+    sessions: Annotated[int, typer.Option(metavar="N", min=1, help="In each condition.")] = 20,
+    seed: Annotated[int, typer.Option(metavar="S", help="Session k has the seed S + k, in each condition.")] = 0,
+    condition: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="operational|degraded-generation|degraded-recognition",
+            help="Repeatable; else all three.",
+        ),
+    ] = None,
+    human: Annotated[
+        Literal["stochastic", "listening", "appendix-b", "misplacing", "table-2-1"],
+        typer.Option(help="How the simulated human behaves; table-2-1: two people and no robot."),
+    ] = "stochastic",
+    resolution: Resolution = None,
+    jobs: Annotated[
+        int | None, typer.Option(metavar="J", min=1, help="Processes; as many as processors.", show_default=False)
+    ] = None,
+    limit: Annotated[
+        float, typer.Option(metavar="SECONDS", min=1, help="Break a session off after so long, in its own time.")
+    ] = 3600.0,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace the results that are there.")] = False,
+    config: ConfigFile = None,
+    settings: Settings = None,
+    quiet: Quiet = False,
+) -> None:
+    """Play many sessions in virtual time, and compare the conditions of the study. Exit 3 if one did not finish."""
+    from services.commandline import run
+    from services.commandline import simulate as simulate_
+
+    where = run.Where(config, settings=tuple(settings or ()))
+    options = simulate_.Options(
+        sessions, seed, out, tuple(condition or ()), human, resolution, jobs, limit, overwrite, where, quiet
+    )
+    raise typer.Exit(simulate_.main(options))
+
+
+@app.command("play-sessions", hidden=True)
+def play_sessions() -> None:
+    """Play the sessions that standard input orders: a child of `engage simulate`."""
+    from services.commandline import session
+
+    raise typer.Exit(session.serve())
 
 
 @app.command()

@@ -1,0 +1,43 @@
+"""A directory of results: refused before anything is done for them, each file written whole or not at all."""
+
+import os
+from collections.abc import Collection
+from pathlib import Path
+
+from schemas.faults import Fault, InputRefused, RunFailed
+
+
+class Folder:
+    """names: of all files that may be written. overwrite: whatever of those is there is replaced, or removed.
+
+    Raises InputRefused if the directory cannot be written to, or holds one of the files and must not lose it.
+    """
+
+    def __init__(self, path: Path, names: Collection[str], *, overwrite: bool) -> None:
+        self.path = path
+        self._names = names
+        try:
+            path.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise InputRefused(Fault(reason=f"cannot be made: {error.strerror}", where=str(path))) from error
+        if not os.access(path, os.W_OK | os.X_OK):
+            raise InputRefused(Fault(reason="cannot be written to", where=str(path)))
+        present = [name for name in names if (path / name).exists()]
+        if present and not overwrite:
+            raise InputRefused(
+                Fault(reason=f"has results already: {', '.join(present)}", where=str(path), advice="add --overwrite")
+            )
+
+    def write(self, files: dict[str, bytes]) -> None:
+        """All of these; of the other names nothing stays. Raises RunFailed."""
+        for name in self._names:
+            try:
+                if name in files:
+                    part = self.path / f".{name}.part"
+                    part.write_bytes(files[name])
+                    part.replace(self.path / name)
+                else:
+                    (self.path / name).unlink(missing_ok=True)
+            except OSError as error:
+                fault = Fault(reason=f"cannot write: {error.strerror}", where=str(self.path / name))
+                raise RunFailed(fault) from error

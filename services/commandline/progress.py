@@ -1,0 +1,46 @@
+"""How far a study has come: a bar on a terminal, a line for each session anywhere else."""
+
+from contextlib import ExitStack
+from types import TracebackType
+from typing import Self
+
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+from services.study.records import SessionRecord
+
+
+class Following:
+    """Called with each session that ended. Rich's own refresh thread stays off."""
+
+    def __init__(self, console: Console, total: int) -> None:
+        self._console = console
+        self._open = ExitStack()
+        self._bar: Progress | None = None
+        if console.is_terminal and not console.quiet:
+            columns = (TextColumn("sessions"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
+            self._bar = Progress(*columns, console=console, auto_refresh=False, transient=True)
+            self._task = self._bar.add_task("sessions", total=total)
+
+    def __enter__(self) -> Self:
+        if self._bar is not None:
+            self._open.enter_context(self._bar)
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._open.close()
+
+    def __call__(self, record: SessionRecord) -> None:
+        if self._bar is not None:
+            self._bar.update(self._task, advance=1, refresh=True)
+        if self._bar is None or not record.finished:
+            self._console.print(told(record), markup=False, highlight=False, soft_wrap=True)
+
+
+def told(record: SessionRecord) -> str:
+    """`operational 3: 155 s, 97 connection events`."""
+    came_to = f"{record.duration:.0f} s, {record.statistics.events} connection events"
+    name = f"{record.condition} {record.session}"
+    return f"{name}: {came_to}" if record.finished else f"{name}: not finished: {record.reason} ({came_to})"

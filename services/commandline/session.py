@@ -1,0 +1,106 @@
+"""One session of a study, and the child process that plays sessions as they are ordered.
+
+The child reads orders from standard input and answers each on standard output, a line of JSON both ways: it needs no
+bus, and ends with whoever orders.
+"""
+
+import asyncio
+import random
+import sys
+import traceback
+
+import msgspec
+from msgspec import Struct
+
+from schemas.recognition import ConnectionEvent, Statistics, WindowStatistics
+from schemas.units import Seconds, Stamp
+from services.commandline.process import DONE
+from services.commandline.tangram import play_tangram
+from services.config import Config
+from services.recognition.session import Session
+from services.recognition.statistics import Tally
+from services.simulation import human_session
+from services.study.records import EventRecord, Recording, SessionRecord
+from services.virtual_time import run_virtual
+
+A_WHILE: Seconds = 120.0
+"""After the last event that was drawn: all that is open has ended by then."""
+
+
+class Order(Struct, frozen=True, kw_only=True):
+    """Play this session.
+
+    limit: a session is broken off after so long, in virtual time.
+    people: no robot, but two people drawn from Table 2.1; of the configuration only recognition counts.
+    """
+
+    session: int
+    condition: str
+    seed: int
+    limit: Seconds
+    config: Config
+    people: bool = False
+
+
+class Played(Struct, frozen=True, kw_only=True):
+    """What a session came to. trace: where in our code it failed, if it did."""
+
+    record: SessionRecord
+    events: tuple[EventRecord, ...] = ()
+    trace: str = ""
+
+
+def serve() -> int:
+    """Play what standard input orders, until it ends."""
+    orders = msgspec.json.Decoder(Order)
+    for line in sys.stdin.buffer:
+        sys.stdout.buffer.write(msgspec.json.encode(play(orders.decode(line))) + b"\n")
+        sys.stdout.buffer.flush()
+    return DONE
+
+
+def play(order: Order) -> Played:
+    """One session in virtual time. Whatever goes wrong in it is in the answer; nothing is raised."""
+    recording = Recording(order.config.robot)
+    reason = trace = ""
+    try:
+        if order.people:
+            _play_people(order, recording)
+        else:
+            run_virtual(_play_robot(order, recording))
+    except TimeoutError:
+        reason = f"not over after {order.limit:g} s"
+    except Exception as error:  # a bug of ours: this session tells of it, the others go on
+        reason, trace = _reason(error), traceback.format_exc()
+    record = recording.session(session=order.session, condition=order.condition, seed=order.seed, reason=reason)
+    events = recording.events(session=order.session, condition=order.condition)
+    return Played(record=record, events=events, trace=trace)
+
+
+async def _play_robot(order: Order, recording: Recording) -> None:
+    """Raises TimeoutError at the limit."""
+    async with asyncio.timeout(order.limit):
+        await play_tangram(order.config, (recording,))
+
+
+def _play_people(order: Order, recording: Recording) -> None:
+    config = order.config.recognition
+    session, tally = Session(order.config.robot, config), Tally(config.window)
+    plan = human_session.draw(random.Random(order.seed))
+    observations = human_session.observations(plan)
+    effects = [effect for observation, at in observations for effect in session.feed(observation, at)]
+    effects += session.advance(observations[-1][1] + A_WHILE)
+    changes = [effect for effect in effects if isinstance(effect, ConnectionEvent)]
+    for change in changes:
+        tally.feed(change)
+        recording(change, change.at.seconds)
+    end = Stamp("loop", observations[-1][1])
+    statistics = Statistics(actor="", at=end, session=tally.session(), recent=WindowStatistics())
+    recording(statistics, end.seconds)
+
+
+def _reason(error: BaseException) -> str:
+    """The first cause, on one line."""
+    while isinstance(error, BaseExceptionGroup):
+        error = error.exceptions[0]
+    return " ".join(f"{type(error).__name__}: {error}".split())

@@ -1,0 +1,207 @@
+"""`engage simulate`: many sessions in virtual time, what they come to, and what that says about the hypotheses."""
+
+import os
+import platform
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+import msgspec
+import numpy as np
+from msgspec import Struct
+from rich import box
+from rich.console import Group, RenderableType
+from rich.markup import escape
+from rich.table import Table as RichTable
+from rich.text import Text
+
+from schemas.faults import Fault, InputRefused
+from schemas.units import Seconds
+from services.commandline import demo
+from services.commandline.folder import Folder
+from services.commandline.outputs import Terminal
+from services.commandline.process import DONE, FAILED, INTERRUPTED, run
+from services.commandline.progress import Following
+from services.commandline.run import Where
+from services.commandline.session import Order, Played
+from services.commandline.validation import beside_table_2_1
+from services.commandline.workers import play_all
+from services.config import Config
+from services.runtime import installed_version
+from services.study import files, summary
+from services.study.conditions import CONDITIONS, WORSE
+from services.study.hypotheses import findings
+from services.study.records import EventRecord, SessionRecord
+from services.study.summary import Table
+
+PEOPLE = "table-2-1"
+"""The human whose sessions have no robot, and so no condition."""
+TWO_PEOPLE = "human-human"
+"""What stands in their column `condition`."""
+BY_WORDS = ("listening", "stochastic")
+"""They follow the robot's words and no script, so that it may choose its own."""
+PLOTS = ("events.png", "delays.png", "failure_rates.png", "mtbce.png", "completion_time.png")
+FILES = ("study.json", "events.csv", "sessions.csv", "hypotheses.csv", "summary.md", "failures.txt", *PLOTS)
+
+Draw = Callable[[Sequence[SessionRecord], Sequence[EventRecord]], dict[str, bytes]]
+
+
+class Options(NamedTuple):
+    """conditions: none means all. jobs: processes; None: one for each processor. limit: see `Order`."""
+
+    sessions: int
+    seed: int
+    out: Path
+    conditions: tuple[str, ...] = ()
+    human: str = "stochastic"
+    resolution: str | None = None
+    jobs: int | None = None
+    limit: Seconds = 3600.0
+    overwrite: bool = False
+    where: Where = Where()
+    quiet: bool = False
+
+
+def main(options: Options) -> int:
+    draw = _plotting()
+    orders = orders_of(options)
+    folder = Folder(options.out, FILES, overwrite=options.overwrite)
+    console = Terminal(quiet=options.quiet)
+    played: list[Played] = []
+    interrupted = False
+    with Following(console, len(orders)) as following:
+
+        def tell(one: Played) -> None:
+            played.append(one)
+            following(one.record)
+
+        try:
+            run(play_all(orders, options.jobs or os.cpu_count() or 1, tell))
+        except KeyboardInterrupt:
+            interrupted = True
+    if played:
+        place = {(order.condition, order.session): number for number, order in enumerate(orders)}
+        played.sort(key=lambda one: place[one.record.condition, one.record.session])
+        tables = tables_of([one.record for one in played], people=options.human == PEOPLE)
+        folder.write(contents(options, orders, played, tables, draw))
+        for table in tables:
+            console.print("", shown(table), sep="\n")
+        console.print(f"\nresults in {options.out}", markup=False, highlight=False, soft_wrap=True)
+    if interrupted:
+        return INTERRUPTED
+    return DONE if all(one.record.finished for one in played) else FAILED
+
+
+def _plotting() -> Draw:
+    """Raises InputRefused without the extra, before any session has been played for nothing."""
+    try:
+        from services.study.plots import draw
+    except ImportError as error:
+        if not (error.name or "").startswith("matplotlib"):
+            raise
+        fault = Fault(reason="plots need matplotlib", advice="pip install 'engage-hri[study]'")
+        raise InputRefused(fault) from error
+    return draw
+
+
+# -- what to play -----------------------------------------------------------------------------------------------
+
+
+def orders_of(options: Options) -> list[Order]:
+    """By condition, then by number. The same number is the same seed in each condition. Raises InputRefused."""
+    if options.human == PEOPLE:
+        if options.conditions:
+            raise InputRefused(Fault(reason=f"--human {PEOPLE} has no conditions", advice="leave out --condition"))
+        return [_order(options, TWO_PEOPLE, number) for number in range(options.sessions)]
+    conditions = dict.fromkeys(options.conditions or CONDITIONS)
+    return [_order(options, condition, number) for condition in conditions for number in range(options.sessions)]
+
+
+def _order(options: Options, condition: str, number: int) -> Order:
+    """Weaker than the user's settings: what makes a condition worse. Stronger: seed and condition themselves."""
+    seed, people = options.seed + number, options.human == PEOPLE
+    defaults, chosen = [*demo.DEFAULTS], [*demo.choices(seed, None if people else options.human, options.resolution)]
+    if options.human in BY_WORDS:
+        defaults.append("collaboration.mode=task")
+    if not people:
+        defaults += WORSE[condition]
+        chosen.append(f"generation.condition={condition}")
+    where = options.where._replace(settings=(*options.where.settings, *chosen))
+    config = where.load(defaults=defaults)
+    return Order(session=number, condition=condition, seed=seed, limit=options.limit, config=config, people=people)
+
+
+# -- what came of it --------------------------------------------------------------------------------------------
+
+
+def tables_of(records: Sequence[SessionRecord], *, people: bool) -> list[Table]:
+    found = findings(records)
+    tables = [summary.overview(records)]
+    if people:
+        tables.append(beside_table_2_1(records))
+    if found:
+        tables.append(summary.hypotheses(found))
+    if any(not record.finished for record in records):
+        tables.append(summary.unfinished(records))
+    return tables
+
+
+def contents(
+    options: Options, orders: Sequence[Order], played: Sequence[Played], tables: Sequence[Table], draw: Draw
+) -> dict[str, bytes]:
+    """The results by file name. Nothing in them depends on the number of processes."""
+    records = [one.record for one in played]
+    events = [event for one in played for event in one.events]
+    found = findings(records)
+    texts = {
+        "events.csv": files.events(events),
+        "sessions.csv": files.sessions(records),
+        "summary.md": "\n".join(table.markdown() for table in tables),
+        "study.json": msgspec.json.format(msgspec.json.encode(_study(options, orders, len(played)))).decode() + "\n",
+    }
+    if found:
+        texts["hypotheses.csv"] = files.findings(found)
+    if failed := [one for one in played if one.trace]:
+        texts["failures.txt"] = "\n".join(
+            f"{one.record.condition} {one.record.session}, seed {one.record.seed}\n{one.trace}" for one in failed
+        )
+    return {name: text.encode() for name, text in texts.items()} | draw(records, events)
+
+
+class Study(Struct, frozen=True, kw_only=True):
+    """study.json: what it takes to play the same sessions again.
+
+    played: less than ordered if it was interrupted. settings: as given. configurations: complete, by condition, of
+    the first session; session k has the seed `seed` + k.
+    """
+
+    versions: dict[str, str]
+    human: str
+    conditions: tuple[str, ...]
+    sessions: int
+    seed: int
+    limit: Seconds
+    ordered: int
+    played: int
+    settings: tuple[str, ...]
+    configurations: dict[str, Config]
+
+
+def _study(options: Options, orders: Sequence[Order], played: int) -> Study:
+    first = {order.condition: order.config for order in orders if order.session == 0}
+    return Study(
+        versions={"engage": installed_version(), "python": platform.python_version(), "numpy": np.__version__},
+        human=options.human, conditions=tuple(first), sessions=options.sessions, seed=options.seed,
+        limit=options.limit, ordered=len(orders), played=played, settings=options.where.settings,
+        configurations=first,
+    )  # fmt: skip
+
+
+def shown(table: Table) -> RenderableType:
+    """For a terminal."""
+    drawn = RichTable(title=table.title, title_justify="left", box=box.HORIZONTALS, show_edge=False, padding=0)
+    for index, column in enumerate(table.columns):
+        drawn.add_column(column, justify="right" if index else "left")
+    for row in table.rows:
+        drawn.add_row(*map(escape, row))
+    return Group(drawn, *(Text(note, style="dim") for note in table.notes))

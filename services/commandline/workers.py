@@ -1,0 +1,85 @@
+"""Sessions in several child processes at once. What a child is given and what becomes of it changes no result."""
+
+import asyncio
+import sys
+from asyncio.subprocess import PIPE, Process
+from collections import deque
+from collections.abc import AsyncIterator, Callable, Iterable
+from contextlib import asynccontextmanager, suppress
+
+import msgspec
+
+from schemas.units import Seconds
+from services.commandline.session import Order, Played
+from services.commandline.supervisor import ending, without_threads
+from services.study.records import SessionRecord
+
+WORKER = (sys.executable, "-m", "services", "play-sessions")
+PATIENCE: Seconds = 600.0
+"""How long a session may take in real time. One that goes in circles without virtual time passing never ends."""
+LONGEST_ANSWER = 2**26
+"""Bytes: an hour of connection events is about 200 kB."""
+
+Tell = Callable[[Played], None]
+
+
+async def play_all(orders: Iterable[Order], jobs: int, tell: Tell, worker: tuple[str, ...] = WORKER) -> None:
+    """Play each order in one of `jobs` processes; `tell` is told how each went, as they end.
+
+    A child that dies costs its session; another takes its place. When cancelled, all children are ended.
+    """
+    waiting = deque(orders)
+    with without_threads():
+        async with asyncio.TaskGroup() as group:
+            for number in range(min(jobs, len(waiting))):
+                group.create_task(_play_some(waiting, tell, worker), name=f"sessions {number}")
+
+
+async def _play_some(waiting: deque[Order], tell: Tell, worker: tuple[str, ...]) -> None:
+    while waiting:
+        async with _child(worker) as child:
+            lost = ""
+            while waiting and not lost:
+                order = waiting.popleft()
+                try:
+                    tell(await _ask(child, order))
+                except _Lost as loss:
+                    lost = str(loss)
+                    record = SessionRecord(
+                        session=order.session, condition=order.condition, seed=order.seed, finished=False, reason=lost
+                    )
+                    tell(Played(record=record))
+
+
+class _Lost(Exception):
+    """The child did not answer, and will not any more."""
+
+
+async def _ask(child: Process, order: Order) -> Played:
+    assert child.stdin is not None
+    assert child.stdout is not None
+    child.stdin.write(msgspec.json.encode(order) + b"\n")
+    try:
+        async with asyncio.timeout(PATIENCE):
+            with suppress(ConnectionError):  # it has died; reading tells so, too
+                await child.stdin.drain()
+            line = await child.stdout.readline()
+            if line.endswith(b"\n"):
+                return msgspec.json.decode(line, type=Played)
+            raise _Lost(f"the process that played it ended with {ending(await child.wait())}")
+    except TimeoutError:
+        raise _Lost(f"no answer within {PATIENCE:g} s") from None
+
+
+@asynccontextmanager
+async def _child(worker: tuple[str, ...]) -> AsyncIterator[Process]:
+    # Its own process group: a terminal's Ctrl-C reaches us alone.
+    child = await asyncio.create_subprocess_exec(
+        *worker, stdin=PIPE, stdout=PIPE, limit=LONGEST_ANSWER, start_new_session=True
+    )
+    try:
+        yield child
+    finally:
+        with suppress(ProcessLookupError):
+            child.kill()  # it holds nothing that needs an orderly end
+        await child.wait()

@@ -1,0 +1,63 @@
+"""The files of a study as text: CSV with a fixed set of columns, whatever happened."""
+
+import csv
+import io
+from collections.abc import Iterable, Sequence
+
+import msgspec
+
+from schemas.units import Seconds
+from services.study.hypotheses import Finding
+from services.study.records import EventRecord, SessionRecord
+from services.study.summary import KINDS
+
+EVENT_COLUMNS = EventRecord.__struct_fields__
+KIND_COLUMNS = ("count", "succeeded", "failed", "failure_rate", "delay_mean", "failed_delay_mean")
+SESSION_COLUMNS = (
+    "session", "condition", "seed", "finished", "reason", "duration", "completion_time", "events", "mtbce", "max_gap",
+    "adjacency_pairs_every", "eye_contact_first", "eye_contact_second", "eye_contact_last",
+    *(f"{kind}_{column}" for kind in KINDS for column in KIND_COLUMNS),
+)  # fmt: skip
+
+Cell = str | int | float | bool | None
+
+
+def events(records: Iterable[EventRecord]) -> str:
+    return _csv(EVENT_COLUMNS, (msgspec.structs.astuple(record) for record in records))
+
+
+def sessions(records: Iterable[SessionRecord]) -> str:
+    return _csv(SESSION_COLUMNS, map(_session, records))
+
+
+def findings(found: Iterable[Finding]) -> str:
+    return _csv(Finding.__struct_fields__, (msgspec.structs.astuple(finding) for finding in found))
+
+
+def _session(record: SessionRecord) -> list[Cell]:
+    eyes, numbers = record.eye_contact, record.statistics
+    return [
+        record.session, record.condition, record.seed, record.finished, record.reason, record.duration,
+        record.completion_time, numbers.events, numbers.mtbce, numbers.max_gap, record.adjacency_pairs_every,
+        *((eyes.first, eyes.second, eyes.last) if eyes else (None, None, None)),
+        *(getattr(record.of(kind), column) for kind in KINDS for column in KIND_COLUMNS),
+    ]  # fmt: skip
+
+
+def _csv(columns: Sequence[str], rows: Iterable[Sequence[Cell]]) -> str:
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(columns)
+    writer.writerows([_cell(cell) for cell in row] for row in rows)
+    return text.getvalue()
+
+
+def _cell(cell: Cell) -> Cell:
+    """Microseconds are enough; `true` and `false` as everywhere else but in Python; empty for what is not known."""
+    if isinstance(cell, bool):
+        return "true" if cell else "false"
+    return _rounded(cell) if isinstance(cell, float) else cell
+
+
+def _rounded(value: Seconds) -> Seconds:
+    return round(value, 6) + 0.0  # + 0.0: no negative zero

@@ -1,0 +1,147 @@
+"""The hypotheses of the thesis (5.2.2) that a system's own statistics can speak to: 6, 7, 8 and 11."""
+
+from collections.abc import Callable, Sequence
+
+from msgspec import Struct
+
+from schemas.units import Probability
+from services.study.conditions import BASELINE
+from services.study.permutation import LEVEL, Paired, holm, paired
+from services.study.records import SessionRecord
+
+Measure = Callable[[SessionRecord], float | None]
+
+CAVEAT = (
+    "The person is a model. The sessions show what the robot's behavior does to an interaction with somebody who "
+    "reacts in just this way, not how people would react, and nobody in them is ever pleased or bored. With enough "
+    "sessions any difference, however small, gets a small p: read the difference and its interval first."
+)
+
+
+class Hypothesis(Struct, frozen=True, kw_only=True):
+    """name: its number in the thesis. sign: of the difference expected, degraded - operational; or of the value
+    itself, if there is no `baseline` to compare with.
+    """
+
+    name: str
+    claim: str
+    measure: str
+    unit: str
+    value: Measure
+    sign: int
+    baseline: bool = True
+
+
+def _pair_delay(record: SessionRecord) -> float | None:
+    return record.of("adjacency_pair").delay_mean
+
+
+def _change(record: SessionRecord) -> float | None:
+    return record.eye_contact.change if record.eye_contact else None
+
+
+HYPOTHESES = (
+    Hypothesis(
+        name="6", claim="the mean time between adjacency pairs is less in operational", sign=1, unit="s",
+        measure="mean time between starts of adjacency pairs", value=lambda record: record.adjacency_pairs_every,
+    ),
+    Hypothesis(
+        name="7", claim="the mean adjacency pair delay is less in operational", sign=1, unit="s",
+        measure="mean delay of succeeded adjacency pairs", value=_pair_delay,
+    ),
+    Hypothesis(
+        name="8", claim="the puzzle is completed sooner in operational", sign=1, unit="s",
+        measure="completion time", value=lambda record: record.completion_time,
+    ),
+    Hypothesis(
+        name="11a", claim="people make progressively less eye contact when degraded", sign=-1, unit="of the time",
+        measure="person's look at the robot's face, last third - first third", value=_change, baseline=False,
+    ),
+    Hypothesis(
+        name="11b", claim="and their eye contact falls more than in operational", sign=-1, unit="of the time",
+        measure="the same, difference from operational", value=_change,
+    ),
+)  # fmt: skip
+
+
+class Finding(Struct, frozen=True, kw_only=True):
+    """A hypothesis in one degraded condition: a row of hypotheses.csv.
+
+    operational, degraded: means over the n sessions compared (operational: None if it is not compared with).
+    difference: their mean difference, with the interval low..high that the test does not reject.
+    effect, p: see `permutation.Paired`. p_corrected: for the number of questions asked (Holm).
+    """
+
+    hypothesis: str
+    claim: str
+    measure: str
+    unit: str
+    condition: str
+    n: int
+    operational: float | None
+    degraded: float | None
+    difference: float | None
+    low: float | None
+    high: float | None
+    effect: float | None
+    p: Probability | None
+    p_corrected: Probability | None
+    verdict: str
+
+
+def findings(records: Sequence[SessionRecord]) -> list[Finding]:
+    """Every hypothesis in every degraded condition there is, from the finished sessions."""
+    values = {(record.condition, record.session): record for record in records if record.finished}
+    conditions = dict.fromkeys(record.condition for record in records)
+    operational = BASELINE in conditions
+    asked = [
+        (hypothesis, condition, *_samples(hypothesis, condition, values))
+        for condition in conditions
+        if condition != BASELINE
+        for hypothesis in HYPOTHESES
+        if operational or not hypothesis.baseline
+    ]
+    tests = [
+        paired([worse - base for base, worse in zip(bases, degraded, strict=True)]) for _, _, bases, degraded in asked
+    ]
+    corrected = holm([test.p for test in tests])
+    return [
+        Finding(
+            hypothesis=hypothesis.name, claim=hypothesis.claim, measure=hypothesis.measure, unit=hypothesis.unit,
+            condition=condition, n=test.n, operational=_mean(bases) if hypothesis.baseline else None,
+            degraded=_mean(degraded), difference=test.mean, low=test.low, high=test.high, effect=test.effect,
+            p=test.p, p_corrected=p, verdict=_verdict(hypothesis, test, p),
+        )
+        for (hypothesis, condition, bases, degraded), test, p in zip(asked, tests, corrected, strict=True)
+    ]  # fmt: skip
+
+
+def _samples(
+    hypothesis: Hypothesis, condition: str, records: dict[tuple[str, int], SessionRecord]
+) -> tuple[list[float], list[float]]:
+    """What operational and degraded sessions with the same seeds measured; pairs with a gap are left out."""
+    bases, degraded = [], []
+    for (name, session), record in sorted(records.items()):
+        if name != condition:
+            continue
+        twin = records.get((BASELINE, session))
+        base = (hypothesis.value(twin) if twin else None) if hypothesis.baseline else 0.0
+        value = hypothesis.value(record)
+        if base is not None and value is not None:
+            bases.append(base)
+            degraded.append(value)
+    return bases, degraded
+
+
+def _mean(values: Sequence[float]) -> float | None:
+    return sum(values) / len(values) if values else None
+
+
+def _verdict(hypothesis: Hypothesis, test: Paired, p: Probability | None) -> str:
+    if test.mean is None or p is None:
+        return "nothing to compare"
+    if test.low is None:
+        return "too few sessions"
+    if p >= LEVEL:
+        return "not shown"
+    return "supported" if test.mean * hypothesis.sign > 0 else "the opposite"

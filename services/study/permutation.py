@@ -1,0 +1,110 @@
+"""The paired test of a study: how often would chance alone give a difference so large?
+
+Each session has a twin with the same seed in the other condition. If the conditions did the same, each difference
+could as well have the other sign; the test counts how many choices of signs give a sum as far from zero. Nothing is
+assumed about the distribution, and small samples get the large p they deserve. Pure; chance has a fixed seed.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+from msgspec import Struct
+from numpy.typing import NDArray
+
+from schemas.units import Probability
+
+EXACT = 14
+"""Up to so many pairs all choices of signs are counted."""
+DRAWS = 20_000
+"""Beyond, so many are drawn."""
+LEVEL = 0.05
+"""Of the test; the interval holds what it would not reject."""
+STEPS = 60
+"""Halvings in the search for an end of the interval: to the last bit."""
+
+Array = NDArray[np.float64]
+
+
+class Paired(Struct, frozen=True, kw_only=True):
+    """n pairs with differences of this mean. None: cannot be said.
+
+    low, high: all true differences that the test does not reject at 5 %; None when n is too small to reject any.
+    effect: mean / standard deviation of the differences (Cohen's d for pairs); None if they do not vary.
+    p: two-sided.
+    """
+
+    n: int
+    mean: float | None = None
+    low: float | None = None
+    high: float | None = None
+    effect: float | None = None
+    p: Probability | None = None
+
+
+def paired(differences: Sequence[float]) -> Paired:
+    """Are these differences of another mean than zero?"""
+    d = np.asarray(differences, dtype=np.float64)
+    n = len(d)
+    if n == 0:
+        return Paired(n=0)
+    mean = float(d.mean())
+    test = _SignFlips(d)
+    spread = float(d.std(ddof=1)) if n > 1 else 0.0
+    varies = spread > 1e-9 * float(np.abs(d).max())
+    low, high = (test.end(-1), test.end(+1)) if test.can_reject else (None, None)
+    return Paired(n=n, mean=mean, low=low, high=high, effect=mean / spread if varies else None, p=test.p(0.0))
+
+
+class _SignFlips:
+    """All choices of signs, or many, for a sample: only their sums over the sample and over ones are needed."""
+
+    def __init__(self, d: Array) -> None:
+        n = len(d)
+        if n <= EXACT:
+            signs = 1.0 - 2.0 * ((np.arange(2**n)[:, None] >> np.arange(n)) & 1)
+        else:
+            drawn = np.random.default_rng(0).integers(0, 2, (DRAWS, n))
+            # The sample itself is one of the choices, so that p is never zero.
+            signs = np.vstack([np.ones((1, n)), 1.0 - 2.0 * drawn])
+        self._sums = signs @ d
+        self._ones = signs.sum(axis=1)
+        self._sum, self._n = float(d.sum()), n
+        self._d = d
+
+    @property
+    def can_reject(self) -> bool:
+        """Could any sample of this size be significant? Two choices of signs always are as extreme as the sample."""
+        return 2.0 / 2.0**self._n < LEVEL
+
+    def p(self, shift: float) -> Probability:
+        """Of the hypothesis that the true difference is `shift`."""
+        slack = 1e-9 * float(np.abs(self._d - shift).sum())  # sums that are equal but for rounding
+        extreme = np.abs(self._sums - shift * self._ones) >= abs(self._sum - shift * self._n) - slack
+        return float(extreme.mean())
+
+    def end(self, side: int) -> float:
+        """Where the differences that the test does not reject end below (-1) or above (+1)."""
+        inside = self._sum / self._n
+        # Beyond the most extreme difference every sign is as it would be by chance alone: certainly rejected.
+        outside = float(self._d.min() if side < 0 else self._d.max())
+        outside += side * 1e-9 * max(1.0, abs(outside))
+        if self.p(outside) >= LEVEL:
+            return outside
+        for _ in range(STEPS):
+            middle = (inside + outside) / 2
+            if self.p(middle) >= LEVEL:
+                inside = middle
+            else:
+                outside = middle
+        return inside
+
+
+def holm(ps: Sequence[Probability | None]) -> list[Probability | None]:
+    """Corrected for asking several questions at once (Holm 1979); None stays None and counts for nothing."""
+    asked = sorted((p, index) for index, p in enumerate(ps) if p is not None)
+    corrected: list[Probability | None] = [None] * len(ps)
+    largest = 0.0
+    for rank, (p, index) in enumerate(asked):
+        largest = max(largest, min(1.0, (len(asked) - rank) * p))
+        corrected[index] = largest
+    return corrected

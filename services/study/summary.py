@@ -1,0 +1,165 @@
+"""What the sessions come to, as tables that read the same in a terminal and in Markdown."""
+
+from collections import Counter
+from collections.abc import Callable, Iterable, Sequence
+from statistics import mean, stdev
+from typing import get_args
+
+from msgspec import Struct
+
+from schemas.behaviors import EventKind
+from schemas.recognition import KindStatistics
+from services.study.hypotheses import CAVEAT, HYPOTHESES, Finding
+from services.study.records import SessionRecord
+
+KINDS: tuple[EventKind, ...] = get_args(EventKind)
+RESPONDED = tuple(kind for kind in KINDS if kind != "backchannel")
+"""A backchannel can neither fail nor be late."""
+MISSING = "-"
+
+
+class Table(Struct, frozen=True, kw_only=True):
+    """The first column is words, the others numbers."""
+
+    title: str
+    columns: tuple[str, ...]
+    rows: tuple[tuple[str, ...], ...]
+    notes: tuple[str, ...] = ()
+
+    def markdown(self) -> str:
+        rule = ("---", *["---:"] * (len(self.columns) - 1))
+        lines = [f"| {' | '.join(cells)} |" for cells in (self.columns, rule, *self.rows)]
+        paragraphs = (f"## {self.title}", "\n".join(lines), *self.notes)
+        return "\n\n".join(paragraphs) + "\n"
+
+
+# -- numbers ----------------------------------------------------------------------------------------------------
+
+
+def by_condition(records: Iterable[SessionRecord]) -> dict[str, list[SessionRecord]]:
+    """The finished sessions of each condition; conditions without one are there, too."""
+    groups: dict[str, list[SessionRecord]] = {}
+    for record in records:
+        group = groups.setdefault(record.condition, [])
+        if record.finished:
+            group.append(record)
+    return groups
+
+
+def pooled(records: Iterable[SessionRecord], kind: EventKind) -> KindStatistics:
+    """The events of one kind in all sessions together."""
+    parts = [record.of(kind) for record in records]
+    succeeded, failed = sum(part.succeeded for part in parts), sum(part.failed for part in parts)
+    return KindStatistics(
+        kind=kind, count=sum(part.count for part in parts), succeeded=succeeded, failed=failed,
+        failure_rate=failed / (succeeded + failed) if succeeded + failed else None,
+        delay_min=min(known(part.delay_min for part in parts), default=None),
+        delay_mean=_weighted((part.delay_mean, part.succeeded) for part in parts),
+        delay_max=max(known(part.delay_max for part in parts), default=None),
+        failed_delay_min=min(known(part.failed_delay_min for part in parts), default=None),
+        failed_delay_mean=_weighted((part.failed_delay_mean, part.failed) for part in parts),
+        failed_delay_max=max(known(part.failed_delay_max for part in parts), default=None),
+    )  # fmt: skip
+
+
+def _weighted(means: Iterable[tuple[float | None, int]]) -> float | None:
+    """The mean of means with their weights; None where there was nothing."""
+    parts = [(mean, weight) for mean, weight in means if mean is not None]
+    return sum(mean * weight for mean, weight in parts) / sum(weight for _, weight in parts) if parts else None
+
+
+def known(values: Iterable[float | None]) -> list[float]:
+    return [value for value in values if value is not None]
+
+
+# -- tables -----------------------------------------------------------------------------------------------------
+
+
+def overview(records: Sequence[SessionRecord]) -> Table:
+    """One column for each condition."""
+    groups = by_condition(records)
+    ordered = Counter(record.condition for record in records)
+    rows = [("finished", *(f"{len(group)} of {ordered[name]}" for name, group in groups.items()))]
+    for title, digits, measure in _MEASURES:
+        cells = (spelled(known(map(measure, group)), digits) for group in groups.values())
+        rows.append((title, *cells))
+    for kind in KINDS:
+        counts = ([float(record.of(kind).count) for record in group] for group in groups.values())
+        rows.append((kind.replace("_", " "), *(spelled(count, 1) for count in counts)))
+        if kind in RESPONDED:
+            all_of = [pooled(group, kind) for group in groups.values()]
+            rows.append(("- failure rate", *(number(one.failure_rate, 3) for one in all_of)))
+            delays = ((one.delay_min, one.delay_mean, one.delay_max) for one in all_of)
+            rows.append(("- delay (s)", *map(numbers, delays)))
+    return Table(
+        title="Sessions", columns=("", *groups), rows=tuple(rows),
+        notes=(
+            "Finished sessions; mean ± standard deviation of a session. Failure rates, and delays of what succeeded "
+            "(least / mean / most), are of all events together. Optional events that fail are no failures.",
+        ),
+    )  # fmt: skip
+
+
+_MEASURES: tuple[tuple[str, int, Callable[[SessionRecord], float | None]], ...] = (
+    ("completion time (s)", 1, lambda record: record.completion_time),
+    ("connection events", 1, lambda record: record.statistics.events),
+    ("MTBCE (s)", 2, lambda record: record.statistics.mtbce),
+    ("longest gap (s)", 1, lambda record: record.statistics.max_gap),
+    ("pair to pair (s)", 2, lambda record: record.adjacency_pairs_every),
+    ("looks at face, start", 2, lambda record: record.eye_contact.first if record.eye_contact else None),
+    ("looks at face, middle", 2, lambda record: record.eye_contact.second if record.eye_contact else None),
+    ("looks at face, end", 2, lambda record: record.eye_contact.last if record.eye_contact else None),
+)
+
+
+def hypotheses(found: Sequence[Finding]) -> Table:
+    """One row for each finding."""
+    rows = (
+        (
+            finding.hypothesis, finding.condition.removeprefix("degraded-"), str(finding.n),
+            number(finding.operational), number(finding.degraded), number(finding.difference),
+            f"{number(finding.low)} .. {number(finding.high)}", number(finding.effect, 1),
+            number(finding.p_corrected, 4), finding.verdict,
+        )
+        for finding in found
+    )  # fmt: skip
+    return Table(
+        title="Hypotheses of the thesis (5.2.2)",
+        columns=("", "degraded", "n", "oper.", "degr.", "diff.", "95 %", "d", "p", "in simulation"),
+        rows=tuple(rows),
+        notes=(
+            *(f"{one.name}: {one.claim} ({one.measure}, {one.unit})." for one in HYPOTHESES),
+            "Sessions of the same seed are pairs. p: two-sided permutation test of their differences (signs "
+            "flipped), corrected for the number of questions (Holm). 95 %: the differences that the test does not "
+            "reject, uncorrected. d: mean / standard deviation of the differences.",
+            CAVEAT,
+        ),
+    )
+
+
+def unfinished(records: Sequence[SessionRecord]) -> Table:
+    rows = (
+        (f"{record.condition} {record.session}", str(record.seed), record.reason)
+        for record in records
+        if not record.finished
+    )
+    return Table(title="Not finished", columns=("session", "seed", "reason"), rows=tuple(rows))
+
+
+def number(value: float | None, digits: int = 2) -> str:
+    """No negative zero; `-` for what is not known."""
+    return MISSING if value is None else f"{round(value, digits) + 0.0:.{digits}f}"
+
+
+def numbers(values: Iterable[float | None]) -> str:
+    """`0.00 / 0.31 / 2.00`, or one `-` if nothing is known."""
+    words = [number(value) for value in values]
+    return MISSING if set(words) == {MISSING} else " / ".join(words)
+
+
+def spelled(values: Sequence[float], digits: int) -> str:
+    """`5.71 ± 0.20`."""
+    if not values:
+        return MISSING
+    middle = number(mean(values), digits)
+    return f"{middle} ± {number(stdev(values), digits)}" if len(values) > 1 else middle
