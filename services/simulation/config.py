@@ -103,7 +103,7 @@ class Habits(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """How long they look at a face or a thing. Ours."""
     reports: Probability = 0.7
     """How often they look up at the robot's face when a piece is laid, times `propensity`. Ours."""
-    reciprocity: Probability = 0.08
+    reciprocity: Probability = 0.05
     """How much an answered look at the robot's face moves their propensity for such looks from 1 toward 2, and an
     unanswered one toward 0. Our assumption, after hypothesis 11 of the thesis; 0: eye contact changes nothing."""
 

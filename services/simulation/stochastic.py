@@ -34,8 +34,6 @@ from services.simulation.human import (
 from services.simulation.listening import COMES, GOES, moves
 from services.tangram_table import SIDES, TangramTable, poses_touching
 
-PATIENCE: Seconds = 1.9
-"""How long a look at the robot's face waits to be returned; as recognition counts it."""
 NOD: Seconds = 0.5
 WORD: Seconds = 0.5
 """Of a spoken backchannel or answer; shorter than 0.8 s, with which speech would be a change of floor."""
@@ -78,8 +76,8 @@ class StochasticHuman(Human):
         """What they are at, or about to be: the busy regime."""
         self._next_task: Lay | None = None
         self._gesture_until: Seconds = 0.0
-        self._awaits_eyes = 0
-        """Which look at the robot's face has not been returned yet; 0: none."""
+        self._awaits_eyes = False
+        """They look at the robot's face, and it has not looked back yet."""
         self.propensity = 1.0
         """For looks at the robot's face, 0..2."""
 
@@ -106,10 +104,7 @@ class StochasticHuman(Human):
         """What doing this changes for them."""
         match act:
             case LookAt(target=target):
-                self._gaze = target
-                self._looks += 1
-                if target == FACE:
-                    self._looks_at_face(now)
+                self._look_changes(target)
             case Sit():
                 self._seated = True
                 self._plan_look_up(now)
@@ -136,7 +131,7 @@ class StochasticHuman(Human):
                     self._robot_looks_at_them(now)
                 elif self._robot_gaze in self._pieces:
                     self._is_directed(self._robot_gaze, self._habits.follows_look, now)
-            case ActionEnded(actor=self._robot, action="look"):
+            case ActionEnded(actor=self._robot, action="look", targets=(self._robot_gaze,)):
                 self._robot_gaze = ""
             case ActionBegan(actor=self._robot, action="point", targets=(target,)) if target in self._pieces:
                 self._is_directed(target, self._habits.follows_point, now)
@@ -180,29 +175,30 @@ class StochasticHuman(Human):
             self._shown.add(piece)
             self._glances(piece, now + self._drawn(self._habits.follow_delay))
 
-    def _robot_looks_at_them(self, now: Seconds) -> None:
-        if self._awaits_eyes:
-            self._learn(answered=True)
-        elif self._gaze != FACE and self._answers(min(1.0, self._habits.answers_look * self.propensity)):
-            self._glances(FACE, now + self._drawn(self._habits.look_delay))
-
     # -- eye contact --------------------------------------------------------------------------------------------
 
-    def _looks_at_face(self, now: Seconds) -> None:
-        """They look at the robot's face. Whether it looks back tells how soon they will do it again."""
+    def _robot_looks_at_them(self, now: Seconds) -> None:
+        if self._gaze == FACE:
+            self._meet_eyes()
+        elif self._answers(min(1.0, self._habits.answers_look * self.propensity)):
+            self._glances(FACE, now + self._drawn(self._habits.look_delay))
+
+    def _look_changes(self, target: str) -> None:
+        """Whether the robot looks back tells how soon they will look at its face again."""
+        if self._awaits_eyes:
+            self._learn(answered=False)
+        self._gaze = target
+        self._looks += 1
+        self._awaits_eyes = target == FACE
         if self._robot_gaze == self._table.person.id:
+            self._meet_eyes()
+
+    def _meet_eyes(self) -> None:
+        if self._awaits_eyes:
             self._learn(answered=True)
-            return
-        self._awaits_eyes = look = self._looks
-
-        def give_up(now: Seconds) -> None:
-            if self._awaits_eyes == look:
-                self._learn(answered=False)
-
-        self._later(now + PATIENCE, give_up)
 
     def _learn(self, *, answered: bool) -> None:
-        self._awaits_eyes = 0
+        self._awaits_eyes = False
         self.propensity += self._habits.reciprocity * ((2.0 if answered else 0.0) - self.propensity)
 
     # -- of their own accord ------------------------------------------------------------------------------------

@@ -286,33 +286,34 @@ def test_backchannels_come_while_the_robot_speaks():
     assert signs == pytest.approx(100, rel=0.35)
 
 
-def eye_contact(answered: bool, **habits: Any) -> tuple[int, int]:
-    """Looks at the face in the first and the last third of fifteen minutes."""
-    watch = Watch(**{**QUIET, "looks_up_every": 6.0}, **habits)
+def eye_contact(answered: bool, seed: int = 0, reciprocity: float = 0.05) -> tuple[StochasticHuman, list[float]]:
+    """The person after fifteen minutes, and when they looked at the robot's face."""
+    watch = Watch(seed, **{**QUIET, "looks_up_every": 6.0, "reciprocity": reciprocity})
+    before = len(watch.began("look", ROBOT))
     if answered:
-        watch.scene.feed(ActionBegan(actor=ROBOT, action="look", targets=(HUMAN,), at=stamp(0.0)), watch.now)
+        watch.scene.feed(ActionBegan(actor=ROBOT, action="look", targets=(HUMAN,), at=stamp(5.0)), watch.now)
     watch.wait(900.0)
-    looks = watch.began("look", ROBOT)
-    return sum(at < 300.0 for at in looks), sum(at > 600.0 for at in looks)
+    return watch.human, watch.began("look", ROBOT)[before:]
 
 
 def test_looks_that_are_not_returned_become_fewer():
-    first, last = eye_contact(answered=False)
+    looks = [at for seed in range(10) for at in eye_contact(answered=False, seed=seed)[1]]
+    human, last = eye_contact(answered=False)
 
-    assert last < first / 2
+    assert sum(at > 600.0 for at in looks) < 0.6 * sum(at < 300.0 for at in looks)
+    assert human.propensity == pytest.approx(0.95 ** (len(last) + 1))
 
 
 def test_looks_that_are_returned_become_more():
-    first, last = eye_contact(answered=True)
+    looks = [at for seed in range(10) for at in eye_contact(answered=True, seed=seed)[1]]
+    human, _ = eye_contact(answered=True)
 
-    assert last > first
+    assert sum(at > 600.0 for at in looks) > 1.2 * sum(at < 300.0 for at in looks)
+    assert 1.8 < human.propensity <= 2.0
 
 
 def test_without_reciprocity_they_stay_as_they_are():
-    watch = Watch(**{**QUIET, "looks_up_every": 6.0}, reciprocity=0.0)
-    watch.wait(900.0)
-
-    assert watch.human.propensity == 1.0
+    assert eye_contact(answered=False, reciprocity=0.0)[0].propensity == 1.0
 
 
 # -- all of it --------------------------------------------------------------------------------------------------
