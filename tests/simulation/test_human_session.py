@@ -114,7 +114,7 @@ def test_a_busy_listener_makes_a_gap_of_seventy_seconds_typical():
 
 def test_without_the_busy_regime_the_same_pace_never_pauses_for_so_long():
     """Pauses that give the same mean time between events."""
-    plans = [draw(random.Random(seed), Pace(detailed=0.0, pause=3.4)) for seed in range(SEEDS)]
+    plans = [draw(random.Random(seed), Pace(detailed=0.0, pause=3.5)) for seed in range(SEEDS)]
 
     assert mean((plan[-1].start - plan[0].start) / (EVENTS - 1) for plan in plans) == pytest.approx(MTBCE, abs=0.3)
     assert max(map(longest_gap, plans)) < LONGEST_GAP / 2
