@@ -32,8 +32,9 @@ from services.generation.config import GenerationConfig
 from services.generation.ordering import ordered
 from services.generation.parts import Names, Parts
 from services.generation.permits import Permits
-from services.generation.rewriting import Operator, Rewriting, points_named
-from services.generation.trail import NOTHING, Stroke, Trail, stroke
+from services.generation.profiles import after, as_in_the_figure, checking_back, same
+from services.generation.rewriting import Operator, Rewriting, instants, points_named
+from services.generation.trail import NOTHING, Stroke, Trail, first_met, stroke
 from services.generation.turn_policy import TurnPlan
 
 _LASTING = frozenset({"gaze", "face", "faceLexeme", "faceFacs", "posture", "event", "turn"})
@@ -93,14 +94,16 @@ class _Emitter:
         }
         self.named = points_named(fragment.id, fragment.behaviors, fragment.constraints)
         self.named_behaviors = {behavior for behavior, _ in self.named}
+        self.speeches = self._speeches()
         self.rewriting = Rewriting(
             fragment=fragment.id,
             replacements={id: parts.replacement(gaze_leads=self.figure) for id, parts in self.parts.items()},
+            words=frozenset(self.speeches),
+            instants=instants(fragment.behaviors, fragment.constraints),
             dropped=frozenset(behavior.id for behavior in self.dropped),
             begins=before.start,
         )
         self.constraints: list[Constraint] = []
-        self.speeches = self._speeches()
         self.last_gaze = self.last_glance = ""
         """The one before the end-of-turn gaze, if it may be told when to relax; and the last glance."""
         self.strokes: list[Stroke] = []
@@ -162,9 +165,9 @@ class _Emitter:
             if (made := stroke(behavior, self.permits.only_hand)) is not None:
                 self.strokes.append(made)
             if is_first or behavior.id in self.named_behaviors:
-                free.append(f"{behavior.id}:start")
+                free.append(f"{behavior.id}:{first_met(behavior, self.named)}")
                 if made is not None:
-                    operators += [_after(sync, f"{behavior.id}:start") for sync in self.before.frees(made.limb)]
+                    operators += [after(sync, f"{behavior.id}:start") for sync in self.before.frees(made.limb)]
         if self.before.start and free:
             operators.insert(0, After(ref=self.before.start, syncs=tuple(free)))
         if operators:
@@ -184,12 +187,15 @@ class _Emitter:
                 operators: list[Operator] = list(self.rewriting.inherited(behavior))
                 hand = self.hands.get(behavior.id, self.permits.only_hand)
                 if parts.point:
-                    operators += [_after(sync, f"{parts.point}:start") for sync in self.before.frees(hand)]
+                    operators += [after(sync, f"{parts.point}:start") for sync in self.before.frees(hand)]
                     self.strokes.append(Stroke(parts.point, hand))
+                is_timed = self.rewriting.is_timed(behavior.id, self.named)
                 if self.figure:
-                    operators += self._as_in_the_figure(parts, preceding)
+                    lines = as_in_the_figure(parts, preceding, self.before.speech, is_timed, self.config.figure_lead)
+                    operators += [each for each in lines if not self._is_said(each, operators)]
                 else:
-                    operators += self._checking_back(parts, preceding, glance, points.get(hand, ""))
+                    previous_point = points.get(hand, "")
+                    operators += checking_back(parts, preceding, self.before.speech, is_timed, glance, previous_point)
                     if parts.point:
                         points[hand] = parts.point
                         if behavior.id != last:
@@ -207,70 +213,30 @@ class _Emitter:
                 preceding = behavior.id
             elif isinstance(behavior, Gaze):
                 gazes += 1
-                free = not {(behavior.id, "relax"), (behavior.id, "end")} & self.named
+                free = not {(behavior.id, "relax"), (behavior.id, "end")} & self.named.keys()
                 # An unnamed gaze follows the one before it; naming it would make it start with the block.
                 unnamed_follower = gazes > 1 and behavior.id not in self.named_behaviors
                 self.last_gaze = behavior.id if free and not unnamed_follower else ""
 
-    def _checking_back(self, parts: Parts, preceding: str, glance: str, previous_point: str) -> list[Operator]:
-        """Profile `check-back`, its lines in the order of docs/generation.md."""
-        gaze, point, phrase, event = parts.gaze, parts.point, parts.phrase, parts.event
-        operators: list[Operator] = []
-        if phrase and preceding:
-            operators.append(_after(f"{preceding}:end", f"{phrase}:start"))
-        if gaze:
-            # What the author has said of its start replaces this, but nothing begins before the fragment does.
-            is_timed = (parts.reference.id, "start") in self.named
-            if words := self.before.speech if is_timed else preceding:
-                operators.append(_after(f"{words}:end", f"{gaze}:start"))
-            if glance:
-                operators.append(_after(f"{glance}:stroke", f"{gaze}:start"))
-            if phrase:
-                operators.append(_after(f"{phrase}:end", f"{gaze}:relax"))
-        if gaze and phrase and not point:
-            operators.append(_after(f"{gaze}:stroke", f"{phrase}:start"))
-        if point:
-            operators.append(_after(f"{gaze}:start", f"{point}:start"))
-            operators.append(_after(f"{gaze}:stroke", f"{point}:stroke_start"))
-            if phrase:
-                operators.append(_same(f"{point}:stroke_start", f"{phrase}:start"))
-                operators.append(_after(f"{phrase}:end", f"{point}:stroke_end"))
-            operators.append(_after(f"{event}:end", f"{point}:stroke_end"))
-            if previous_point:
-                operators.append(_after(f"{previous_point}:stroke_end", f"{point}:start"))
-        return operators
-
     def _glance(self, parts: Parts) -> Operator:
         parts.glance = self.names.fresh(f"{parts.reference.id}-glance")
         parts.behaviors.append(Gaze(id=parts.glance, target=self.turn.addressee))
-        return _same(f"{parts.gaze}:relax", f"{parts.glance}:start")
+        return same(f"{parts.gaze}:relax", f"{parts.glance}:start")
 
-    def _as_in_the_figure(self, parts: Parts, preceding: str) -> list[Operator]:
-        """Profile `figure-3.3`: the gaze leads by a phrase, and the point is over when the phrase begins."""
-        gaze, point, phrase = parts.gaze, parts.point, parts.phrase
-        operators: list[Operator] = []
-        if gaze and preceding:
-            # When an earlier fragment's words begin is not for this block to foresee: the gaze goes when they do.
-            follows = preceding == self.before.speech
-            relate, sync = (_after, "start") if follows else (_same, "stroke")
-            operators.append(relate(f"{preceding}:start", f"{gaze}:{sync}"))
-            if point and follows:
-                operators.append(_after(f"{gaze}:start", f"{point}:start"))
-        if point:
-            operators.append(_same(f"{gaze}:stroke+{self.config.figure_lead:g}", f"{point}:stroke_start"))
-            if phrase:
-                operators.append(_same(f"{point}:stroke_end", f"{phrase}:start"))
-        if phrase and preceding and (parts.reference.id, "start") not in self.named:
-            operators.append(_after(f"{preceding}:end", f"{phrase}:start"))
-        return operators
+    def _is_said(self, operator: Operator, inherited: Sequence[Operator]) -> bool:
+        """Does the input, or the reference's own timing, ask for this order already?"""
+        said = [*inherited, *(each for constraint in self.constraints for each in constraint.operators)]
+        return isinstance(operator, After) and any(
+            {operator.ref, *operator.syncs} <= {each.ref, *each.syncs}
+            for each in said
+            if isinstance(each, Synchronize) or each.ref == operator.ref
+        )
 
     def _keep_in_line(self, speech: Speech, preceding: str) -> None:
         """Speeches without timing follow one another by document order, but only while nothing names them; we do."""
         if preceding and preceding != self.before.speech and speech.id not in self.named_behaviors:
             start = f"{speech.id}:start"
-            operator: Operator = (
-                _same(f"{preceding}:end", start) if self.figure else _after(f"{preceding}:end", start)
-            )
+            operator: Operator = same(f"{preceding}:end", start) if self.figure else after(f"{preceding}:end", start)
             id = self.names.fresh(f"{speech.id}-timing")
             self.constraints.append(Constraint(id=id, operators=(operator,), line=speech.line))
 
@@ -341,11 +307,11 @@ class _Emitter:
                 )
             )
             if self.speeches:
-                operators.append(_same(f"{self.speeches[-1]}:end", f"{gaze}:start"))
+                operators.append(same(f"{self.speeches[-1]}:end", f"{gaze}:start"))
             else:
                 operators += self._once_all_is_done(f"{gaze}:start")
             if self.last_gaze:
-                operators.append(_same(f"{self.last_gaze}:relax", f"{gaze}:start"))
+                operators.append(same(f"{self.last_gaze}:relax", f"{gaze}:start"))
             signal = msgspec.structs.replace(signal, timing=(Timing("start", f"{gaze}:start"),))
         if self.speeches:
             signal = msgspec.structs.replace(signal, timing=(Timing("start", f"{self.speeches[-1]}:end"),))
@@ -360,16 +326,8 @@ class _Emitter:
         """After the last words of the turn, and all that ends by itself; a gaze or a face lasts until that has."""
         ends = [self.before.start] if self.before.start else []
         ends += [f"{behavior.id}:end" for behavior in self._in_document_order() if _ends_by_itself(behavior)]
-        return [_after(end, sync) for end in ends]
+        return [after(end, sync) for end in ends]
 
 
 def _ends_by_itself(behavior: BlockBehavior) -> bool:
     return type_name(behavior) not in _LASTING
-
-
-def _after(reference: str, sync: str) -> After:
-    return After(ref=reference, syncs=(sync,))
-
-
-def _same(reference: str, sync: str) -> Synchronize:
-    return Synchronize(ref=reference, syncs=(sync,))

@@ -11,7 +11,7 @@ from itertools import pairwise
 
 from msgspec import Struct
 
-from schemas.behaviors import After, Before, Constraint, FragmentBehavior, Reference, Speech
+from schemas.behaviors import After, Before, Constraint, FragmentBehavior, Gaze, Reference, Speech
 from schemas.syncref import SYNC_POINTS, SyncRef, canonical_sync
 from schemas.units import Seconds
 
@@ -36,8 +36,10 @@ def ordered(
 ) -> tuple[FragmentBehavior, ...]:
     """The behaviors, each after those that its constraints put before it. A cycle is left in document order.
 
-    fragment: its id, by which sync references may name it.
+    What takes no turn with voice or gaze (a nod) comes as soon as it may: a reference that is tied to it does not have
+    to wait for the words between. fragment: its id, by which sync references may name it.
     """
+    behaviors = sorted(behaviors, key=lambda behavior: isinstance(behavior, Speech | Reference | Gaze))
     relations = _relations(behaviors, constraints, fragment)
     begins = [("", behavior.id, START) for behavior in behaviors]
     instants = _instants(begins, relations)

@@ -63,11 +63,11 @@ class Parts:
             )
 
     def replacement(self, *, gaze_leads: bool) -> Replacement:
-        start = (self.gaze or self.phrase, "start")
-        if gaze_leads and self.gaze and self.phrase:
-            start = (self.phrase, "start")
         if self.phrase:
             end = (self.phrase, "end")
         else:
             end = (self.point, "stroke_end") if self.point else (self.gaze, "stroke")
-        return Replacement(start, end, loose_start=gaze_leads and bool(self.gaze and self.phrase))
+        leads = gaze_leads and self.gaze and self.phrase
+        return Replacement(
+            (self.gaze or self.phrase, "start"), end, start_of_words=(self.phrase, "start") if leads else None
+        )

@@ -1,6 +1,8 @@
 """A fragment's constraints as its block needs them: ids of removed references stay usable, dropped ones vanish."""
 
-from collections.abc import Iterator, Mapping
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from functools import cached_property
 
 from msgspec import Struct
 from msgspec.structs import replace
@@ -9,30 +11,40 @@ from schemas.behaviors import After, Before, Behavior, Constraint, Synchronize, 
 from schemas.syncref import BLOCK_ITSELF, SyncRef
 
 Operator = Synchronize | Before | After
+Point = tuple[str, str]
+"""Behavior and sync point."""
 
 
 class Replacement(Struct, frozen=True):
-    """What stands for a removed reference. start, end: (behavior, sync).
+    """What stands for what was removed.
 
-    loose_start: nothing is synchronized with its start any more; what was, comes no later than `start` (Fig. 3.3:
-    the gaze leads, so only the order of the phrases is kept).
+    start_of_words: of a reference whose gaze leads (Fig. 3.3), the start of its phrase. Words and clock times are not
+    tied to the gaze, then: the phrase comes no earlier than they do.
     """
 
-    start: tuple[str, str]
-    end: tuple[str, str]
-    loose_start: bool = False
+    start: Point
+    end: Point
+    start_of_words: Point | None = None
 
 
-class Rewriting(Struct, frozen=True, kw_only=True):
-    """begins: the sync point of another block that stands for the start of this one; "": it begins by itself."""
+class Rewriting(Struct, frozen=True, kw_only=True, dict=True):
+    """words: ids of speeches and phrases. instants: the input's sync points that are each other's, a few at a time.
+
+    begins: the sync point of another block that stands for the start of this one; "": it begins by itself.
+    """
 
     fragment: str
     replacements: Mapping[str, Replacement]
+    words: frozenset[str] = frozenset()
+    instants: Sequence[Sequence[str]] = ()
     dropped: frozenset[str] = frozenset()
     begins: str = ""
 
-    def text(self, text: str) -> str | None:
-        """A sync reference as the block must have it; None if what it names was dropped."""
+    def text(self, text: str, *, among_words: bool = False) -> str | None:
+        """A sync reference as the block must have it; None if what it names was dropped.
+
+        among_words: it is related to words or the clock.
+        """
         ref = self._parse(text)
         if ref is None:
             return text
@@ -44,7 +56,8 @@ class Rewriting(Struct, frozen=True, kw_only=True):
         replacement = self.replacements.get(ref.behavior)
         if replacement is None:
             return text
-        behavior, sync = replacement.start if ref.sync == "start" else replacement.end
+        start = (among_words and replacement.start_of_words) or replacement.start
+        behavior, sync = start if ref.sync == "start" else replacement.end
         return str(SyncRef(behavior=behavior, sync=sync, offset=ref.offset))
 
     def constraint(self, constraint: Constraint) -> Constraint | None:
@@ -54,7 +67,8 @@ class Rewriting(Struct, frozen=True, kw_only=True):
 
     def timing(self, behavior: Behavior) -> tuple[Timing, ...]:
         """The inline timing of a behavior that stays."""
-        texts = ((timing.sync, self.text(timing.ref)) for timing in behavior.timing)
+        speaks = behavior.id in self.words
+        texts = ((timing.sync, self.text(timing.ref, among_words=speaks)) for timing in behavior.timing)
         return tuple(Timing(sync, text) for sync, text in texts if text is not None)
 
     def inherited(self, reference: Behavior) -> tuple[Operator, ...]:
@@ -67,31 +81,99 @@ class Rewriting(Struct, frozen=True, kw_only=True):
             )
         )
 
+    def is_timed(self, reference: str, named: Counter[Point]) -> bool:
+        """Does the input say when `reference` starts? Not if all it says is that something free starts with it.
+
+        named: see `points_named`.
+        """
+        start, ties = (reference, "start"), 0
+        uses: Counter[str] = Counter()
+        for (behavior, _), times in named.items():
+            uses[behavior] += times
+        for group in self.instants:
+            refs = {text: self._parse(text) for text in group if text}
+            if start not in ((ref.behavior, ref.sync) for ref in refs.values() if ref):
+                continue
+            ties += 1
+            for text, ref in refs.items():
+                is_free = ref is not None and (ref.behavior == reference or uses[ref.behavior] == 1)
+                if not is_free or (ref and ref.behavior != reference and self._is_of_words(text)):
+                    return True
+        return named[start] > ties
+
     def _operators(self, operator: Operator) -> Iterator[Operator]:
         if isinstance(operator, Synchronize):
             yield from self._synchronize(operator)
             return
-        reference = self.text(operator.ref)
-        syncs = tuple(text for sync in operator.syncs if (text := self.text(sync)) is not None)
-        if reference is not None and syncs:
-            yield replace(operator, ref=reference, syncs=syncs)
+        pairs: dict[str, list[str]] = {}
+        ref_is_later = isinstance(operator, Before)
+        for sync in operator.syncs:
+            ref = self.text(operator.ref, among_words=self._leads(sync, not ref_is_later))
+            text = self.text(sync, among_words=self._leads(operator.ref, ref_is_later))
+            if ref is not None and text is not None and not self._have_become_one(operator.ref, sync):
+                pairs.setdefault(ref, []).append(text)
+        for ref, syncs in pairs.items():
+            yield replace(operator, ref=ref, syncs=tuple(syncs))
+
+    def _leads(self, other: str, is_later: bool) -> bool:
+        """Does a gaze lead what comes before or after `other`, so that this is the phrase's to keep?"""
+        return self._is_of_words(other) if is_later else self._is_timed(other)
 
     def _synchronize(self, operator: Synchronize) -> Iterator[Operator]:
         members = [member for member in (operator.ref, *operator.syncs) if member]
         loose = [member for member in members if self._is_loose(member)]
-        fast = [text for member in members if member not in loose and (text := self.text(member)) is not None]
-        if len(fast) > 1:
-            yield Synchronize(ref=fast[0], syncs=tuple(fast[1:]), line=operator.line)
-        if fast and loose:
-            syncs = tuple(text for member in loose if (text := self.text(member)) is not None)
-            yield After(ref=fast[0], syncs=syncs, line=operator.line)
+        fast = [member for member in members if member not in loose]
+        if not any(map(self._is_timed, fast)):
+            fast, loose = members, []
+        fast = [member for member in fast if not self._have_become_one(fast[0], member)]
+        texts = [text for member in fast if (text := self.text(member)) is not None]
+        if len(texts) > 1:
+            yield Synchronize(ref=texts[0], syncs=tuple(texts[1:]), line=operator.line)
+        if texts and loose:
+            syncs = tuple(text for member in loose if (text := self.text(member, among_words=True)) is not None)
+            yield After(ref=texts[0], syncs=syncs, line=operator.line)
+
+    def _have_become_one(self, one: str, other: str) -> bool:
+        """Two different points of the input, whatever their offsets."""
+        parsed, made = (self._parse(one), self._parse(other)), (self.text(one), self.text(other))
+        if None in parsed or None in made or _is_same(one, other):
+            return False
+        return _is_same(str(made[0]), str(made[1]))
 
     def _is_loose(self, text: str) -> bool:
         ref = self._parse(text)
         if ref is None or ref.sync != "start":
             return False
         replacement = self.replacements.get(ref.behavior)
-        return replacement is not None and replacement.loose_start
+        return replacement is not None and replacement.start_of_words is not None
+
+    def _is_timed(self, text: str) -> bool:
+        """Is it a point of words or of the clock, or of the same instant as one?"""
+        ref = self._parse(text)
+        return ref is None or (ref.behavior, ref.sync) in self._timed or self._is_of_words(text)
+
+    def _is_of_words(self, text: str) -> bool:
+        """Or of the clock, as the points of other blocks are, which nothing here can move."""
+        ref = self._parse(text)
+        if ref is None or ref.behavior in ("", BLOCK_ITSELF):
+            return True
+        if replacement := self.replacements.get(ref.behavior):
+            return (replacement.start if ref.sync == "start" else replacement.end)[0] in self.words
+        return ref.behavior in self.words
+
+    @cached_property
+    def _timed(self) -> frozenset[Point]:
+        """Points of the same instant as words or the clock, but not through a start that is loose."""
+        timed: set[Point] = set()
+        groups = [[text for text in group if text and not self._is_loose(text)] for group in self.instants]
+        points = [{(ref.behavior, ref.sync) for text in group if (ref := self._parse(text))} for group in groups]
+        while grown := [
+            named
+            for group, named in zip(groups, points, strict=True)
+            if not named <= timed and (named & timed or any(map(self._is_of_words, group)))
+        ]:
+            timed.update(*grown)
+        return frozenset(timed)
 
     def _parse(self, text: str) -> SyncRef | None:
         """None for what is not of this fragment."""
@@ -101,21 +183,29 @@ class Rewriting(Struct, frozen=True, kw_only=True):
         return ref if ref.block in ("", self.fragment) else None
 
 
+def _is_same(one: str, other: str) -> bool:
+    """Is it one sync point, whatever the offsets?"""
+    return replace(SyncRef.parse(one), offset=0.0) == replace(SyncRef.parse(other), offset=0.0)
+
+
+def instants(behaviors: Sequence[Behavior], constraints: Sequence[Constraint]) -> Sequence[Sequence[str]]:
+    """Sync points that the input puts at one instant, or a fixed time apart."""
+    inline = [(f"{behavior.id}:{timing.sync}", timing.ref) for behavior in behaviors for timing in behavior.timing]
+    operators = [operator for constraint in constraints for operator in constraint.operators]
+    return [*inline, *((each.ref, *each.syncs) for each in operators if isinstance(each, Synchronize))]
+
+
 def points_named(
     fragment: str, behaviors: tuple[Behavior, ...], constraints: tuple[Constraint, ...]
-) -> frozenset[tuple[str, str]]:
-    """(behavior, sync) of every point that the input times or names, on either side of a constraint."""
-    named: set[tuple[str, str]] = set()
-    texts: list[str] = []
-    for behavior in behaviors:
-        for timing in behavior.timing:
-            named.add((behavior.id, timing.sync))
-            texts.append(timing.ref)
-    for constraint in constraints:
-        for operator in constraint.operators:
-            texts += [operator.ref, *operator.syncs]
-    for text in filter(None, texts):
-        ref = SyncRef.parse(text)
-        if ref.block in ("", fragment):
-            named.add((ref.behavior, ref.sync))
-    return frozenset(named)
+) -> Counter[Point]:
+    """How often the input times or names each (behavior, sync), on either side of a constraint."""
+    texts = [f"{behavior.id}:{timing.sync}" for behavior in behaviors for timing in behavior.timing]
+    texts += [timing.ref for behavior in behaviors for timing in behavior.timing]
+    texts += [
+        text
+        for constraint in constraints
+        for operator in constraint.operators
+        for text in (operator.ref, *operator.syncs)
+    ]
+    refs = map(SyncRef.parse, filter(None, texts))
+    return Counter((ref.behavior, ref.sync) for ref in refs if ref.block in ("", fragment))

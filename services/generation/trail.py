@@ -10,6 +10,8 @@ from typing import Literal
 from msgspec import Struct
 
 from schemas.behaviors import Behavior, Gesture, Hand, Head, Pointing
+from schemas.references import type_name
+from schemas.syncref import SYNC_POINTS, canonical_sync
 
 Limb = Hand | Literal["head"] | None
 """What a stroke is made with; None: whichever arm the body chooses."""
@@ -72,6 +74,18 @@ def stroke(behavior: Behavior, hand: Hand | None = None) -> Stroke | None:
         case Head():
             return Stroke(behavior.id, "head", over="end")
     return None
+
+
+def first_met(behavior: Behavior, named: Collection[tuple[str, str]]) -> str:
+    """The sync point of `behavior` that the words before its fragment must not come after: its start, as a rule.
+
+    Whose stroke is tied to something may set out before, so that it meets the first words: the realizer knows when.
+    named: behavior and sync point of all that the fragment names.
+    """
+    type = type_name(behavior)
+    syncs = {canonical_sync(sync, type) for id, sync in named if id == behavior.id}
+    first = next((sync for sync in SYNC_POINTS if sync in syncs), "start")
+    return first if first in ("stroke_start", "stroke") and type != "speech" else "start"
 
 
 def _may_be_one(one: Limb, other: Limb) -> bool:
