@@ -12,6 +12,7 @@
 | alive  | who is there | liveliness; delivered as `PeerAlive` and `PeerGone` |
 """
 
+from collections.abc import Iterable
 from functools import lru_cache
 from typing import Literal, get_args
 
@@ -92,6 +93,28 @@ def statistics(actor: str) -> str:
 def connection_event(actor: str, kind: str) -> str:
     """actor: the person's id, whoever began; kind: an `EventKind`. Either may be `*`."""
     return f"{PREFIX}/evt/recognition/connection_event/{actor}/{kind}"
+
+
+def event_stream(actor: str = "", kinds: Iterable[str] = ()) -> tuple[str, ...]:
+    """What a reader of connection events subscribes to: the events themselves, which are open, and who tells them.
+
+    actor: a person's id. Empty stands for all, of kinds too. Raises ValueError for an id that can't be in a key.
+    """
+    person = chunk(actor)
+    events = [connection_event(person, chunk(kind)) for kind in kinds] or [connection_event(person, "*")]
+    return (*events, open_events(person), alive("recognition"))
+
+
+def chunk(name: str) -> str:
+    """The name as one chunk of a key expression; `*` for an empty one. Raises ValueError if it can't be one."""
+    if not is_chunk(name or "all"):
+        raise ValueError(f"{name!r} can't be part of a key: no '/', '*', '$', '?', '#', and no '@' at its beginning")
+    return name or "*"
+
+
+def is_chunk(name: str) -> bool:
+    """Can a name stand in a key, and do wildcards reach it there?"""
+    return bool(name) and name[0] != "@" and not any(letter in "/*$?#" for letter in name)
 
 
 def open_events(actor: str) -> str:

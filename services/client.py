@@ -11,12 +11,11 @@ Refused input raises InputRefused, failure at run time RunFailed, each with the 
 
 import asyncio
 import uuid
-from collections.abc import AsyncIterator, Awaitable, Callable, Iterable, Sequence
+from collections.abc import AsyncIterator, Awaitable, Collection, Iterable, Sequence
 from contextlib import asynccontextmanager
 from itertools import count
 from pathlib import Path
-from types import TracebackType
-from typing import Any, Generic, Literal, Self, TypeVar
+from typing import Any, Literal, TypeVar, get_args
 
 import msgspec
 from msgspec import Struct
@@ -25,7 +24,7 @@ from msgspec.structs import replace
 from schemas import keys
 from schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost
 from schemas.attention import HeadOwner, Inhibit
-from schemas.behaviors import BlockBehavior, Constraint
+from schemas.behaviors import BlockBehavior, Constraint, EventKind
 from schemas.blocks import (
     BehaviorInterrupted,
     Block,
@@ -38,14 +37,15 @@ from schemas.faults import Fault, InputRefused, NoReply, RunFailed
 from schemas.feedback import Feedback
 from schemas.fragments import FragmentOutcome, PerformFragment, TurnClosed, TurnFragment
 from schemas.json_codec import read
-from schemas.recognition import ConnectionEvent, Statistics
+from schemas.recognition import Statistics
 from schemas.requests import Outcome, Request
 from schemas.units import Seconds, Stamp
 from schemas.world import Entity, World
-from services.bus import Bus, Hub, Keep, Subscription
+from services.bus import Bus, Hub, Keep
+from services.event_stream import EventStream
+from services.feeds import EventFeed, Feed
 from services.requests import Pending, Requester, RequestRefused
 
-M = TypeVar("M")
 FragmentSource = TurnFragment | str | bytes | Path | dict[str, Any]
 """A fragment, or EBML or JSON that describes one (a language model's tool input, too), or the file it stands in."""
 ANSWER_PATIENCE = 20.0
@@ -61,43 +61,6 @@ class PerformFailed(RunFailed):
     def __init__(self, fault: Fault, outcome: FragmentOutcome | BlockOutcome) -> None:
         super().__init__(fault)
         self.outcome = outcome
-
-
-class Feed(Generic[M]):
-    """Messages of one kind, from when it was made: `async for`, or `next` with a timeout. Ends with the client."""
-
-    def __init__(self, subscription: Subscription, kinds: tuple[type, ...], now: Callable[[], Seconds]) -> None:
-        self._subscription = subscription
-        self._kinds = kinds
-        self._now = now
-
-    async def next(self, timeout: Seconds | None = None) -> M | None:
-        """The next message; None after `timeout` seconds without one, or at the end."""
-        deadline = None if timeout is None else self._now() + timeout
-        while (received := await self._subscription.next(deadline)) is not None:
-            if isinstance(received.message, self._kinds):
-                return received.message  # type: ignore[return-value]
-        return None
-
-    def __aiter__(self) -> Self:
-        return self
-
-    async def __anext__(self) -> M:
-        message = await self.next()
-        if message is None:
-            raise StopAsyncIteration
-        return message
-
-    def close(self) -> None:
-        self._subscription.close()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
 
 
 class Robot:
@@ -256,9 +219,19 @@ class Robot:
 
     # -- what happens -------------------------------------------------------------------------------------------
 
-    def connection_events(self) -> Feed[ConnectionEvent]:
-        """Every change in the life of every connection event, from now on."""
-        return self._feed((ConnectionEvent,), keys.ANY_CONNECTION_EVENT)
+    def connection_events(
+        self, actor: str = "", kind: EventKind | Collection[EventKind] = (), *, open: bool = False
+    ) -> EventFeed:
+        """Every change in the life of the connection events with one person, or all, of one kind, several, or all.
+
+        open: first those that are open already, each as it was last told; otherwise from now on.
+        Raises ValueError for what can be no person or kind.
+        """
+        kinds = (kind,) if isinstance(kind, str) else tuple(kind)
+        if unknown := set(kinds) - set(get_args(EventKind)):
+            raise ValueError(f"{', '.join(map(repr, unknown))}: the kinds are {', '.join(get_args(EventKind))}")
+        stream = EventStream(self.now(), self._bus.stamp, kinds=kinds, opening=open)
+        return EventFeed(self._bus, stream, keys.event_stream(actor, kinds))
 
     def turns(self) -> Feed[TurnClosed]:
         """Each turn of the robot once it is over and answered, or it is too late for an answer."""
@@ -298,10 +271,13 @@ class Robot:
                 if world.people:
                     return world.people[0]
 
+    def standings(self, actor: str = "") -> Feed[Statistics]:
+        """The statistics of a person, or of each and `all`: now, and when they change; only the newest are kept."""
+        return self._feed((Statistics,), keys.statistics(keys.chunk(actor)), keep=Keep.LATEST)
+
     async def statistics(self, actor: str = "all", timeout: Seconds | None = None) -> Statistics:
         """The statistics of a person, or of `all`; waits for recognition. Raises NoReply after `timeout` seconds."""
-        feed: Feed[Statistics]
-        with self._feed((Statistics,), keys.statistics(actor), keep=Keep.LATEST) as feed:
+        with self.standings(actor) as feed:
             return _there(await feed.next(timeout), f"statistics of {actor}", timeout)
 
     def _feed(self, kinds: tuple[type, ...], *patterns: str, keep: Keep = Keep.EVERY) -> Feed[Any]:

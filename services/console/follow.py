@@ -1,13 +1,16 @@
 """Listen to a running system and pass on what happens, each message with the local instant it speaks of."""
 
 import asyncio
-from collections.abc import AsyncIterator, Callable, Iterable
+from collections.abc import AsyncIterator, Callable, Collection, Iterable
 from contextlib import asynccontextmanager
 
 from schemas import keys
+from schemas.behaviors import EventKind
 from schemas.messages import Message
+from schemas.recognition import ConnectionEvent, OpenEvents
 from schemas.units import Seconds, Stamp
 from services.bus import Bus, Received
+from services.event_stream import EventStream
 
 Sink = Callable[[Message, Seconds], None]
 FOLLOWED = (
@@ -16,6 +19,7 @@ FOLLOWED = (
     keys.SYNC_POINT,
     keys.ANY_ACTION,
     keys.ANY_CONNECTION_EVENT,
+    keys.ANY_OPEN_EVENTS,
     keys.ANY_STATISTICS,
     keys.HEAD_OWNER,
     keys.ANY_REQUEST_STATE,
@@ -26,25 +30,42 @@ FOLLOWED = (
 
 
 @asynccontextmanager
-async def following(bus: Bus, sinks: Iterable[Sink], *, past: bool = True) -> AsyncIterator[None]:
+async def following(
+    bus: Bus,
+    sinks: Iterable[Sink],
+    *,
+    past: bool = True,
+    patterns: Collection[str] = FOLLOWED,
+    kinds: Collection[EventKind] = (),
+) -> AsyncIterator[None]:
     """Feed the sinks, in order, while the body of `async with` runs; what has arrived by its end is still fed.
 
-    past: also with what the bus still has from before.
+    past: also with what the bus still has from before, of connection events those that are open. kinds: of
+    connection events only these; all if empty.
     """
     sinks = tuple(sinks)
+    events = EventStream(bus.now(), bus.stamp, kinds=kinds, opening=past)
 
-    def tell(received: Received) -> None:
-        if received.past and not past:
-            return
-        at = instant(bus, received)
+    def tell(message: Message, at: Seconds) -> None:
         for sink in sinks:
-            sink(received.message, at)
+            sink(message, at)
 
-    with bus.subscribe(*FOLLOWED) as inbox:
+    def take(received: Received) -> None:
+        message, at = received.message, instant(bus, received.message, received.at)
+        for event in events.feed(message, at, bus.now(), past=received.past):
+            tell(event, instant(bus, event, at))
+        if not isinstance(message, ConnectionEvent | OpenEvents) and (past or not received.past):
+            tell(message, at)
+
+    with bus.subscribe(*patterns) as inbox:
 
         async def listen() -> None:
-            async for received in inbox:
-                tell(received)
+            while (received := await inbox.next(events.deadline)) or events.deadline is not None:
+                if received is not None:
+                    take(received)
+                else:
+                    for event in events.expire(bus.now()):
+                        tell(event, bus.now())
 
         # In a group: a sink that fails ends the body, which might wait for ever.
         async with asyncio.TaskGroup() as group:
@@ -55,10 +76,10 @@ async def following(bus: Bus, sinks: Iterable[Sink], *, past: bool = True) -> As
                 listening.cancel()
                 await asyncio.wait([listening])
                 while listening.cancelled() and len(inbox) and (received := await inbox.next()):
-                    tell(received)
+                    take(received)
 
 
-def instant(bus: Bus, received: Received) -> Seconds:
+def instant(bus: Bus, message: Message, arrived: Seconds) -> Seconds:
     """When what the message tells happened, in local loop time; its arrival if it does not say."""
-    at = getattr(received.message, "at", None)
-    return bus.local(at) if isinstance(at, Stamp) else received.at
+    at = getattr(message, "at", None)
+    return bus.local(at) if isinstance(at, Stamp) else arrived

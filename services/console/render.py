@@ -32,6 +32,7 @@ STATE_STYLES = {
     "preempted": "dim",
     "withdrawn": "dim",
     "superseded": "dim",
+    "lost": "red",
 }
 
 

@@ -24,7 +24,7 @@ class Counted(Struct, frozen=True, kw_only=True):
     failed: int = 0
     failed_optional: int = 0
     other: int = 0
-    """Preempted, withdrawn or superseded."""
+    """Preempted, withdrawn or superseded, or lost."""
     open: int = 0
     delays: tuple[Seconds, ...] = ()
     """Of those that succeeded."""
@@ -57,7 +57,8 @@ def feed(tally: Tally, message: Message, at: Seconds) -> Tally:
     match message:
         case ConnectionEvent():
             known = {event.id: event for event in tally.events}
-            if message.state == "completed" and message.id in known:
+            before = known.get(message.id, message).state
+            if message.state in ("completed", "lost") and before not in ("started", message.state):
                 return tally  # its decision is what counts
             known[message.id] = message
             return msgspec.structs.replace(tally, events=tuple(known.values()))
@@ -84,7 +85,7 @@ def count(tally: Tally, kind: EventKind, initiator: str | None, robot: str) -> C
             succeeded=counted.succeeded + succeeded,
             failed=counted.failed + (failed and not event.optional),
             failed_optional=counted.failed_optional + (failed and event.optional),
-            other=counted.other + (event.state in ("preempted", "withdrawn", "superseded")),
+            other=counted.other + (event.state in ("preempted", "withdrawn", "superseded", "lost")),
             open=counted.open + (event.state == "started"),
             delays=(*counted.delays, event.delay) if succeeded and event.delay is not None else counted.delays,
         )

@@ -241,7 +241,7 @@ def _merged(known: tuple[Point, ...], news: tuple[Point, ...]) -> tuple[Point, .
 def _event(scene: Scene, event: ConnectionEvent, at: Seconds) -> Scene:
     known = [other for other in scene.events if other.event.id == event.id]
     began = known[0].began if known else at
-    if event.state == "completed" and known:
+    if event.state in ("completed", "lost") and known and known[0].event.state != "started":
         # The shared phase is over; what the reader wants to keep seeing is the decision.
         event = msgspec.structs.replace(event, state=known[0].event.state, delay=known[0].event.delay)
     new = EventInView(event=event, began=began)

@@ -1,0 +1,111 @@
+"""Connection events as one stream for one reader: what is open, then each change exactly once, in order. Pure.
+
+Recognition tells each change (`keys.connection_event`), and right after it, as a state, which events of that person
+are open (`keys.open_events`). Who comes late gets that state, and what was told before it needs no repeating. Who
+is there when recognition dies is told that its events are `lost`.
+"""
+
+from collections.abc import Callable, Collection
+
+from msgspec.structs import replace
+
+from schemas.behaviors import EventKind
+from schemas.messages import Message
+from schemas.presence import PeerAlive, PeerGone
+from schemas.recognition import ENDINGS, ConnectionEvent, OpenEvents, session_of
+from schemas.units import Seconds, Stamp
+
+GRACE: Seconds = 2.0
+"""How long recognition may be gone before its events are lost: a router's restart looks like a death."""
+
+
+class EventStream:
+    """What a reader gets to hear, fed with everything on the three keys: events, open events, liveliness.
+
+    began: when the reader came, local time. stamp: a local time as a stamp. kinds: only these; all if empty.
+    opening: tell also the events that were open already. open: those that have not ended, by id.
+    deadline: when to `expire`.
+    """
+
+    def __init__(
+        self,
+        began: Seconds,
+        stamp: Callable[[Seconds], Stamp],
+        *,
+        kinds: Collection[EventKind] = (),
+        opening: bool = True,
+    ) -> None:
+        self.open: dict[str, ConnectionEvent] = {}
+        self.deadline: Seconds | None = None
+        self._began = began
+        self._stamp = stamp
+        self._kinds = kinds
+        self._opening = opening
+        self._session = ""
+        self._lost: tuple[ConnectionEvent, ...] = ()
+
+    def feed(self, message: Message, at: Seconds, now: Seconds, *, past: bool = False) -> list[ConnectionEvent]:
+        """What is new. at: the local instant that the message speaks of. past: it is from before the subscription."""
+        match message:
+            case PeerAlive(participant="recognition", run=run):
+                self.deadline = None
+                return [*self._follow(session_of(run), now), *self._regain()]
+            case PeerGone(participant="recognition"):
+                self.deadline = now + GRACE
+            case ConnectionEvent() if not past or at >= self._began:  # of what is older, the state tells what is open
+                return [*self._follow(message.session, now), *self._change(message)]
+            case OpenEvents(session=session):
+                return [*self._follow(session, now), *self._compare(message, now)]
+        return []
+
+    def expire(self, now: Seconds) -> list[ConnectionEvent]:
+        """`deadline` has passed: recognition stays away."""
+        self.deadline = None
+        self._lost = tuple(self.open.values())
+        return self._lose(self._lost, now)
+
+    def _follow(self, session: str, now: Seconds) -> list[ConnectionEvent]:
+        """Another life of recognition knows nothing of the events of the former."""
+        if session in ("", self._session):
+            return []
+        self._session, self._lost = session, ()
+        return self._lose(tuple(self.open.values()), now)
+
+    def _regain(self) -> list[ConnectionEvent]:
+        """It was only cut off, for longer than the grace; what happened meanwhile comes after this."""
+        regained, self._lost = self._lost, ()
+        return [told for event in regained for told in self._change(event)]
+
+    def _compare(self, state: OpenEvents, now: Seconds) -> list[ConnectionEvent]:
+        """Usually nothing: the changes have come already."""
+        still_open = {event.id for event in state.events}
+        ended = [
+            event
+            for event in self.open.values()
+            if state.actor in (event.initiator, event.responder) and event.id not in still_open
+        ]
+        told = self._lose(ended, now)
+        for event in state.events:
+            if self._opening or event.id in self.open:
+                told += self._change(event)
+        return told
+
+    def _change(self, event: ConnectionEvent) -> list[ConnectionEvent]:
+        known = self.open.get(event.id)
+        if (self._kinds and event.kind not in self._kinds) or (known and _progress(known) >= _progress(event)):
+            return []
+        if event.state in ENDINGS:
+            self.open.pop(event.id, None)
+        else:
+            self.open[event.id] = event
+        return [event]
+
+    def _lose(self, events: Collection[ConnectionEvent], now: Seconds) -> list[ConnectionEvent]:
+        for event in events:
+            del self.open[event.id]
+        return [replace(event, state="lost", at=self._stamp(now)) for event in events]
+
+
+def _progress(event: ConnectionEvent) -> int:
+    """An event starts, is decided, is over."""
+    return 0 if event.state == "started" else 1 if event.state == "succeeded" else 2
