@@ -1,8 +1,6 @@
 """Whatever comes in, in whatever order: no exception, every event ends exactly once, statistics add up."""
 
-import itertools
 import random
-from collections import Counter
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -18,10 +16,10 @@ from schemas.requests import Accepted, Cancel, Refused
 from services.recognition.config import RecognitionConfig
 from services.recognition.machine import DECISIONS
 from services.recognition.session import Observation, Session
-from services.recognition.standings import Standings
 from services.recognition.statistics import KINDS
 from tests.recognition.observations import ROBOT, request_event, stamp, world
 
+Stream = list[tuple[float, Observation]]
 ACTORS = ("ann", "bob")
 LATENESS = (0.0, 0.0, 0.0, 0.0, 0.3, 1.0)
 
@@ -88,7 +86,7 @@ class Chance:
         status = self.pick(("done", "interrupted", "failed"))
         return BlockProgress(block=block, progress="end", at=stamp(at), status=status)
 
-    def stream(self, length: int) -> list[tuple[float, Observation]]:
+    def stream(self, length: int) -> Stream:
         """(time, observation) as they arrive, mostly in order: some come late, some twice."""
         arrivals: list[tuple[float, float, Observation]] = []
         at = 0.0
@@ -104,7 +102,18 @@ def drawn_streams(draw):
     return Chance(lambda choices: draw(st.sampled_from(choices))).stream(draw(st.integers(1, 15)))
 
 
-seeded_streams = st.integers(0, 10**6).map(lambda seed: Chance(random.Random(seed).choice).stream(250))
+class Seeded(Stream):
+    """Long and dense; told by its seed."""
+
+    def __init__(self, seed: int) -> None:
+        super().__init__(Chance(random.Random(seed).choice).stream(200))
+        self._seed = seed
+
+    def __repr__(self) -> str:
+        return f"Seeded({self._seed})"
+
+
+seeded_streams = st.integers(0, 10**6).map(Seeded)
 streams = st.one_of(drawn_streams(), seeded_streams)
 
 
@@ -167,35 +176,3 @@ def test_times_of_an_event_never_run_backwards(stream):
             times[event.id] = event.at.seconds
             assert event.duration is None or event.duration >= 0
             assert event.delay is None or event.delay >= 0 or event.kind == "adjacency_pair"
-
-
-@settings(max_examples=100, deadline=None)
-@given(streams)
-def test_statistics_equal_a_slow_recomputation_from_the_log(stream):
-    _, effects, _, _ = run(stream)
-    log = [effect for effect in effects if isinstance(effect, ConnectionEvent)]
-    standings = Standings(ROBOT, RecognitionConfig())
-    published = {}
-    for event in log:
-        for statistics in standings.feed([event], set(), event.at.seconds):
-            published[statistics.actor] = statistics
-
-    for actor in ("", *ACTORS):
-        own = [event for event in log if actor in ("", event.initiator, event.responder)]
-        if not own:
-            continue
-        starts = sorted(event.started.seconds for event in own if event.state == "started")
-        gaps = [later - earlier for earlier, later in itertools.pairwise(starts)]
-        session = published[actor].session
-        assert session.events == len(starts)
-        assert session.max_gap == (max(gaps) if gaps else None)
-        assert (session.mtbce is None) == (not gaps)
-        assert session.mtbce is None or abs(session.mtbce - sum(gaps) / len(gaps)) < 1e-9
-        states = Counter((event.kind, event.state) for event in own if event.state == "succeeded")
-        states += Counter((event.kind, "failed") for event in own if event.state == "failed" and not event.optional)
-        for kind in session.kinds:
-            delays = [e.delay for e in own if (e.kind, e.state) == (kind.kind, "succeeded") and e.delay is not None]
-            assert (kind.succeeded, kind.failed) == (states[kind.kind, "succeeded"], states[kind.kind, "failed"])
-            assert kind.delay_min == min(delays, default=None)
-            assert kind.delay_max == max(delays, default=None)
-            assert kind.delay_mean is None or abs(kind.delay_mean - sum(delays) / len(delays)) < 1e-9
