@@ -6,7 +6,8 @@ namespaces hold is ignored. Two spellings of one block decode to equal structs, 
 names of sync points, which stay as written (`schemas.syncref.canonical_sync`); in fragments these are the draft's.
 
 A block is read leniently: what is unknown in it is left out and noted in `Block.unread`, an unknown behavior
-becomes `Unknown`; the realizer warns of both. A fragment is read strictly: it is a program's, not an author's.
+becomes `Unknown`; the realizer warns of both. A fragment is read strictly: it is a program's, not an author's. What
+stands behind a reference in it is speech: `<ebml:reference .../>, and then`.
 """
 
 from typing import Any
@@ -154,7 +155,7 @@ class _Document:
     ) -> tuple[list[of.Behavior], list[of.Constraint]]:
         behaviors: list[of.Behavior] = []
         constraints: list[of.Constraint] = []
-        texts = [parent.text, *(child.tail for child in parent)]
+        texts = [parent.text, *(child.tail for child in parent if not self._speaks_on(child))]
         if words := " ".join(text.strip() for text in texts if text and text.strip()):
             self._note(f"text {words[:40]!r} outside of speech", parent, "")
         for element, namespace, local in ours(parent):
@@ -175,6 +176,8 @@ class _Document:
                 behaviors.append(self._behavior(element, local, CORE_BEHAVIORS[local], required))
             elif local in EXTENSIONS and (namespace == EBML or (not namespace and self._is_strict)):
                 behaviors.append(self._behavior(element, local, EXTENSIONS[local], required))
+                if self._speaks_on(element) and (words := " ".join((element.tail or "").split())):
+                    behaviors.append(self._after_reference(element, words))
             elif self._is_strict or not element.get("id"):
                 advice = f"known: {', '.join(sorted(CORE_BEHAVIORS))}, constraint"
                 kind: WarningKind = "BEHAVIOR_TYPE_NOT_SUPPORTED"
@@ -182,6 +185,15 @@ class _Document:
             else:
                 behaviors.append(self._unknown(element, local, required))
         return behaviors, constraints
+
+    def _speaks_on(self, element: etree._Element) -> bool:
+        """Is the text behind it said? A comma or a full stop belongs to the phrase; it is no speech by itself."""
+        namespace, local = split(str(element.tag))
+        return self._is_strict and local == "reference" and namespace in ("", EBML)
+
+    def _after_reference(self, element: etree._Element, words: str) -> of.Speech:
+        timing = (of.Timing("start", f"{element.get('id')}:end"),)
+        return of.Speech(id=f"{element.get('id')}-text", text=words, timing=timing, line=self._source.line(element))
 
     def _unknown(self, element: etree._Element, local: str, required: bool) -> of.Unknown:
         raw = {"id": self._id(element), "element": local, "line": self._source.line(element)}

@@ -26,6 +26,7 @@ _SENTENCE = rf"{_ABBREVIATED}[.!?…]+{_CLOSING}(?=\s)"
 _CLAUSE = rf"[,;:–—]{_CLOSING}(?=\s)"
 _CUT = re.compile(rf"{_REFERENCE}|(?P<sentence>{_SENTENCE}|\n\s*\n)|(?P<clause>{_CLAUSE})")
 _WORD = re.compile(r"\w")
+_SPOKEN = re.compile(r"\S*\w\S*")
 
 
 class Chunker:
@@ -62,13 +63,13 @@ class Chunker:
     @property
     def _words(self) -> int:
         """A reference counts as two: "the square"."""
-        return sum(len(part.say.split()) if isinstance(part, Say) else 2 for part in self._parts)
+        return sum(len(_SPOKEN.findall(part.say)) if isinstance(part, Say) else 2 for part in self._parts)
 
     def _say(self, text: str) -> None:
         said = " ".join(text.split())
         if self._parts and isinstance(last := self._parts[-1], Say):
             self._parts[-1] = Say(say=f"{last.say} {said}".rstrip())
-        elif _WORD.search(said):
+        elif _WORD.search(said) or (said and self._parts and isinstance(self._parts[-1], Refer)):
             self._parts.append(Say(say=said))
 
     def _taken(self) -> Chunk:

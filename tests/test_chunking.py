@@ -35,7 +35,7 @@ def words(*pieces: str | Part, **settings: int) -> list[str]:
         ('"Really?" she said... "Yes!" No', ['"Really?"', "she said...", '"Yes!"', "No"]),
         ("One\n\nTwo \n \n three", ["One", "Two", "three"]),
         ("line one\nline two", ["line one line two"]),
-        ("Take [a]. And [b], please, now", ["Take <a>", "And <b> please,", "now"]),
+        ("Take [a]. And [b], please, now", ["Take <a> .", "And <b> , please,", "now"]),
         ("[a] [b] [c]", ["<a> <b> <c>"]),
         ("an [open bracket. And [] more", ["an [open bracket.", "And [] more"]),
         ("   ", []),
@@ -62,6 +62,10 @@ def test_parts_stand_where_they_stand() -> None:
     nod = Gesture(gesture="nod")
 
     assert chunks("Yes, ", nod, "it is [a") == [(Say(say="Yes,"), nod, Say(say="it is [a"))]
+
+
+def test_what_stands_behind_a_reference_is_said_though_it_is_no_word() -> None:
+    assert chunks("Is it [a]?") == [(Say(say="Is it"), Refer(refer="a"), Say(say="?"))]
 
 
 def test_how_long_a_clause_must_be_can_be_set() -> None:

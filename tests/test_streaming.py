@@ -118,8 +118,10 @@ async def test_each_sentence_is_sent_while_the_next_is_being_written(hub: Memory
         (0.2, "t-1", "beginning"), (0.5, "t-2", "middle"), (0.8, "t-3", "middle"), (0.8, "t-4", "end"),
     ]  # fmt: skip
     assert [each.fragment for each in outcomes] == ["t-1", "t-2", "t-3", "t-4"]
-    assert summary(*outcomes).said == "Hello there. Look at It is red."
-    (look, cup) = generation.heard[1][1].behaviors
+    assert summary(*outcomes).said == "Hello there. Look at . It is red."  # this one says no references
+    (look, cup, stop) = generation.heard[1][1].behaviors
+    assert isinstance(stop, Speech)
+    assert stop.text == "."
     assert isinstance(look, Speech)
     assert isinstance(cup, Reference)
     assert (cup.target, cup.options) == ("cup", None)

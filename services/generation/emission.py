@@ -33,6 +33,7 @@ from services.generation.ordering import ordered
 from services.generation.parts import Names, Parts
 from services.generation.permits import Permits
 from services.generation.profiles import after, as_in_the_figure, checking_back, same
+from services.generation.punctuation import joined
 from services.generation.rewriting import Operator, Rewriting, instants, points_named
 from services.generation.trail import NOTHING, Stroke, Trail, first_met, stroke
 from services.generation.turn_policy import TurnPlan
@@ -83,11 +84,19 @@ class _Emitter:
         self.figure = config.profile == "figure-3.3"
         self.dropped = [behavior for behavior in fragment.behaviors if not permits.allows(behavior)]
         kept = [behavior for behavior in fragment.behaviors if permits.allows(behavior)]
-        self.order = ordered(kept, fragment.constraints, fragment.id)
+        order = ordered(kept, fragment.constraints, fragment.id)
         chosen = {choice.reference: choice for choice in choices}
+        punctuation = joined(order, [id for id, choice in chosen.items() if choice.phrase])
+        self.kept = [each for old in kept if (each := punctuation.rest.get(old.id, old)) is not None]
+        self.order = [each for old in order if (each := punctuation.rest.get(old.id, old)) is not None]
         self.parts = {
             behavior.id: Parts(
-                behavior, chosen[behavior.id], self.names, turn, hands.get(behavior.id, permits.only_hand)
+                behavior,
+                chosen[behavior.id],
+                punctuation.closings.get(behavior.id, ""),
+                self.names,
+                turn,
+                hands.get(behavior.id, permits.only_hand),
             )
             for behavior in self.order
             if isinstance(behavior, Reference)
@@ -97,7 +106,8 @@ class _Emitter:
         self.speeches = self._speeches()
         self.rewriting = Rewriting(
             fragment=fragment.id,
-            replacements={id: parts.replacement(gaze_leads=self.figure) for id, parts in self.parts.items()},
+            replacements={id: parts.replacement(gaze_leads=self.figure) for id, parts in self.parts.items()}
+            | {id: self.parts[said_by].closing for id, said_by in punctuation.follows.items()},
             words=frozenset(self.speeches),
             instants=instants(fragment.behaviors, fragment.constraints),
             dropped=frozenset(behavior.id for behavior in self.dropped),
@@ -134,10 +144,10 @@ class _Emitter:
 
     def _in_document_order(self) -> list[BlockBehavior]:
         behaviors: list[BlockBehavior] = []
-        for behavior in self.fragment.behaviors:
+        for behavior in self.kept:
             if isinstance(behavior, Reference):
                 behaviors += self.parts[behavior.id].behaviors
-            elif self.permits.allows(behavior):
+            else:
                 behaviors.append(self._passed_through(behavior))
         return behaviors
 
@@ -157,8 +167,8 @@ class _Emitter:
         operators: list[Operator] = []
         free: list[str] = []
         types: set[str] = set()
-        for behavior in self.fragment.behaviors:
-            if isinstance(behavior, Reference) or not self.permits.allows(behavior):
+        for behavior in self.kept:
+            if isinstance(behavior, Reference):
                 continue
             is_first = type_name(behavior) not in types
             types.add(type_name(behavior))

@@ -36,8 +36,8 @@ def ordered(
 ) -> tuple[FragmentBehavior, ...]:
     """The behaviors, each after those that its constraints put before it. A cycle is left in document order.
 
-    What takes no turn with voice or gaze (a nod) comes as soon as it may: a reference that is tied to it does not have
-    to wait for the words between. fragment: its id, by which sync references may name it.
+    What takes no turn with voice or gaze (a nod) comes as soon as it may: a reference that is tied to it need not
+    wait for the words between. fragment: its id, by which sync references may name it.
     """
     behaviors = sorted(behaviors, key=lambda behavior: isinstance(behavior, Speech | Reference | Gaze))
     relations = _relations(behaviors, constraints, fragment)

@@ -21,10 +21,16 @@ class Names:
 
 
 class Parts:
-    """The behaviors that replace one reference."""
+    """The behaviors that replace one reference. closing: what its phrase ends with, no words."""
 
     def __init__(
-        self, reference: Reference, choice: ReferenceChoice, names: Names, turn: TurnPlan, hand: Hand | None
+        self,
+        reference: Reference,
+        choice: ReferenceChoice,
+        closing: str,
+        names: Names,
+        turn: TurnPlan,
+        hand: Hand | None,
     ):
         points = choice.gesture == "directed_gaze_with_pointing"
         looks = choice.gesture != "none"
@@ -45,7 +51,8 @@ class Parts:
             anchors.append(f"{self.point}:stroke")
         if choice.phrase:
             self.phrase = names.fresh(f"{reference.id}-phrase")
-            self.behaviors.append(Speech(id=self.phrase, text=choice.phrase, required=required, line=line))
+            said = choice.phrase + closing
+            self.behaviors.append(Speech(id=self.phrase, text=said, required=required, line=line))
             anchors.append(f"{self.phrase}:start")
         if looks and choice.gesture != "gaze":
             self.event = names.fresh(f"{reference.id}-event")
@@ -61,6 +68,11 @@ class Parts:
                     timing=(Timing("start", f"{self.gaze}:start"),),
                 )
             )
+
+    @property
+    def closing(self) -> Replacement:
+        """Of a speech of which all is said with the phrase."""
+        return Replacement((self.phrase, "end"), (self.phrase, "end"))
 
     def replacement(self, *, gaze_leads: bool) -> Replacement:
         if self.phrase:

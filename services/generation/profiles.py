@@ -48,10 +48,10 @@ def as_in_the_figure(parts: Parts, preceding: str, earlier: str, is_timed: bool,
     gaze, point, phrase = parts.gaze, parts.point, parts.phrase
     operators: list[Operator] = []
     if gaze and preceding and (phrase or not is_timed):
-        # When an earlier fragment's words begin is not for this block to foresee: the gaze goes when they do.
+        # An earlier fragment's words may have begun by now: the gaze is on target with them, or as soon as it can.
         follows = preceding == earlier
-        relate, sync = (after, "start") if follows else (same, "stroke")
-        operators.append(relate(f"{preceding}:start", f"{gaze}:{sync}"))
+        relate = after if follows else same
+        operators.append(relate(f"{preceding}:start", f"{gaze}:stroke"))
         if point and follows:
             operators.append(after(f"{gaze}:start", f"{point}:start"))
     if point:
