@@ -282,7 +282,9 @@ class Motion:
     def at(self, t: Seconds) -> State:
         """Where the joints are, and how they move."""
         if t >= self.end:
-            return resting(self.path.at(self._stop).q)
+            if self._rest is None:
+                self._rest = resting(self.path.at(self._stop).q)
+            return self._rest
         piece = self._piece(t)
         rate, state = piece.rate_at(t), self.path.at(min(piece.s_at(t), self._stop))
         return State(state.q, state.v * rate, state.a * rate * rate + state.v * piece.slope)
@@ -302,6 +304,7 @@ class Motion:
 
     def _replan(self, now: Seconds, s: Seconds, rate: float) -> None:
         self._stop = max(s, min(self.limit, self.path.length))
+        self._rest: State | None = None
         self._pieces: list[_Piece] = []
         left = self._stop - s
         if left <= 0.0:

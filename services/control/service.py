@@ -251,7 +251,7 @@ class _Control:
     def publish_state(self) -> None:
         """Tell how the body stands, and once more after a while: soon if it moves."""
         now, state = self._bus.now(), self._body.state()
-        self.note_look()
+        self._publish(self._deeds.looks_at(state.looking_at, "", now))
         self._published = now
         self._bus.publish(
             keys.ROBOT_STATE,

@@ -70,7 +70,8 @@ class Track:
         return State(state.q[columns], state.v[columns], state.a[columns])
 
     def angles(self, t: Seconds) -> tuple[float, ...]:
-        return tuple(float(angle) for angle in self.at(t).q)
+        columns = self.motion.at(t).q.tolist()
+        return tuple(columns[self._column : self._column + len(self.joints)])
 
     def is_moving(self, t: Seconds) -> bool:
         return t < self.motion.end
