@@ -12,7 +12,7 @@ from services.collaboration.config import CollaborationConfig
 from services.collaboration.service import collaborate
 from services.control.config import ControlConfig, Variability
 from services.control.service import embody
-from services.generation.config import GenerationConfig
+from services.generation.config import Condition, GenerationConfig
 from services.generation.service import generate
 from services.memory_bus import Faults, MemoryHub
 from services.realizer.config import RealizerConfig
@@ -20,7 +20,7 @@ from services.realizer.service import realize
 from services.recognition.config import RecognitionConfig
 from services.recognition.service import recognize
 from services.runtime import Ready, Service, running
-from services.simulation.config import SimulationConfig
+from services.simulation.config import Habits, SimulationConfig
 from services.simulation.service import simulate
 
 LIMIT = 900.0
@@ -62,11 +62,16 @@ async def play(
     seed: int = 0,
     faults: Faults | None = None,
     noise: float = 0.0,
+    condition: Condition = "operational",
+    habits: Habits | None = None,
     **manager: Any,
 ) -> Record:
-    """Until the manager has said goodbye. faults: of the bus. noise: of the body. manager: its configuration."""
+    """Until the manager has said goodbye. faults: of the bus. noise: of the body. habits: of the stochastic person.
+    manager: its configuration.
+    """
     received: list[Received] = []
     finished = asyncio.Event()
+    person = SimulationConfig(human=human, seed=seed, stochastic=habits or Habits())  # type: ignore[arg-type]
 
     async def collaboration(bus: Bus, ready: Ready) -> None:
         await collaborate(bus, ready, CollaborationConfig(**manager))
@@ -76,8 +81,8 @@ async def play(
         "control": partial(embody, config=ControlConfig(variability=Variability(seed=seed, noise=noise))),
         "realizer": partial(realize, config=RealizerConfig()),
         "recognition": partial(recognize, config=RecognitionConfig(gaze_resolution=resolution)),  # type: ignore[arg-type]
-        "generation": partial(generate, config=GenerationConfig()),
-        "simulation": partial(simulate, config=SimulationConfig(human=human, seed=seed)),  # type: ignore[arg-type]
+        "generation": partial(generate, config=GenerationConfig(condition=condition)),
+        "simulation": partial(simulate, config=person),
         "collaboration": collaboration,
     }
     async with MemoryHub(faults=faults, seed=seed) as hub:
