@@ -37,7 +37,7 @@ class _Piece(Struct):
     """From that hand to the piece."""
     hidden: bool = False
     touched: dict[str, Seconds] = field(default_factory=dict)
-    """When hands were last at its place since it has been hidden."""
+    """Hands that have been at its place since it was hidden, and until when: before they first left it."""
     sights: deque[tuple[Seconds, Vector]] = field(default_factory=deque)
 
 
@@ -66,6 +66,8 @@ class Manipulation:
         self._pieces: dict[str, _Piece] = {}
         self._hands: dict[str, Entity] = {}
         self._acts: dict[str, _Act] = {}
+        self._before: Seconds = float("-inf")
+        """When the world was last seen."""
 
     def acts(self, actor: str) -> bool:
         return actor in self._acts
@@ -93,6 +95,7 @@ class Manipulation:
         for id, piece in self._pieces.items():
             if id not in seen:
                 self._miss(piece, at)
+        self._before = at
         return found
 
     def advance(self, now: Seconds) -> list[Acts]:
@@ -119,16 +122,16 @@ class Manipulation:
         self._pause(piece, place, at)
         found = []
         if piece.holder:
-            self._grip(piece, place)
+            self._grip(piece, entity.position)
         elif piece.hidden:
             found = self._reappears(id, piece, entity, at)
         elif math.dist(place, piece.place) <= self._sensing.tremor:
             piece.still_at, piece.hands_then = at, self._hands
             piece.place = _between(piece.place, place, FOLLOW)
         elif math.dist(place, piece.place) >= self._sensing.moved:
-            hand = self._moving_along(piece, entity.position)
-            found = self._begin(id, piece, entity, hand, piece.still_at) if hand else []
-            if not found:
+            if hand := self._moving_along(piece, entity.position):
+                found = self._begin(id, piece, entity, hand, piece.still_at)
+            else:
                 self._rest(piece)
         elif at - piece.moved_at >= self._sensing.rest:
             self._rest(piece)  # nudged
@@ -141,9 +144,10 @@ class Manipulation:
             piece.hidden = True
             piece.sights.clear()
         if not piece.holder:
-            piece.touched.update(
-                (hand, at) for hand, entity in self._hands.items() if self._reaches(entity, piece.place)
-            )
+            for hand, entity in self._hands.items():
+                here_before = piece.touched.get(hand, self._before) == self._before
+                if here_before and self._reaches(entity, piece.place):
+                    piece.touched[hand] = at
         elif piece.holder in self._hands:
             hand = self._hands[piece.holder].position
             self._pause(piece, _plus(hand, piece.grip), at)

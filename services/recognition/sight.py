@@ -20,6 +20,8 @@ Targets = tuple[str, ...]
 AWAY: Targets = ()
 SURFACE = "table"
 """What a thing lies on when no surface is seen under it."""
+FARTHEST = 1e6
+"""Metres. No place is farther off; nor is it one that is no number."""
 SAME_ANGLE = 1e-6
 """Radians. Closer ones are the same; then the nearer thing is in front."""
 
@@ -195,7 +197,8 @@ def _crosses(corners: Floats, edges: Floats, points: Floats) -> NDArray[np.bool_
 
 def _angles(layout: _Layout, eye: Floats, direction: Floats) -> tuple[Floats, Floats]:
     """Angle from the gaze to the extent of each entity, radians; and the distance of its center, metres."""
-    axis = direction / np.linalg.norm(direction)
+    axis = direction / np.abs(direction).max()
+    axis /= np.linalg.norm(axis)
     reach = layout.centers - eye
     distances = np.maximum(np.linalg.norm(reach, axis=1), 1e-9)
     angles = np.arccos(np.clip(reach @ axis / distances, -1.0, 1.0))
@@ -241,4 +244,4 @@ def is_direction(vector: Vector) -> bool:
 
 
 def is_place(vector: Vector) -> bool:
-    return all(map(math.isfinite, vector))
+    return all(abs(part) < FARTHEST for part in vector)
