@@ -149,8 +149,8 @@ class Manipulation:
                 if here_before and self._reaches(entity, piece.place):
                     piece.touched[hand] = at
         elif piece.holder in self._hands:
-            hand = self._hands[piece.holder].position
-            self._pause(piece, _plus(hand, piece.grip), at)
+            palm = self._hands[piece.holder].position
+            self._pause(piece, _plus(palm, piece.grip), at)
 
     def _averaged(self, piece: _Piece, place: Vector, at: Seconds) -> Vector:
         piece.sights.append((at, place))
