@@ -243,9 +243,10 @@ and advice. Of a block, what cannot be realized is left out with a warning (docs
 ## JSON lines
 
 `--feedback FILE` and `--events FILE` (of `engage demo`, `up` and `play`) write one JSON object per line; `engage watch
---json` prints both kinds, and every other message as it is. These are public: keys may be added, but none is renamed or removed. Every key is always there; what is not known is `null`. Times are seconds,
-rounded to microseconds; `time` of feedback counts from the start of the block, `global_time` and `time` of events are
-instants of the bus clock.
+--json` prints all kinds. These are public: keys may be added, but none is renamed or removed. Every key is always there
+(but for those of `head_owner` and `fault`, which are the messages of that name); what is not known is `null`. Times are
+seconds, rounded to microseconds; `time` of feedback counts from the start of the block, `global_time` and the other
+`time` are instants of the bus clock. JSON Schema: `schemas/exported/lines.json`.
 
 | stream | `type` | keys |
 |---|---|---|
@@ -254,6 +255,9 @@ instants of the bus clock.
 | feedback | `warning` | `block`, `behavior` (`null`: the whole block), `kind`, `message` |
 | `engage watch --json` only | `prediction` | `block`, `points` (each `behavior`, `sync`, `time`) |
 | events | `connection_event` | `id`, `kind`, `initiator`, `responder`, `objects`, `cause`, `state`, `optional`, `delay`, `time`, `started`, `duration`, `response`, `block`, `behavior`, `turn` |
+| `engage watch --json` only | `statistics` | `actor` (`null`: all together), `time`, `engagement`, `level`, `reasons`, `busy`, `session` and `recent` (each `events`, `mtbce`, `mtbce_without_maintenance`, `max_gap`, and by kind in `kinds` what `KindStatistics` has) |
+| `engage watch --json` only | `head_owner` | `owner`, `since`, `waiting` |
+| `engage watch --json` only | `fault` | `reason`, `where`, `line`, `advice`, `service` |
 
 ## Messages
 

@@ -1,7 +1,8 @@
 """JSON Schemas of everything that travels, for other languages: `python -m schemas.export [--check]`.
 
-One file per message of the bus, and one each for a block and a turn fragment. Draft 2020-12; quantities carry
-their unit as `description`. And the tool by which language models speak, as an API takes it (`schemas.tool`).
+One file per message of the bus, one each for a block and a turn fragment, and `lines.json` for the lines of
+`engage watch`. Draft 2020-12; quantities carry their unit as `description`. And the tool by which language models
+speak, as an API takes it (`schemas.tool`).
 """
 
 import argparse
@@ -12,7 +13,7 @@ from typing import Any, get_args
 
 import msgspec
 
-from schemas import tool
+from schemas import lines, tool
 from schemas.blocks import Block
 from schemas.fragments import TurnFragment
 from schemas.messages import MAJOR, Message
@@ -24,15 +25,15 @@ def exported_types() -> tuple[type[msgspec.Struct], ...]:
     return (Block, TurnFragment, *get_args(Message))
 
 
-def schema(kind: type[msgspec.Struct]) -> dict[str, Any]:
-    """The JSON Schema of one struct, complete in itself."""
+def schema(kind: Any, name: str = "") -> dict[str, Any]:
+    """The JSON Schema of a struct, or of a named union of some, complete in itself."""
     reference, components = msgspec.json.schema_components((kind,), ref_template="#/$defs/{name}")
     for component in components.values():
         if "description" in component:
             component["description"] = inspect.cleandoc(component["description"])
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
-        "$id": f"urn:engage:{MAJOR}:{kind.__name__}",
+        "$id": f"urn:engage:{MAJOR}:{name or kind.__name__}",
         **reference[0],
         "$defs": {name: components[name] for name in sorted(components)},
     }
@@ -41,6 +42,7 @@ def schema(kind: type[msgspec.Struct]) -> dict[str, Any]:
 def files() -> dict[str, bytes]:
     """What the folder should hold: name to content."""
     contents = {f"{kind.__name__}.json": schema(kind) for kind in exported_types()}
+    contents["lines.json"] = schema(lines.Line, "lines")
     contents[tool.FILE] = tool.definition()
     return {
         name: msgspec.json.format(msgspec.json.encode(content), indent=2) + b"\n"

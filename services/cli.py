@@ -301,15 +301,24 @@ def play_sessions() -> None:
 
 @app.command()
 def watch(
-    json: Annotated[bool, typer.Option("--json", help="JSON lines of every kind instead of text.")] = False,
+    json: Annotated[bool, typer.Option("--json", help="JSON lines instead of text.")] = False,
+    only: Annotated[
+        list[str] | None,
+        typer.Option(metavar="WHAT", help="events, statistics, feedback, head or faults; may be repeated."),
+    ] = None,
+    actor: Annotated[str, typer.Option(metavar="ID", help="Only what goes on with this person.")] = "",
+    kind: Annotated[
+        list[str] | None, typer.Option(metavar="KIND", help="Only these connection events; may be repeated.")
+    ] = None,
     robot: Robot = None,
     connect: Connect = None,
     config: ConfigFile = None,
 ) -> None:
-    """Follow a running system: connection events, feedback, claims on the head, as they come."""
+    """Follow a running system: connection events, the open ones first, feedback, claims on the head, as they come."""
     from services.commandline import run, watch
 
-    raise typer.Exit(watch.main(run.Where(config, robot, tuple(connect or ()), ()), json))
+    where = run.Where(config, robot, tuple(connect or ()), ())
+    raise typer.Exit(watch.main(where, json, watch.Wanted(tuple(only or ()), actor, tuple(kind or ()))))
 
 
 UsageError: type[Exception] = next(kind for kind in typer.BadParameter.__mro__ if kind.__name__ == "UsageError")

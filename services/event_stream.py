@@ -9,7 +9,6 @@ from collections.abc import Callable, Collection
 
 from msgspec.structs import replace
 
-from schemas.behaviors import EventKind
 from schemas.messages import Message
 from schemas.presence import PeerAlive, PeerGone
 from schemas.recognition import ENDINGS, ConnectionEvent, OpenEvents, session_of
@@ -32,7 +31,7 @@ class EventStream:
         began: Seconds,
         stamp: Callable[[Seconds], Stamp],
         *,
-        kinds: Collection[EventKind] = (),
+        kinds: Collection[str] = (),
         opening: bool = True,
     ) -> None:
         self.open: dict[str, ConnectionEvent] = {}

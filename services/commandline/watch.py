@@ -1,38 +1,100 @@
 """`engage watch`: follow a running system, as text or as JSON lines."""
 
-from schemas import lines
+from collections.abc import Collection
+from typing import NamedTuple, get_args
+
+from schemas import keys, lines
 from schemas.attention import HeadOwner
-from schemas.faults import Fault
+from schemas.behaviors import EventKind
+from schemas.faults import Fault, InputRefused
 from schemas.feedback import BlockProgress, SyncPointProgress, WarningFeedback
-from schemas.messages import Message, encode_json
-from schemas.recognition import ConnectionEvent
+from schemas.messages import Message
+from schemas.recognition import ConnectionEvent, Statistics
 from schemas.units import Seconds
 from services.commandline.outputs import Terminal
 from services.commandline.process import DONE, run_until_signal
 from services.commandline.run import Where, forever, unique
 from services.config import Config
-from services.console.follow import Sink, following
+from services.console.follow import FOLLOWED, Sink, following
 from services.console.live import Log
+from services.console.log import Telling
 
-WATCHED = (ConnectionEvent, BlockProgress, SyncPointProgress, WarningFeedback, HeadOwner, Fault)
+OTHERS = (keys.ANY_FEEDBACK, keys.HEAD_OWNER, keys.ANY_FAULT)
+SUBJECTS: dict[str, tuple[type[Message], ...]] = {
+    "events": (ConnectionEvent,),
+    "statistics": (Statistics,),
+    "feedback": (BlockProgress, SyncPointProgress, WarningFeedback),
+    "head": (HeadOwner,),
+    "faults": (Fault,),
+}
 
 
-def main(where: Where, json: bool) -> int:
+class Wanted(NamedTuple):
+    """What to show: these subjects; of connection events and statistics those of `actor` and these kinds.
+
+    Empty stands for all. Of a person there are only events and statistics, of kinds only events.
+    """
+
+    only: tuple[str, ...] = ()
+    actor: str = ""
+    kinds: tuple[str, ...] = ()
+
+    def check(self) -> None:
+        """Raises InputRefused for what can't be asked for."""
+        known = (("--only", self.only, SUBJECTS), ("--kind", self.kinds, get_args(EventKind)))
+        for option, given, good in known:
+            for name in set(given) - set(good):
+                raise InputRefused(
+                    Fault(reason=f"unknown {name!r}", where=option, advice=f"known: {', '.join(good)}")
+                )
+        try:
+            keys.chunk(self.actor)
+        except ValueError as error:
+            raise InputRefused(Fault(reason=str(error), where="--actor")) from error
+
+    @property
+    def is_everything(self) -> bool:
+        return self == Wanted()
+
+    @property
+    def subjects(self) -> Collection[str]:
+        if self.only:
+            return self.only
+        return ("events",) if self.kinds else ("events", "statistics") if self.actor else tuple(SUBJECTS)
+
+    @property
+    def patterns(self) -> Collection[str]:
+        if not (self.actor or self.kinds):
+            return FOLLOWED
+        return (*keys.event_stream(self.actor, self.kinds), keys.statistics(keys.chunk(self.actor)), *OTHERS)
+
+    def includes(self, message: Message) -> bool:
+        return any(isinstance(message, SUBJECTS[subject]) for subject in self.subjects)
+
+
+def main(where: Where, json: bool, wanted: Wanted) -> int:
     config = where.load()
-    run_until_signal(_watch(where, config, json))
+    wanted.check()
+    run_until_signal(_watch(where, config, json, wanted))
     return DONE
 
 
-async def _watch(where: Where, config: Config, json: bool) -> None:
+async def _watch(where: Where, config: Config, json: bool, wanted: Wanted) -> None:
     async with await where.open(config.robot) as hub:
         bus = hub.join(unique("watch"))
-        sink: Sink = as_json if json else Log(Terminal(), config.robot, bus.now())
-        async with following(bus, (sink,)):
+        # As text everything includes what people do and say, but statistics would drown it.
+        everything = wanted.is_everything and not json
+        telling = Telling(standings=not everything)
+        show: Sink = as_json if json else Log(Terminal(), config.robot, bus.now(), telling)
+
+        def tell(message: Message, at: Seconds) -> None:
+            if everything or wanted.includes(message):
+                show(message, at)
+
+        async with following(bus, (tell,), patterns=wanted.patterns, kinds=wanted.kinds):
             bus.declare_alive()
             await forever()
 
 
 def as_json(message: Message, at: Seconds) -> None:
-    """Print one of the messages that are public; others are not for `watch`."""
-    if isinstance(message, WATCHED):
-        print(lines.line(message) or encode_json(message).decode(), flush=True)
+    print(lines.line(message), flush=True)

@@ -5,7 +5,6 @@ from collections.abc import AsyncIterator, Callable, Collection, Iterable
 from contextlib import asynccontextmanager
 
 from schemas import keys
-from schemas.behaviors import EventKind
 from schemas.messages import Message
 from schemas.recognition import ConnectionEvent, OpenEvents
 from schemas.units import Seconds, Stamp
@@ -36,7 +35,7 @@ async def following(
     *,
     past: bool = True,
     patterns: Collection[str] = FOLLOWED,
-    kinds: Collection[EventKind] = (),
+    kinds: Collection[str] = (),
 ) -> AsyncIterator[None]:
     """Feed the sinks, in order, while the body of `async with` runs; what has arrived by its end is still fed.
 

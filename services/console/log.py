@@ -8,7 +8,7 @@ from schemas.behaviors import Action
 from schemas.faults import Fault
 from schemas.feedback import BlockProgress, SyncPointProgress, WarningFeedback
 from schemas.messages import Message
-from schemas.recognition import ConnectionEvent
+from schemas.recognition import ConnectionEvent, Statistics
 from schemas.units import Seconds
 from services.console import wording
 from services.console.view import OWN_BLOCKS, Scene
@@ -25,11 +25,14 @@ AT: dict[Action, str] = {"look": "at ", "point": "at ", "nod": "to ", "shake": "
 
 
 class Telling(Struct, frozen=True, kw_only=True):
-    """What the log tells. actions: what people and the robot do; points: sync points; head: who owns the head."""
+    """What the log tells. actions: what people and the robot do; points: sync points; head: who owns the head;
+    standings: statistics.
+    """
 
     actions: bool = True
     points: bool = True
     head: bool = True
+    standings: bool = False
 
 
 def told(message: Message, before: Scene, after: Scene, at: Seconds, telling: Telling) -> str | None:
@@ -50,6 +53,8 @@ def _text(message: Message, before: Scene, after: Scene, telling: Telling) -> st
             who = f"{message.initiator} → {message.responder}"
             kind = wording.KINDS[message.kind]
             return f"* {kind}, {who}{about} ({message.cause}): {wording.decision(message)}"
+        case Statistics() if telling.standings:
+            return wording.standing(message)
         case HeadOwner() if telling.head:
             waiting = wording.names([claim.kind for claim in message.waiting])
             return f"head: {wording.claim(message.owner)}" + (f"; waiting: {waiting}" if waiting else "")

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 from schemas.attention import Claim
 from schemas.behaviors import EventKind
-from schemas.recognition import ConnectionEvent
+from schemas.recognition import ConnectionEvent, Statistics
 from schemas.units import Seconds
 
 KINDS: dict[EventKind, str] = {
@@ -54,6 +54,15 @@ def decision(event: ConnectionEvent) -> str:
     else:
         text = event.state
     return f"{text} (optional)" if event.optional and event.state == "failed" else text
+
+
+def standing(statistics: Statistics) -> str:
+    """`anna: engaged 0.92 (pace 0.92); 12 events, MTBCE 5.31 s`."""
+    engagement = f"{statistics.level} {number(statistics.engagement)}" if statistics.engagement is not None else "-"
+    reasons = f" ({'; '.join(statistics.reasons)})" if statistics.reasons else ""
+    count = statistics.session.events
+    events = f"{count} event{'' if count == 1 else 's'}, MTBCE {seconds(statistics.session.mtbce)}"
+    return f"{statistics.actor or 'all'}: {engagement}{reasons}; {events}"
 
 
 def claim(claim: Claim) -> str:

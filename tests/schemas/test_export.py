@@ -16,7 +16,7 @@ def test_the_exported_schemas_are_not_stale() -> None:
 
 def test_every_message_and_both_inputs_are_exported() -> None:
     assert {"Block.json", "TurnFragment.json", "SyncPointReached.json"} <= files().keys()
-    assert len(files()) == len(exported_types()) + 1  # the tool of language models
+    assert len(files()) == len(exported_types()) + 2  # JSON lines, and the tool of language models
 
 
 def test_units_are_in_the_schema() -> None:

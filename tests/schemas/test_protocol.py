@@ -10,6 +10,7 @@ from textwrap import indent
 from types import ModuleType
 from typing import get_args
 
+import msgspec
 import pytest
 
 from schemas import keys, lines
@@ -62,18 +63,12 @@ def test_every_key_is_in_the_table(protocol: ModuleType) -> None:
     assert table == (constants | made) - {keys.PREFIX, keys.EVERYTHING}
 
 
-@pytest.mark.parametrize(
-    "name", ["block_progress", "sync_point_progress", "prediction", "warning", "connection_event"]
-)
-def test_every_key_of_the_json_lines_is_described(name: str) -> None:
-    source = Path(lines.__file__).read_text(encoding="utf-8")
-    function = source.partition(f"def {name}(")[2].partition("\n\n\n")[0]
-    (row,) = re.findall(rf"^\| [^|]+ \| `{name}` \| (.*) \|$", PAGE, re.MULTILINE)
+@pytest.mark.parametrize("kind", get_args(lines.Line))
+def test_every_key_of_the_json_lines_is_described(kind: type[msgspec.Struct]) -> None:
+    (row,) = re.findall(rf"^\| [^|]+ \| `{kind.__struct_config__.tag}` \| (.*) \|$", PAGE, re.MULTILINE)
 
-    written = set(re.findall(r'"(\w+)":', function)) - {"type"}
-
-    assert written
-    assert written <= set(re.findall(r"`(\w+)`", row))
+    assert kind.__struct_fields__
+    assert set(kind.__struct_fields__) <= set(re.findall(r"`(\w+)`", row))
 
 
 @pytest.mark.real_time
