@@ -25,6 +25,7 @@ def generated(things: Sequence[Thing], world: World, config: Config, source: str
 
 async def _generated(things: Sequence[Thing], world: World, config: Config, source: str) -> list[Plan]:
     from services.control.simulated import SimulatedBody
+    from services.generation.discourse import SILENCE
     from services.generation.fragment_check import checked
     from services.generation.leases import Leases
     from services.generation.motions import collect, distinct, from_each_other, from_here
@@ -39,6 +40,7 @@ async def _generated(things: Sequence[Thing], world: World, config: Config, sour
         return [body.estimate(item.behavior, item.pose, world) for item in items]
 
     plans = []
+    discourse = SILENCE
     for each in things:
         if isinstance(each, Block):
             plans.append(Plan(block=each))
@@ -50,7 +52,13 @@ async def _generated(things: Sequence[Thing], world: World, config: Config, sour
         onward = estimated(from_each_other(sequence, here, permits.only_hand))
         motions = collect(sequence, here, onward)
         try:
-            plans.append(plan(fragment, turn, world, body.capabilities, motions, permits, config.generation))
+            if not turn.backchannel:
+                discourse = discourse.in_turn(turn.turn, turn.addressee)
+            made = plan(
+                fragment, turn, world, body.capabilities, motions, permits, config.generation, discourse=discourse
+            )
+            discourse = discourse.naming(fragment.id, [mention.object for mention in made.mentions])
+            plans.append(made)
         except RunFailed as error:
             where = f"{source}: {fragment.id}: {error.fault.where}"
             raise RunFailed(replace(error.fault, where=where, line=_line(fragment, error.fault.where))) from error

@@ -19,6 +19,7 @@ from services.bus import Bus
 from services.generation.arbiter import Arbiter
 from services.generation.body_link import BodyLink
 from services.generation.config import GenerationConfig
+from services.generation.discourse import SILENCE
 from services.generation.fragment_check import checked
 from services.generation.leases import Leases
 from services.generation.performance import GazesOfFragments, Performance
@@ -56,6 +57,7 @@ class Conductor:
         self._gazes = GazesOfFragments()
         self._body = BodyLink(bus, config.body_patience)
         self._world: World | None = None
+        self._discourse = SILENCE
         self._live: dict[str, Performance] = {}
         """By request id: from acceptance to outcome."""
         self._line: asyncio.Queue[Performance] = asyncio.Queue()
@@ -102,6 +104,7 @@ class Conductor:
                 self._world = message
             case ConnectionEvent():
                 self._events.feed(message)
+                self._discourse = self._discourse.hearing(message, self._bus.robot)
             case ActionBegan() | ActionEnded():
                 self._turns.feed(message, now)
             case SyncPointProgress():
@@ -202,7 +205,12 @@ class Conductor:
                 if body is not None:
                     self._arbiter.gaze_perceived_within(body.gaze_half_angle)
                 before = reduce(Trail.then, (each.trail for each in company), NOTHING)
-                performance.begin(plan(fragment, turn, self._world, body, motions, permits(), self._config, before))
+                discourse = self._discourse
+                if not turn.backchannel:
+                    discourse = self._discourse = discourse.in_turn(turn.turn, turn.addressee)
+                made = plan(fragment, turn, self._world, body, motions, permits(), self._config, before, discourse)
+                self._discourse = discourse.naming(fragment.id, [mention.object for mention in made.mentions])
+                performance.begin(made)
                 try:
                     return await self._send_block(performance)
                 except RequestRefused:
@@ -244,6 +252,7 @@ class Conductor:
         """Or there will be none."""
         now, fragment = self._bus.now(), performance.fragment
         self._follow_gaze(performance)
+        self._discourse = self._discourse.without(fragment.id, performance.unsaid)
         if performance.refusal is not None:
             aborted = self._turns.fragment_refused(fragment.id, now)
         else:

@@ -30,7 +30,7 @@ from schemas.fragments import ReferenceChoice, TurnFragment
 from schemas.references import type_name
 from services.generation.config import GenerationConfig
 from services.generation.ordering import ordered
-from services.generation.parts import Names, Parts
+from services.generation.parts import Mention, Names, Parts
 from services.generation.permits import Permits
 from services.generation.profiles import after, as_in_the_figure, checking_back, same
 from services.generation.punctuation import joined
@@ -47,6 +47,7 @@ class Emission(Struct, frozen=True):
 
     block: Block
     trail: Trail
+    mentions: tuple[Mention, ...]
     warnings: tuple[str, ...]
 
 
@@ -130,7 +131,9 @@ class _Emitter:
             id=self.fragment.id, behaviors=behaviors, constraints=tuple(self.constraints), unread=self.fragment.unread
         )
         trail = Trail(self.speeches[-1] if self.speeches else "", self.last_glance, tuple(self.strokes))
-        return Emission(block, trail, tuple(f"{behavior.id} is left out: inhibited" for behavior in self.dropped))
+        mentions = tuple(parts.mention for parts in self.parts.values())
+        left_out = tuple(f"{behavior.id} is left out: inhibited" for behavior in self.dropped)
+        return Emission(block, trail, mentions, left_out)
 
     def _speeches(self) -> list[str]:
         """Ids of plain speeches and phrases, in order."""

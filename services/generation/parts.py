@@ -1,9 +1,18 @@
 """The behaviors that replace one reference, and ids that nobody in the fragment uses."""
 
+from msgspec import Struct
+
 from schemas.behaviors import BlockBehavior, Event, Gaze, Hand, Pointing, Reference, Speech, Timing
 from schemas.fragments import ReferenceChoice, TurnFragment
-from services.generation.rewriting import Replacement
+from services.generation.rewriting import Point, Replacement
 from services.generation.turn_policy import TurnPlan
+
+
+class Mention(Struct, frozen=True):
+    """by: the sync point of the block from which on `object` has been referred to."""
+
+    object: str
+    by: Point
 
 
 class Names:
@@ -73,6 +82,10 @@ class Parts:
     def closing(self) -> Replacement:
         """Of a speech of which all is said with the phrase."""
         return Replacement((self.phrase, "end"), (self.phrase, "end"))
+
+    @property
+    def mention(self) -> Mention:
+        return Mention(self.reference.target, self.replacement(gaze_leads=False).end)
 
     def replacement(self, *, gaze_leads: bool) -> Replacement:
         if self.phrase:

@@ -110,6 +110,13 @@ class Performance:
         return self.plan.trail.pending(self.fragment.id, self._reached) if self.plan is not None else NOTHING
 
     @property
+    def unsaid(self) -> frozenset[str]:
+        """The objects that it was to refer to, and has not."""
+        mentions = self.plan.mentions if self.plan is not None else ()
+        said = {mention.object for mention in mentions if mention.by in self._reached}
+        return frozenset(mention.object for mention in mentions) - said
+
+    @property
     def moving(self) -> tuple[BlockBehavior, ...]:
         """Gazes and points that are not over, in order: they say where the body will be."""
         return tuple(

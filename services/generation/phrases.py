@@ -17,6 +17,7 @@ from msgspec.structs import replace
 from schemas.behaviors import Reference, SpeechOption
 from schemas.world import Entity, World
 from services.generation.config import GenerationConfig, PhraseAttribute
+from services.generation.discourse import SILENCE, Discourse
 from services.generation.geometry import extent
 
 SPOKEN: tuple[PhraseAttribute, ...] = get_args(PhraseAttribute)
@@ -41,19 +42,25 @@ class Proposals(Struct, frozen=True):
     warnings: tuple[str, ...] = ()
 
 
-def proposed(references: Sequence[Reference], world: World, config: GenerationConfig) -> Proposals:
-    """The same references, in the order in which they are made; those that came without phrases have some."""
+def proposed(
+    references: Sequence[Reference], world: World, config: GenerationConfig, discourse: Discourse = SILENCE
+) -> Proposals:
+    """The same references, in the order in which they are made; those that came without phrases have some.
+
+    discourse: what was referred to before them.
+    """
     objects = _Objects(world)
     made: list[Reference] = []
     warnings: list[str] = []
     for reference in references:
         if reference.options is None:
-            mentioned = {earlier.target for earlier in made}
-            options = phrases(reference.target, objects, config, is_the_topic=mentioned == {reference.target})
+            is_the_topic = discourse.topic == reference.target
+            options = phrases(reference.target, objects, config, is_the_topic=is_the_topic)
             if not objects.describes(reference.target):
                 warnings.append(f"{reference.id}: the world does not say what {reference.target} looks like")
             reference = replace(reference, options=options)
         made.append(reference)
+        discourse = discourse.naming("", [reference.target])
     return Proposals(tuple(made), tuple(warnings))
 
 
@@ -62,7 +69,7 @@ def phrases(
 ) -> tuple[SpeechOption, ...]:
     """From short to long, each with its cost in words and its distractors.
 
-    is_the_topic: the target alone was mentioned before in this fragment, so that "it" can mean nothing else.
+    is_the_topic: the target alone was mentioned before, so that "it" can mean nothing else.
     """
     options = [_option("it", frozenset())] if is_the_topic else []
     demonstrative = "this" if objects.distance(target) <= config.this_within else "that"

@@ -10,9 +10,11 @@ from schemas.body import Capabilities
 from schemas.fragments import ReferenceChoice, TurnFragment
 from schemas.world import World
 from services.generation.config import GenerationConfig
+from services.generation.discourse import SILENCE, Discourse
 from services.generation.emission import emit
 from services.generation.motions import Motions
 from services.generation.ordering import ordered
+from services.generation.parts import Mention
 from services.generation.permits import Permits
 from services.generation.phrases import proposed
 from services.generation.reference_policy import Choices, Scene, choose
@@ -21,10 +23,11 @@ from services.generation.turn_policy import TurnPlan, vain_delay
 
 
 class Plan(Struct, frozen=True, kw_only=True):
-    """trail: what the block leaves for the turn's next fragment."""
+    """trail: what the block leaves for the turn's next fragment. mentions: when each object has been referred to."""
 
     block: Block
     trail: Trail = NOTHING
+    mentions: tuple[Mention, ...] = ()
     choices: tuple[ReferenceChoice, ...] = ()
     warnings: tuple[str, ...] = ()
 
@@ -49,18 +52,26 @@ def plan(
     permits: Permits,
     config: GenerationConfig,
     before: Trail = NOTHING,
+    discourse: Discourse = SILENCE,
 ) -> Plan:
     """The block of a checked fragment. body, motions: needed for references only. before: the turn's other blocks'.
 
+    discourse: what was referred to before it.
     Raises RunFailed where a reference cannot be made at all.
     """
     chosen = Choices()
-    made = proposed(references(fragment), world, config)
+    made = proposed(references(fragment), world, config, discourse)
     if made.references:
         chosen = choose(made.references, _scene(world, body, permits, config), motions, config)
     emission = emit(fragment, turn, chosen.choices, config, permits, chosen.hands, before)
     warnings = (*vain_delay(fragment), *made.warnings, *chosen.warnings, *emission.warnings)
-    return Plan(block=emission.block, trail=emission.trail, choices=chosen.choices, warnings=warnings)
+    return Plan(
+        block=emission.block,
+        trail=emission.trail,
+        mentions=emission.mentions,
+        choices=chosen.choices,
+        warnings=warnings,
+    )
 
 
 def _scene(world: World, body: Capabilities | None, permits: Permits, config: GenerationConfig) -> Scene:

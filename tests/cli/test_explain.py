@@ -187,3 +187,11 @@ def test_what_cannot_be_explained_says_what_to_do(engage: Engage, tmp_path: Path
     assert results[2].err.startswith(f"{unknown}:3: ")
     assert results[3].err.startswith(f"{unable}: f: f-r: no way to refer to rectangle: ")
     assert "no-point zone" in results[3].err
+
+
+def test_fragments_of_a_file_know_what_those_before_them_named(engage: Engage, tmp_path: Path) -> None:
+    calls = [{"turn_status": status, "parts": [{"refer": "rectangle"}]} for status in ("beginning", "end", "full")]
+
+    chosen = [pair["phrase"] for pair in rows(engage, written(tmp_path, calls)) if pair["chosen"]]
+
+    assert chosen == ["the rectangle", "it", "it"]

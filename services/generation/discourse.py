@@ -1,0 +1,59 @@
+"""What the robot has referred to, in its turn and the one before: what "it" can mean. Values in, values out."""
+
+from collections.abc import Collection
+
+from msgspec import Struct
+from msgspec.structs import replace
+
+from schemas.recognition import ConnectionEvent
+
+
+class Named(Struct, frozen=True):
+    """An object that a fragment refers to."""
+
+    fragment: str
+    object: str
+
+
+class Discourse(Struct, frozen=True):
+    """named: in the turn. before: in the turn before it. addressee: who has heard that."""
+
+    turn: str = ""
+    addressee: str = ""
+    named: tuple[Named, ...] = ()
+    before: tuple[Named, ...] = ()
+
+    def in_turn(self, turn: str, addressee: str) -> "Discourse":
+        """As `turn` finds it. To somebody else nothing has been said."""
+        if turn == self.turn:
+            return self
+        before = self.named if addressee == self.addressee else ()
+        return Discourse(turn=turn, addressee=addressee, before=before)
+
+    def naming(self, fragment: str, objects: Collection[str]) -> "Discourse":
+        """After a fragment that refers, or is going to refer, to `objects`."""
+        return replace(self, named=(*self.named, *(Named(fragment, each) for each in objects)))
+
+    def without(self, fragment: str, unsaid: Collection[str]) -> "Discourse":
+        """The fragment has ended and never came to refer to some of its objects."""
+        return replace(
+            self,
+            named=tuple(each for each in self.named if each.fragment != fragment or each.object not in unsaid),
+            before=tuple(each for each in self.before if each.fragment != fragment or each.object not in unsaid),
+        )
+
+    def hearing(self, event: ConnectionEvent, robot: str) -> "Discourse":
+        """A person who directs to something else makes that the topic: "it" is not what the robot named before."""
+        is_theirs = event.kind == "directed_gaze" and event.initiator != robot
+        if not is_theirs or not event.objects or set(event.objects) == {self.topic}:
+            return self
+        return replace(self, named=(), before=())
+
+    @property
+    def topic(self) -> str:
+        """The only object that was referred to: in the turn or, as long as nothing was in it, in the one before."""
+        objects = {each.object for each in self.named or self.before}
+        return objects.pop() if len(objects) == 1 else ""
+
+
+SILENCE = Discourse()
