@@ -28,8 +28,9 @@ class Presence:
         return True
 
     def found(self, at: Seconds) -> None:
-        self._found_last = max(at, self._found_last)
-        self.seen(at)
+        if at > self._found_last:
+            self._found_last = at
+            self.seen(at)
 
     def lost(self, at: Seconds) -> None:
         """The face is lost. Nothing new if that was known, or if it has been found since."""

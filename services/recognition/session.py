@@ -178,7 +178,7 @@ class Session:
                     person.robot_gesture_ends(ended.action, at)
 
     def _person_begins(self, person: Person, began: ActionBegan, at: Seconds) -> None:
-        if not person.presence.seen(at) or not self._is_news(began, at):
+        if not self._is_news(began, at) or not person.presence.seen(at):
             return
         confidence = began.confidence
         match began.action:
@@ -209,9 +209,7 @@ class Session:
                 person.manipulation_ends(at)
 
     def _is_news(self, action: ActionBegan | ActionEnded, at: Seconds) -> bool:
-        """Did it neither come twice nor too late, after something newer of the same kind? Looks order themselves."""
-        if action.action == "look":
-            return True
+        """Did it neither come twice nor too late, after something newer of the same kind?"""
         key = (action.actor, action.action, action.behavior, action.targets)
         began, ended = self._performed.get(key, (NEVER, NEVER))
         if isinstance(action, ActionBegan):

@@ -1,0 +1,98 @@
+"""Observations that come twice change nothing; those of different persons may come in any order."""
+
+import random
+from collections import Counter
+
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from msgspec.structs import replace
+
+from schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost
+from schemas.recognition import ConnectionEvent, RequestEvent, SignalTurn
+from services.recognition.config import RecognitionConfig
+from services.recognition.machine import Effect
+from services.recognition.session import Observation, Session
+from tests.recognition.observations import ROBOT, world
+from tests.recognition.test_random_streams import Chance, Stream, streams
+
+PEOPLE = ("ann", "bob")
+CELL = 0.04
+"""Within this from each full second things happen, and come in whatever order."""
+CONFIG = RecognitionConfig(manipulation_limit=8.3, turn_patience=12.3, after_robot_directed=2.3)
+"""No limit is a number of full seconds, so none passes between two observations of a cell."""
+
+
+def effects_of(stream: Stream) -> list[Effect]:
+    session = Session(ROBOT, CONFIG)
+    session.feed(world(*PEOPLE), 0.0)
+    effects = [effect for at, observation in stream for effect in session.feed(observation, at)]
+    return effects + session.advance(1e6)
+
+
+def by_content(effects: list[Effect]) -> Counter[ConnectionEvent]:
+    """The connection events; only their numbers depend on the order."""
+    return Counter(replace(effect, id="") for effect in effects if isinstance(effect, ConnectionEvent))
+
+
+@settings(max_examples=60, deadline=None)
+@given(streams, st.integers(0, 99))
+def test_what_comes_twice_changes_nothing(stream, seed):
+    """Actions and presence also after others have come; what travels by itself on its key, at once."""
+    chance = random.Random(seed)
+    once = [one for index, one in enumerate(stream) if one not in stream[:index]]
+    twice: Stream = []
+    later: Stream = []
+    for at, observation in once:
+        twice.append((at, observation))
+        if isinstance(observation, ActionBegan | ActionEnded | ActorFound | ActorLost):
+            later.append((at, observation))
+        elif not isinstance(observation, RequestEvent | SignalTurn):
+            twice.append((at, observation))  # requests come through a desk that lets none pass twice
+        while later and chance.random() < 0.6:
+            twice.append(later.pop(chance.randrange(len(later))))
+
+    assert effects_of(twice) == effects_of(once)
+
+
+@st.composite
+def independent(draw):
+    """The same observations in two orders: each person's own in order, those of others before or after.
+
+    What everybody is concerned with (the robot's actions, head, blocks and turns) has cells of its own.
+    """
+    chance = Chance(random.Random(draw(st.integers(0, 10**6))).choice)
+    one: Stream = []
+    other: Stream = []
+    for second in range(draw(st.integers(1, 60))):
+        cell = [(second + number * CELL / 8, chance.observation(second + number * CELL / 8)) for number in range(8)]
+        whose = {person: [it for it in cell if concerns(it[1]) == person] for person in PEOPLE}
+        common = [it for it in cell if concerns(it[1]) == ""]
+        if common and chance.pick((True, False)):
+            one += common
+            other += common
+        else:
+            for stream in (one, other):
+                queues = {person: list(own) for person, own in whose.items() if own}
+                while queues:
+                    person = chance.pick(tuple(queues))
+                    stream.append(queues[person].pop(0))
+                    queues = {name: left for name, left in queues.items() if left}
+    return one, other
+
+
+def concerns(observation: Observation) -> str:
+    """The only person that it is about; empty: all."""
+    match observation:
+        case ActionBegan(actor=actor) | ActionEnded(actor=actor) | ActorFound(actor=actor) | ActorLost(actor=actor):
+            return actor if actor != ROBOT else ""
+        case RequestEvent(event=event):
+            return event.responder
+    return ""
+
+
+@settings(max_examples=60, deadline=None)
+@given(independent())
+def test_what_different_persons_do_may_come_in_any_order_unless_a_limit_passes_between(streams):
+    one, other = streams
+
+    assert by_content(effects_of(one)) == by_content(effects_of(other))
