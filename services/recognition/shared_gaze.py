@@ -99,9 +99,10 @@ class SharedGaze(Machine):
         """The responder is there; came: since when, if not `at`. confidence: of the look that says so."""
         assert self.event is not None
         self.event.rests_on(confidence)
-        self.event.delay = max(0.0, (at if came is None else came) - self.event.started)
+        together_since = max(at if came is None else came, self.event.started)
+        self.event.delay = together_since - self.event.started
         self.step(given, at)
-        self._share(at)
+        self._share(together_since)
 
     def _share(self, at: Seconds) -> None:
         """The shared phase: begins when both are there, ends when one of them is not."""
