@@ -6,6 +6,7 @@ from itertools import pairwise
 from math import inf
 
 from msgspec import Struct
+from msgspec.structs import replace
 
 from schemas.units import Seconds
 from services.realizer.chains import Chain
@@ -13,7 +14,7 @@ from services.realizer.circles import components
 from services.realizer.classes import Classes, Instant, instants
 from services.realizer.handover import Arrangement
 from services.realizer.net import Bound, PetriNet, Place, PlaceKind, Transition
-from services.realizer.points import ORIGIN, Gate, Point, gate, gate_point, one_instant, performer
+from services.realizer.points import ORIGIN, WITH_STROKE, Gate, Point, gate, gate_point, one_instant, performer
 from services.realizer.relations import Order, Relations
 from services.realizer.schedule import EPSILON
 
@@ -82,6 +83,10 @@ class Assembler:
         self._class_delays(found)
         for relation in relations.orders:
             self._order(relation)
+        self._foreign = frozenset(self.at[point] for point in foreign)
+        for here in sorted(self._foreign):
+            classmates = [each for each in range(self.size) if found[each].class_id == found[here].class_id]
+            self._set_out_late(classmates)
         self._fixed = (self.places, self.bounds)
         self.waived: set[tuple[str, str]] = set()
 
@@ -124,6 +129,31 @@ class Assembler:
                 seconds = round(high - low, 9)
                 self.places.append(Place("delay", source, target, seconds, seconds))
                 self.bounds.append(Bound("delay", target, source, -seconds))
+
+    def _set_out_late(self, elsewhere: list[int]) -> None:
+        """Whose stroke comes after these instants of another block, but not his start, comes just in time.
+
+        Ours begins when it is sent, which may be long before: nobody is to hold his arm up all the while.
+        """
+        out: dict[int, list[int]] = {}
+        for place in self.places:
+            out.setdefault(place.source, []).append(place.target)
+        for chain in self.chains.values():
+            for since, to in pairwise(chain.points):
+                out.setdefault(self.at[since], []).append(self.at[to])
+        after, todo = set(elsewhere), list(elsewhere)
+        while todo:
+            fresh = set(out.get(todo.pop(), ())) - after
+            after |= fresh
+            todo += fresh
+        for id, chain in self.chains.items():
+            if chain.type in WITH_STROKE and self.at[chain.points[0]] not in after:
+                here, stroke = (self.at[Point(id, sync)] for sync in ("stroke_start", "stroke"))
+                if stroke in after and self.kinds[id, here] == "hold":
+                    self.kinds[id, here] = "prompt"
+                    self.members[here] = tuple(
+                        [replace(each, kind="prompt") if each.behavior == id else each for each in self.members[here]]
+                    )
 
     def _clock(self, number: int, at: Seconds) -> None:
         """Each time is counted from the block's start, whatever else was late."""
@@ -216,10 +246,13 @@ class Assembler:
     def _never_too_soon(self) -> None:
         """An order on a point that cannot wait is kept for certain by where its behavior can: it waits there.
 
-        Unless what it would wait for waits for it in turn, or it has no time to; then prediction must do.
+        Unless what it would wait for waits for it in turn, or it has no time to; then prediction must do. So it does
+        where others of the instant wait for another block: words that follow its words do not wait for a stroke, too.
         """
         waits = []
         for place in self.places:
+            if place.source in self._foreign and any(each.kind != "passive" for each in self.members[place.target]):
+                continue
             if place.kind == "order" and place.source != 0:
                 for member in self.members[place.target]:
                     if member.kind == "passive" and (chain := self.chains.get(member.behavior)):

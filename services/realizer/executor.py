@@ -8,11 +8,7 @@ from collections.abc import Iterable, Mapping
 
 from schemas.behaviors import BlockBehavior, Event, TurnSignal, Wait
 from schemas.blocks import Block, BlockOutcome, PerformBlock
-from schemas.body import (
-    BehaviorOutcome,
-    SyncPointArrived,
-    SyncPointReached,
-)
+from schemas.body import BehaviorOutcome, SyncPointArrived, SyncPointReached
 from schemas.faults import EngageError, Fault, InputRefused
 from schemas.feedback import WarningKind
 from schemas.syncref import BLOCK_ITSELF
@@ -47,7 +43,7 @@ class Performance:
         self._recognition = RecognitionLink(around.bus, around.requests, around.config, around.peers)
         self._body = BodyLink(around.bus, around.requests, request.id, plan.block.id)
         self._loop = loop
-        self._report = Reporter(around.bus, plan.block.id)
+        self._report = Reporter(around.bus, plan.block.id, around.config.skew)
         self._begun: dict[str, asyncio.Future[None]] = {id: loop.create_future() for id in plan.chains}
         self._asked: dict[str, Begin | Extend] = {}
         """Of each behavior, what it was last told."""
@@ -57,15 +53,12 @@ class Performance:
         self._unwanted: set[str] = set()
         """Whose end somebody has asked for."""
         self._elsewhere = elsewhere
-        self._foreign = frozenset(point for point in plan.at if ":" in point.behavior)
-        """Points of other blocks that this one is tied to."""
+        self._foreign = frozenset(plan.foreign)
         self._vanished: set[str] = set()
         """Behaviors of other blocks, of which some point will never be."""
         self._performed: dict[str, BlockBehavior] = {}
         """As they were begun: a later plan may have chosen another hand."""
         self.spoken = Spoken(plan.block.behaviors)
-        self._late: set[Point] = set()
-        """Of which it has been said."""
         self._ending: asyncio.Future[Ending] = loop.create_future()
         self._timer: asyncio.TimerHandle | None = None
         self._is_stale = False
@@ -75,7 +68,7 @@ class Performance:
     async def run(self) -> BlockOutcome:
         """Perform the block to its end, whatever that is. Ends everything it began."""
         began = self._bus.now()
-        self._authority = Authority(self.plan, began, self._config)
+        self.authority = Authority(self.plan, began, self._config)
         self._report.started(self.plan, began)
         for problem in self.plan.problems:
             self._report.warn(problem.kind, problem.message, problem.behavior)
@@ -90,6 +83,7 @@ class Performance:
                     )
                     for behavior in self.plan.behaviors
                 }
+                self._around.ledger.perform(self.plan.block.id, self)
                 with self._around.ledger.followed(self, self._foreign):
                     self._advance()
                     ending = await self._ending
@@ -118,7 +112,7 @@ class Performance:
 
     def is_going_on(self, behavior: str) -> bool:
         """Is it of this block, and has it neither ended nor been dropped?"""
-        return not self._ending.done() and behavior in self._running and not self._authority.has_ended(behavior)
+        return not self._ending.done() and behavior in self._running and not self.authority.has_ended(behavior)
 
     async def interrupt(self, behavior: str) -> bool:
         """End one behavior on request; the others go on. Returns once it has ended: had it come to its end before?"""
@@ -132,7 +126,7 @@ class Performance:
             self._requests.cancel(self._body.id(behavior), "interrupted")
             self._lose(behavior, Fault(reason="interrupted"))
             self._advance()
-        return behavior not in self._dropped and self._authority.has_ended(behavior)
+        return behavior not in self._dropped and self.authority.has_ended(behavior)
 
     def feed(self, message: SyncPointArrived | SyncPointReached) -> None:
         """A body's report about a behavior of this block."""
@@ -140,34 +134,44 @@ class Performance:
         if pending is None or pending.request.id != message.id or pending.outcome.done():
             return
         point = Point(message.behavior, message.sync)
-        at = self._authority.plausible(point, self._bus.local(message.at), self._bus.now())
+        at = self.authority.plausible(point, self._bus.local(message.at), self._bus.now())
         match message:
             case SyncPointArrived():
-                self._authority.arrive(point, at)
+                self.authority.arrive(point, at)
             case SyncPointReached(arrived=arrived):
                 self._reach(
-                    point, at, arrived=self._authority.plausible(point, self._bus.local(arrived), at), by_body=True
+                    point, at, arrived=self.authority.plausible(point, self._bus.local(arrived), at), by_body=True
                 )
         self._advance()
 
     def _tell_prediction(self) -> None:
         """Say when the rest is expected, if something was not when it was expected."""
-        if self._authority.is_surprised and self._report.may_expect() and not self._ending.done():
-            self._report.expect(
-                self._authority.plan, self._authority.began, self._authority.expected(self._bus.now())
-            )
+        if self.authority.is_surprised and self._report.may_expect() and not self._ending.done():
+            self._report.expect(self.authority.plan, self.authority.began, self.authority.expected(self._bus.now()))
 
     # -- other blocks ------------------------------------------------------------------------------------------------
 
     def hear(self, point: Point, at: Seconds) -> None:
         """A point of another block is reached."""
         if point in self._foreign and not self._ending.done():
-            self._authority.reach(point, at)
+            self.authority.reach(point, at)
+            self._advance()
+
+    def foresee(self, point: Point, at: Seconds) -> None:
+        """A point of another block is expected at `at` now."""
+        if point in self._foreign and not self._ending.done():
+            self.authority.foresee(point, at)
+            self._advance()
+
+    def follow(self, points: Iterable[Point]) -> None:
+        """Other blocks are tied to these."""
+        if points and not self._ending.done():
+            self.authority.follow(points)
             self._advance()
 
     def miss(self, behaviors: Iterable[str]) -> None:
         """What has not been reached of these, in other blocks, never will be."""
-        lost = {point.behavior for point in self._foreign - self._authority.reached.keys()}.intersection(behaviors)
+        lost = {point.behavior for point in self._foreign - self.authority.reached.keys()}.intersection(behaviors)
         if lost and not self._ending.done():
             self._vanished |= lost
             self._replan()
@@ -206,16 +210,17 @@ class Performance:
             self._replan()
         again = True
         while again and not self._ending.done():
-            made_facts = [self._apply(effect) for effect in self._authority.advance(self._bus.now())]
+            made_facts = [self._apply(effect) for effect in self.authority.advance(self._bus.now())]
             again = any(made_facts)
         self._tell_prediction()
+        self._around.ledger.foresee(self.plan.block.id, self.authority.ahead)
         if self._timer is not None:
             self._timer.cancel()
             self._timer = None
-        if self._authority.is_over:
+        if self.authority.is_over:
             self.stop(Ending("done"))
-        elif self._authority.deadline is not None and not self._ending.done():
-            self._timer = self._loop.call_at(self._authority.deadline, self._advance)
+        elif self.authority.deadline is not None and not self._ending.done():
+            self._timer = self._loop.call_at(self.authority.deadline, self._advance)
 
     def _apply(self, effect: Effect) -> bool:
         """Do what the authority says; whether that made new facts at once."""
@@ -228,8 +233,9 @@ class Performance:
                 self._begun[id].set_result(None)
             case Late(behavior=id, sync=sync, overdue=overdue):
                 if not self._around.peers.has_left("control"):
-                    self._warn_late(Point(id, sync), f"{sync} is {overdue:.1f} s overdue")
-                self._authority.is_surprised = True
+                    instant = self.authority.member(Point(id, sync)).point
+                    self._report.late(instant, f"{sync} is {overdue:.1f} s overdue")
+                self.authority.is_surprised = True
             case Stalled(behavior=id, sync=sync, overdue=overdue):
                 self._body.abort(id)
                 self._lose(id, Fault(reason=f"stalled before {sync}, {overdue:.1f} s overdue"))
@@ -238,28 +244,19 @@ class Performance:
 
     def _extend(self, id: str) -> bool:
         behavior, end = self._performed.get(id), Point(id, "end")
-        if isinstance(behavior, Wait) and end in self._authority.arrived:
-            self._reach(end, self._bus.now(), arrived=self._authority.arrived[end])
+        if isinstance(behavior, Wait) and end in self.authority.arrived:
+            self._reach(end, self._bus.now(), arrived=self.authority.arrived[end])
             return True
         if behavior is not None and id in self._pending and performer(behavior) == "body":
             self._send(behavior)
         return False
 
     def _reach(self, point: Point, at: Seconds, *, arrived: Seconds | None = None, by_body: bool = False) -> None:
-        for each in self._authority.reach(point, at):
-            came = self._authority.arrived.get(each, arrived if each == point else None)
-            skew = self._report.reached(self.plan, self._authority, each, arrived=came, by_body=by_body)
-            if (late := max(skew, self._authority.lateness(each))) > self._config.skew:
-                self._warn_late(each, f"{each.sync} came {late:.2f} s later than it should")
+        for each in self.authority.reach(point, at):
+            came = self.authority.arrived.get(each, arrived if each == point else None)
+            self._report.reached(self.plan, self.authority, each, arrived=came, by_body=by_body)
             self.spoken.reach(each)
             self._around.ledger.reach(self.plan.block.id, each, at)
-
-    def _warn_late(self, point: Point, message: str) -> None:
-        """Once for each instant of a behavior."""
-        instant = self._authority.member(point).point
-        if instant not in self._late:
-            self._late.add(instant)
-            self._report.warn("LATE", message, point.behavior)
 
     def _lose(self, id: str, fault: Fault, kind: WarningKind = "EXECUTION_FAILURE") -> None:
         """A behavior cannot be finished: the block fails if it is required, else goes on as if it had not been."""
@@ -272,7 +269,7 @@ class Performance:
             self._report.interrupted(id, self.spoken.of(id))
         else:
             self._report.warn(kind, str(fault), id)
-            if id in self._authority.begun:
+            if id in self.authority.begun:
                 self._go_home(self._parts(id), id)
             if id in self.plan.required:
                 self.stop(Ending("failed", Fault(reason=fault.reason, where=f"{self.plan.block.id}: {id}")))
@@ -288,7 +285,7 @@ class Performance:
         except InputRefused as error:
             self.stop(Ending("failed", error.fault))
             return
-        self._authority.replan(plan)
+        self.authority.replan(plan)
         for problem in plan.problems:
             # What is too late now that something else is gone.
             if problem.behavior in plan.dropped and problem.behavior not in gone:
@@ -300,7 +297,7 @@ class Performance:
 
     async def _perform(self, behavior: BlockBehavior) -> None:
         await self._begun[behavior.id]
-        behavior = self._performed[behavior.id] = self._authority.plan.chains[behavior.id].behavior
+        behavior = self._performed[behavior.id] = self.authority.plan.chains[behavior.id].behavior
         match behavior:
             case Wait(duration=duration):
                 await self._wait(behavior.id, duration or 0.0)
@@ -335,7 +332,7 @@ class Performance:
         self.spoken.end(outcome)
         if is_done:
             end = Point(behavior.id, sync_points(behavior)[-1])
-            at = self._authority.plausible(end, self._bus.local(outcome.at), self._bus.now())
+            at = self.authority.plausible(end, self._bus.local(outcome.at), self._bus.now())
             self._reach(end, at, by_body=True)
             self._advance()
         else:
@@ -354,13 +351,13 @@ class Performance:
     @property
     def parts_used(self) -> set[str]:
         """Of the body, by what has begun so far."""
-        return {part for id in self._authority.begun for part in self._parts(id)}
+        return {part for id in self.authority.begun for part in self._parts(id)}
 
     @property
     def parts_moving(self) -> set[str]:
         """By what has begun and not ended."""
         moving = self._performed.keys() - set(self._dropped)
-        return {part for id in moving if not self._authority.has_ended(id) for part in self._parts(id)}
+        return {part for id in moving if not self.authority.has_ended(id) for part in self._parts(id)}
 
     def _parts(self, id: str) -> set[str]:
         estimate = self.plan.estimates.get(id)
@@ -375,7 +372,7 @@ class Performance:
         if self._asked[id].through == "end":
             self._reach(Point(id, "end"), self._bus.now())
         else:
-            self._authority.arrive(Point(id, "end"), self._bus.now())
+            self.authority.arrive(Point(id, "end"), self._bus.now())
         self._advance()
 
     def _at_once(self, id: str) -> None:
@@ -392,7 +389,7 @@ class Performance:
             self._pending[event.id] = pending
         self._advance()
         try:
-            decision = await self._recognition.decision(event, self.plan.block, pending, self._authority.reached)
+            decision = await self._recognition.decision(event, self.plan.block, pending, self.authority.reached)
         except RequestRefused as error:
             self._lose(event.id, error.fault, kind="CANNOT_CREATE_BEHAVIOR")
         else:

@@ -1,13 +1,15 @@
-"""What live blocks may be to one another: whose points others can name, when each was, and which will never be."""
+"""What live blocks may be to one another: whose points others can name, when each is to be, or was, or never will."""
 
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
+from math import inf
 from typing import Protocol
 
 from schemas.blocks import Block
 from schemas.syncref import BLOCK_ITSELF
 from schemas.units import Seconds
 from services.realizer.points import Point
+from services.realizer.schedule import EPSILON
 
 
 class Follower(Protocol):
@@ -16,15 +18,31 @@ class Follower(Protocol):
     def hear(self, point: Point, at: Seconds) -> None:
         """A point of another block is reached."""
 
+    def foresee(self, point: Point, at: Seconds) -> None:
+        """A point of another block is expected at another time than before."""
+
     def miss(self, behaviors: Iterable[str]) -> None:
         """What has not been reached of these never will be."""
 
 
+class Author(Protocol):
+    """A block that is being performed."""
+
+    def follow(self, points: Iterable[Point]) -> None:
+        """Others are tied to these points of it: tell them from now on when they are expected."""
+
+
 class _Page:
-    """Of one live block. lost: behaviors that were dropped."""
+    """Of one live block. lost: behaviors that were dropped. named: its points that others are tied to.
+
+    expected: when these are to be, as far as is known and has been told.
+    """
 
     def __init__(self, block: Block) -> None:
         self.block = block
+        self.author: Author | None = None
+        self.named: set[Point] = set()
+        self.expected: dict[Point, Seconds] = {}
         self.reached: dict[Point, Seconds] = {}
         self.lost: set[str] = set()
         self.followers: list[Follower] = []
@@ -59,6 +77,21 @@ class Ledger:
         for follower in list(page.followers):
             follower.hear(_abroad(block, point), at)
 
+    def perform(self, block: str, author: Author) -> None:
+        """It begins."""
+        page = self._pages[block]
+        page.author = author
+        author.follow(page.named)
+
+    def foresee(self, block: str, expected: Mapping[Point, Seconds]) -> None:
+        """When points of a live block are to be. What is no news is not told."""
+        page = self._pages[block]
+        for point, at in expected.items():
+            if abs(at - page.expected.get(point, inf)) > EPSILON:
+                page.expected[point] = at
+                for follower in list(page.followers):
+                    follower.foresee(_abroad(block, point), at)
+
     def lose(self, block: str, behavior: str) -> None:
         """A behavior of a live block is dropped."""
         page = self._pages[block]
@@ -75,12 +108,19 @@ class Ledger:
             page.followers.append(follower)
         for point in wanted:
             block = _home(point)
-            behavior = point.behavior.removeprefix(f"{block}:")
+            named = Point(point.behavior.removeprefix(f"{block}:"), point.sync)
             page_or_none = pages.get(block)
-            if page_or_none is None or behavior in page_or_none.lost:
+            if page_or_none is None or named.behavior in page_or_none.lost:
                 follower.miss((point.behavior,))
-            elif (at := page_or_none.reached.get(Point(behavior, point.sync))) is not None:
+            elif (at := page_or_none.reached.get(named)) is not None:
                 follower.hear(point, at)
+            else:
+                page_or_none.named.add(named)
+                if (expected := page_or_none.expected.get(named)) is not None:
+                    follower.foresee(point, expected)
+        for page in pages.values():
+            if page.author is not None:
+                page.author.follow(page.named)
         try:
             yield
         finally:

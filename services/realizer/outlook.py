@@ -140,6 +140,11 @@ class Outlook(Facts):
         self.is_surprised = False
         return {point: self._expected[point] - self.began for point in coming}
 
+    def times(self) -> dict[Point, Seconds]:
+        """When each point of the plan was, or is expected."""
+        forecast = self.from_scratch()
+        return {point: self.reached.get(point, forecast.times[at]) for point, at in self.plan.at.items()}
+
     def from_scratch(self) -> Forecast:
         """When each instant will be: what the forecast kept up to date says of those it keeps, and all others."""
         facts = (self.foreseen, self.reached, self.arrived, self._instants)

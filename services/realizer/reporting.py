@@ -39,9 +39,13 @@ def moved_noticeably(old: Mapping[Point, Seconds], new: Mapping[Point, Seconds])
 class Reporter:
     """The feedback of one block."""
 
-    def __init__(self, bus: Bus, block: str) -> None:
+    def __init__(self, bus: Bus, block: str, tolerance: Seconds) -> None:
+        """tolerance: what misses its instant by more is late."""
         self._bus = bus
         self._block = block
+        self._tolerance = tolerance
+        self._late: set[Point] = set()
+        """Instants of behaviors of which that has been said."""
         self._character = ""
         self._predicted: Mapping[Point, Seconds] = {}
         self._not_before = 0.0
@@ -80,8 +84,8 @@ class Reporter:
 
     def reached(
         self, first_plan: Plan, authority: Authority, point: Point, *, arrived: Seconds | None, by_body: bool
-    ) -> Seconds:
-        """Report a point; returns how much later it was than the first of its instant.
+    ) -> None:
+        """Report a point, and how much later it was than the first of its instant.
 
         first_plan: the one the block began with, which said when the point was to be.
         """
@@ -103,7 +107,14 @@ class Reporter:
                     character_id=self._character,
                 )
             )
-        return skew
+        if (late := max(skew, authority.lateness(point))) > self._tolerance:
+            self.late(authority.member(point).point, f"{point.sync} came {late:.2f} s later than it should")
+
+    def late(self, instant: Point, message: str) -> None:
+        """Once for each instant of a behavior."""
+        if instant not in self._late:
+            self._late.add(instant)
+            self.warn("LATE", message, instant.behavior)
 
     def warn(self, kind: WarningKind, message: str, behavior: str = "") -> None:
         warning = WarningFeedback(

@@ -27,8 +27,8 @@ from services.bus import Bus
 from services.realizer.config import RealizerConfig
 from services.realizer.executor import Performance
 from services.realizer.ledger import Ledger
-from services.realizer.planner import Plan, plan_block, poses_before
-from services.realizer.points import performer
+from services.realizer.planner import Plan, plan_block, poses_before, poses_left
+from services.realizer.points import Point, performer
 from services.realizer.relations import BlockRefused, extent, relations
 from services.realizer.surroundings import Ending, Presence, Surroundings
 from services.requests import RequestDesk, Requester
@@ -126,7 +126,7 @@ class _Realizer:
             if plan is None:
                 self._end(live, _never_begun(live.request, live.stopped.result()))
                 return
-            named = {point.behavior.partition(":")[0] for point in plan.at if ":" in point.behavior}
+            named = {point.behavior.partition(":")[0] for point in plan.foreign}
             tied_to = {id: elsewhere[id] for id in named}
             live.performance = Performance(live.request, plan, self.around, tied_to)
             self._end(live, await live.performance.run())
@@ -143,7 +143,7 @@ class _Realizer:
         first, is_asked_again = estimates, False
         while True:
             plan = plan_block(chosen, estimates, elsewhere=elsewhere, barred=barred)
-            before = poses_before(plan)
+            before = poses_before(plan, self._left_for(plan))
             if plan.block is chosen and (is_asked_again or not before):
                 return plan
             chosen, is_asked_again = plan.block, True
@@ -151,6 +151,20 @@ class _Realizer:
             if refused := _hands_refused(block, chosen, estimates):
                 barred |= refused
                 chosen, estimates, is_asked_again = block, first, False
+
+    def _left_for(self, plan: Plan) -> dict[str, BodyPose]:
+        """How the blocks that `plan` is tied to will leave the body for it, by part: the last of them says."""
+        others = {each.plan.block.id: each.authority for each in self.performing()}
+        named = {point: point.behavior.partition(":")[0::2] for point in plan.foreign}
+        times = {block: others[block].times() for block, _ in named.values() if block in others}
+        ties = [
+            times[block].get(Point(id, point.sync), 0.0) for point, (block, id) in named.items() if block in times
+        ]
+        poses: dict[str, BodyPose] = {}
+        for block in others:
+            if block in times:
+                poses |= poses_left(others[block].plan, times[block], max(ties))
+        return poses
 
     async def _estimates(self, block: Block, before: Mapping[str, BodyPose]) -> tuple[Estimate, ...]:
         """before: where the body will be when a behavior starts; the others are asked for from where it is now."""

@@ -30,8 +30,9 @@ class Wiring:
             if place.kind in ("order", "delay", "series"):
                 self.waits_for[place.target].append((place.source, place.lag))
                 self.awaited_by[place.source].append(place.target)
-                # Who is predicted, or is of another block, may have been there before those it waits for.
-                self.not_after[place.source].append((place.target, -place.lag))
+                if place.kind != "series":
+                    # Who is predicted, or is of another block, may have been there before those it waits for.
+                    self.not_after[place.source].append((place.target, -place.lag))
         for bound in plan.net.bounds:
             if bound.kind != "phase":
                 self.not_after[bound.source].append((bound.target, -bound.lag))

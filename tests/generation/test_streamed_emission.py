@@ -126,7 +126,7 @@ def test_profile_figure_looks_when_the_words_before_it_begin() -> None:
     text = made(middle(reference("r")), (POINT, "it"), profile="figure-3.3", hands={"r": "RIGHT_HAND"})
 
     assert text == [
-        "r-gaze:start after a:s:start",
+        "r-gaze:stroke after a:s:start",
         "r-point:start after r-gaze:start",
         "r-point:stroke_start = r-gaze:stroke+2",
         "r-phrase:start = r-point:stroke_end",

@@ -179,7 +179,7 @@ async def test_profile_figure_looks_ahead_when_the_words_before_begin(hub: Memor
 
         reached = stage.reached
         assert reached["b:ref-gaze:start"] == reached["a:s:start"]
-        assert reached["c:ref-gaze:start"] == reached["b:ref-phrase:start"]
+        assert reached["c:ref-gaze:stroke"] == reached["b:ref-phrase:start"]
         assert reached["c:ref-point:start"] >= reached["c:ref-gaze:start"]
         assert reached["b:ref-phrase:start"] >= reached["a:s:end"]
         assert reached["c:ref-phrase:start"] >= reached["b:ref-phrase:end"]
