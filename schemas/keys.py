@@ -105,10 +105,13 @@ def event_stream(actor: str = "", kinds: Iterable[str] = ()) -> tuple[str, ...]:
     return (*events, open_events(person), alive("recognition"))
 
 
+CHUNK = "no '/', '*', '$', '?', '#', and no '@' at its beginning"
+
+
 def chunk(name: str) -> str:
     """The name as one chunk of a key expression; `*` for an empty one. Raises ValueError if it can't be one."""
     if not is_chunk(name or "all"):
-        raise ValueError(f"{name!r} can't be part of a key: no '/', '*', '$', '?', '#', and no '@' at its beginning")
+        raise ValueError(f"{name!r} can't be in a key: {CHUNK}")
     return name or "*"
 
 

@@ -5,6 +5,7 @@ from collections.abc import Iterable
 from schemas import keys
 from schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost
 from schemas.attention import HeadOwner
+from schemas.faults import Fault
 from schemas.perception import HeadPose, VoiceActivity
 from schemas.recognition import ConnectionEvent, EventOutcome, RequestEvent, SignalTurn, TurnOutcome, session_of
 from schemas.requests import Accepted, Cancel, Refused
@@ -17,6 +18,9 @@ from services.recognition.recognizer import Perceived, Recognizer, Result
 from services.recognition.standings import Standings
 from services.requests import RequestDesk
 from services.runtime import Ready
+
+COMPLAINTS = 100
+"""How many bad ids are told of."""
 
 
 async def recognize(bus: Bus, ready: Ready, config: RecognitionConfig) -> None:
@@ -44,6 +48,7 @@ class _Recognition:
     def __init__(self, bus: Bus, config: RecognitionConfig) -> None:
         self.desk = RequestDesk(bus, "recognition", self._cancel)
         self._bus = bus
+        self._nameless: set[str] = set()
         session = session_of(bus.run)
         self._recognizer = Recognizer(bus.robot, config, clock=bus.clock, name=f"{session}-")
         self._open = OpenBook(bus.robot, session)
@@ -76,16 +81,26 @@ class _Recognition:
         match received.message:
             case ActionBegan(actor=actor) | ActionEnded(actor=actor):
                 by_robot = actor == self._bus.robot
-                return keys.is_chunk(actor) and by_robot == (received.key == keys.ROBOT_ACTION)
+                return self._can_take_part(actor) and by_robot == (received.key == keys.ROBOT_ACTION)
             case ActorFound(actor=actor) | ActorLost(actor=actor):
-                return keys.is_chunk(actor) and actor != self._bus.robot
+                return self._can_take_part(actor) and actor != self._bus.robot
             case HeadPose(actor=actor):
                 return actor != self._bus.robot and received.key == keys.head_pose(actor)
             case VoiceActivity(actor=actor):
                 return actor != self._bus.robot and received.key == keys.voice_activity(actor)
-            case World(entities=entities):
-                return all(keys.is_chunk(entity.id) for entity in entities)
+            case World(people=people):
+                return all(self._can_take_part(person.id) for person in people)
         return True
+
+    def _can_take_part(self, actor: str) -> bool:
+        """An id that can't be in a key has no events. Told once."""
+        if keys.is_chunk(actor):
+            return True
+        if actor not in self._nameless and len(self._nameless) < COMPLAINTS:
+            self._nameless.add(actor)
+            fault = Fault(reason=f"{actor!r} can't be in a key", advice=keys.CHUNK, service="recognition")
+            self._bus.publish(keys.fault("recognition"), fault)
+        return False
 
     def _when(self, observation: Perceived, arrived: Seconds) -> Seconds:
         """Local time of what happened. A stamp from the future is not believed."""

@@ -4,7 +4,7 @@ from functools import partial
 from typing import Any
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from schemas import keys
@@ -228,6 +228,7 @@ def stream(began: float = 0.0) -> EventStream:
     return EventStream(began, partial(Stamp, "loop"))
 
 
+@settings(max_examples=50)
 @given(histories(), st.integers(0, 20), st.integers(0, 20))
 def test_whenever_one_comes_nothing_is_missed_repeated_or_stale(
     history: list[ConnectionEvent], joins: int, remembered: int

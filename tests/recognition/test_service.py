@@ -177,8 +177,9 @@ async def test_a_block_that_ends_stops_the_wait_for_its_anchors(hub: MemoryHub):
 
 async def test_bad_names_never_end_the_service(hub: MemoryHub):
     bus = hub.join("perception")
+    faults = bus.subscribe(keys.fault("recognition"))
     async with running(hub, recognition()):
-        for actor in ("", "a/b", "**", "#"):
+        for actor in ("", "a/b", "**", "#", "@b"):
             bus.publish(
                 keys.PERCEIVED_ACTION, ActionBegan(actor=actor, action="look", at=bus.stamp(), targets=(ROBOT,))
             )
@@ -189,3 +190,5 @@ async def test_bad_names_never_end_the_service(hub: MemoryHub):
 
     assert received is not None
     assert received.message.initiator == "ann"  # type: ignore[union-attr]
+    told = [queued.message.reason for queued in faults._queue]  # type: ignore[union-attr]
+    assert told == [f"{name!r} can't be in a key" for name in ("", "a/b", "**", "#", "@b")]
