@@ -37,6 +37,8 @@ SHELLS = {
     "services/console/live.py",  # draws
 }
 """Files beside `service.py` and `__main__.py` that are not pure. Each is a decision: keep the list short."""
+VISITOR = "examples/plain_zenoh_events.py"
+"""Shows how to do without Engage: it may import nothing of it."""
 COMPOSERS = {"commandline"}
 """Packages of `services` that are no service: they put services together and may import all of them."""
 ON_A_ROBOT = {"realizer", "generation", "recognition", "control"}
@@ -80,7 +82,7 @@ def _in_code(place: PurePosixPath, text: str, tree: ast.Module) -> Iterator[str]
     if place.parts[0] in ("schemas", "services"):
         for name in _called(tree) & THREAD_CALLS:
             yield f"calls {name}: this code starts no threads"
-    if place.parts[0] != "tests" and str(place) != "schemas/keys.py":
+    if place.parts[0] != "tests" and str(place) not in ("schemas/keys.py", VISITOR):
         for node in ast.walk(tree):
             if isinstance(node, ast.Constant) and isinstance(node.value, str) and "engage/v1" in node.value:
                 yield f"line {node.lineno} spells a key expression: schemas/keys.py has them all"
@@ -89,10 +91,13 @@ def _in_code(place: PurePosixPath, text: str, tree: ast.Module) -> Iterator[str]
 def _import(place: PurePosixPath, module: str) -> Iterator[str]:
     """Why `place` may not import `module`."""
     top = place.parts[0]
+    if str(place) == VISITOR and module.split(".")[0] in ("schemas", "services"):
+        yield "it shows how to do without"
     package = place.parts[1] if top == "services" and len(place.parts) > 2 else ""
     first, second = [*module.split("."), ""][:2]
     measures = top in ("tests", "benchmarks")
-    if first == "zenoh" and not measures and not re.fullmatch(r"services/zenoh_\w+\.py", str(place)):
+    visits = measures or str(place) == VISITOR
+    if first == "zenoh" and not visits and not re.fullmatch(r"services/zenoh_\w+\.py", str(place)):
         yield "only services/zenoh_*.py may"
     if first in THREADS and not measures:
         yield "this code starts no threads"
@@ -212,6 +217,8 @@ def test_the_list_of_shells_holds_only_files_that_need_it() -> None:
         ("services/cli.py", "async def f():\n    await asyncio.to_thread(g)", "no threads"),
         ("services/cli.py", "loop.run_in_executor(None, f)", "no threads"),
         ("services/cli.py", "key = 'engage/v1/cmd/realizer/block'", "spells a key"),
+        ("examples/x.py", "import zenoh", "imports zenoh"),
+        ("examples/plain_zenoh_events.py", "from schemas import keys", "do without"),
         ("examples/x.py", "key = f'robot/engage/v1/{x}'", "spells a key"),
         ("services/cli.py", "x = 1\n" * 401, "401 lines"),
         ("tests/test_x.py", "import time\ntime.sleep(1)", "sleeps"),
