@@ -38,8 +38,10 @@ PEOPLE = "table-2-1"
 """The human whose sessions have no robot, and so no condition."""
 TWO_PEOPLE = "human-human"
 """What stands in their column `condition`."""
-BY_WORDS = ("listening", "stochastic")
-"""They follow the robot's words and no script, so that it may choose its own."""
+BY_WORDS = ("collaboration.mode=task",)
+"""For people who follow the robot's words and no script: it may choose its own."""
+USUAL = {"listening": BY_WORDS, "stochastic": BY_WORDS, PEOPLE: ()}
+"""What suits a human, weaker than the user's settings; all others act the transcript."""
 PLOTS = ("events.png", "delays.png", "failure_rates.png", "mtbce.png", "completion_time.png")
 FILES = ("study.json", "events.csv", "sessions.csv", "hypotheses.csv", "summary.md", "failures.txt", *PLOTS)
 
@@ -114,15 +116,18 @@ def orders_of(options: Options) -> list[Order]:
             raise InputRefused(Fault(reason=f"--human {PEOPLE} has no conditions", advice="leave out --condition"))
         return [_order(options, TWO_PEOPLE, number) for number in range(options.sessions)]
     conditions = dict.fromkeys(options.conditions or CONDITIONS)
+    for condition in conditions:
+        if condition not in CONDITIONS:
+            advice = f"one of {', '.join(CONDITIONS)}"
+            raise InputRefused(Fault(reason=f"no condition {condition!r}", advice=advice))
     return [_order(options, condition, number) for condition in conditions for number in range(options.sessions)]
 
 
 def _order(options: Options, condition: str, number: int) -> Order:
     """Weaker than the user's settings: what makes a condition worse. Stronger: seed and condition themselves."""
     seed, people = options.seed + number, options.human == PEOPLE
-    defaults, chosen = [*demo.DEFAULTS], [*demo.choices(seed, None if people else options.human, options.resolution)]
-    if options.human in BY_WORDS:
-        defaults.append("collaboration.mode=task")
+    defaults = [*USUAL.get(options.human, demo.DEFAULTS)]
+    chosen = [*demo.choices(seed, None if people else options.human, options.resolution)]
     if not people:
         defaults += WORSE[condition]
         chosen.append(f"generation.condition={condition}")

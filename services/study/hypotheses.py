@@ -5,7 +5,7 @@ from collections.abc import Callable, Sequence
 from msgspec import Struct
 
 from schemas.units import Probability
-from services.study.conditions import BASELINE
+from services.study.conditions import BASELINE, DEGRADED
 from services.study.permutation import LEVEL, Paired, holm, paired
 from services.study.records import SessionRecord
 
@@ -13,8 +13,10 @@ Measure = Callable[[SessionRecord], float | None]
 
 CAVEAT = (
     "The person is a model. The sessions show what the robot's behavior does to an interaction with somebody who "
-    "reacts in just this way, not how people would react, and nobody in them is ever pleased or bored. With enough "
-    "sessions any difference, however small, gets a small p: read the difference and its interval first."
+    "reacts in just this way, not how people would react. That a look that is not returned makes the next one rarer "
+    "is built into the stochastic person (`simulation.stochastic.reciprocity`): 11 shows how strong the effect of "
+    "that would be, not that there is one. With enough sessions any difference, however small, gets a small p: read "
+    "the difference and its interval first."
 )
 
 
@@ -92,12 +94,12 @@ class Finding(Struct, frozen=True, kw_only=True):
 def findings(records: Sequence[SessionRecord]) -> list[Finding]:
     """Every hypothesis in every degraded condition there is, from the finished sessions."""
     values = {(record.condition, record.session): record for record in records if record.finished}
-    conditions = dict.fromkeys(record.condition for record in records)
+    conditions = {record.condition for record in records}
     operational = BASELINE in conditions
     asked = [
         (hypothesis, condition, *_samples(hypothesis, condition, values))
-        for condition in conditions
-        if condition != BASELINE
+        for condition in DEGRADED
+        if condition in conditions
         for hypothesis in HYPOTHESES
         if operational or not hypothesis.baseline
     ]

@@ -16,7 +16,7 @@ from services.study.summary import KINDS, RESPONDED, by_condition, pooled
 COLORS = ("#0072B2", "#E69F00", "#009E73")
 HATCHES = ("", "//", "..")
 """For prints without color."""
-DPI = 150
+DPI = 120
 
 Groups = Mapping[str, Sequence[SessionRecord]]
 Height = Callable[[str, EventKind], tuple[float, str]]
@@ -68,7 +68,7 @@ def _failure_rates(groups: Groups) -> Figure:
 
     figure, axes = _one_panel()
     _bars(axes, groups, RESPONDED, rate)
-    axes.set_ylabel("failed, of those that could (%)")
+    axes.set_ylabel("failure rate (%), without optional events")
     axes.set_ylim(0, 105)
     return figure
 
@@ -87,8 +87,10 @@ def _delays(groups: Groups, events: Sequence[EventRecord]) -> Figure:
             for name in groups
         ]
         _boxes(axes, groups, samples, whiskers=(5, 95))
+        axes.set_ylim(bottom=min(0.0, axes.get_ylim()[0]))
         axes.set_title(kind.replace("_", " "), fontsize=10)
     figure.axes[0].set_ylabel("delay of those that succeeded (s)")
+    figure.supxlabel("box: quartiles and median; whiskers: 5th and 95th percentile", fontsize=8)
     return figure
 
 
@@ -103,6 +105,7 @@ def _each_session(groups: Groups, label: str, measure: Callable[[SessionRecord],
         places = [index - 0.18 + number * step for number in range(len(sample))] if len(sample) > 1 else [index]
         axes.plot(places[: len(sample)], sample, "o", markersize=3, color="0.25", alpha=0.6, linestyle="none")
     axes.set_ylabel(label)
+    axes.set_xlabel("box: quartiles and median; a point for each session", fontsize=8)
     axes.set_ylim(bottom=0)
     return figure
 
@@ -132,12 +135,13 @@ def _bars(
         places = [number + (index - (len(groups) - 1) / 2) * width for number in range(len(kinds))]
         heights, words = zip(*(height(name, kind) for kind in kinds), strict=True)
         bars = axes.bar(
-            places, heights, 0.92 * width, label=f"{name} (n = {len(groups[name])})",
+            places, heights, 0.92 * width, label=f"{name} ({len(groups[name])} sessions)",
             color=COLORS[index % len(COLORS)], hatch=HATCHES[index % len(HATCHES)], edgecolor="white",
         )  # fmt: skip
         axes.bar_label(bars, words, fontsize=7, padding=1)
     axes.set_xticks(range(len(kinds)), [kind.replace("_", " ") for kind in kinds])
-    axes.legend(frameon=False, fontsize=8)
+    if groups:
+        axes.legend(frameon=False, fontsize=8)
 
 
 def _boxes(axes: Axes, groups: Groups, samples: Sequence[Sequence[float]], whiskers: tuple[float, float]) -> None:

@@ -92,10 +92,11 @@ def overview(records: Sequence[SessionRecord]) -> Table:
             delays = ((one.delay_min, one.delay_mean, one.delay_max) for one in all_of)
             rows.append(("- delay (s)", *map(numbers, delays)))
     return Table(
-        title="Sessions", columns=("", *groups), rows=tuple(rows),
+        title="Sessions", columns=("", *(name.replace("-", " ") for name in groups)), rows=tuple(rows),
         notes=(
-            "Finished sessions; mean ± standard deviation of a session. Failure rates, and delays of what succeeded "
-            "(least / mean / most), are of all events together. Optional events that fail are no failures.",
+            "Finished sessions; mean ± standard deviation of a session. Face: how much of that third of the session "
+            "the person is seen to look at the robot's face. Failure rates, and delays of what succeeded (least, "
+            "mean, most), are of all events together; optional events that fail are no failures.",
         ),
     )  # fmt: skip
 
@@ -106,9 +107,9 @@ _MEASURES: tuple[tuple[str, int, Callable[[SessionRecord], float | None]], ...] 
     ("MTBCE (s)", 2, lambda record: record.statistics.mtbce),
     ("longest gap (s)", 1, lambda record: record.statistics.max_gap),
     ("pair to pair (s)", 2, lambda record: record.adjacency_pairs_every),
-    ("looks at face, start", 2, lambda record: record.eye_contact.first if record.eye_contact else None),
-    ("looks at face, middle", 2, lambda record: record.eye_contact.second if record.eye_contact else None),
-    ("looks at face, end", 2, lambda record: record.eye_contact.last if record.eye_contact else None),
+    ("face, first third", 2, lambda record: record.eye_contact.first if record.eye_contact else None),
+    ("face, second third", 2, lambda record: record.eye_contact.second if record.eye_contact else None),
+    ("face, last third", 2, lambda record: record.eye_contact.last if record.eye_contact else None),
 )
 
 
@@ -152,9 +153,9 @@ def number(value: float | None, digits: int = 2) -> str:
 
 
 def numbers(values: Iterable[float | None]) -> str:
-    """`0.00 / 0.31 / 2.00`, or one `-` if nothing is known."""
+    """`0.00 0.31 2.00`, or one `-` if nothing is known."""
     words = [number(value) for value in values]
-    return MISSING if set(words) == {MISSING} else " / ".join(words)
+    return MISSING if set(words) == {MISSING} else " ".join(words)
 
 
 def spelled(values: Sequence[float], digits: int) -> str:

@@ -1,0 +1,298 @@
+"""`engage simulate`: sessions in processes of their own, their files, and what goes wrong with them."""
+
+import asyncio
+import csv
+import json
+import signal
+import sys
+from pathlib import Path
+
+import pytest
+
+from services.commandline import session as playing
+from services.commandline import simulate, workers
+from services.commandline.session import Order, Played, play
+from services.commandline.workers import play_all
+from services.config import Config
+from services.study.records import SessionRecord
+from services.virtual_time import Deadlock
+from tests.cli.command import Engage, start, threads
+
+PEOPLE = ("--human", "table-2-1")
+
+
+def rows(folder: Path, name: str) -> list[dict[str, str]]:
+    with (folder / name).open(newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def order(number: int, config: Config | None = None) -> Order:
+    return Order(session=number, condition="operational", seed=number, limit=60.0, config=config or Config())
+
+
+# -- a study ----------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def study(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Two whole sessions, the same seed in two conditions, each in a process of its own."""
+    out = tmp_path_factory.mktemp("study")
+    options = simulate.Options(1, 3, out, ("operational", "degraded-generation"), "appendix-b", jobs=2, quiet=True)
+    assert simulate.main(options) == 0
+    return out
+
+
+def test_a_study_leaves_all_its_files(study: Path) -> None:
+    assert {file.name for file in study.iterdir()} == set(simulate.FILES) - {"failures.txt"}
+    assert all((study / name).read_bytes().startswith(b"\x89PNG") for name in simulate.PLOTS)
+
+
+def test_each_session_is_a_row_and_each_event(study: Path) -> None:
+    sessions, events = rows(study, "sessions.csv"), rows(study, "events.csv")
+
+    assert [(row["condition"], row["session"], row["seed"], row["finished"]) for row in sessions] == [
+        ("operational", "0", "3", "true"), ("degraded-generation", "0", "3", "true"),
+    ]  # fmt: skip
+    assert list(events[0]) == [
+        "session", "condition", "kind", "initiator", "cause", "outcome", "optional", "start", "delay",
+    ]  # fmt: skip
+    for row in sessions:
+        assert int(row["events"]) == sum(event["condition"] == row["condition"] for event in events)
+        assert 100 < float(row["completion_time"]) < float(row["duration"]) < 300
+
+
+def test_a_degraded_robot_initiates_no_gaze(study: Path) -> None:
+    seen = {
+        (row["condition"], row["initiator"])
+        for row in rows(study, "events.csv")
+        if row["kind"] in ("directed_gaze", "mutual_facial_gaze")
+    }
+
+    assert ("operational", "robot") in seen
+    assert ("degraded-generation", "robot") not in seen
+
+
+def test_the_study_says_how_to_repeat_it(study: Path) -> None:
+    told = json.loads((study / "study.json").read_text())
+
+    assert (told["human"], told["sessions"], told["seed"], told["ordered"], told["played"]) == (
+        "appendix-b", 1, 3, 2, 2,
+    )  # fmt: skip
+    assert told["configurations"]["degraded-generation"]["generation"]["condition"] == "degraded-generation"
+    assert told["configurations"]["operational"]["simulation"]["seed"] == 3
+    assert "python" in told["versions"]
+
+
+def test_the_summary_answers_the_hypotheses(study: Path) -> None:
+    text = (study / "summary.md").read_text()
+
+    assert [row["hypothesis"] for row in rows(study, "hypotheses.csv")] == ["6", "7", "8", "11a", "11b"]
+    for expected in ("MTBCE", "completion time", "too few sessions", "The person is a model"):
+        assert expected in text
+
+
+def test_the_number_of_processes_changes_nothing(engage: Engage, tmp_path: Path) -> None:
+    """Not even with more processes than sessions. Broken off early, to be quick."""
+    common = ("simulate", "--condition", "operational", "--sessions", 2, "--limit", 12, "--quiet")
+
+    one = engage(*common, "--out", tmp_path / "one", "--jobs", 1)
+    three = engage(*common, "--out", tmp_path / "three", "--jobs", 3)
+
+    assert one.code == three.code == 3
+    files = {file.name: file.read_bytes() for file in (tmp_path / "one").iterdir()}
+    assert files == {file.name: file.read_bytes() for file in (tmp_path / "three").iterdir()}
+    assert len(rows(tmp_path / "one", "events.csv")) > 2
+
+
+# -- two people -------------------------------------------------------------------------------------------------
+
+
+def test_two_people_are_told_beside_the_table(engage: Engage, tmp_path: Path) -> None:
+    result = engage("simulate", *PEOPLE, "--sessions", 12, "--seed", 1, "--out", tmp_path)
+
+    sessions = rows(tmp_path, "sessions.csv")
+    assert result.code == 0
+    assert {row["condition"] for row in sessions} == {"human-human"}
+    assert {row["events"] for row in sessions} == {"97"}
+    assert {(row["directed_gaze_count"], row["backchannel_count"]) for row in sessions} == {("14", "15")}
+    assert sum(float(row["mtbce"]) for row in sessions) / 12 == pytest.approx(5.7, abs=1.0)
+    for expected in ("Beside Table 2.1", "mutual facial gaze, success rate", "MTBCE (s)", "5.7", "human-human 11:"):
+        assert expected in result.out
+    assert not (tmp_path / "hypotheses.csv").exists()
+
+
+def test_two_people_have_no_condition(engage: Engage, tmp_path: Path) -> None:
+    result = engage("simulate", *PEOPLE, "--condition", "operational", "--out", tmp_path / "new")
+
+    assert (result.code, result.out) == (2, "")
+    assert "leave out --condition" in result.err
+    assert not (tmp_path / "new").exists()
+
+
+# -- what is refused --------------------------------------------------------------------------------------------
+
+
+def test_results_are_not_overwritten_unless_asked(engage: Engage, tmp_path: Path) -> None:
+    again = ("simulate", *PEOPLE, "--sessions", 1, "--quiet", "--out", tmp_path)
+    (tmp_path / "hypotheses.csv").write_text("of an earlier study")
+    (tmp_path / "notes.txt").write_text("mine")
+
+    refused, done = engage(*again), engage(*again, "--overwrite")
+
+    assert refused.code == 2
+    assert "hypotheses.csv" in refused.err
+    assert "--overwrite" in refused.err
+    assert (done.code, done.out) == (0, "")
+    assert not (tmp_path / "hypotheses.csv").exists(), "a stale result among new ones"
+    assert (tmp_path / "notes.txt").read_text() == "mine"
+    assert not list(tmp_path.glob(".*")), "parts of files left"
+
+
+def test_a_directory_that_cannot_be_is_refused(engage: Engage, tmp_path: Path) -> None:
+    (tmp_path / "file").touch()
+
+    result = engage("simulate", *PEOPLE, "--out", tmp_path / "file")
+
+    assert (result.code, result.out) == (2, "")
+    assert "cannot be made" in result.err
+
+
+def test_without_matplotlib_nothing_is_played(
+    engage: Engage, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.delitem(sys.modules, "services.study.plots", raising=False)
+    for name in [name for name in sys.modules if name.split(".")[0] == "matplotlib"]:
+        monkeypatch.delitem(sys.modules, name)
+    monkeypatch.setitem(sys.modules, "matplotlib", None)
+
+    result = engage("simulate", *PEOPLE, "--out", tmp_path / "new")
+
+    assert (result.code, result.out) == (2, "")
+    assert "pip install 'engage-hri[study]'" in result.err
+    assert not (tmp_path / "new").exists()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "reason"),
+    [
+        (("--condition", "degraded"), "no condition 'degraded'"),
+        (("--sessions", "0"), "--sessions"),
+        (("--set", "simulation.sede=1"), "do you mean `seed`"),
+    ],
+)
+def test_bad_arguments_are_refused(arguments: tuple[str, ...], reason: str, engage: Engage, tmp_path: Path) -> None:
+    result = engage("simulate", "--out", tmp_path / "new", *arguments)
+
+    assert (result.code, result.out) == (2, "")
+    assert reason in result.err
+    assert not (tmp_path / "new").exists()
+
+
+def test_the_users_settings_are_stronger_than_a_conditions_but_not_than_its_name() -> None:
+    settings = ("simulation.faults.missed_look=0.1", "generation.condition=operational", "simulation.seed=9")
+    options = simulate.Options(2, 40, Path(), where=simulate.Where(settings=settings))
+
+    orders = simulate.orders_of(options)
+
+    worse = [order for order in orders if order.condition == "degraded-recognition"]
+    assert [order.config.simulation.faults.missed_look for order in worse] == [0.1, 0.1]
+    assert worse[0].config.simulation.faults.wrong_look > 0
+    assert [order.config.generation.condition for order in worse] == ["degraded-recognition"] * 2
+    assert [order.config.simulation.seed for order in orders] == [40, 41] * 3
+    assert {order.config.collaboration.mode for order in orders} == {"task"}
+
+
+# -- what goes wrong --------------------------------------------------------------------------------------------
+
+
+def test_a_session_that_does_not_end_is_broken_off() -> None:
+    nobody = simulate.Where(settings=("simulation.human=none",)).load()
+
+    record = play(order(0, nobody)).record
+
+    assert (record.finished, record.reason) == (False, "not over after 60 s")
+    assert record.duration == pytest.approx(60.0, abs=1.0)
+
+
+@pytest.mark.parametrize("error", [Deadlock("all tasks wait"), RuntimeError("all tasks\nwait")])
+def test_a_bug_costs_its_session_and_is_told(error: Exception, monkeypatch: pytest.MonkeyPatch) -> None:
+    async def fails(*arguments: object) -> None:
+        raise ExceptionGroup("services", [error])
+
+    monkeypatch.setattr(playing, "play_tangram", fails)
+
+    played = play(order(4))
+
+    assert (played.record.session, played.record.finished) == (4, False)
+    assert played.record.reason == f"{type(error).__name__}: all tasks wait"
+    assert "Traceback" in played.trace
+
+
+def answering(deed: str) -> tuple[str, ...]:
+    """A child that answers each order, but does `deed` with session 1."""
+    code = (
+        "import json, os, signal, sys\n"
+        "for line in sys.stdin:\n"
+        "    order = json.loads(line)\n"
+        f"    if order['session'] == 1: {deed}\n"
+        "    record = dict(session=order['session'], condition=order['condition'], seed=0, finished=True)\n"
+        "    print(json.dumps(dict(record=record)), flush=True)\n"
+    )
+    return (sys.executable, "-c", code)
+
+
+@pytest.mark.real_time
+@pytest.mark.parametrize(
+    ("deed", "reason"),
+    [
+        ("os.kill(os.getpid(), signal.SIGKILL)", "the process that played it ended with signal 9"),
+        ("sys.exit(5)", "the process that played it ended with exit code 5"),
+        ("print('{\"half', end='', flush=True) or sys.exit(5)", "the process that played it ended with exit code 5"),
+        ("signal.pause()", "no answer within 1 s"),
+    ],
+)
+async def test_a_child_that_is_lost_costs_only_its_session(
+    deed: str, reason: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(workers, "PATIENCE", 1.0)
+    told: list[SessionRecord] = []
+
+    def tell(played: Played) -> None:
+        told.append(played.record)
+
+    await play_all([order(number) for number in range(4)], 2, tell, worker=answering(deed))
+
+    told.sort(key=lambda record: record.session)
+    assert [(record.session, record.reason) for record in told] == [(0, ""), (1, reason), (2, ""), (3, "")]
+    assert [record.finished for record in told] == [True, False, True, True]
+
+
+def children_of(pid: int) -> list[int]:
+    return [int(child) for child in Path(f"/proc/{pid}/task/{pid}/children").read_text().split()]
+
+
+def is_there(pid: int) -> bool:
+    return Path(f"/proc/{pid}").exists()
+
+
+@pytest.mark.real_time
+async def test_ctrl_c_ends_the_children_and_keeps_what_there_is(tmp_path: Path) -> None:
+    process = await start(
+        "simulate", "--human", "appendix-b", "--sessions", 500, "--limit", 10, "--jobs", 2, "--out", tmp_path
+    )
+    assert process.stdout is not None
+    async with asyncio.timeout(60):
+        first = await process.stdout.readline()
+        children = children_of(process.pid)
+        started = threads(process.pid)
+        process.send_signal(signal.SIGINT)
+        await process.communicate()
+
+    assert b"not finished: not over after 10 s" in first
+    assert process.returncode == 130
+    assert len(children) == 2
+    assert started == []
+    assert not any(map(is_there, children))
+    told = json.loads((tmp_path / "study.json").read_text())
+    assert 1 <= told["played"] == len(rows(tmp_path, "sessions.csv")) < told["ordered"] == 1500
+    assert rows(tmp_path, "events.csv")
