@@ -38,7 +38,6 @@ from services.realizer.relations import (
 from services.realizer.schedule import EPSILON, Solution
 from services.realizer.verdict import Losses, clashes, judge
 
-
 EVERYTHING_HOME: Mapping[str, BodyPose] = {}
 
 

@@ -1,4 +1,4 @@
-"""A block that is tied to the words of another prepares for them: its strokes come just in time, its arms not before."""
+"""A block that is tied to words of another prepares for them: strokes come just in time, and no arm before that."""
 
 import asyncio
 
