@@ -152,9 +152,8 @@ class Attention:
         self._sight.see_face(actor.id, pose.position, at)
         if "look" in actor.told:
             return actions
-        seen = self._sight.target(
-            actor.id, pose.position, pose.direction, present=actor.looking.nearest, at=at, sure=pose.confidence
-        )
+        gaze, present = (pose.position, pose.direction), actor.looking.nearest
+        seen = self._sight.target(actor.id, gaze, present=present, at=at, sure=pose.confidence)
         return actions + self._tell(actor, actor.looking.feed(seen, at))
 
     def _sounds(self, actor: _Actor, voice: VoiceActivity, at: Seconds) -> list[Symbolic]:

@@ -1,29 +1,29 @@
-"""What lies in the direction of a head: things, faces and surfaces as arrays, and the angle from the gaze to each.
+"""What lies in the direction of a head, and the angle from the gaze to each thing, face and surface.
 
-An angle is measured to the thing's extent: 0 when the gaze meets its footprint, or the sphere of its radius. What is
-covered stays where it was last seen, with a confidence that decays (thesis 5.4.2).
+An angle is measured to the thing's extent: 0 when the gaze goes through its footprint, or the sphere of its radius.
+What is covered stays where it was last seen, with a confidence that decays (thesis 5.4.2).
 """
 
 import math
+from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
 from msgspec import Struct
 from numpy.typing import NDArray
 
-from schemas.units import Probability, Seconds, Vector
+from schemas.units import Meters, Probability, Radians, Seconds, Vector
 from schemas.world import Entity, World
-from services.recognition.config import GazeResolution, RecognitionConfig
+from services.recognition.config import RecognitionConfig
 
-Floats = NDArray[np.float64]
 Targets = tuple[str, ...]
 AWAY: Targets = ()
 SURFACE = "table"
 """What a thing lies on when no surface is seen under it."""
-FARTHEST = 1e6
-"""Metres. No place is farther off; nor is it one that is no number."""
-SAME_ANGLE = 1e-6
-"""Radians. Closer ones are the same; then the nearer thing is in front."""
+FARTHEST: Meters = 1e6
+"""No place is farther off; nor is it one that is no number."""
+SAME_ANGLE: Radians = 1e-6
+"""Closer angles are the same; then the nearer thing is in front."""
 
 
 class Seen(NamedTuple):
@@ -33,36 +33,71 @@ class Seen(NamedTuple):
     confidence: Probability
 
 
-class _Known(Struct):
-    """hidden_since: when it was covered; None while it is in view."""
+class _Thing(Struct):
+    """radius: of a sphere, 0 for what has an outline. bound: of a sphere around all of it."""
 
     entity: Entity
+    outline: tuple[Vector, ...]
+    """The corners of its footprint where it is."""
+    radius: Meters
+    bound: Meters
     hidden_since: Seconds | None = None
+    """When it was covered; None while it is in view."""
 
 
-class _Layout(Struct, frozen=True):
-    """Everything that can be looked at, n entities. The edges of footprints, m, are in the order of their owners."""
+class _Candidate(NamedTuple):
+    """How far from the gaze, to its extent, and how near to the eye; then what it is."""
 
-    ids: tuple[str, ...]
-    targets: tuple[str, ...]
-    """What a look at each is reported as."""
-    centers: Floats
-    radii: Floats
-    surface: NDArray[np.bool_]
-    confidence: Floats
-    hidden_since: Floats
-    """Infinity while in view."""
-    outlined: NDArray[np.intp]
-    """Which entities have a footprint, (k,)."""
-    first: NDArray[np.intp]
-    """Index of the first edge of each of those, (k,)."""
-    owner: NDArray[np.intp]
-    """Which of those each edge belongs to, (m,)."""
-    corners: Floats
-    edges: Floats
-    """From each corner to the next, (m, 3)."""
-    lengths: Floats
-    """Squared."""
+    angle: Radians
+    distance: Meters
+    targets: Targets
+    confidence: Probability
+
+
+class _Gaze:
+    """A ray from the eyes; the coordinates of what is in front, in units of its depth, across the ray."""
+
+    def __init__(self, eye: Vector, direction: Vector) -> None:
+        longest = max(map(abs, direction))
+        scaled = [part / longest for part in direction]
+        length = math.hypot(*scaled)
+        self.eye = eye
+        self.axis = x, y, z = scaled[0] / length, scaled[1] / length, scaled[2] / length
+        # Any two axes across the gaze: from the one of the world's that is the least along it.
+        side = (0.0, -z, y) if abs(x) <= min(abs(y), abs(z)) else (z, 0.0, -x) if abs(y) <= abs(z) else (-y, x, 0.0)
+        length = math.hypot(*side)
+        self._right = a, b, c = side[0] / length, side[1] / length, side[2] / length
+        self._up = (y * c - z * b, z * a - x * c, x * b - y * a)
+
+    def across(self, place: Vector) -> tuple[float, float] | None:
+        """Where a place appears: its distance from (0, 0) is the tangent of its angle. None: it is not in front."""
+        from_eye = (place[0] - self.eye[0], place[1] - self.eye[1], place[2] - self.eye[2])
+        depth = _dot(from_eye, self.axis)
+        if depth <= 1e-9:
+            return None
+        return _dot(from_eye, self._right) / depth, _dot(from_eye, self._up) / depth
+
+    def angle_to(self, thing: _Thing) -> Radians:
+        """To the nearest point of the thing."""
+        corners = [self.across(corner) for corner in thing.outline]
+        if corners and None not in corners:
+            return _to_polygon([corner for corner in corners if corner is not None])
+        center = thing.entity.position
+        distance = math.dist(center, self.eye)
+        if distance <= thing.radius:
+            return 0.0
+        along = sum((one - eye) * axis for one, eye, axis in zip(center, self.eye, self.axis, strict=True))
+        angle = math.acos(max(-1.0, min(1.0, along / max(distance, 1e-9))))
+        return max(0.0, angle - math.asin(thing.radius / max(distance, 1e-9)))
+
+    def meets(self, surface: _Thing) -> bool:
+        """Does it go through the surface's footprint?"""
+        height = surface.entity.position[2] - self.eye[2]
+        if height * self.axis[2] <= 0.0:
+            return False
+        far = height / self.axis[2]
+        x, y = self.eye[0] + far * self.axis[0], self.eye[1] + far * self.axis[1]
+        return _is_inside([(corner[0] - x, corner[1] - y) for corner in surface.outline])
 
 
 class Sight:
@@ -70,173 +105,141 @@ class Sight:
 
     def __init__(self, robot: str, config: RecognitionConfig) -> None:
         self._robot = robot
-        self._resolution: GazeResolution = config.gaze_resolution
+        self._by_table = config.gaze_resolution == "table"
         self._least = config.least_confidence
         self._sensing = config.sensing
         self._half_angle = math.radians(config.sensing.gaze_half_angle)
         self._margin = math.radians(config.sensing.gaze_margin)
-        self._known: dict[str, _Known] = {}
-        self._layout: _Layout | None = None
+        self._known: dict[str, _Thing] = {}
+        self._surfaces: list[_Thing] = []
+        self._others: list[_Thing] = []
+        self._rows: dict[str, int] = {}
+        self._spheres: NDArray[np.float64] | None = None
+        """Around each of the `others`: center and radius, (n, 4); None: to be made anew."""
         self.see_face(robot, config.sensing.robot_face)
 
     def see(self, world: World, at: Seconds) -> None:
         """What is missing, or there with too little confidence, is covered."""
-        self._layout = None
+        self._spheres = None
         seen = {one.id: one for one in world.entities if one.kind != "hand" and one.confidence >= self._least}
-        for id, known in self._known.items():
-            if id not in seen and known.hidden_since is None and id != self._robot:
-                known.hidden_since = at
-        self._known.update((id, _Known(entity)) for id, entity in seen.items())
+        for id, thing in self._known.items():
+            if id not in seen and thing.hidden_since is None and id != self._robot:
+                thing.hidden_since = at
+        for id, entity in seen.items():
+            before = self._known.get(id)
+            if before is None or before.entity != entity:
+                self._known[id] = self._thing(entity)
+            else:
+                before.hidden_since = None
 
     def see_face(self, actor: str, position: Vector, at: Seconds | None = None) -> None:
         """at: when; the place is the less certain the longer ago. None: it stays certain."""
-        before = self._known.get(actor)
-        self._known[actor] = _Known(Entity(id=actor, kind="person", position=position), at)
-        if self._layout is None or before is None:
-            self._layout = None
-            return
-        row = self._layout.ids.index(actor)
-        self._layout.centers[row] = position
-        self._layout.hidden_since[row] = math.inf if at is None else at
+        thing = self._thing(Entity(id=actor, kind="person", position=position))
+        thing.hidden_since = at
+        self._known[actor] = thing
+        if self._spheres is not None and actor in self._rows:
+            row = self._rows[actor]
+            self._others[row], self._spheres[row] = thing, (*position, thing.bound)
+        else:
+            self._spheres = None
+
+    def _thing(self, entity: Entity) -> _Thing:
+        x, y, z = entity.position
+        cos, sin = math.cos(entity.yaw), math.sin(entity.yaw)
+        outline = tuple((x + cos * u - sin * v, y + sin * u + cos * v, z) for u, v in entity.footprint)
+        face = self._sensing.face_radius if entity.kind == "person" else 0.0
+        radius = 0.0 if outline else entity.radius or face
+        return _Thing(entity, outline, radius, max((math.hypot(u, v) for u, v in entity.footprint), default=radius))
 
     def target(
-        self,
-        looker: str,
-        position: Vector,
-        direction: Vector,
-        *,
-        present: Targets | None,
-        at: Seconds,
-        sure: Probability,
+        self, looker: str, gaze: tuple[Vector, Vector], *, present: Targets | None, at: Seconds, sure: Probability
     ) -> Seen:
         """What `looker`'s gaze is on: the nearest by angle in the cone, else the surface it meets, else `AWAY`.
 
-        present: what it was on before; that stays, unless something else is nearer by the margin. sure: of the pose.
+        gaze: from where and in which direction. present: what it was on before; that stays, unless something else is
+        nearer by the margin. sure: of the pose.
         """
-        layout = self._layout = self._layout or self._laid_out()
-        angles, distances = _angles(layout, np.array(position), np.array(direction))
-        age = np.maximum(0.0, at - layout.hidden_since)
-        confidence = sure * layout.confidence * np.exp2(-age / self._sensing.memory)
-        was = np.array([(name,) == present for name in layout.targets])
-        limits = np.where(layout.surface, SAME_ANGLE, self._half_angle) + np.where(was, self._margin, 0.0)
-        visible = (angles <= limits) & (confidence >= self._least)
-        visible &= np.array([id != looker for id in layout.ids])
-        if not visible.any():
-            return Seen(AWAY, sure)
-        if not layout.surface[visible].all():
-            visible &= ~layout.surface
-        angles = np.where(visible, angles, np.inf)
-        best = int(np.lexsort((distances, np.round(angles / SAME_ANGLE)))[0])
-        if (was & visible).any():
-            kept = int(np.argmin(np.where(was, angles, np.inf)))
-            if angles[kept] - angles[best] < self._margin:
-                best = kept
-        return Seen((layout.targets[best],), float(confidence[best]))
+        ray = _Gaze(*gaze)
+        found: list[_Candidate] = []
+        nearest = self._half_angle
+        for thing, least in self._around(ray):
+            if least > nearest + self._margin:
+                break
+            confidence = sure * self._confidence(thing, at)
+            if confidence >= self._least and thing.entity.id != looker:
+                targets = (self._reported(thing.entity),)
+                angle = ray.angle_to(thing)
+                if angle <= self._half_angle + (self._margin if targets == present else 0.0):
+                    distance = math.dist(thing.entity.position, ray.eye)
+                    found.append(_Candidate(round(angle / SAME_ANGLE) * SAME_ANGLE, distance, targets, confidence))
+                    nearest = min(nearest, angle)
+        if found:
+            best = min(found)
+            kept = min((one for one in found if one.targets == present), default=best)
+            best = kept if kept.angle - best.angle < self._margin else best
+            return Seen(best.targets, best.confidence)
+        for surface in self._surfaces:
+            confidence = sure * self._confidence(surface, at)
+            if confidence >= self._least and ray.meets(surface):
+                return Seen((surface.entity.id,), confidence)
+        return Seen(AWAY, sure)
 
-    def _laid_out(self) -> _Layout:
-        entities = [known.entity for known in self._known.values()]
-        hidden = [known.hidden_since for known in self._known.values()]
-        outlines = [_outline(entity) for entity in entities]
-        outlined = [index for index, outline in enumerate(outlines) if len(outline)]
-        sizes = [len(outlines[index]) for index in outlined]
-        corners = np.concatenate([outlines[index] for index in outlined]) if outlined else np.zeros((0, 3))
-        edges = [np.roll(outlines[index], -1, axis=0) - outlines[index] for index in outlined]
-        edge = np.concatenate(edges) if edges else np.zeros((0, 3))
-        return _Layout(
-            ids=tuple(self._known),
-            targets=tuple(self._reported(entity, entities) for entity in entities),
-            centers=np.array([entity.position for entity in entities], dtype=float),
-            radii=np.array([self._radius(entity) for entity in entities]),
-            surface=np.array([entity.kind == "surface" for entity in entities]),
-            confidence=np.array([entity.confidence for entity in entities]),
-            hidden_since=np.array([math.inf if since is None else since for since in hidden]),
-            outlined=np.array(outlined, dtype=np.intp),
-            first=np.cumsum([0, *sizes[:-1]], dtype=np.intp) if sizes else np.zeros(0, dtype=np.intp),
-            owner=np.repeat(np.arange(len(sizes)), sizes),
-            corners=corners,
-            edges=edge,
-            lengths=(edge**2).sum(axis=1),
-        )
+    def _around(self, gaze: _Gaze) -> Iterator[tuple[_Thing, Radians]]:
+        """All that may be in the cone, and at least how far from the gaze: the nearest first."""
+        if self._spheres is None:
+            self._surfaces = [thing for thing in self._known.values() if thing.entity.kind == "surface"]
+            self._others = [thing for thing in self._known.values() if thing.entity.kind != "surface"]
+            self._rows = {thing.entity.id: row for row, thing in enumerate(self._others)}
+            self._spheres = np.array([(*thing.entity.position, thing.bound) for thing in self._others])
+        reach, bounds = self._spheres[:, :3] - gaze.eye, self._spheres[:, 3]
+        along = reach @ np.array(gaze.axis)
+        squares = np.einsum("ij,ij->i", reach, reach)
+        across = np.sqrt(np.maximum(0.0, squares - along * along))
+        width = np.arcsin(np.minimum(1.0, bounds / np.maximum(np.sqrt(squares), 1e-9)))
+        least = np.arctan2(across, along) - width
+        (near,) = np.nonzero(least <= self._half_angle + self._margin)
+        for index in near[np.argsort(least[near])]:
+            yield self._others[index], float(least[index])
 
-    def _reported(self, entity: Entity, entities: list[Entity]) -> str:
+    def _confidence(self, thing: _Thing, at: Seconds) -> Probability:
+        age = 0.0 if thing.hidden_since is None else max(0.0, at - thing.hidden_since)
+        return thing.entity.confidence * math.exp2(-age / self._sensing.memory)
+
+    def _reported(self, entity: Entity) -> str:
         """At resolution `table` a thing cannot be told from what it lies on."""
-        if entity.kind != "object" or self._resolution == "object":
+        if entity.kind != "object" or not self._by_table:
             return entity.id
-        below = (one.id for one in entities if one.kind == "surface" and _lies_on(entity, one))
-        return next(below, SURFACE)
-
-    def _radius(self, entity: Entity) -> float:
-        """Of the sphere; 0 for what has an outline."""
-        if entity.kind == "person":
-            return entity.radius or self._sensing.face_radius
-        return 0.0 if entity.footprint else entity.radius
+        x, y, _ = entity.position
+        for surface in self._surfaces:
+            if _is_inside([(corner[0] - x, corner[1] - y) for corner in surface.outline]):
+                return surface.entity.id
+        return SURFACE
 
 
-def _outline(entity: Entity) -> Floats:
-    """The corners of the footprint where the entity lies, (k, 3)."""
-    x, y, z = entity.position
-    cos, sin = math.cos(entity.yaw), math.sin(entity.yaw)
-    corners = [(x + cos * u - sin * v, y + sin * u + cos * v, z) for u, v in entity.footprint]
-    return np.array(corners, dtype=float).reshape(-1, 3)
+def _dot(a: Vector, b: Vector) -> float:
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
-def _lies_on(thing: Entity, surface: Entity) -> bool:
-    corners = _outline(surface)
-    crossings = _crosses(corners, np.roll(corners, -1, axis=0) - corners, np.array([thing.position]))
-    return bool(crossings.sum() % 2)
-
-
-def _crosses(corners: Floats, edges: Floats, points: Floats) -> NDArray[np.bool_]:
-    """Does the line from each point along x cross its edge? Odd numbers of crossings are inside. z is ignored."""
-    below, above = corners[:, 1] > points[:, 1], (corners + edges)[:, 1] > points[:, 1]
-    with np.errstate(divide="ignore", invalid="ignore"):
-        meets = corners[:, 0] + (points[:, 1] - corners[:, 1]) / edges[:, 1] * edges[:, 0]
-    crosses: NDArray[np.bool_] = (below != above) & (points[:, 0] < meets)
-    return crosses
-
-
-def _angles(layout: _Layout, eye: Floats, direction: Floats) -> tuple[Floats, Floats]:
-    """Angle from the gaze to the extent of each entity, radians; and the distance of its center, metres."""
-    axis = direction / np.abs(direction).max()
-    axis /= np.linalg.norm(axis)
-    reach = layout.centers - eye
-    distances = np.maximum(np.linalg.norm(reach, axis=1), 1e-9)
-    angles = np.arccos(np.clip(reach @ axis / distances, -1.0, 1.0))
-    angles = np.maximum(0.0, angles - np.arcsin(np.minimum(1.0, layout.radii / distances)))
-    if len(layout.outlined):
-        inside = _meets(layout, eye, axis)
-        angles[layout.outlined] = np.where(inside, 0.0, _to_edges(layout, eye, axis))
-    return angles, distances
-
-
-def _to_edges(layout: _Layout, eye: Floats, axis: Floats) -> Floats:
-    """The least angle from the gaze to the outline of each entity that has one, (k,).
-
-    On the edge c + s e, seen from the eye, the cosine is (a + s b) / |c + s e|; its derivative is 0 at one s.
-    """
-    corners = layout.corners - eye
-    a, b = corners @ axis, layout.edges @ axis
-    square, along = (corners**2).sum(axis=1), (corners * layout.edges).sum(axis=1)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        s = np.nan_to_num((a * along - b * square) / (b * along - a * layout.lengths), posinf=1.0, neginf=0.0)
-    s = np.clip(s, 0.0, 1.0)
-    at_s = (a + s * b) / np.sqrt(np.maximum(square + 2.0 * s * along + s * s * layout.lengths, 1e-18))
-    at_corner = a / np.sqrt(np.maximum(square, 1e-18))
-    nearest = np.maximum.reduceat(np.maximum(at_s, at_corner), layout.first)
-    angles: Floats = np.arccos(np.clip(nearest, -1.0, 1.0))
-    return angles
-
-
-def _meets(layout: _Layout, eye: Floats, axis: Floats) -> NDArray[np.bool_]:
-    """Whose footprint the gaze goes through, (k,)."""
-    height: Floats = layout.centers[layout.outlined, 2] - eye[2]
-    with np.errstate(divide="ignore", invalid="ignore"):
-        t = height / axis[2]
-    ahead = np.isfinite(t) & (t > 0.0)
-    points = eye + np.where(ahead, t, 0.0)[:, None] * axis
-    crossings = _crosses(layout.corners, layout.edges, points[layout.owner])
-    inside: NDArray[np.bool_] = ahead & (np.add.reduceat(crossings.astype(np.intp), layout.first) % 2 == 1)
+def _is_inside(corners: list[tuple[float, float]]) -> bool:
+    """Is (0, 0) inside the polygon?"""
+    inside = False
+    for (x, y), (u, v) in zip(corners, [*corners[1:], *corners[:1]], strict=True):
+        if (y > 0.0) != (v > 0.0) and x - y * (u - x) / (v - y) > 0.0:
+            inside = not inside
     return inside
+
+
+def _to_polygon(corners: list[tuple[float, float]]) -> Radians:
+    """The angle whose tangent is the distance of (0, 0) from the polygon, 0 inside."""
+    if _is_inside(corners):
+        return 0.0
+    nearest = math.inf
+    for (x, y), (u, v) in zip(corners, [*corners[1:], *corners[:1]], strict=True):
+        dx, dy = u - x, v - y
+        square = dx * dx + dy * dy
+        s = 0.0 if square == 0.0 else max(0.0, min(1.0, -(x * dx + y * dy) / square))
+        nearest = min(nearest, math.hypot(x + s * dx, y + s * dy))
+    return math.atan(nearest)
 
 
 def is_direction(vector: Vector) -> bool:
