@@ -198,11 +198,12 @@ class SpeechOption(Struct, frozen=True, kw_only=True, omit_defaults=True):
 class Reference(Behavior, frozen=True, kw_only=True, tag="reference", omit_defaults=True):
     """An object reference: generation replaces it by a phrase and perhaps a gaze, a directed gaze, a point.
 
+    minimum_reliability: in (0, 1), of the target being understood; None: generation's default.
     options: the phrases to choose from; None: generation proposes some, from what the world knows of the target.
     """
 
     target: str
-    minimum_reliability: float
+    minimum_reliability: float | None = None
     options: tuple[SpeechOption, ...] | None = None
 
 

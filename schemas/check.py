@@ -147,7 +147,7 @@ def _marks(speech: Speech) -> Iterator[tuple[str, str, str]]:
 
 
 def _options(reference: Reference, path: str) -> Iterator[Problem]:
-    if not 0 < reference.minimum_reliability < 1:
+    if reference.minimum_reliability is not None and not 0 < reference.minimum_reliability < 1:
         reason = f"minimum reliability {reference.minimum_reliability:g} is outside (0, 1)"
         yield Problem(reason, f"{path}.minimum_reliability", reference.id, reference.line, "for example 0.85")
     if reference.options is None:

@@ -35,6 +35,8 @@ class TurnFragment(Struct, frozen=True, kw_only=True, tag="fragment", omit_defau
     accept: tuple[Action, ...] = ()
     unread: tuple[Unread, ...] = ()
     """Warned of when the block that it becomes begins."""
+    from_parts: bool = False
+    """Of a language model's tool call, each behavior of one part: refusals name the part (`schemas.tool_call`)."""
     line: int = 0
 
 
@@ -60,7 +62,10 @@ class PairConsidered(Struct, frozen=True, kw_only=True, omit_defaults=True):
 
 
 class ReferenceChoice(Struct, frozen=True, kw_only=True, omit_defaults=True):
-    """How a reference was made, and every pair that was considered. Thesis 3.3.2."""
+    """How a reference was made, and every pair that was considered. Thesis 3.3.2.
+
+    Where no pair can be performed none is chosen, and the fragment has failed.
+    """
 
     reference: str
     target: str

@@ -73,15 +73,21 @@ def summary(*outcomes: FragmentOutcome) -> Summary:
     contact = _last(
         event for event in events.values() if event.kind == "mutual_facial_gaze" and event.block in fragments
     )
+    status: Literal["failed", "interrupted", "done"] = (
+        "failed" if "failed" in statuses else "interrupted" if "interrupted" in statuses else "done"
+    )
     return Summary(
-        status="failed" if "failed" in statuses else "interrupted" if "interrupted" in statuses else "done",
+        status=status,
         said=_said(spoken),
         cut_short=bool(statuses - {"done"}) or not all(each.complete for each in spoken),
         references=tuple(
-            _referred(outcome, choice, events.values()) for outcome in outcomes for choice in outcome.choices
+            _referred(outcome, choice, events.values())
+            for outcome in outcomes
+            for choice in outcome.choices
+            if _was_made(outcome, choice)
         ),
         eye_contact=_decision(contact),
-        answer=_answer(pair),
+        answer=_answer(pair, is_over=status != "done"),
         answer_delay=_rounded(pair.delay) if pair and _decision(pair) else None,
         problems=_problems(
             text
@@ -98,6 +104,12 @@ def refusal(fault: Fault) -> Summary:
 
 def _said(spoken: Sequence[SpokenText]) -> str:
     return " ".join(" ".join(each.text for each in spoken).split())
+
+
+def _was_made(outcome: FragmentOutcome, choice: ReferenceChoice) -> bool:
+    """Of a fragment that came to its end all are; else those of whose phrase something was said."""
+    phrase = f"{choice.reference}-phrase"
+    return outcome.status == "done" or any(each.behavior.startswith(phrase) for each in outcome.spoken)
 
 
 def _referred(outcome: FragmentOutcome, choice: ReferenceChoice, events: Iterable[ConnectionEvent]) -> Referred:
@@ -122,8 +134,9 @@ def _decision(event: ConnectionEvent | None) -> bool | None:
     return event.state != "failed"
 
 
-def _answer(pair: ConnectionEvent | None) -> Action | Literal["none", "pending"] | None:
-    if pair is None:
+def _answer(pair: ConnectionEvent | None, *, is_over: bool) -> Action | Literal["none", "pending"] | None:
+    """is_over: the turn ended early, so nobody waits for an answer any more."""
+    if pair is None or (is_over and pair.state == "started"):
         return None
     if pair.state == "started":
         return "pending"

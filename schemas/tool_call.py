@@ -3,6 +3,7 @@
 Whatever is wrong is refused with its JSON path, so that the model can correct itself.
 """
 
+import re
 from collections.abc import Iterable
 from typing import Any, get_args, get_type_hints
 
@@ -15,13 +16,14 @@ from schemas.fragments import TurnFragment
 from schemas.tool import PARTS, Certainty, Expects, Gesture, Look, Part, Refer, Say, ToolInput
 from schemas.units import Probability
 
-RELIABILITY: dict[Certainty, Probability] = {"normal": 0.85, "high": 0.95}
-"""The minimum for a reference: of landmarks, and of the piece to be moved, as in the thesis' Appendix B."""
+RELIABILITY: dict[Certainty, Probability | None] = {"normal": None, "high": 0.95}
+"""The minimum for a reference: generation's default, or that of the pieces to be moved in the thesis' Appendix B."""
 ANSWERS: dict[Expects, tuple[Action, ...]] = {"reply": (), "action": ("act", "speak", "nod", "shake")}
 """What answers the turn; empty: recognition's default."""
 DEMONSTRATIVES = ("this", "that")
 """A phrase that begins so means nothing without a point."""
 
+_BEHAVIOR = re.compile(r"\$\.behaviors\[(?P<index>\d+)\](?:\.options\[(?P<option>\d+)\])?[\w.\[\]]*")
 _KINDS = {kind.__struct_fields__[0]: kind for kind in PARTS}
 
 
@@ -34,7 +36,19 @@ def from_tool(parsed: dict[str, Any], id: str, source: str = "", path: str = "$"
     """The fragment, called `id`, of a decoded tool input. Raises InputRefused with source, JSON path and advice."""
     call = _converted(parsed, ToolInput, source, path)
     parts = [_part(raw, source, f"{path}.parts[{index}]") for index, raw in enumerate(call.parts)]
-    return fragment_of(parts, replace(call, parts=()), id)
+    return replace(fragment_of(parts, replace(call, parts=()), id), from_parts=True)
+
+
+def in_call(where: str, fragment: TurnFragment) -> str:
+    """A place in a fragment as whoever wrote it knows it: of a tool call the part instead of the behavior."""
+    return _BEHAVIOR.sub(lambda found: _part_of(found, fragment), where) if fragment.from_parts else where
+
+
+def _part_of(found: re.Match[str], fragment: TurnFragment) -> str:
+    index = int(found["index"])
+    kind = fragment.behaviors[index].id.partition("-")[0]
+    option = found["option"]
+    return f"$.parts[{index}].{kind if option is None else f'phrases[{option}]'}"
 
 
 def fragment_of(parts: Iterable[Part], turn: ToolInput, id: str) -> TurnFragment:

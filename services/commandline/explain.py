@@ -12,7 +12,7 @@ from rich.text import Text
 
 from schemas.faults import Fault, InputRefused
 from schemas.fragments import GestureChoice, PairConsidered, ReferenceChoice, TurnFragment
-from services.commandline.generating import generated
+from services.commandline.generating import Unplanned, generated
 from services.commandline.outputs import Terminal
 from services.commandline.process import DONE
 from services.commandline.run import Where
@@ -39,14 +39,23 @@ def main(path: Path, format: str, world: Path | None, where: Where) -> int:
     if not fragments:
         advice = "only turn fragments refer to objects; for a block: engage plan"
         raise InputRefused(Fault(reason="holds no turn fragment", where=str(path), advice=advice))
+    failure: Unplanned | None = None
     with source.blamed():
-        plans = generated(fragments, around, config, str(path))
+        try:
+            plans = generated(fragments, around, config, str(path))
+        except Unplanned as error:
+            failure, plans = error, error.plans
+    impossible = failure.choices if failure else ()
     if format == "json":
-        print(as_json([choice for plan in plans for choice in plan.choices]))
+        print(as_json([*(choice for plan in plans for choice in plan.choices), *impossible]))
         for warning in (warning for plan in plans for warning in plan.warnings):
             print(f"warning: {warning}", file=sys.stderr)
     else:
-        show(plans, Terminal(highlight=False, markup=False, emoji=False))
+        console = Terminal(highlight=False, markup=False, emoji=False)
+        show(plans, console)
+        show_tables(impossible, console)
+    if failure:
+        raise failure
     return DONE
 
 
@@ -58,15 +67,19 @@ def as_json(choices: Sequence[ReferenceChoice]) -> str:
 
 def show(plans: Sequence[Plan], console: Console) -> None:
     for plan in plans:
-        for choice in plan.choices:
-            console.print(_table(choice, wide=console.width >= WIDE))
-            console.print()
+        show_tables(plan.choices, console)
         total = sum(choice.cost for choice in plan.choices)
         count = len(plan.choices)
         made = f"{count} reference{'s' if count != 1 else ''}, {total:.3g} s" if count else "no references"
         console.print(Text(f"{plan.block.id}: {made}", style="bold"))
         for warning in plan.warnings:
             console.print(Text(f"warning: {warning}", style="yellow"))
+
+
+def show_tables(choices: Sequence[ReferenceChoice], console: Console) -> None:
+    for choice in choices:
+        console.print(_table(choice, wide=console.width >= WIDE))
+        console.print()
 
 
 def _table(choice: ReferenceChoice, *, wide: bool) -> Table:

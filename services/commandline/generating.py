@@ -6,8 +6,8 @@ from msgspec.structs import replace
 
 from schemas.blocks import Block
 from schemas.body import Estimate, EstimateItem
-from schemas.faults import RunFailed
-from schemas.fragments import TurnFragment
+from schemas.faults import Fault, RunFailed
+from schemas.fragments import ReferenceChoice, TurnFragment
 from schemas.world import World
 from services.commandline.sources import Thing
 from services.config import Config
@@ -15,10 +15,19 @@ from services.generation.planning import Plan
 from services.virtual_time import run_virtual
 
 
+class Unplanned(RunFailed):
+    """A fragment that cannot be performed. plans: of those before it. choices: the tables of its references."""
+
+    def __init__(self, fault: Fault, plans: list[Plan], choices: tuple[ReferenceChoice, ...]) -> None:
+        super().__init__(fault)
+        self.plans = plans
+        self.choices = choices
+
+
 def generated(things: Sequence[Thing], world: World, config: Config, source: str) -> list[Plan]:
     """As generation would plan them one after the other, the simulated body at home before each.
 
-    A block is its own plan. Raises InputRefused or RunFailed, as performing them would.
+    A block is its own plan. Raises InputRefused or Unplanned, as performing them would.
     """
     return run_virtual(_generated(things, world, config, source))
 
@@ -30,6 +39,7 @@ async def _generated(things: Sequence[Thing], world: World, config: Config, sour
     from services.generation.leases import Leases
     from services.generation.motions import collect, distinct, from_each_other, from_here
     from services.generation.planning import plan, targets
+    from services.generation.reference_policy import Unreferable
     from services.generation.turn_policy import TurnPolicy
 
     body = SimulatedBody(config.control.no_point_zones, config.control.variability)
@@ -59,9 +69,10 @@ async def _generated(things: Sequence[Thing], world: World, config: Config, sour
             )
             discourse = discourse.naming(fragment.id, [mention.object for mention in made.mentions])
             plans.append(made)
-        except RunFailed as error:
+        except Unreferable as error:
             where = f"{source}: {fragment.id}: {error.fault.where}"
-            raise RunFailed(replace(error.fault, where=where, line=_line(fragment, error.fault.where))) from error
+            fault = replace(error.fault, where=where, line=_line(fragment, error.fault.where))
+            raise Unplanned(fault, plans, error.choices) from error
         turns.fragment_ended(fragment.id, complete=True, now=0.0)
     return plans
 

@@ -169,7 +169,8 @@ class Conductor:
 
     def _enforce_inhibitions(self, performance: Performance) -> None:
         for id in performance.forbid(self._leases.permits()):
-            self._bus.publish(keys.BEHAVIOR, AbortBehavior(id=id, requester=self._bus.name))
+            how = "freeze" if self._leases.holds_head else "relax"
+            self._bus.publish(keys.BEHAVIOR, AbortBehavior(id=id, requester=self._bus.name, how=how))
 
     # -- fragments: those of a turn at once, turns one after the other --------------------------------------------
 
@@ -220,7 +221,7 @@ class Conductor:
         except RequestRefused as error:
             performance.refuse(error.fault, self._bus.now())  # the realizer did
         except EngageError as error:
-            performance.end(self._bus.now(), "failed", fault=error.fault)
+            performance.fail(error, self._bus.now())
         self._block_ended(performance)
         return None
 
@@ -244,7 +245,7 @@ class Conductor:
                 raise RunFailed(Fault(reason=reason, where=performance.block_id))
             performance.end_with(outcome, self._bus.now())
         except EngageError as error:
-            performance.end(self._bus.now(), "failed", fault=error.fault)
+            performance.fail(error, self._bus.now())
         self._block_ended(performance)
         self._changed(self._bus.now())
 

@@ -33,6 +33,8 @@ class GenerationConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=
     """rDG, in (rG, rDGP): of a look that waits for the other's."""
     pointing_reliability: Probability = 0.28
     """rDGP, in (rDG, 1): of a directed gaze with pointing."""
+    minimum_reliability: Probability = 0.85
+    """Rmin, in (0, 1): of references that come without one, as a language model's do. Appendix B's of landmarks."""
 
     # Cost, thesis 3.3.2, in seconds (decision B6).
     seconds_per_head_degree: float = 1 / 100
@@ -111,6 +113,8 @@ class GenerationConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=
             )
         if not 0 < self.phrase_reliability < 1:
             raise ValueError(f"phrase_reliability {self.phrase_reliability} is not in (0, 1)")
+        if not 0 < self.minimum_reliability < 1:
+            raise ValueError(f"minimum_reliability {self.minimum_reliability} is not in (0, 1)")
         if self.channel == "sum" and pointing + self.phrase_reliability >= 1:
             raise ValueError(
                 f"pointing_reliability {pointing} + phrase_reliability {self.phrase_reliability} reaches 1: "

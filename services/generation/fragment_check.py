@@ -10,6 +10,7 @@ from schemas.check import sound
 from schemas.faults import Fault, InputRefused
 from schemas.fragments import TurnFragment
 from schemas.syncref import SyncRef
+from schemas.tool_call import in_call
 from schemas.world import Entity, World
 
 
@@ -19,6 +20,14 @@ def checked(fragment: TurnFragment, world: World, robot: str) -> TurnFragment:
     robot: its actor id, which may be a target too. Raises InputRefused with JSON path and XML line of the first
     thing that is wrong, by itself or with regard to the world.
     """
+    try:
+        return _checked(fragment, world, robot)
+    except InputRefused as error:
+        fault = replace(error.fault, where=in_call(error.fault.where, fragment))
+        raise InputRefused(fault, error.block) from error
+
+
+def _checked(fragment: TurnFragment, world: World, robot: str) -> TurnFragment:
     fragment = sound(fragment)
     known = {entity.id: entity for entity in world.entities}
     for path, target, line in _targets(fragment):

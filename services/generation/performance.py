@@ -13,12 +13,13 @@ from schemas.behaviors import (
     TurnSignal,
 )
 from schemas.blocks import BlockOutcome, SpokenText
-from schemas.faults import Fault
+from schemas.faults import EngageError, Fault
 from schemas.feedback import SyncPointProgress
-from schemas.fragments import FragmentOutcome, PerformFragment, TurnFragment
+from schemas.fragments import FragmentOutcome, PerformFragment, ReferenceChoice, TurnFragment
 from schemas.units import Seconds
 from services.generation.permits import Permits
 from services.generation.planning import Plan
+from services.generation.reference_policy import Unreferable
 from services.generation.trail import NOTHING, Trail
 from services.generation.turn_events import TurnEvents
 from services.generation.turn_policy import TurnPlan
@@ -52,6 +53,7 @@ class Performance:
         self.signalled_end = False
         """Has recognition been told that the turn is over?"""
         self._patience = patience
+        self._considered: tuple[ReferenceChoice, ...] = ()
         self._tries = 0
         self._warnings: list[str] = []
         self._behaviors: dict[str, Behavior] = {}
@@ -149,6 +151,12 @@ class Performance:
             self._ended = Ended(at, status, spoken, replaced_by, fault)
             self._running.clear()
 
+    def fail(self, error: EngageError, at: Seconds) -> None:
+        """There is no block, or it went wrong."""
+        if isinstance(error, Unreferable):
+            self._considered = error.choices
+        self.end(at, "failed", fault=error.fault)
+
     def refuse(self, fault: Fault, at: Seconds) -> None:
         """Its block was. A fragment that had been accepted already has failed."""
         self.refusal = None if self.accepted else fault
@@ -189,7 +197,7 @@ class Performance:
             spoken=self._ended.spoken,
             replaced_by=self._ended.replaced_by,
             events=events.of(self.turn.turn),
-            choices=self.plan.choices if self.plan else (),
+            choices=self.plan.choices if self.plan else self._considered,
             warnings=(*self._warnings, *(f"{id} was never decided" for id in undecided)),
             fault=self._ended.fault,
         )

@@ -10,6 +10,7 @@ from functools import cached_property
 from typing import get_args
 
 from msgspec import Struct
+from msgspec.structs import replace
 
 from schemas.behaviors import Hand, Reference, SpeechOption
 from schemas.body import Estimate, NoPointZone
@@ -97,12 +98,21 @@ class Choices(Struct, frozen=True):
     hands: dict[str, Hand] = {}
 
 
+class Unreferable(RunFailed):
+    """A reference cannot be made at all. choices: the tables of all references; of this one nothing is chosen."""
+
+    def __init__(self, fault: Fault, choices: tuple[ReferenceChoice, ...]) -> None:
+        super().__init__(fault)
+        self.choices = choices
+
+
 class _Way(Struct, frozen=True):
     """The best way to reach a posture. rank: what decides, its rounded cost and then its preferences."""
 
     cost: Seconds
     rank: tuple[float, tuple[tuple[bool, float, int, int], ...]]
-    pairs: tuple[Pair, ...]
+    pairs: tuple[Pair | None, ...]
+    """None: of a reference that cannot be made."""
     postures: tuple[Posture, ...]
     """Before each pair, and after the last."""
 
@@ -115,26 +125,37 @@ def choose(references: Sequence[Reference], scene: Scene, motions: Motions, conf
     """The pairs of least total cost for `references` in this order, each with the table it was chosen from.
 
     A reference none of whose pairs reaches its minimum gets one of its most reliable, with a warning (decision B10).
-    Raises RunFailed where a reference cannot be made at all.
+    Raises Unreferable where a reference cannot be made at all.
     """
     warnings: list[str] = []
     for reference in references:
         warnings += _doubts(reference, scene)
     tables = [considered(reference, scene, motions, config) for reference in references]
     best = _cheapest_way(references, tables, motions, config)
-    choices: list[ReferenceChoice] = []
+    choices = tuple(
+        _explain(reference, table, pair, posture, motions, config)
+        for reference, table, pair, posture in zip(references, tables, best.pairs, best.postures, strict=False)
+    )
     hands: dict[str, Hand] = {}
-    for reference, table, pair, posture in zip(references, tables, best.pairs, best.postures[:-1], strict=True):
-        choice = _explain(reference, table, pair, posture, motions, config)
-        if _below(pair.reliability, reference.minimum_reliability):
+    for reference, table, pair, choice in zip(references, tables, best.pairs, choices, strict=True):
+        if pair is None:
+            raise Unreferable(_no_way(reference, table), choices)
+        minimum = _minimum(reference, config)
+        if _below(pair.reliability, minimum):
             warnings.append(
-                f"{reference.id}: nothing reaches the minimum reliability {reference.minimum_reliability:g}; chose "
-                f"{_name(pair)} with R {pair.reliability:.4g}"
+                f"{reference.id}: nothing reaches the minimum reliability {minimum:g}; chose "
+                f"{_name(pair.gesture, pair.option.text)} with R {pair.reliability:.4g}"
             )
-        choices.append(choice)
         if choice.gesture == "directed_gaze_with_pointing" and (hand := hand_of(motions.point(HERE, choice.target))):
             hands[choice.reference] = hand
-    return Choices(tuple(choices), tuple(warnings), hands)
+    return Choices(choices, tuple(warnings), hands)
+
+
+def _no_way(reference: Reference, table: Sequence[Pair]) -> Fault:
+    reasons = dict.fromkeys(
+        f"{_name(pair.gesture, pair.option.text)}: {pair.ruled_out or FROM_NOWHERE}" for pair in table
+    )
+    return Fault(reason=f"no way to refer to {reference.target}: {'; '.join(reasons)}", where=reference.id)
 
 
 def considered(reference: Reference, scene: Scene, motions: Motions, config: GenerationConfig) -> tuple[Pair, ...]:
@@ -242,27 +263,22 @@ def _cheapest_way(
     motions: Motions,
     config: GenerationConfig,
 ) -> _Way:
-    """argmin of the summed cost over all sequences of pairs, the posture carried along (decision B11)."""
+    """argmin of the summed cost over all sequences of pairs, the posture carried along (decision B11).
+
+    A reference that cannot be made is passed over.
+    """
     ways = [_Way(0.0, (0.0, ()), (), (Posture(),))]
     for reference, table in zip(references, tables, strict=True):
         possible = [pair for pair in table if not pair.ruled_out]
         onward: list[_Way] = []
-        while not onward:
-            if not possible:
-                reasons = "; ".join(
-                    dict.fromkeys(f"{_name(pair)}: {pair.ruled_out or FROM_NOWHERE}" for pair in table)
-                )
-                raise RunFailed(Fault(reason=f"no way to refer to {reference.target}: {reasons}", where=reference.id))
-            candidates = _candidates(possible, reference.minimum_reliability, config)
+        while possible and not onward:
+            candidates = _candidates(possible, _minimum(reference, config), config)
             onward = _continued(ways, candidates.values(), reference.target, motions, config)
             possible = [pair for pair in possible if pair.gesture not in candidates]
-        ways = onward
+        ways = onward or [
+            replace(way, pairs=(*way.pairs, None), postures=(*way.postures, way.posture)) for way in ways
+        ]
     return min(ways, key=lambda way: way.rank)
-
-
-def _impossible(reference: Reference, table: Sequence[Pair]) -> RunFailed:
-    reasons = "; ".join(dict.fromkeys(f"{_name(pair)}: {pair.ruled_out or FROM_NOWHERE}" for pair in table))
-    return RunFailed(Fault(reason=f"no way to refer to {reference.target}: {reasons}", where=reference.id))
 
 
 def _continued(
@@ -286,24 +302,25 @@ def _continued(
 def _explain(
     reference: Reference,
     table: tuple[Pair, ...],
-    chosen: Pair,
+    chosen: Pair | None,
     posture: Posture,
     motions: Motions,
     config: GenerationConfig,
 ) -> ReferenceChoice:
-    least = cost(chosen, reference.target, posture, motions, config)
-    fallback = _below(chosen.reliability, reference.minimum_reliability)
+    least = cost(chosen, reference.target, posture, motions, config) if chosen else 0.0
+    minimum = _minimum(reference, config)
+    fallback = chosen is not None and _below(chosen.reliability, minimum)
     rows = []
     for pair in table:
         seconds = cost(pair, reference.target, posture, motions, config)
-        short = _below(pair.reliability, reference.minimum_reliability)
+        short = _below(pair.reliability, minimum)
         hindrance = pair.ruled_out or _hindrance(pair.gesture, reference.target, posture, motions)
         if pair is chosen:
             reason = "most reliable: nothing reaches the minimum" if fallback else "least cost"
         elif hindrance:
             reason = hindrance
         elif short:
-            reason = f"R {pair.reliability:.4g} below {reference.minimum_reliability:g}"
+            reason = f"R {pair.reliability:.4g} below {minimum:g}"
         elif round(seconds - least, ROUNDING) == 0:
             reason = "same cost, less preferred"
         elif seconds > least:
@@ -317,7 +334,7 @@ def _explain(
                 distractors=tuple(sorted(pair.distractors)),
                 channel=pair.channel,
                 reliability=pair.reliability,
-                minimum=reference.minimum_reliability,
+                minimum=minimum,
                 cost=seconds,
                 feasible=not hindrance and not short,
                 chosen=pair is chosen,
@@ -327,9 +344,9 @@ def _explain(
     return ReferenceChoice(
         reference=reference.id,
         target=reference.target,
-        gesture=chosen.gesture,
-        phrase=chosen.option.text,
-        reliability=chosen.reliability,
+        gesture=chosen.gesture if chosen else "none",
+        phrase=chosen.option.text if chosen else "",
+        reliability=chosen.reliability if chosen else 0.0,
         cost=least,
         pairs=tuple(rows),
     )
@@ -345,11 +362,15 @@ def _doubts(reference: Reference, scene: Scene) -> list[str]:
     ]
 
 
+def _minimum(reference: Reference, config: GenerationConfig) -> Probability:
+    given = reference.minimum_reliability
+    return config.minimum_reliability if given is None else given
+
+
 def _below(value: Probability, minimum: Probability) -> bool:
     return round(value - minimum, ROUNDING) < 0
 
 
-def _name(pair: Pair) -> str:
-    phrase = repr(pair.option.text) if pair.option.text else "no phrase"
-    gesture = "no gesture" if pair.gesture == "none" else pair.gesture.replace("_", " ")
-    return f"{gesture} with {phrase}"
+def _name(gesture: GestureChoice, phrase: str) -> str:
+    said = repr(phrase) if phrase else "no phrase"
+    return f"{'no gesture' if gesture == 'none' else gesture.replace('_', ' ')} with {said}"

@@ -180,7 +180,8 @@ def test_what_cannot_be_explained_says_what_to_do(engage: Engage, tmp_path: Path
     results = [engage("explain", path, "--set", zone) for path in (block, orphan, unknown, unable)]
 
     assert [result.code for result in results] == [2, 2, 2, 3]
-    assert [result.out for result in results] == [""] * 4
+    assert [result.out for result in results[:3]] == [""] * 3
+    assert "f-r -> rectangle" in results[3].out
     assert all(result.err.count("\n") == 1 for result in results)
     assert results[0].err.startswith(f"{block}: holds no turn fragment (")
     assert results[1].err.startswith(f"{orphan}: f: $.turn_status: 'end' with no turn open (begin a turn")
@@ -195,3 +196,28 @@ def test_fragments_of_a_file_know_what_those_before_them_named(engage: Engage, t
     chosen = [pair["phrase"] for pair in rows(engage, written(tmp_path, calls)) if pair["chosen"]]
 
     assert chosen == ["the rectangle", "it", "it"]
+
+
+THIS = option("this", deictic=True)
+
+
+def test_where_a_reference_cannot_be_made_the_tables_come_all_the_same(engage: Engage, tmp_path: Path) -> None:
+    stuck = fragment("f2", "end", THIS)
+    stuck["behaviors"] = [*fragment("a", "end")["behaviors"], *stuck["behaviors"]]  # type: ignore[misc]
+    path = written(tmp_path, [fragment("f1", "beginning"), stuck, fragment("f3", "full")])
+    speechless = ("--set", "generation.condition=degraded-generation")
+
+    as_json, as_text = engage("explain", path, "--format", "json", *speechless), engage("explain", path, *speechless)
+
+    pairs = json.loads(as_json.out)
+    assert as_json.code == as_text.code == 3
+    assert [pair["reference"] for pair in pairs] == ["f1-r"] * 4 + ["a-r"] * 4 + ["f2-r"] * 4
+    assert [pair["reference"] for pair in pairs if pair["chosen"]] == ["f1-r", "a-r"]
+    assert all(pair.keys() == KEYS for pair in pairs)
+    assert [(pair["feasible"], pair["reason"]) for pair in pairs[8:]] == [
+        *[(False, "a deictic phrase needs a point")] * 3, (False, "speech only"),
+    ]  # fmt: skip
+    assert [line.split(" -> ")[0] for line in as_text.out.splitlines() if " -> " in line] == ["f1-r", "a-r", "f2-r"]
+    assert as_text.out.count("a deictic phrase") == 3
+    for result in (as_json, as_text):
+        assert result.err.splitlines()[-1].startswith(f"{path}: f2: f2-r: no way to refer to rectangle: ")

@@ -5,6 +5,7 @@ import pytest
 from schemas.behaviors import After, Constraint, Gaze, Pointing, Reference, Speech, SpeechOption, Synchronize, Timing
 from schemas.faults import InputRefused
 from schemas.fragments import TurnFragment
+from schemas.tool_call import from_tool, in_call
 from schemas.world import Entity, World
 from services.generation.fragment_check import checked
 from tests.generation.partners import TABLE
@@ -111,3 +112,28 @@ def test_the_rest_of_a_turn_need_not_say_again_whom_it_speaks_to() -> None:
         checked(TurnFragment(id="f", turn_status="beginning"), two, "robot")
 
     assert checked(TurnFragment(id="f", turn_status="end"), two, "robot").addressee == ""
+
+
+@pytest.mark.parametrize(
+    ("part", "place"),
+    [
+        ({"refer": "cub"}, "$.parts[1].refer"),
+        ({"look": "nowhere"}, "$.parts[1].look"),
+        ({"refer": "table", "phrases": ["it"]}, "$.parts[1].refer"),
+    ],
+)
+def test_of_a_tool_call_the_part_is_named_that_the_model_wrote(part: dict[str, object], place: str) -> None:
+    call = from_tool({"turn_status": "full", "parts": [{"say": "Take"}, part]}, "f")
+
+    with pytest.raises(InputRefused) as refusal:
+        checked(call, TABLE, "robot")
+
+    assert refusal.value.fault.where == f"f: {place}"
+
+
+def test_of_a_tool_call_a_bad_phrase_is_named_by_its_number() -> None:
+    call = from_tool({"turn_status": "full", "parts": [{"refer": "left"}]}, "f")
+
+    assert in_call("f: $.behaviors[0].options[2].distractors[1]", call) == "f: $.parts[0].phrases[2]"
+    assert in_call("f: $.turn_status", call) == "f: $.turn_status"
+    assert in_call("f: $.behaviors[0].target", GOOD) == "f: $.behaviors[0].target"

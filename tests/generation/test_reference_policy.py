@@ -80,6 +80,13 @@ def test_the_eight_choices_of_appendix_b(references: list[Reference], expected: 
 # -- decisions --------------------------------------------------------------------------------------------------
 
 
+def test_a_reference_without_a_minimum_has_that_of_the_configuration() -> None:
+    free = Reference(id="r", target="rectangle", options=(option("the rectangle"),))
+
+    assert made(choice_of(free)) == made(choice_of(refer("r", "rectangle", 0.85, option("the rectangle"))))
+    assert {pair.minimum for pair in choice_of(free).pairs} == {0.85}
+
+
 def test_nothing_at_all_is_never_chosen() -> None:  # B2
     choice = choice_of(refer("r", "rectangle", 0.01, option("", 0), option("the rectangle")))
 

@@ -138,3 +138,21 @@ def test_many_long_problems_stay_short() -> None:
 def test_nothing_is_told_of_nothing() -> None:
     assert summary() == Summary(status="done")
     assert summary().text == "Nothing was said."
+
+
+def test_what_was_never_referred_to_is_not_told_as_if_it_had_been() -> None:
+    cut = outcome(
+        status="interrupted",
+        spoken=(SpokenText(behavior="r1-phrase", text="that", complete=False),),
+        choices=(choice("r1"), choice("r2")),
+    )
+
+    assert len(summary(cut).references) == 1
+    assert summary(outcome(status="failed", choices=(choice("r"),))).references == ()
+
+
+def test_nobody_waits_for_the_answer_to_a_turn_that_ended_early() -> None:
+    pending = (event("adjacency_pair", "started", turn="f"),)
+
+    assert summary(outcome(events=pending)).answer == "pending"
+    assert summary(outcome(status="failed", events=pending)).answer is None
