@@ -141,7 +141,8 @@ def _bars(
         axes.bar_label(bars, words, fontsize=7, padding=1)
     axes.set_xticks(range(len(kinds)), [kind.replace("_", " ") for kind in kinds])
     if groups:
-        axes.legend(frameon=False, fontsize=8)
+        # Above the bars: any of them may be as high as the axes.
+        axes.legend(frameon=False, fontsize=8, loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=len(groups))
 
 
 def _boxes(axes: Axes, groups: Groups, samples: Sequence[Sequence[float]], whiskers: tuple[float, float]) -> None:
