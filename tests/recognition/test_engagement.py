@@ -1,0 +1,155 @@
+"""Engagement as published, over time: the pause of Table 2.1, tasks, failures that are forgotten, several people."""
+
+from itertools import pairwise
+
+import pytest
+
+from schemas.recognition import ConnectionEvent, Statistics
+from schemas.units import Seconds
+from services.recognition.config import RecognitionConfig
+from services.recognition.standings import Standings
+from tests.recognition.test_statistics import event, table_2_1
+
+PAUSE: Seconds = 70.0
+TASK_AFTER: Seconds = 2.0
+
+
+class Told:
+    """What standings publish of one actor (empty: all), each message at its time."""
+
+    def __init__(self, actor: str = "human", **config: object) -> None:
+        self.messages: list[Statistics] = []
+        self._actor = actor
+        self._standings = Standings("robot", RecognitionConfig(**config))  # type: ignore[arg-type]
+        self._busy: set[str] = set()
+
+    def happens(self, *events: ConnectionEvent, at: Seconds | None = None) -> None:
+        self.until(events[0].at.seconds if at is None else at)
+        self._feed(list(events), events[0].at.seconds if at is None else at)
+
+    def busy(self, at: Seconds, *persons: str) -> None:
+        self.until(at)
+        self._busy = set(persons)
+        self._feed([], at)
+
+    def until(self, now: Seconds) -> None:
+        while self._standings.deadline is not None and self._standings.deadline <= now:
+            self._feed([], self._standings.deadline)
+
+    def _feed(self, events: list[ConnectionEvent], now: Seconds) -> None:
+        told = self._standings.feed(events, self._busy, now)
+        self.messages += [statistics for statistics in told if statistics.actor == self._actor]
+
+    @property
+    def levels(self) -> list[tuple[float, str]]:
+        """Changes of the level and when they were told."""
+        changes: list[tuple[float, str]] = []
+        for message in self.messages:
+            if not changes or changes[-1][1] != message.level:
+                changes.append((round(message.at.seconds, 3), message.level))
+        return changes
+
+
+def replayed(*, busy: bool) -> tuple[Told, Seconds, Seconds]:
+    """A log as Table 2.1 has it, with the person busy in the pause of 70 s or not; when the pause began and ended."""
+    log = table_2_1()
+    starts = sorted(change.started.seconds for change in log if change.state == "started")
+    begin, end = next((a, b) for a, b in pairwise(starts) if b - a > PAUSE - 0.01)
+    told = Told()
+    for change in log:
+        if busy and change.started.seconds == end and change.state == "started":
+            told.busy(begin + TASK_AFTER, "human")
+            told.busy(end - 1.0)
+        told.happens(change)
+    return told, begin, end
+
+
+def in_pause(told: Told, begin: Seconds, end: Seconds) -> list[Statistics]:
+    return [message for message in told.messages if begin + TASK_AFTER <= message.at.seconds < end]
+
+
+def test_the_pause_of_table_2_1_is_no_disengagement_of_who_is_busy():
+    told, begin, end = replayed(busy=True)
+    before = [message for message in told.messages if message.at.seconds <= begin + TASK_AFTER][-1]
+    pause = in_pause(told, begin, end)
+
+    assert before.level == "engaged"
+    assert {message.level for message in pause} == {"engaged"}
+    assert {message.engagement for message in pause if message.busy} == {before.engagement}
+
+
+def test_the_same_pause_of_who_is_not_busy_is_a_disengagement():
+    told, begin, end = replayed(busy=False)
+
+    assert [level for at, level in told.levels if begin < at < end - 0.01] == ["weakening", "disengaged"]
+    assert min(message.engagement for message in in_pause(told, begin, end)) < 0.2
+
+
+def test_a_task_freezes_the_estimate_of_its_beginning():
+    """Not the one that was published last."""
+    told = Told()
+    told.happens(event("dg-1", "started", 0.0))
+    told.busy(11.4, "human")
+    told.until(100.0)
+
+    assert {message.engagement for message in told.messages if message.busy} == {5.7 / 11.4}
+
+
+def test_after_a_task_the_recent_pace_counts_again_once_the_window_holds_nothing_else():
+    """No event happens at that moment, and none leaves the window."""
+    told = Told(window=30.0)
+    told.happens(event("dg-1", "started", 0.0))
+    told.busy(1.0, "human")
+    told.busy(100.0)
+    told.happens(event("dg-2", "started", 101.0))
+    told.happens(event("dg-3", "started", 129.0))
+    told.until(130.0)
+
+    assert told.messages[-1].at.seconds == 130.0
+    assert told.messages[-1].engagement == pytest.approx(5.7 / 28.0)
+    assert told.levels[-2:] == [(129.0, "engaged"), (130.0, "weakening")]
+
+
+def test_failures_are_forgotten_when_they_leave_the_window():
+    told = Told(window=30.0)
+    for number in range(3):
+        told.happens(event(f"mfg-{number}", "started", float(number)))
+        told.happens(event(f"mfg-{number}", "failed", float(number), 0.5), at=number + 0.5)
+    for number in range(3, 12):
+        told.happens(event(f"dg-{number}", "started", number * 3.0))
+        told.happens(event(f"dg-{number}", "succeeded", number * 3.0, 0.0))
+    forgotten = next(message for message in told.messages if message.at.seconds == 32.0)
+
+    assert told.levels[0] == (0.0, "engaged")
+    assert told.levels[1] == (0.5, "disengaged")
+    assert "0 of 8 recent events failed" in forgotten.reasons[1]
+    assert forgotten.level == "engaged"
+
+
+def test_whoever_is_busy_freezes_the_estimate_of_all_but_not_of_the_others():
+    everybody, bob = Told(""), Told("human")
+    for told in (everybody, bob):
+        told.happens(event("dg-1", "started", 0.0))
+        told.busy(1.0, "ann")
+        told.until(60.0)
+
+    assert everybody.levels == [(0.0, "engaged")]
+    assert [level for _, level in bob.levels] == ["engaged", "weakening", "disengaged"]
+
+
+def test_who_has_left_is_disengaged_in_time_and_comes_back_as_the_same_person():
+    told = Told()
+    told.happens(event("dg-1", "started", 0.0))
+    told.until(3600.0)
+    told.happens(event("dg-2", "started", 3600.0))
+
+    assert [level for _, level in told.levels] == ["engaged", "weakening", "disengaged", "engaged"]
+    assert told.messages[-1].session.events == 2
+
+
+def test_optional_failures_lower_nothing():
+    told = Told()
+    told.happens(event("mfg-1", "started", 0.0, optional=True))
+    told.happens(event("mfg-1", "failed", 0.0, 1.9, optional=True), at=1.9)
+
+    assert told.messages[-1].engagement == 1.0
