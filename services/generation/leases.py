@@ -80,6 +80,11 @@ class Leases:
                 return Inhibition(Claim(kind="inhibition", priority=1, target=target, reason=reason), request.mode)
         return None
 
+    @property
+    def holds_head(self) -> bool:
+        """Is the head to stay on what it is on? Then it must not even start for home."""
+        return self.inhibition is not None and self.inhibition.mode == "hold"
+
     def permits(self) -> Permits:
         """What fragments may do now."""
         inhibited = {lease.request.part for lease in self._leases.values()}

@@ -258,8 +258,8 @@ class Performance:
             self.spoken.reach(each)
             self._around.ledger.reach(self.plan.block.id, each, at)
 
-    def _lose(self, id: str, fault: Fault, kind: WarningKind = "EXECUTION_FAILURE") -> None:
-        """A behavior cannot be finished: the block fails if it is required, else goes on as if it had not been."""
+    def _lose(self, id: str, fault: Fault, kind: WarningKind = "EXECUTION_FAILURE", *, at_rest: bool = False) -> None:
+        """It cannot be finished: the block fails if it is required, else goes on without. at_rest: its parts are."""
         if id in self._dropped or self._ending.done():
             return
         self._dropped.append(id)
@@ -269,7 +269,7 @@ class Performance:
             self._report.interrupted(id, self.spoken.of(id))
         else:
             self._report.warn(kind, str(fault), id)
-            if id in self.authority.begun:
+            if id in self.authority.begun and not at_rest:
                 self._go_home(self._parts(id), id)
             if id in self.plan.required:
                 self.stop(Ending("failed", Fault(reason=fault.reason, where=f"{self.plan.block.id}: {id}")))
@@ -336,7 +336,8 @@ class Performance:
             self._reach(end, at, by_body=True)
             self._advance()
         else:
-            self._lose(behavior.id, outcome.fault or Fault(reason=f"the body {outcome.status} it"))
+            fault = outcome.fault or Fault(reason=f"the body {outcome.status} it")
+            self._lose(behavior.id, fault, at_rest=outcome.status == "aborted")
 
     def _send(self, behavior: BlockBehavior) -> Pending:
         pending = self._pending[behavior.id] = self._body.perform(behavior, self._asked[behavior.id])

@@ -14,6 +14,7 @@ from schemas.feedback import BlockProgress, SyncPointProgress, WarningFeedback
 from schemas.fragments import FragmentOutcome, PerformFragment, TurnClosed, TurnFragment
 from schemas.recognition import ConnectionEvent, SignalTurn
 from schemas.world import World
+from services.control.body import Body
 from services.control.config import ControlConfig, Variability
 from services.control.service import embody
 from services.generation.config import GenerationConfig
@@ -122,11 +123,12 @@ async def robot(
     hub: MemoryHub,
     config: GenerationConfig | None = None,
     world: World = TABLE,
+    body: Body | None = None,
 ) -> AsyncIterator[Robot]:
     stage = Robot(hub)
     stage.bus.publish(keys.WORLD, world)
     services: dict[str, Service] = {
-        "control": partial(embody, config=ControlConfig(variability=Variability(seed=0, noise=0.0))),
+        "control": partial(embody, config=ControlConfig(variability=Variability(seed=0, noise=0.0)), body=body),
         "realizer": partial(realize, config=RealizerConfig()),
         "recognition": partial(recognize, config=RecognitionConfig()),
         "generation": partial(generate, config=config or GenerationConfig()),

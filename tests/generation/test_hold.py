@@ -1,0 +1,55 @@
+"""Inhibition with mode `hold`, on a whole robot: the head is still from the instant of the lease."""
+
+import asyncio
+import math
+
+import numpy as np
+import pytest
+
+from schemas import keys
+from schemas.attention import Inhibit
+from schemas.behaviors import Gaze
+from services.control.simulated import SimulatedBody
+from services.memory_bus import MemoryHub
+from tests.generation.robots import robot, says
+
+STEP = 0.002
+"""Seconds between two looks at the joints."""
+
+
+@pytest.mark.parametrize("since", [0.1, 0.2, 0.3, 1.0])
+async def test_the_head_stops_and_never_turns_back_towards_home(hub: MemoryHub, since: float) -> None:
+    loop, body = asyncio.get_running_loop(), SimulatedBody()
+    async with robot(hub, body=body) as stage:
+        stage.send(says("a", "beginning", "one two three four five six seven eight", Gaze(id="g", target="left")))
+        await stage.until("a:g:start")
+        await asyncio.sleep(since)
+        head = body._tracks["head"]
+        there = np.array(head.motion.at(math.inf).q)
+        ahead = there - np.array(head.at(loop.time()).q)
+        stage.bus.publish(keys.INHIBIT, Inhibit(id="l", requester="t", part="gaze", mode="hold", ttl=60.0))
+        velocities = []
+        for _ in range(int(4.0 / STEP)):
+            await asyncio.sleep(STEP)
+            velocities.append(np.array(head.at(loop.time()).v))
+
+    speeds = np.linalg.norm(velocities, axis=1)
+    assert (np.array(velocities) @ ahead >= -1e-9).all()
+    assert (speeds[round(0.2 / STEP) : round(0.5 / STEP)] < 1e-9).all()
+    assert np.allclose(head.at(loop.time()).q, there, atol=1e-6)
+
+
+async def test_a_head_on_its_target_does_not_move_at_all(hub: MemoryHub) -> None:
+    loop, body = asyncio.get_running_loop(), SimulatedBody()
+    async with robot(hub, body=body) as stage:
+        stage.send(says("a", "beginning", "one two three four five six seven eight", Gaze(id="g", target="left")))
+        await stage.until("a:g:start")
+        await asyncio.sleep(1.0)
+        stood = body._tracks["head"].at(loop.time()).q
+        stage.bus.publish(keys.INHIBIT, Inhibit(id="l", requester="t", part="gaze", mode="hold", ttl=60.0))
+        moved = []
+        for _ in range(int(6.0 / STEP)):
+            await asyncio.sleep(STEP)
+            moved.append(float(np.abs(body._tracks["head"].at(loop.time()).q - stood).max()))
+
+    assert max(moved) < 1e-6
