@@ -1,6 +1,5 @@
 """The command line. Options are declared here; what they do is in `services.commandline`, loaded only when called."""
 
-import os
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -10,7 +9,7 @@ import typer
 
 from schemas.faults import EngageError, InputRefused
 from services.commandline.errors import readable
-from services.commandline.process import FAILED, INTERRUPTED, REFUSED
+from services.commandline.process import FAILED, INTERRUPTED, REFUSED, silence
 from services.commandline.roster import ServiceName
 
 app = typer.Typer(
@@ -273,7 +272,10 @@ def simulate(
         int | None, typer.Option(metavar="J", min=1, help="Processes; as many as processors.", show_default=False)
     ] = None,
     limit: Annotated[
-        float, typer.Option(metavar="SECONDS", min=1, help="Break a session off after so long, in its own time.")
+        float,
+        typer.Option(
+            metavar="SECONDS", min=1, max=86_400, help="Break a session off after so long in its own time."
+        ),
     ] = 3600.0,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace the results that are there.")] = False,
     config: ConfigFile = None,
@@ -365,6 +367,5 @@ def _ended(errors: Sequence[BaseException]) -> int:
         print(readable(error.fault), file=sys.stderr)
     if told:
         return FAILED if any(not isinstance(error, InputRefused) for error in told) else REFUSED
-    # Whoever read our output (`| head`) has had enough; Python would complain again when it flushes at exit.
-    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    silence()  # whoever read our output (`| head`) has had enough
     return INTERRUPTED

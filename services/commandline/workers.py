@@ -14,7 +14,7 @@ from services.commandline.session import Order, Played
 from services.commandline.supervisor import ending, without_threads
 from services.study.records import SessionRecord
 
-WORKER = (sys.executable, "-m", "services", "play-sessions")
+WORKER = (sys.executable, "-P", "-m", "services", "play-sessions")
 PATIENCE: Seconds = 600.0
 """How long a session may take in real time. One that goes in circles without virtual time passing never ends."""
 LONGEST_ANSWER = 2**26

@@ -231,6 +231,8 @@ class Motion:
         self.path = path
         self.cruise = min(cruise, path.fastest)
         self.limit = limit
+        self._rest: State | None = None
+        """Where it stands once it is over, when somebody has asked."""
         # From rest the rate may jump: nothing moves yet. A path that starts in motion was built for rate 1.
         self._replan(start, 0.0, self.cruise if path.start.at_rest else 1.0)
 
@@ -304,7 +306,7 @@ class Motion:
 
     def _replan(self, now: Seconds, s: Seconds, rate: float) -> None:
         self._stop = max(s, min(self.limit, self.path.length))
-        self._rest: State | None = None
+        self._rest = None
         self._pieces: list[_Piece] = []
         left = self._stop - s
         if left <= 0.0:
