@@ -38,7 +38,7 @@ async def _generated(things: Sequence[Thing], world: World, config: Config, sour
     from services.generation.fragment_check import checked
     from services.generation.leases import Leases
     from services.generation.motions import collect, distinct, from_each_other, from_here
-    from services.generation.planning import plan, targets
+    from services.generation.planning import glance, plan, targets
     from services.generation.reference_policy import Unreferable
     from services.generation.turn_policy import TurnPolicy
 
@@ -58,9 +58,10 @@ async def _generated(things: Sequence[Thing], world: World, config: Config, sour
         fragment = checked(each, world, config.robot)
         turn = turns.accept(fragment, fragment.addressee)
         sequence = targets(fragment)
-        here = estimated(from_here(distinct(sequence), permits.only_hand))
-        onward = estimated(from_each_other(sequence, here, permits.only_hand))
-        motions = collect(sequence, here, onward)
+        glanced = glance(fragment, turn, config.generation)
+        here = estimated(from_here(distinct(sequence), permits.only_hand, glance=glanced))
+        onward = estimated(from_each_other(sequence, here, permits.only_hand, glanced))
+        motions = collect(sequence, here, onward, glanced)
         try:
             if not turn.backchannel:
                 discourse = discourse.in_turn(turn.turn, turn.addressee)

@@ -33,12 +33,12 @@ class BodyLink:
         self.capabilities = None
 
     async def motions(
-        self, sequence: Sequence[str], hand: Hand | None, moving: Sequence[BlockBehavior] = ()
+        self, sequence: Sequence[str], hand: Hand | None, moving: Sequence[BlockBehavior] = (), glance: str = ""
     ) -> Motions:
         """Costs, rays and poses of all that references to the `sequence` of targets could need.
 
-        hand: the only one allowed, if so. moving: what goes on, in order; it will be on target before. Raises
-        NoReply without a body.
+        hand: the only one allowed, if so. moving: what goes on, in order; it will be on target before. glance: see
+        `Motions`. Raises NoReply without a body.
         """
         if not sequence:
             return Motions({}, {})
@@ -48,8 +48,9 @@ class BodyLink:
                 self.capabilities = described
         last = last_motions(moving)
         pose = pose_after(last, await self._estimates(last))
-        here = await self._estimates(from_here(distinct(sequence), hand, pose))
-        return collect(sequence, here, await self._estimates(from_each_other(sequence, here, hand)))
+        here = await self._estimates(from_here(distinct(sequence), hand, pose, glance))
+        onward = await self._estimates(from_each_other(sequence, here, hand, glance))
+        return collect(sequence, here, onward, glance)
 
     async def _estimates(self, items: tuple[EstimateItem, ...]) -> tuple[Estimate, ...]:
         if not items:

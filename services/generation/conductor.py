@@ -23,7 +23,7 @@ from services.generation.discourse import SILENCE
 from services.generation.fragment_check import checked
 from services.generation.leases import Leases
 from services.generation.performance import GazesOfFragments, Performance
-from services.generation.planning import plan, targets
+from services.generation.planning import glance, plan, targets
 from services.generation.trail import NOTHING, Trail
 from services.generation.turn_events import TurnEvents, TurnOutcomes
 from services.generation.turn_policy import Aborted, TurnPolicy
@@ -198,7 +198,8 @@ class Conductor:
             while True:
                 company = [each for each in self._live.values() if each.goes_on_with(performance)]
                 moving = [behavior for each in company for behavior in each.moving]
-                motions = await self._body.motions(targets(fragment), permits().only_hand, moving)
+                glanced = glance(fragment, turn, self._config)
+                motions = await self._body.motions(targets(fragment), permits().only_hand, moving, glanced)
                 if performance.is_over:  # cancelled meanwhile
                     return None
                 assert self._world is not None

@@ -12,10 +12,14 @@ HERE = ""
 
 
 class Motions(Struct, frozen=True):
-    """Estimates by (since, target): a head or an arm that is on `since`, or HERE, goes to `target`."""
+    """Estimates by (since, target): a head or an arm that is on `since`, or HERE, goes to `target`.
+
+    glance: who is looked at after each point, before the next reference is made; "": nobody, the head stays.
+    """
 
     gazes: dict[tuple[str, str], Estimate]
     points: dict[tuple[str, str], Estimate]
+    glance: str = ""
 
     def gaze(self, since: str, target: str) -> Estimate:
         return self.gazes[since, target]
@@ -65,46 +69,56 @@ def pose_after(items: Sequence[EstimateItem], answers: Sequence[Estimate]) -> Po
 
 
 def from_here(
-    targets: Sequence[str], hand: Hand | None = None, pose: Pose = HERE_AND_NOW
+    targets: Sequence[str], hand: Hand | None = None, pose: Pose = HERE_AND_NOW, glance: str = ""
 ) -> tuple[EstimateItem, ...]:
-    """First question: a gaze and a point at each of the distinct `targets`, from where the body is or will be."""
+    """First question: a gaze and a point at each of the distinct `targets`, from where the body is or will be.
+
+    glance: see `Motions`. With only one target there is none.
+    """
     items = []
     for target in targets:
-        gaze = Gaze(id=f"gaze at {target}", target=target)
         point = Pointing(id=f"point at {target}", target=target, mode=hand)
-        items.append(EstimateItem(behavior=gaze, pose=pose.head))
+        items.append(EstimateItem(behavior=_gaze(target), pose=pose.head))
         items.append(EstimateItem(behavior=point, pose=pose.arms))
+    if glance:
+        items.append(EstimateItem(behavior=_gaze(glance), pose=pose.head))
     return tuple(items)
 
 
 def from_each_other(
-    sequence: Sequence[str], answers: Sequence[Estimate], hand: Hand | None = None
+    sequence: Sequence[str], answers: Sequence[Estimate], hand: Hand | None = None, glance: str = ""
 ) -> tuple[EstimateItem, ...]:
     """Second question: the same from the pose that an earlier reference of the `sequence` of targets leaves.
 
     A point only where one arm makes both. answers: to `from_here` of `distinct(sequence)`.
     """
-    first = _from_here(sequence, answers)
+    first = _from_here(sequence, answers, glance)
     items = []
     for since, target, one_arm in _steps(sequence, first):
         pose = first.gaze(HERE, since).pose_after
-        items.append(EstimateItem(behavior=Gaze(id=f"gaze at {target}", target=target), pose=pose))
+        items.append(EstimateItem(behavior=_gaze(target), pose=pose))
         if one_arm:
             # The block will name this hand: no other may be asked about, whichever is nearer from there.
             named = hand_of(first.point(HERE, target)) or hand
             pointing = Pointing(id=f"point at {target}", target=target, mode=named)
             items.append(EstimateItem(behavior=pointing, pose=first.point(HERE, since).pose_after))
+    for target in _after_glances(sequence, first):
+        items.append(EstimateItem(behavior=_gaze(target), pose=first.gaze(HERE, glance).pose_after))
     return tuple(items)
 
 
-def collect(sequence: Sequence[str], here: Sequence[Estimate], onward: Sequence[Estimate]) -> Motions:
+def collect(
+    sequence: Sequence[str], here: Sequence[Estimate], onward: Sequence[Estimate], glance: str = ""
+) -> Motions:
     """The answers to both questions, by where the motion starts and what it goes to."""
-    motions = _from_here(sequence, here)
+    motions = _from_here(sequence, here, glance)
     answers = iter(onward)
     for since, target, one_arm in _steps(sequence, motions):
         motions.gazes[since, target] = next(answers)
         if one_arm:
             motions.points[since, target] = next(answers)
+    for target in _after_glances(sequence, motions):
+        motions.gazes[glance, target] = next(answers)
     return motions
 
 
@@ -112,11 +126,24 @@ def distinct(sequence: Sequence[str]) -> tuple[str, ...]:
     return tuple(dict.fromkeys(sequence))
 
 
-def _from_here(sequence: Sequence[str], answers: Sequence[Estimate]) -> Motions:
+def _gaze(target: str) -> Gaze:
+    return Gaze(id=f"gaze at {target}", target=target)
+
+
+def _after_glances(sequence: Sequence[str], motions: Motions) -> tuple[str, ...]:
+    """What may be looked at after a glance."""
+    return distinct(sequence[1:]) if motions.glance else ()
+
+
+def _from_here(sequence: Sequence[str], answers: Sequence[Estimate], glance: str = "") -> Motions:
     gazes: dict[tuple[str, str], Estimate] = {}
     points: dict[tuple[str, str], Estimate] = {}
-    for target, gaze, point in zip(distinct(sequence), answers[::2], answers[1::2], strict=True):
+    each = answers[:-1] if glance else answers
+    for target, gaze, point in zip(distinct(sequence), each[::2], each[1::2], strict=True):
         gazes[HERE, target], points[HERE, target] = gaze, point
+    if glance and answers[-1].feasible:
+        gazes[HERE, glance] = answers[-1]
+        return Motions(gazes, points, glance)
     return Motions(gazes, points)
 
 

@@ -43,6 +43,11 @@ def targets(fragment: TurnFragment) -> Sequence[str]:
     return [reference.target for reference in references(fragment)]
 
 
+def glance(fragment: TurnFragment, turn: TurnPlan, config: GenerationConfig) -> str:
+    """Who is looked at after each of its points but the last; "": nobody."""
+    return turn.addressee if config.profile == "check-back" and len(references(fragment)) > 1 else ""
+
+
 def plan(
     fragment: TurnFragment,
     turn: TurnPlan,

@@ -72,7 +72,7 @@ class Pair(Struct, frozen=True, kw_only=True):
 
 
 class Posture(Struct, frozen=True):
-    """What the head looks at and each arm points at: a reference's target, or HERE."""
+    """What the head looks at and each arm points at: a reference's target, who was glanced at, or HERE."""
 
     head: str = HERE
     arms: tuple[tuple[str, str], ...] = ()
@@ -87,7 +87,7 @@ class Posture(Struct, frozen=True):
         if gesture != "directed_gaze_with_pointing":
             return Posture(target, self.arms)
         arms = {**dict(self.arms), arm_of(motions.point(HERE, target)): target}
-        return Posture(target, tuple(sorted(arms.items())))
+        return Posture(motions.glance or target, tuple(sorted(arms.items())))
 
 
 class Choices(Struct, frozen=True):

@@ -221,3 +221,17 @@ def test_where_a_reference_cannot_be_made_the_tables_come_all_the_same(engage: E
     assert as_text.out.count("a deictic phrase") == 3
     for result in (as_json, as_text):
         assert result.err.splitlines()[-1].startswith(f"{path}: f2: f2-r: no way to refer to rectangle: ")
+
+
+@pytest.mark.parametrize(("profile", "looks_away"), [("check-back", True), ("figure-3.3", False)])
+def test_a_look_after_a_point_starts_where_the_glance_has_led_the_head(
+    engage: Engage, tmp_path: Path, profile: str, looks_away: bool
+) -> None:
+    both = fragment("f", "full", THIS)
+    both["behaviors"] = [*both["behaviors"], *fragment("g", "full")["behaviors"]]  # type: ignore[misc]
+
+    pairs = rows(engage, written(tmp_path, both), "--set", f"generation.profile={profile}")
+
+    costs = {(pair["reference"], pair["gesture"]): pair["cost"] for pair in pairs}
+    assert (costs["g-r", "gaze"] > costs["g-r", "none"]) == looks_away
+    assert costs["g-r", GESTURES[3]] == costs["g-r", GESTURES[2]]  # the arm is there

@@ -9,8 +9,8 @@ from schemas.body import Estimate, NoPointZone
 from schemas.faults import RunFailed
 from schemas.fragments import ReferenceChoice
 from services.generation.config import GenerationConfig
-from services.generation.motions import HERE, collect, from_each_other
-from services.generation.reference_policy import Pair, choose
+from services.generation.motions import HERE, Motions, collect, from_each_other, from_here
+from services.generation.reference_policy import Pair, Posture, choose
 from tests.generation.tables import apart, body, flat_world, option, refer, scene
 
 CONFIG = GenerationConfig()
@@ -315,3 +315,29 @@ def test_from_there_the_body_is_asked_about_the_hand_that_will_be_named_and_abou
 
 def from_each_other_answered(asked: Sequence[object]) -> list[Estimate]:
     return [Estimate(behavior=str(number), feasible=True) for number, _ in enumerate(asked)]
+
+
+def test_the_head_is_on_who_is_glanced_at_after_a_point() -> None:
+    away = Estimate(behavior="", feasible=True, head_degrees=40.0)
+    motions = body(apart(), ["rectangle", "rectangle"])
+    motions = Motions({**motions.gazes, ("ann", "rectangle"): away}, motions.points, "ann")
+    posture = Posture().after("directed_gaze_with_pointing", "rectangle", motions)
+
+    assert posture.head == "ann"
+    assert posture.after("directed_gaze", "rectangle", motions).head == "rectangle"
+
+
+def test_a_glance_is_asked_about_once_and_only_for_what_comes_after_it() -> None:
+    here = [Estimate(behavior=str(number), feasible=True, parts=("left_arm",)) for number in range(5)]
+    first = from_here(["a", "b"], glance="ann")
+    onward = from_each_other(["a", "b"], here, glance="ann")
+
+    assert [item.behavior.target for item in first] == ["a", "a", "b", "b", "ann"]  # type: ignore[union-attr]
+    assert [item.behavior.target for item in onward] == ["b", "b", "b"]  # type: ignore[union-attr]
+    assert collect(["a", "b"], here, here[:3], "ann").gaze("ann", "b") is here[2]
+
+
+def test_who_cannot_be_looked_at_is_not_glanced_at() -> None:
+    here = [Estimate(behavior=str(number), feasible=number < 4) for number in range(5)]
+
+    assert collect(["a", "b"], here, here[:1] * 2, "ann").glance == ""
