@@ -6,7 +6,7 @@
 
 Where perception says itself what a person does, it is believed: from the first symbolic observation of an action of
 somebody on, raw perception of the same is ignored, as long as this lives. Actions carry the times at which they
-began and ended, though they are known only later; until then `undecided_since` says from when on.
+began and ended, though they are known only later; until then `undecided` says from when on.
 """
 
 from collections.abc import Iterable, Iterator
@@ -84,9 +84,9 @@ class Attention:
         return min(times, default=None)
 
     @property
-    def undecided_since(self) -> Seconds | None:
-        """From when on looks and speech may still become known."""
-        return min((since for actor in self._actors.values() for since in actor.undecided), default=None)
+    def undecided(self) -> list[Seconds]:
+        """Since when gazes and voices do something that may be a look, or speech, or the end of one."""
+        return [since for actor in self._actors.values() for since in actor.undecided]
 
     def feed(self, observation: Raw, at: Seconds) -> list[Symbolic]:
         """What has begun and ended, in order. at: when the observation was made."""

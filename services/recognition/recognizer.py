@@ -33,21 +33,23 @@ class Recognizer:
         self._attention = Attention(robot, config, clock)
         self._waiting: list[tuple[Seconds, int, Observation]] = []
         self._numbers = count()
+        self._now: Seconds = -math.inf
 
     @property
     def deadline(self) -> Seconds | None:
         """When `advance` has something to do, unless an observation comes first."""
+        settled, due = self._settled, self.session.deadline
+        more = settled + self._config.sensing.settling  # is settled then, at the latest
         times = [self._attention.deadline]
-        since = self._attention.undecided_since
-        if self._waiting and since is not None:
-            times.append(since + self._config.sensing.settling)
-        due = self.session.deadline
+        if self._waiting:
+            times.append(more)
         if due is not None:
-            times.append(due if since is None or due < since else max(due, since + self._config.sensing.settling))
+            times.append(due if due < settled else max(due, more))
         return min((at for at in times if at is not None), default=None)
 
     def feed(self, observation: Perceived, at: Seconds, now: Seconds) -> list[Result]:
         """Take what happened at `at`, before or at `now`."""
+        self._now = now
         derived: list[Symbolic] = []
         match observation:
             case HeadPose() | VoiceActivity():
@@ -66,19 +68,20 @@ class Recognizer:
                 self._wait(observation, at)
             case _:
                 self._wait(observation, at)
-        return self._take(derived, now)
+        return self._take(derived)
 
     def advance(self, now: Seconds) -> list[Result]:
         """What happens by itself up to and including `now`."""
-        results = self._take(self._attention.advance(now), now)
-        settled = self._settled(now)
+        self._now = now
+        results = self._take(self._attention.advance(now))
+        settled = self._settled
         # What is due at the very moment from which on things are undecided has to wait, too.
         return [*results, *self.session.advance(now if settled > now else math.nextafter(settled, -math.inf))]
 
-    def _take(self, derived: list[Symbolic], now: Seconds) -> list[Result]:
+    def _take(self, derived: list[Symbolic]) -> list[Result]:
         for action in derived:
             self._wait(action, action.at.seconds)
-        settled = self._settled(now)
+        settled = self._settled
         results: list[Result] = [*derived]
         while self._waiting and self._waiting[0][0] <= settled:
             at, _, observation = heapq.heappop(self._waiting)
@@ -88,7 +91,8 @@ class Recognizer:
     def _wait(self, observation: Observation, at: Seconds) -> None:
         heapq.heappush(self._waiting, (at, next(self._numbers), observation))
 
-    def _settled(self, now: Seconds) -> Seconds:
-        """Nothing from before this can still become known; at the latest after the time to settle."""
-        since = self._attention.undecided_since
-        return math.inf if since is None or now >= since + self._config.sensing.settling else since
+    @property
+    def _settled(self) -> Seconds:
+        """Nothing from before this can still become known, but for what has taken longer than the time to settle."""
+        longest = self._config.sensing.settling
+        return min((since for since in self._attention.undecided if self._now < since + longest), default=math.inf)

@@ -280,7 +280,7 @@ def test_symbolic_looks_are_believed_and_the_head_is_no_longer_asked():
     watch.hears(True, *ticks(1.55, 3.0))
 
     assert watch.told[2:] == [("speak", "", 1.55)]
-    assert watch.attention.undecided_since is None
+    assert watch.attention.undecided == []
 
 
 def test_who_is_told_to_come_and_go_is_not_lost_with_the_face():
@@ -359,7 +359,7 @@ def test_looks_of_any_stream_alternate_and_never_flicker_faster_than_the_dwell(s
         before = at
     assert not there
     assert attention.deadline is None
-    assert attention.undecided_since is None
+    assert attention.undecided == []
 
 
 def test_frames_of_all_rates_agree():

@@ -96,4 +96,4 @@ def test_speech_of_any_stream_alternates_and_pauses_at_least_as_long_as_the_paus
     assert times == sorted(times)
     assert all(action.actor == HUMAN for action in actions)
     assert attention.deadline is None
-    assert attention.undecided_since is None
+    assert attention.undecided == []
