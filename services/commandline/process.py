@@ -1,9 +1,10 @@
 """How a command becomes a process: which loop it runs on, how it is stopped, what its exit code says."""
 
 import asyncio
+import os
 import signal
+import sys
 from collections.abc import Coroutine
-from contextlib import suppress
 from importlib import import_module
 from typing import Any, TypeVar
 
@@ -28,9 +29,18 @@ def run(main: Coroutine[Any, Any, T], *, virtual_time: bool = False) -> T:
 
 
 def run_until_signal(main: Coroutine[Any, Any, None]) -> None:
-    """Run what never ends by itself, or need not: Ctrl-C and SIGTERM are a good end."""
-    with suppress(KeyboardInterrupt):
+    """Run what never ends by itself, or need not: Ctrl-C, SIGTERM and a reader who has had enough are good ends."""
+    try:
         run(main)
+    except* KeyboardInterrupt:
+        pass
+    except* BrokenPipeError:
+        silence()
+
+
+def silence() -> None:
+    """Nobody reads on: Python's own flush of standard output at the end must not complain of it."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def _fastest_loop() -> Any:
