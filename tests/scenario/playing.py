@@ -4,6 +4,8 @@ import asyncio
 from functools import partial
 from typing import Any
 
+from msgspec.structs import replace
+
 from schemas import keys
 from schemas.fragments import FragmentOutcome
 from schemas.recognition import ConnectionEvent
@@ -64,14 +66,15 @@ async def play(
     noise: float = 0.0,
     condition: Condition = "operational",
     habits: Habits | None = None,
+    sensors: SimulationConfig | None = None,
     **manager: Any,
 ) -> Record:
     """Until the manager has said goodbye. faults: of the bus. noise: of the body. habits: of the stochastic person.
-    manager: its configuration.
+    sensors: how person and table are perceived; exactly, by default. manager: its configuration.
     """
     received: list[Received] = []
     finished = asyncio.Event()
-    person = SimulationConfig(human=human, seed=seed, stochastic=habits or Habits())  # type: ignore[arg-type]
+    person = replace(sensors or SimulationConfig(), human=human, seed=seed, stochastic=habits or Habits())
 
     async def collaboration(bus: Bus, ready: Ready) -> None:
         await collaborate(bus, ready, CollaborationConfig(**manager))
