@@ -1,0 +1,162 @@
+"""`engage watch`, the client and the plain example beside a recognition of its own process, over real sockets.
+
+The test itself is the body and the perception of the robot.
+"""
+
+import asyncio
+import json
+import sys
+from asyncio.subprocess import PIPE, Process
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import msgspec
+import pytest
+
+from schemas import keys, lines
+from schemas.actions import ActionBegan, ActionEnded
+from schemas.recognition import ConnectionEvent
+from services.bus import Bus
+from services.client import Robot, connect
+from services.feeds import EventFeed
+from services.zenoh_bus import open_hub
+from tests.bus.places import free_endpoint
+from tests.cli.command import engage, start
+from tests.cli.test_processes import PATIENCE, line, stopped
+
+pytestmark = pytest.mark.real_time
+
+EXAMPLE = Path(__file__).parents[2] / "examples" / "plain_zenoh_events.py"
+MUTUAL = "mutual_facial_gaze"
+
+
+class Scene(NamedTuple):
+    """A recognition that runs by itself, our place on its bus, and where that is."""
+
+    recognition: list[Process]
+    robot: Robot
+    body: Bus
+    where: tuple[str, ...]
+
+    def look(self, actor: str, target: str) -> None:
+        key = keys.ROBOT_ACTION if actor == self.body.robot else keys.PERCEIVED_ACTION
+        began = ActionBegan(actor=actor, action="look", at=self.body.stamp(), targets=(target,))
+        self.body.publish(key, began)
+
+    def look_away(self, actor: str) -> None:
+        ended = ActionEnded(actor=actor, action="look", at=self.body.stamp())
+        self.body.publish(keys.PERCEIVED_ACTION, ended)
+
+    async def recognize(self) -> None:
+        """Start another one."""
+        self.recognition.append(await start("run", "recognition", *self.where))
+        await line(self.recognition[-1], "recognition is ready")
+
+
+@asynccontextmanager
+async def scene(robot: str, endpoint: str) -> AsyncIterator[Scene]:
+    async with await open_hub(robot, listen=[endpoint]) as hub, connect(hub=hub) as client:
+        made = Scene([], client, hub.join("control"), ("--robot", robot, "--connect", endpoint))
+        try:
+            await made.recognize()
+            yield made
+        finally:
+            for process in made.recognition:
+                await stopped(process)
+
+
+@pytest.fixture
+def endpoint() -> str:
+    return free_endpoint()
+
+
+async def heard(events: EventFeed, state: str) -> ConnectionEvent:
+    while (event := await events.next(PATIENCE)) is not None:
+        if event.state == state:
+            return event
+    raise AssertionError(f"nothing {state}")
+
+
+def parsed(text: str) -> Any:
+    """The line, which is as its schema says and keeps every key."""
+    again = msgspec.json.decode(text, type=lines.Line, strict=True)
+    assert msgspec.json.decode(msgspec.json.encode(again)) == json.loads(text)
+    return json.loads(text)
+
+
+async def test_late_joiners_of_all_kinds_and_the_death_of_recognition(endpoint: str) -> None:
+    async with scene("seen", endpoint) as our, scene("other", free_endpoint()) as other:
+        with our.robot.connection_events("ann") as early:
+            for where in (our, other):
+                where.look(where.body.robot, "ann")
+                where.look("ann", where.body.robot)
+                where.look("bob", where.body.robot)
+            shared = await heard(early, "succeeded")
+        command = ("watch", "--json", *our.where, "--actor", "ann", "--kind", MUTUAL)
+        watch = await start(*command, "--only", "events", "--only", "statistics")
+        plain = await asyncio.create_subprocess_exec(
+            sys.executable, EXAMPLE, "--robot", "seen", "--actor", "ann", endpoint, stdout=PIPE, stderr=PIPE
+        )
+        try:
+            joined = [parsed(await line(watch, "{", log=False)) for _ in range(2)]
+            plain_joined = {await line(plain, "ann", log=False) for _ in range(2)}
+            with our.robot.connection_events("ann", MUTUAL, open=True) as late:
+                assert await late.next(PATIENCE) == shared
+                our.recognition[0].kill()
+                killed = our.robot.now()
+                lost = await heard(late, "lost")
+                waited = our.robot.now() - killed
+                await our.recognize()
+                our.look_away("ann")
+                our.look("ann", "seen")
+                again = await heard(late, "started")
+            watched = [parsed(await line(watch, f'"{state}"', log=False)) for state in ("lost", "started")]
+            plain_watched = [await line(plain, state, log=False) for state in (": lost", ": started")]
+        finally:
+            codes = [await stopped(watch), await stopped(plain)]
+
+    assert {one["type"] for one in joined} == {"connection_event", "statistics"}
+    assert [one["id"] for one in joined if "id" in one] == [shared.id]
+    assert plain_joined == {"ann: engaged, 1 events\n", f"{shared.id}: {MUTUAL} of ann: succeeded after 0.00 s\n"}
+    assert (lost.id, again.session != lost.session) == (shared.id, True)
+    assert 2.0 <= waited < PATIENCE
+    assert [one["id"] for one in watched] == [lost.id, again.id]
+    assert [text.split(":")[0] for text in plain_watched] == [lost.id, again.id]
+    assert codes == [0, 0]
+
+
+async def test_a_reader_who_has_had_enough_ends_watch_without_a_word(endpoint: str) -> None:
+    async with scene("seen", endpoint) as our:
+        our.look("ann", "seen")
+        watch = await start("watch", "--json", *our.where)
+        assert watch.stdout is not None
+        await line(watch, MUTUAL, log=False)
+        watch.stdout._transport.close()  # type: ignore[attr-defined]
+        our.look("bob", "seen")
+        async with asyncio.timeout(PATIENCE):
+            await watch.wait()
+        assert watch.stderr is not None
+        told = await watch.stderr.read()
+
+    assert (watch.returncode, told) == (0, b"")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [
+        (
+            ("--kind", "gaze"),
+            "--kind: unknown 'gaze' (known: directed_gaze, mutual_facial_gaze, adjacency_pair, backchannel)",
+        ),
+        (("--only", "all"), "--only: unknown 'all' (known: events, statistics, feedback, head, faults)"),
+        (("--actor", "a/b"), "--actor: 'a/b' can't be in a key: "),
+    ],
+)
+def test_what_cannot_be_watched_is_refused(
+    capsys: pytest.CaptureFixture[str], arguments: tuple[str, ...], told: str
+) -> None:
+    result = engage(capsys)("watch", *arguments)
+
+    assert (result.code, result.err.startswith(told), result.err.count("\n")) == (2, True, 1)
