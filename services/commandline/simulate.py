@@ -3,7 +3,6 @@
 import os
 import platform
 from collections.abc import Callable, Sequence
-from math import isfinite
 from pathlib import Path
 from typing import NamedTuple
 
@@ -112,8 +111,6 @@ def _plotting() -> Draw:
 
 def orders_of(options: Options) -> list[Order]:
     """By condition, then by number. The same number is the same seed in each condition. Raises InputRefused."""
-    if not isfinite(options.limit):  # nan is in every range
-        raise InputRefused(Fault(reason=f"--limit {options.limit} is no number of seconds"))
     if options.human == PEOPLE:
         if options.conditions:
             raise InputRefused(Fault(reason=f"--human {PEOPLE} has no conditions", advice="leave out --condition"))

@@ -177,7 +177,7 @@ def test_without_matplotlib_nothing_is_played(
     [
         (("--condition", "degraded"), "no condition 'degraded'"),
         (("--sessions", "0"), "--sessions"),
-        (("--limit", "nan"), "--limit nan"),
+        (("--limit", "nan"), "--limit"),
         (("--set", "simulation.sede=1"), "do you mean `seed`"),
     ],
 )
