@@ -44,9 +44,3 @@ def test_all_plots_are_drawn(records: list[SessionRecord], seen: list[EventRecor
 
     assert set(drawn) == NAMES
     assert all(width(png) > 800 for png in drawn.values())
-
-
-def test_the_same_study_gives_the_same_bytes():
-    records = [session("operational", 0, kind("adjacency_pair", 2, 1), mtbce=5.0, completion=9.0)]
-
-    assert draw(records, events(1, 0.4)) == draw(records, events(1, 0.4))
