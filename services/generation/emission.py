@@ -305,6 +305,7 @@ class _Emitter:
         signal = TurnSignal(id=ended, turn=turn.turn, signal="ended", actor=turn.addressee)
         operators: list[Operator] = []
         closing: list[BlockBehavior] = []
+        wordless = self._wordless_at_the_end() if self.speeches else ()
         if self._ends_with_gaze:
             gaze = self.names.fresh("turn-gaze")
             closing.append(Gaze(id=gaze, target=turn.addressee))
@@ -319,14 +320,16 @@ class _Emitter:
                     timing=(Timing("start", f"{gaze}:start"),),
                 )
             )
-            if self.speeches:
+            if wordless:
+                operators += [after(end, f"{gaze}:start") for end in (f"{self.speeches[-1]}:end", *wordless)]
+            elif self.speeches:
                 operators.append(same(f"{self.speeches[-1]}:end", f"{gaze}:start"))
             else:
                 operators += self._once_all_is_done(f"{gaze}:start")
             if self.last_gaze:
                 operators.append(same(f"{self.last_gaze}:relax", f"{gaze}:start"))
             signal = msgspec.structs.replace(signal, timing=(Timing("start", f"{gaze}:start"),))
-        if self.speeches:
+        if self.speeches and not wordless:
             signal = msgspec.structs.replace(signal, timing=(Timing("start", f"{self.speeches[-1]}:end"),))
         elif not self._ends_with_gaze:
             operators += self._once_all_is_done(f"{ended}:start")
@@ -334,6 +337,19 @@ class _Emitter:
         if operators:
             self.constraints.append(Constraint(id=self.names.fresh("turn-timing"), operators=tuple(operators)))
         return closing
+
+    def _wordless_at_the_end(self) -> Sequence[str]:
+        """Ends of references made after the last words, by a gesture alone: the turn is not over before."""
+        ends: list[str] = []
+        for behavior in reversed(self.order):
+            if isinstance(behavior, Speech):
+                break
+            if isinstance(behavior, Reference):
+                parts = self.parts[behavior.id]
+                if parts.phrase:
+                    break
+                ends.append(":".join(parts.mention.by))
+        return ends
 
     def _once_all_is_done(self, sync: str) -> list[Operator]:
         """After the last words of the turn, and all that ends by itself; a gaze or a face lasts until that has."""

@@ -171,3 +171,15 @@ def test_speech_only_says_the_words_and_announces_the_pair() -> None:
     made = block(fragment, [("none", "it")], permits=Permits(speech_only=True))
 
     assert list(by_id(made)) == ["turn-pair", "s", "r-phrase", "turn-ended"]
+
+
+@pytest.mark.parametrize("profile", ["check-back", "figure-3.3"])
+def test_a_reference_without_words_after_the_last_words_is_made_before_the_turn_ends(profile: str) -> None:
+    fragment = TurnFragment(id="f", behaviors=(speech("s"), reference("r")))
+
+    made = block(fragment, [(POINT, "")], profile)
+
+    assert [line for line in lines(made, "turn-timing") if line.startswith("turn-gaze:start after")] == [
+        "turn-gaze:start after s:end", "turn-gaze:start after r-point:stroke_end",
+    ]  # fmt: skip
+    assert start_of(by_id(made)["turn-ended"]) == "turn-gaze:start"
