@@ -63,7 +63,7 @@ class VirtualTimeLoop(asyncio.SelectorEventLoop):
         selector = _InstantSelector()
         selector.loop = self
         super().__init__(selector)
-        self._clock_resolution = 1e-9
+        self._clock_resolution = math.ulp(0.0)
 
     def time(self) -> float:
         return self._virtual_now
@@ -88,8 +88,9 @@ class VirtualTimeLoop(asyncio.SelectorEventLoop):
         scheduled = self._scheduled  # type: ignore[attr-defined]
         # The exact instant of the next timer: now + timeout would be off by a rounding.
         self._virtual_now = scheduled[0]._when if scheduled else self._virtual_now + timeout
-        # Timers are due before now + resolution; after months 1e-9 would vanish beside now, and time stand still.
-        self._clock_resolution = max(1e-9, math.ulp(self._virtual_now))
+        # Timers are due before now + resolution: at now, and never earlier, or who asks again at once what was due
+        # then would ask for ever, in one instant.
+        self._clock_resolution = math.ulp(self._virtual_now)
 
 
 def _whereabouts(task: "asyncio.Task[Any]") -> str:

@@ -1,4 +1,5 @@
 import asyncio
+import math
 
 import pytest
 
@@ -108,3 +109,16 @@ def test_waiting_for_nothing_while_a_timer_repeats_ends_at_the_limit():
 
 def test_there_is_no_limit_by_default():
     assert run_virtual(asyncio.sleep(1e6, "done")) == "done"
+
+
+def test_no_timer_fires_before_its_time_however_little_is_missing() -> None:
+    async def fires() -> list[tuple[float, float]]:
+        loop = asyncio.get_running_loop()
+        fired: list[tuple[float, float]] = []
+        await asyncio.sleep(103.7)
+        for when in (loop.time(), math.nextafter(loop.time(), math.inf), loop.time() + 4e-14, loop.time() + 1e-10):
+            loop.call_at(when, lambda when=when: fired.append((when, loop.time())))
+        await asyncio.sleep(1.0)
+        return fired
+
+    assert [when <= at for when, at in run_virtual(fires())] == [True] * 4
