@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 
 import pytest
+from msgspec.structs import replace
 
 from schemas.behaviors import Gaze, Reference, Speech
 from schemas.fragments import TurnFragment
@@ -40,13 +41,17 @@ def spoken(fragment: TurnFragment) -> str:
 
 
 class Player:
-    """The robot and the human. Pieces are laid where they were asked for, but for the first `wrong` times."""
+    """The robot and the human. Pieces are laid where they were asked for, but for the first `wrong` times.
 
-    def __init__(self, *, wrong: int = 0, idle: int = 0) -> None:
+    hidden: a piece that is laid nowhere, and not seen any more once it has been moved.
+    """
+
+    def __init__(self, *, wrong: int = 0, idle: int = 0, hidden: str = "") -> None:
         self.pieces = {piece.id: TABLE.lying(piece, piece.start) for piece in TABLE.pieces}
         self.performed: list[TurnFragment] = []
         self._wrong = wrong
         self._idle = idle
+        self._hidden = hidden
 
     def play(self, plan: Plan[None]) -> list[TurnFragment]:
         answer: object = None
@@ -78,6 +83,9 @@ class Player:
         if self._idle:
             self._idle -= 1
             return False
+        if piece == self._hidden:
+            self.pieces[piece] = replace(self.pieces[piece], confidence=0.0)
+            return True
         landmark = [it.target for it in self.performed[-1].behaviors if isinstance(it, Reference)][1]
         side = next(s for s in sides(spoken(self.performed[-1])))
         if self._wrong:
@@ -189,6 +197,26 @@ def test_a_request_that_nobody_follows_is_repeated() -> None:
 
     assert list(fragments)[3:7] == ["step-5", "step-5-again", "step-5-again-2", "step-7-ours-a"]
     assert spoken(fragments["step-5-again"]) == spoken(fragments["step-5"])
+
+
+def test_a_piece_that_is_not_seen_any_more_is_asked_for_again_and_never_for_a_fix() -> None:
+    fragments = scripted(Player(hidden="blue-square"))
+
+    assert list(fragments)[3:7] == ["step-5", "step-5-again", "step-5-again-2", "step-7-ours-a"]
+
+
+def test_what_is_right_when_it_is_seen_again_needs_no_placement() -> None:
+    player = Player(idle=1)
+    place = player._place
+
+    def unseen(piece: str) -> bool:
+        """It was laid where it belongs, but nobody saw it being moved."""
+        place(piece)
+        return place(piece) and False
+
+    player._place = unseen  # type: ignore[method-assign]
+
+    assert not [id for id in scripted(player) if "again" in id]
 
 
 def test_a_human_who_does_nothing_does_not_stop_the_manager() -> None:

@@ -2,6 +2,7 @@
 
 import math
 import random
+from collections import Counter
 from collections.abc import Iterable
 from itertools import pairwise
 from typing import Any
@@ -33,6 +34,8 @@ from services.simulation.human import (
     Pause,
     Rule,
     Sit,
+    Start,
+    Stop,
     Withdraw,
 )
 from services.simulation.perception import Scene
@@ -195,6 +198,24 @@ def test_a_turning_head_always_points_somewhere_and_never_goes_back(start: Vecto
     assert way[-1] == goal
 
 
+SPEAKS = (Pause(1.0), Start("speak"), Pause(0.5), Stop("speak"))
+
+
+def test_the_voice_is_heard_while_the_person_speaks() -> None:
+    film = raw(*SPEAKS, until=3.0)
+
+    assert [it.at.seconds for it in film.of(VoiceActivity) if it.active] == [1.0 + FRAME * n for n in range(8)]
+
+
+def test_what_recognition_cannot_find_out_of_raw_perception_is_told_as_it_is() -> None:
+    film = raw(Start("nod"), Pause(0.4), Stop("nod"), until=1.0)
+
+    assert [(type(it), it.action) for it in film.of(ActionBegan, ActionEnded)] == [
+        (ActionBegan, "nod"),
+        (ActionEnded, "nod"),
+    ]
+
+
 # -- faults -----------------------------------------------------------------------------------------------------
 
 
@@ -303,6 +324,22 @@ def test_without_faults_actions_pass_as_they_are() -> None:
         happened += [(now, message) for message in scene.advance(now)]
 
     assert symbolic(*acts, until=60.0).messages == happened
+
+
+@pytest.mark.parametrize("perception", ["raw", "symbolic"])
+def test_an_utterance_is_dropped_whole_or_not_at_all(perception: str) -> None:
+    faults = PerceptionFaults(dropped_speech=0.5)
+    film = Filmed(*SPEAKS * 60, until=90.0, perception=perception, frame=FRAME, faults=faults)
+    told = Counter(
+        it.active if isinstance(it, VoiceActivity) else type(it)
+        for it in film.of(VoiceActivity, ActionBegan, ActionEnded)
+    )
+
+    if perception == "raw":
+        assert told[True] % 8 == 0
+        assert told[True] / 8 == pytest.approx(30, abs=10)
+    else:
+        assert told[ActionBegan] == told[ActionEnded] == pytest.approx(30, abs=10)
 
 
 def test_turning_one_fault_on_does_not_change_the_others() -> None:

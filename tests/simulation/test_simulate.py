@@ -1,5 +1,6 @@
 """The simulation on the bus: the world, the person's coming, and what moves."""
 
+from collections import Counter
 from functools import partial
 
 import pytest
@@ -118,3 +119,16 @@ async def test_who_does_not_come_is_never_found(hub: MemoryHub) -> None:
 def test_a_wrong_number_in_the_configuration_is_refused_by_name(wrong: dict[str, float]) -> None:
     with pytest.raises(ValueError, match=next(iter(wrong))):
         SimulationConfig(**wrong)  # type: ignore[arg-type]
+
+
+async def test_raw_perception_comes_on_its_own_keys_in_place_of_actions(hub: MemoryHub) -> None:
+    config = SimulationConfig(await_participants=(), entrance=1.0, jitter=0.0, perception="raw")
+    bus = hub.join("test")
+    seen = Counter[str]()
+    with bus.subscribe(keys.ANY_HEAD_POSE, keys.ANY_VOICE_ACTIVITY, keys.PERCEIVED_ACTION) as inbox:
+        async with running(hub, {"simulation": partial(simulate, config=config)}):
+            while (received := await inbox.next(10.0)) is not None:
+                seen[received.key] += 1
+
+    assert seen.keys() == {keys.head_pose("human"), keys.voice_activity("human")}
+    assert seen[keys.head_pose("human")] == pytest.approx((10.0 - 1.8) * 15, abs=2)
