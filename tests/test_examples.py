@@ -70,5 +70,12 @@ def test_what_the_page_on_language_models_shows_is_so() -> None:
     assert [each.id for each in fragment.behaviors] == ["say-1", "refer-2", "say-3", "refer-4"]
     assert msgspec.json.decode(told.json) == msgspec.json.decode(result)
     assert set(fields) == {*ToolInput.__struct_fields__, *Summary.__struct_fields__} - {"cut_short", "answer_delay"}
-    for snippet in re.findall("```python\n(.*?)```", page, re.DOTALL):
-        compile(snippet, "language-models.md", "exec", flags=ast.PyCF_ALLOW_TOP_LEVEL_AWAIT)
+
+
+@pytest.mark.parametrize("page", ["language-models.md", "connection-events.md"])
+def test_the_python_of_a_page_is_python(page: str) -> None:
+    snippets = re.findall("```python\n(.*?)```", (ROOT / "docs" / page).read_text(), re.DOTALL)
+
+    assert snippets
+    for snippet in snippets:
+        compile(snippet, page, "exec", flags=ast.PyCF_ALLOW_TOP_LEVEL_AWAIT)

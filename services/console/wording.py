@@ -57,9 +57,9 @@ def decision(event: ConnectionEvent) -> str:
 
 
 def standing(statistics: Statistics) -> str:
-    """`anna: engaged 0.92 (pace 0.92); 12 events, MTBCE 5.31 s`."""
+    """`anna: engaged 0.92; 12 events, MTBCE 5.31 s`; the reasons, too, if it is less than engaged."""
     engagement = f"{statistics.level} {number(statistics.engagement)}" if statistics.engagement is not None else "-"
-    reasons = f" ({'; '.join(statistics.reasons)})" if statistics.reasons else ""
+    reasons = f" ({'; '.join(statistics.reasons)})" if statistics.reasons and statistics.level != "engaged" else ""
     count = statistics.session.events
     events = f"{count} event{'' if count == 1 else 's'}, MTBCE {seconds(statistics.session.mtbce)}"
     return f"{statistics.actor or 'all'}: {engagement}{reasons}; {events}"

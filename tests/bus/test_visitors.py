@@ -12,6 +12,7 @@ import zenoh
 
 from schemas import keys
 from schemas.messages import decode, encode, encode_json
+from schemas.recognition import OpenEvents
 from schemas.requests import Accepted
 from schemas.status import AskStatus
 from services.bus import Bus
@@ -223,3 +224,17 @@ async def test_without_a_payload_a_visitor_asks_every_service_how_it_is(town: To
     assert found["one"]["run"] == found["two"]["run"] == near.run
     assert found["three"]["run"] == far.run
     assert all(status["bus"]["passed"] > 0 and status["bus"]["lag"] > 0 for status in found.values())
+
+
+async def test_what_is_for_programs_of_others_comes_as_json_but_they_may_ask_otherwise(town: Town):
+    near, _, visitor = town
+    here = near.join("here")
+    open_events = OpenEvents(actor="ann", session="life", at=here.stamp())
+    here.publish(keys.open_events("ann"), open_events)
+
+    [plain] = await visitor.samples("engage/v1/state/**")
+    [asked] = await visitor.samples("engage/v1/state/**?format=msgpack")
+
+    assert json.loads(plain.payload.to_bytes())["session"] == "life"
+    assert str(asked.encoding) == "application/msgpack;engage.OpenEvents/1"
+    assert decode(asked.payload.to_bytes(), str(asked.encoding)) == open_events

@@ -1,11 +1,13 @@
 from io import StringIO
 
+import msgspec
 import pytest
 from rich.console import Console
 
 from schemas.feedback import WarningFeedback
 from schemas.fragments import FragmentOutcome
 from schemas.messages import Message
+from schemas.recognition import Statistics, WindowStatistics
 from schemas.units import Seconds
 from services.console import log, tally, view
 from services.console.log import Telling
@@ -92,3 +94,33 @@ def test_the_summary_names_kinds_outcomes_delays_and_pace() -> None:
         "1 fragments, 1 not finished",
     ):
         assert expected in text
+
+
+def test_an_event_is_lost_with_its_recognition_but_not_what_was_decided() -> None:
+    life = (event("dg-1", "started", 11.0), event("dg-1", "lost", 12.0))
+    decided = (
+        event("dg-2", "started", 11.0),
+        event("dg-2", "succeeded", 11.5, delay=0.5),
+        event("dg-2", "lost", 12.0),
+    )
+
+    assert lines(life, Telling())[-1] == "0:02.0  * directed gaze, robot → human about rectangle (reference): lost"
+    counted = tally.empty(10.0)
+    for message, time in (*life, *decided):
+        counted = tally.feed(counted, message, time)
+    row = tally.count(counted, "directed_gaze", "robot", "robot")
+    assert (row.count, row.succeeded, row.other, row.open, row.delays) == (2, 1, 1, 0, (0.5,))
+
+
+def test_statistics_are_told_if_asked_for_with_reasons_for_what_is_not_well() -> None:
+    well = Statistics(
+        actor="ann", at=at(12.0), session=WindowStatistics(events=12, mtbce=5.314), recent=WindowStatistics(),
+        engagement=0.92, level="engaged", reasons=("pace 0.92",),
+    )  # fmt: skip
+    ill = msgspec.structs.replace(well, actor="", engagement=0.1, level="disengaged")
+
+    assert lines(((well, 12.0), (ill, 12.0)), Telling(standings=True)) == [
+        "0:02.0  ann: engaged 0.92; 12 events, MTBCE 5.31 s",
+        "0:02.0  all: disengaged 0.10 (pace 0.92); 12 events, MTBCE 5.31 s",
+    ]
+    assert lines(((well, 12.0),), Telling()) == []

@@ -2,10 +2,12 @@
 
 import json
 
+from schemas.faults import Fault
 from schemas.feedback import BlockProgress, PlannedPoint, PredictionFeedback, SyncPointProgress, WarningFeedback
 from schemas.lines import line
+from schemas.messages import published
 from schemas.presence import PeerGone
-from schemas.recognition import ConnectionEvent
+from schemas.recognition import ConnectionEvent, KindStatistics, OpenEvents, Statistics, WindowStatistics
 from schemas.units import Stamp
 
 
@@ -74,3 +76,43 @@ def test_a_connection_event_that_has_only_begun() -> None:
 
 def test_other_messages_have_no_line() -> None:
     assert line(PeerGone(participant="control")) is None
+
+
+def test_statistics_of_all() -> None:
+    kind = KindStatistics(kind="directed_gaze", count=2, succeeded=2, delay_mean=0.1 + 0.2, failure_rate=0.0)
+    window = WindowStatistics(kinds=(kind,), events=2, mtbce=5.7)
+    message = Statistics(
+        actor="", at=at(3), session=window, recent=WindowStatistics(), engagement=0.5, level="engaged"
+    )
+
+    assert json.loads(line(message) or "") == {
+        "type": "statistics", "actor": None, "time": 3.0, "engagement": 0.5, "level": "engaged", "reasons": [],
+        "busy": False,
+        "session": {
+            "events": 2, "mtbce": 5.7, "mtbce_without_maintenance": None, "max_gap": None,
+            "kinds": [
+                {
+                    "kind": "directed_gaze", "count": 2, "succeeded": 2, "failed": 0, "failure_rate": 0.0,
+                    "delay_min": None, "delay_mean": 0.3, "delay_max": None,
+                    "failed_delay_min": None, "failed_delay_mean": None, "failed_delay_max": None,
+                }
+            ],
+        },
+        "recent": {
+            "events": 0, "mtbce": None, "mtbce_without_maintenance": None, "max_gap": None, "kinds": [],
+        },
+    }  # fmt: skip
+
+
+def test_faults_and_head_owners_are_lines_as_they_travel() -> None:
+    assert line(Fault(reason="bad", where="here")) == '{"type":"fault","reason":"bad","where":"here"}'
+
+
+def test_what_is_for_programs_of_others_travels_as_json() -> None:
+    state = OpenEvents(actor="ann", session="7a4d6501", at=at(1))
+
+    payload, encoding = published(state)
+
+    assert encoding == "application/json;engage.OpenEvents/1"
+    assert json.loads(payload) == {"type": "open_events", "actor": "ann", "session": "7a4d6501", "at": ["loop", 1.0]}
+    assert published(Fault(reason="bad"))[1] == "application/msgpack;engage.Fault/1"
