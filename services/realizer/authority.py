@@ -148,8 +148,8 @@ class Authority(Outlook):
             if behavior in self.begun and not self.has_ended(behavior):
                 effects += self._extension(behavior, now)
         self._touched.clear()
-        # Of two that begin together on one part, the later in the document takes it over.
-        for behavior in sorted(beginning, key=list(self.plan.chains).index) if len(beginning) > 1 else beginning:
+        # Of two that begin together on one part, the body leaves it to the later: who that is stands in the plan.
+        for behavior in sorted(beginning, key=self.plan.entering.index) if len(beginning) > 1 else beginning:
             through = self._furthest(behavior, now)
             self.paces[behavior] = pace(behavior, self, now)
             effects.append(Begin(behavior, self._points[behavior][through].sync, self.paces[behavior]))

@@ -102,6 +102,20 @@ def arrange(
     return Arrangement(before.natural, lasting, successors, cuts, before.turns), conflicts
 
 
+def entering(
+    chains: Mapping[str, Chain],
+    mentioned: Collection[str],
+    times: Mapping[Point, Seconds],
+    rounds: Mapping[Point, int],
+) -> tuple[str, ...]:
+    """Who takes his parts before whom. Of those that start together what nobody mentions comes last."""
+    rank = {
+        id: (round(times[start := chain.points[0]], 6), rounds[start], id not in mentioned, number)
+        for number, (id, chain) in enumerate(chains.items())
+    }
+    return tuple(sorted(chains, key=rank.__getitem__))
+
+
 def _not_given_up(
     chain: Chain, first: int, kept: Collection[Point], is_natural: bool, *, is_asked: bool
 ) -> int | None:
@@ -130,18 +144,14 @@ def _successors(
     times: Mapping[Point, Seconds],
     rounds: Mapping[Point, int],
 ) -> dict[str, str]:
-    """The next of each behavior on any of its parts. Of those that start together what nobody mentions comes last."""
+    """The next of each behavior on any of its parts."""
+    rank = {id: number for number, id in enumerate(entering(chains, mentioned, times, rounds))}
     users: dict[str, list[str]] = {}
-    for id, chain in chains.items():
-        for part in chain.parts:
+    for id in rank:
+        for part in chains[id].parts:
             users.setdefault(part, []).append(id)
-    rank = {
-        id: (times[start := chain.points[0]], rounds[start], id not in mentioned, number)
-        for number, (id, chain) in enumerate(chains.items())
-    }
     found: dict[str, str] = {}
     for those in users.values():
-        those.sort(key=rank.__getitem__)
         for earlier, later in pairwise(those):
             if earlier not in found or rank[later] < rank[found[earlier]]:
                 found[earlier] = later

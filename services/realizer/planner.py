@@ -20,7 +20,7 @@ from schemas.units import Seconds
 from services.realizer.assembly import Assembler, Assembly, Member
 from services.realizer.chains import Chain, chain, natural_ends
 from services.realizer.classes import Classes
-from services.realizer.handover import Arrangement, Conflict, arrange
+from services.realizer.handover import Arrangement, Conflict, arrange, entering
 from services.realizer.net import Bound, PetriNet
 from services.realizer.points import ORIGIN, Point, one_instant
 from services.realizer.prediction import Impossible, predict
@@ -46,6 +46,7 @@ class Plan(Struct, frozen=True, kw_only=True):
 
     block: with a hand for each gesture that must use a certain one. critical: the transitions that make the block as
     long as it is, from first to last.
+    entering: behaviors in the order in which they take their parts: of two that begin at one instant, too.
     behaviors: those that will be performed, in document order. dropped: those that will not, with `problems`.
     natural: behaviors that end when something takes their place, or with the block.
     waited_for: behaviors that the end of the block waits for.
@@ -62,6 +63,7 @@ class Plan(Struct, frozen=True, kw_only=True):
     natural: frozenset[str]
     required: frozenset[str]
     waited_for: frozenset[str]
+    entering: tuple[str, ...]
     critical: tuple[int, ...] = ()
     dropped: tuple[str, ...] = ()
     problems: tuple[Problem, ...] = ()
@@ -165,6 +167,7 @@ class _Planner:
         waited_for = frozenset(self.chains) - self._unawaited_events(present)
         arrangement = Arrangement(natural=natural)
         assembler = Assembler(self.chains, present, classes, waited_for)
+        mentioned = {point.behavior for point in present.constrained}
         while True:
             assembler, assembly, solution = self._solved(assembler, arrangement, classes)
             times = {point: solution.times[transition] for point, transition in assembly.at.items()}
@@ -194,6 +197,7 @@ class _Planner:
             natural=natural,
             required=present.required,
             waited_for=waited_for,
+            entering=entering(self.chains, mentioned, times, rounds),
             critical=_critical(solution),
             dropped=tuple(self.dropped),
             problems=tuple(self.problems),
