@@ -96,7 +96,7 @@ class Attention:
                 actions += self._faces(self._actor(observation.actor), observation, at)
             case VoiceActivity():
                 actions += self._sounds(self._actor(observation.actor), observation, at)
-            case World() if at > self._world_at and all(is_place(one.position) for one in observation.entities):
+            case World() if at >= self._world_at and all(is_place(one.position) for one in observation.entities):
                 self._world_at = at
                 self._sight.see(observation, at)
                 for actor, changes in self._manipulation.feed(observation, at):

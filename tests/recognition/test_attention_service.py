@@ -34,6 +34,7 @@ class Body:
         self.looks = looks
         self.speaks = speaks
         self.hand: Callable[[float], Vector] = lambda at: LAP
+        self.hidden: Callable[[float], bool] = lambda at: False
         self.blue: Callable[[float], Vector] = lambda at: place_of("blue")
 
     async def watched(self, bus: Bus) -> None:
@@ -44,7 +45,8 @@ class Body:
             if world != shown:
                 bus.publish(keys.WORLD, world)
                 shown = world
-            bus.publish(keys.head_pose(HUMAN), pose(self.looks(now), now))
+            if not self.hidden(now):
+                bus.publish(keys.head_pose(HUMAN), pose(self.looks(now), now))
             await asyncio.sleep(1 / 30)
 
     async def heard(self, bus: Bus) -> None:
@@ -149,6 +151,26 @@ async def test_a_moved_piece_answers_an_adjacency_pair(hub: MemoryHub):
         outcome = await ask(bus, requests, "speak", "act")
 
     assert (outcome.state, outcome.response, outcome.delay) == ("succeeded", "act", pytest.approx(1.55, abs=0.06))
+
+
+@pytest.mark.parametrize("back", [1.95, 9.0])
+async def test_a_face_lost_for_half_a_second_ends_what_was_shared_and_not_before(hub: MemoryHub, back: float):
+    body = Body(looks=lambda at: ROBOT)
+    body.hidden = lambda at: 1.52 < at < back
+    watcher = hub.join("console")
+    with watcher.subscribe(keys.ANY_CONNECTION_EVENT) as inbox:
+        async with watching(hub, body) as (bus, _):
+            bus.publish(keys.ROBOT_ACTION, ActionBegan(actor=ROBOT, action="look", at=bus.stamp(), targets=(HUMAN,)))
+            await asyncio.sleep(3.0)
+        events = [queued.message for queued in list(inbox._queue)]
+    ended = [event for event in events if event.state == "completed"]  # type: ignore[union-attr]
+
+    if back < 2.0:
+        assert ended == []
+    else:
+        (event,) = ended
+        assert event.at.seconds == pytest.approx(2.0, abs=1e-3), "half a second after the last pose"  # type: ignore[union-attr]
+        assert event.duration == pytest.approx(1.0, abs=1 / 30), "until the last pose"  # type: ignore[union-attr]
 
 
 async def test_what_it_finds_is_told_to_all(hub: MemoryHub):
