@@ -96,7 +96,7 @@ class Habits(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     looks_up_every: Seconds = 12.0
     """Mean time between looks at the robot's face of their own accord, at a `propensity` of 1. Ours."""
     directs_every: Seconds = 45.0
-    """Mean time between looks or points at a piece of their own accord. Ours."""
+    """Mean time between looks or points at a piece of their own accord, while the robot is silent. Ours."""
     points: Probability = 0.4
     """Share of those that are points. Ours."""
     glance: Seconds = 1.2

@@ -70,6 +70,8 @@ class StochasticHuman(Human):
         self._looks = 0
         """How many looks there were: who finds another number has been overtaken."""
         self._robot_gaze = ""
+        self._robot_speech: set[str] = set()
+        """What it is saying now, by behavior."""
         self._shown: set[str] = set()
         """Pieces that they saw the robot look or point at during its present turn."""
         self._task: Lay | None = None
@@ -133,6 +135,10 @@ class StochasticHuman(Human):
                     self._is_directed(self._robot_gaze, self._habits.follows_look, now)
             case ActionEnded(actor=self._robot, action="look", targets=(self._robot_gaze,)):
                 self._robot_gaze = ""
+            case ActionBegan(actor=self._robot, action="speak", behavior=behavior):
+                self._robot_speech.add(behavior)
+            case ActionEnded(actor=self._robot, action="speak", behavior=behavior):
+                self._robot_speech.discard(behavior)
             case ActionBegan(actor=self._robot, action="point", targets=(target,)) if target in self._pieces:
                 self._is_directed(target, self._habits.follows_point, now)
             case WordSpoken() if self._happens(self._habits.backchannels) and not self._task:
@@ -215,10 +221,10 @@ class StochasticHuman(Human):
         self._later(now + self._chance.expovariate(2 / self._habits.looks_up_every), look_up)
 
     def _plan_direction(self, now: Seconds) -> None:
-        """Now and then look or point at some piece."""
+        """Now and then look or point at some piece, but not while the robot speaks."""
 
         def direct(now: Seconds) -> None:
-            if self._answers(1.0):
+            if not self._robot_speech and self._answers(1.0):
                 piece = self._chance.choice(sorted(self._pieces))
                 self._glance(piece, now)
                 if self._happens(self._habits.points):

@@ -276,6 +276,18 @@ def test_they_look_up_and_direct_at_their_rates():
     assert directed == pytest.approx(12_000 / 45, rel=0.2)
 
 
+def test_they_direct_nobody_who_speaks():
+    watch = Watch(**{**PERFECT, "directs_every": 5.0})
+    watch.scene.feed(ActionBegan(actor=ROBOT, action="speak", behavior="b:s", at=stamp(5.0)), 5.0)
+    watch.wait(100.0)
+    meanwhile = len(watch.began("point"))
+    watch.scene.feed(ActionEnded(actor=ROBOT, action="speak", behavior="b:s", at=stamp(105.0)), 105.0)
+    watch.wait(100.0)
+
+    assert meanwhile == 0
+    assert len(watch.began("point")) > 2
+
+
 def test_backchannels_come_while_the_robot_speaks():
     watch = Watch(**{**PERFECT, "backchannels": 0.1, "answers_turn": 0.0})
     for _ in range(100):
