@@ -144,6 +144,7 @@ class SimulationConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=
     head_turn: Seconds = 0.2
     """`raw`: how long the head takes to face something else."""
     faults: PerceptionFaults = PerceptionFaults()
+    """What cameras and microphones get wrong."""
     stochastic: Habits = Habits()
     """Of the person `stochastic`."""
     hand_speed: Meters = 0.45
