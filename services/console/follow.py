@@ -5,6 +5,7 @@ from collections.abc import AsyncIterator, Callable, Collection, Iterable
 from contextlib import asynccontextmanager
 
 from schemas import keys
+from schemas.attention import HeadOwner
 from schemas.messages import Message
 from schemas.recognition import ConnectionEvent, OpenEvents
 from schemas.units import Seconds, Stamp
@@ -80,5 +81,5 @@ async def following(
 
 def instant(bus: Bus, message: Message, arrived: Seconds) -> Seconds:
     """When what the message tells happened, in local loop time; its arrival if it does not say."""
-    at = getattr(message, "at", None)
+    at = message.since if isinstance(message, HeadOwner) else getattr(message, "at", None)
     return bus.local(at) if isinstance(at, Stamp) else arrived
