@@ -34,6 +34,7 @@ from services.control.actions import ActionMessage, Deeds
 from services.control.body import Arrived, Authority, BehaviorRefused, Body, BodyFailed, Progress, Reached, Spoke
 from services.control.config import ControlConfig
 from services.control.simulated import SimulatedBody
+from services.covered import CoveredObjects
 from services.requests import RequestDesk
 from services.runtime import Ready
 
@@ -94,6 +95,7 @@ class _Control:
         self._tasks = tasks
         self._deeds = Deeds(bus.robot, bus.clock)
         self._world = World(entities=())
+        self._objects = CoveredObjects(config.covered_for)
         self._live: dict[str, _Performance] = {}
         self._sent = 0
         self._loop = asyncio.get_running_loop()
@@ -120,8 +122,8 @@ class _Control:
     # -- requests -----------------------------------------------------------------------------------------------
 
     def see(self, world: World) -> None:
-        self._world = world
-        self._body.see(world)
+        self._world = self._objects.see(world, self._bus.now())
+        self._body.see(self._world)
         self.note_look()
         if self._body.state().moving:
             self._keep_publishing()

@@ -169,8 +169,10 @@ class Conductor:
 
     def _enforce_inhibitions(self, performance: Performance) -> None:
         for id in performance.forbid(self._leases.permits()):
-            how = "freeze" if self._leases.holds_head else "relax"
-            self._bus.publish(keys.BEHAVIOR, AbortBehavior(id=id, requester=self._bus.name, how=how))
+            abort = AbortBehavior(
+                id=id, requester=self._bus.name, how="freeze" if self._leases.holds_head else "relax"
+            )
+            self._bus.publish(keys.BEHAVIOR, abort)
 
     # -- fragments: those of a turn at once, turns one after the other --------------------------------------------
 
@@ -207,18 +209,22 @@ class Conductor:
                 if body is not None:
                     self._arbiter.gaze_perceived_within(body.gaze_half_angle)
                 before = reduce(Trail.then, (each.trail for each in company), NOTHING)
-                discourse = self._discourse
                 if not turn.backchannel:
-                    discourse = self._discourse = discourse.in_turn(turn.turn, turn.addressee)
-                made = plan(fragment, turn, self._world, body, motions, permits(), self._config, before, discourse)
-                self._discourse = discourse.naming(fragment.id, [mention.object for mention in made.mentions])
+                    self._discourse = self._discourse.in_turn(turn.turn, turn.addressee)
+                made = plan(
+                    fragment, turn, self._world, body, motions, permits(), self._config, before, self._discourse
+                )
                 performance.begin(made)
                 try:
-                    return await self._send_block(performance)
+                    pending = await self._send_block(performance)
                 except RequestRefused:
                     if not any(each.is_over for each in company):
                         raise
                     # It has named blocks that ended while it was on its way: once more, without them.
+                else:
+                    named = [mention.object for mention in made.mentions]
+                    self._discourse = self._discourse.naming(fragment.id, named)
+                    return pending
         except RequestRefused as error:
             performance.refuse(error.fault, self._bus.now())  # the realizer did
         except EngageError as error:

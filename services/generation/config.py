@@ -71,6 +71,9 @@ class GenerationConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=
     """After a block's end: how long its undecided connection events may delay the fragment's outcome. Ours."""
     world_patience: Seconds = 5.0
     """How long a fragment waits for a first report of the world. Ours."""
+    covered_for: Seconds = 10.0
+    """How long an object that the world no longer reports is taken to be covered, and spoken of and looked at where
+    it was. Ours."""
     body_patience: Seconds = 5.0
     """How long a reference waits for a body to say what motions cost. Ours."""
 
@@ -158,5 +161,5 @@ _POSITIVE = (
 _NOT_NEGATIVE = (
     "seconds_per_head_degree", "seconds_per_arm_degree", "seconds_per_word", "wait_weight", "expected_delay",
     "figure_lead", "this_within", "dwell", "hand_speed", "hand_onset", "hand_stillness", "face_lost",
-    "mtbce_events", "body_patience",
+    "mtbce_events", "body_patience", "covered_for",
 )  # fmt: skip

@@ -16,6 +16,7 @@ from schemas.requests import Cancel, Unreadable
 from schemas.units import Seconds
 from schemas.world import World
 from services.bus import Bus, Received
+from services.covered import CoveredObjects
 from services.generation.arbiter import Arbiter, Shift
 from services.generation.conductor import Conductor
 from services.generation.config import GenerationConfig
@@ -56,7 +57,7 @@ class _Generation:
         self._arbiter = Arbiter(bus.robot, config)
         self._leases = Leases(config)
         self._conductor = Conductor(bus, config, self._desk, self._requests, self._arbiter, self._leases, self._after)
-        self._world: World | None = None
+        self._objects = CoveredObjects(config.covered_for)
         self._early: dict[str, tuple[PerformFragment, Seconds]] = {}
         """Fragments that came before the first report of the world, and when they give up."""
         self._changed = asyncio.Event()
@@ -84,9 +85,9 @@ class _Generation:
                 self._cancel(cancel)
         match message:
             case World():
-                self._world = message
-                self._conductor.feed(message, now)
-                self._arbiter.feed(message, now)
+                world = self._objects.see(message, now)
+                self._conductor.feed(world, now)
+                self._arbiter.feed(world, now)
                 early, self._early = self._early, {}
                 for request, _ in early.values():
                     self._admit(request, now)
@@ -113,18 +114,20 @@ class _Generation:
         self._after(now)
 
     def _admit(self, request: PerformFragment, now: Seconds) -> None:
-        if self._world is None:
+        world = self._objects.at(now)
+        if world is None:
             self._early[request.id] = (request, now + self._config.world_patience)
             return
         try:
-            self._conductor.admit(request, self._world)
+            self._conductor.admit(request, world)
         except EngageError as error:
             self._refuse(request.id, error.fault)
             self._warn(request.fragment.id, "PARSING_FAILURE", str(error.fault))
 
     def _grant(self, request: Inhibit, now: Seconds) -> None:
+        world = self._objects.at(now)
         try:
-            if request.target and self._world is not None and self._world.entity(request.target) is None:
+            if request.target and world is not None and world.entity(request.target) is None:
                 raise InputRefused(Fault(reason=f"the world does not know {request.target!r}", where=request.id))
             self._leases.take(request, now)
         except EngageError as error:

@@ -27,10 +27,12 @@ from schemas.body import (
 )
 from schemas.faults import Fault, InputRefused
 from schemas.requests import Outcome
+from schemas.world import World
 from services.control.config import Displaced, Slow, Variability
 from services.memory_bus import MemoryHub
 from services.requests import RequestRefused
 from services.virtual_time import VirtualTimeLoop
+from tests.control.contract import WORLD
 from tests.control.directing import robot, tip
 from tests.control.motions import STEP
 
@@ -53,6 +55,20 @@ async def test_a_behavior_goes_from_request_to_outcome(hub: MemoryHub):
         assert at[phase.to] - at[phase.since] == pytest.approx(phase.natural)
     assert (outcome.status, outcome.block, outcome.behavior) == ("done", "block-1", "point-1")
     assert outcome.at.seconds == at["end"]
+
+
+async def test_a_covered_object_is_pointed_at_where_it_was_and_one_that_has_gone_is_not(hub: MemoryHub):
+    without = World(entities=tuple(one for one in WORLD.entities if one.id != POINT.target))
+    async with robot(hub, covered_for=10.0) as client:
+        client.bus.publish(keys.WORLD, without)
+        await asyncio.sleep(9.0)
+        outcome = await client.outcome(client.perform(POINT))
+        await asyncio.sleep(2.0)
+        client.bus.publish(keys.WORLD, without)
+        with pytest.raises(RequestRefused, match="near-right"):
+            await client.perform(Pointing(id="point-2", target="near-right")).outcome
+
+    assert outcome.status == "done"
 
 
 async def test_it_holds_until_its_authority_is_extended(hub: MemoryHub):

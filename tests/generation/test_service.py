@@ -8,6 +8,7 @@ from schemas.behaviors import Event, Gaze, Pointing, Reference, Speech, SpeechOp
 from schemas.blocks import SpokenText
 from schemas.faults import Fault
 from schemas.fragments import FragmentOutcome, TurnFragment
+from schemas.world import World
 from services.generation.config import GenerationConfig
 from services.memory_bus import MemoryHub
 from services.requests import GRACE, RequestRefused
@@ -350,3 +351,16 @@ async def test_a_dead_manager_ends_what_it_asked_for(hub: MemoryHub) -> None:
 
         assert partners.cancelled == [partners.request("a").id]
         assert [each.signal.signal for each in partners.signals] == ["aborted"]
+
+
+async def test_a_covered_piece_is_still_spoken_of_and_one_that_has_gone_is_not(hub: MemoryHub) -> None:
+    without = World(entities=tuple(entity for entity in TABLE.entities if entity.id != "middle"))
+    async with stage(hub, GenerationConfig(covered_for=10.0)) as partners:
+        partners.see(without)
+        await asyncio.sleep(9.0)
+        partners.send(refers("covered"))
+        await partners.fragment_block("covered")
+        await asyncio.sleep(2.0)
+
+        with pytest.raises(RequestRefused, match="does not know the object 'middle'"):
+            await partners.send(refers("gone")).outcome
