@@ -177,7 +177,7 @@ class _Document:
             elif local in EXTENSIONS and (namespace == EBML or (not namespace and self._is_strict)):
                 behaviors.append(self._behavior(element, local, EXTENSIONS[local], required))
                 if self._speaks_on(element) and (words := " ".join((element.tail or "").split())):
-                    behaviors.append(self._after_reference(element, words))
+                    behaviors.append(self._after_reference(element, words, required))
             elif self._is_strict or not element.get("id"):
                 advice = f"known: {', '.join(sorted(CORE_BEHAVIORS))}, constraint"
                 kind: WarningKind = "BEHAVIOR_TYPE_NOT_SUPPORTED"
@@ -191,9 +191,10 @@ class _Document:
         namespace, local = split(str(element.tag))
         return self._is_strict and local == "reference" and namespace in ("", EBML)
 
-    def _after_reference(self, element: etree._Element, words: str) -> of.Speech:
-        timing = (of.Timing("start", f"{element.get('id')}:end"),)
-        return of.Speech(id=f"{element.get('id')}-text", text=words, timing=timing, line=self._source.line(element))
+    def _after_reference(self, element: etree._Element, words: str, required: bool) -> of.Speech:
+        id, line = element.get("id"), self._source.line(element)
+        timing = (of.Timing("start", f"{id}:end"),)
+        return of.Speech(id=f"{id}-text", text=words, timing=timing, required=required, line=line)
 
     def _unknown(self, element: etree._Element, local: str, required: bool) -> of.Unknown:
         raw = {"id": self._id(element), "element": local, "line": self._source.line(element)}

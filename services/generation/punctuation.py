@@ -8,7 +8,10 @@ from msgspec.structs import replace
 
 from schemas.behaviors import FragmentBehavior, Mark, Reference, Speech
 
-_CLOSING = re.compile(r"\s*((?:['’]s\b)?[.,;:!?…)\]\"'”’»]*)(?=\s|$)\s*")
+_ALPHABETIC = r"""(?:['’](?:s|d|m|ll|re|ve)\b)?[.,;:!?…)\]"'”’»]*(?=\s|$)"""
+_IDEOGRAPHIC = "[、。，．；：！？…）］」』】》〉]+"
+"""Without a space behind it."""
+_CLOSING = re.compile(rf"\s*({_ALPHABETIC}|{_IDEOGRAPHIC})\s*")
 
 
 class Joined(Struct, frozen=True):
@@ -30,13 +33,14 @@ def joined(order: Sequence[FragmentBehavior], phrased: Collection[str]) -> Joine
     for behavior in order:
         if isinstance(behavior, Reference):
             before = behavior.id if behavior.id in phrased else ""
-        elif isinstance(behavior, Speech):
+        elif isinstance(behavior, Speech) and behavior.text.strip():
             match = _CLOSING.match(behavior.text)
             if before and match and match[1] and not behavior.markup:
-                result.closings[before] = match[1]
+                result.closings[before] = result.closings.get(before, "") + match[1]
                 result.rest[behavior.id] = _without(behavior, match.end())
                 if match.end() == len(behavior.text):
                     result.follows[behavior.id] = before
+                    continue
             before = ""
     return result
 

@@ -1,6 +1,7 @@
 """What "it" can mean: the one thing that was referred to, across fragments and turns, if it was said at all."""
 
 import asyncio
+from unittest.mock import patch
 
 from schemas.behaviors import Reference
 from schemas.faults import Fault
@@ -13,6 +14,7 @@ from services.generation.discourse import SILENCE, Discourse
 from services.memory_bus import MemoryHub
 from services.simulation.still import tangram_world
 from tests.generation.partners import Partners, stage
+from tests.generation.test_service_streams import says
 
 WORLD = tangram_world()
 
@@ -145,3 +147,24 @@ async def test_what_a_refused_fragment_was_to_name_is_not_named(hub: MemoryHub) 
             partners.end(partners.request(id))
 
         assert await its(partners, last)
+
+
+async def test_what_is_sent_again_is_not_its_own_topic(hub: MemoryHub) -> None:
+    async with stage(hub) as partners:
+        partners.send(says("a", "beginning"))
+        await partners.fragment_block("a")
+        refuse = partners.desk.refuse
+
+        def refuse_too_late(id: str, fault: Fault) -> None:
+            partners.end(partners.request("a"))
+            refuse(id, fault)
+            partners.refusal = None
+
+        partners.refusal = Fault(reason="'a:s:end' is not a point of a live block")
+        with patch.object(partners.desk, "refuse", refuse_too_late):
+            again = partners.send(refers("b", "end", "left"))
+            await partners.fragment_block("b")
+        partners.end(partners.request("b"))
+
+        assert partners.request("b").id == "ask-b.block-2"
+        assert not await its(partners, again)

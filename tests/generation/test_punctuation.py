@@ -63,17 +63,32 @@ def test_text_behind_a_reference_survives_both_forms() -> None:
     assert fragment.unread == ()
 
 
+def test_text_behind_a_required_reference_is_required() -> None:
+    required = XML.replace(REFERENCE.format("r1"), f"<required>{REFERENCE.format('r1')}").replace(
+        "rather", "rather</required>"
+    )
+    fragment = decode_xml(required)
+
+    assert [behavior.required for behavior in fragment.behaviors] == [False, True, True, False, False]
+
+
 @pytest.mark.parametrize(
     ("text", "said"),
     [
         (".", ["the cup."]), (" ?! ", ["the cup?!"]), ("'s handle", ["the cup's", "handle"]), (",", ["the cup,"]),
         (", and", ["the cup,", "and"]), ("… well", ["the cup…", "well"]), (".5 litres", ["the cup", ".5 litres"]),
         ("and", ["the cup", "and"]), ("(the red)", ["the cup", "(the red)"]), ("'small", ["the cup", "'small"]),
-        ("- or so", ["the cup", "- or so"]),
+        ("- or so", ["the cup", "- or so"]), ("'ll do", ["the cup'll", "do"]), ("'is' it", ["the cup", "'is' it"]),
+        ("。", ["the cup。"]), ("、それから", ["the cup、", "それから"]), ("」と", ["the cup」", "と"]),
     ],
 )  # fmt: skip
 def test_what_belongs_to_the_phrase(text: str, said: list[str]) -> None:
     assert texts(made(reference("r"), speech("s", text))) == said
+
+
+def test_several_speeches_of_punctuation_belong_to_the_phrase() -> None:
+    assert texts(made(reference("r"), speech("s", "?"), speech("t", "! Or"))) == ["the cup?!", "Or"]
+    assert texts(made(reference("r"), speech("s", " "), speech("t", "?"))) == ["the cup?", " "]
 
 
 def test_marks_move_with_their_words() -> None:
