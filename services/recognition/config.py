@@ -75,7 +75,8 @@ class RecognitionConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields
     accept: tuple[Action, ...] = ("speak", "nod", "shake", "point")
     """What answers a robot's adjacency pair whose request does not say."""
     turn_patience: Seconds = 12.0
-    """How long after the robot's last word its unfinished turn is believed in; longer than generation's 10 s."""
+    """How long after the robot's last word its unfinished turn is believed in; longer than generation's 10 s.
+    After the limit, an anchor that does not come is waited for as long."""
     backchannel_limit: Seconds = 0.8
     """Longest speech that is still a backchannel."""
     direct_by_look: Seconds = 0.6

@@ -1,5 +1,6 @@
 """When a time limit starts to run: sync points of blocks as realised, and the clock that waits for its anchors."""
 
+import math
 from collections.abc import Iterable
 
 from schemas.syncref import BLOCK_ITSELF, SyncRef, canonical_sync
@@ -54,10 +55,16 @@ class Blocks:
 
 
 class LimitClock:
-    """`limit` seconds from the latest of `start` and the anchors; not running while one of those is still to come."""
+    """`limit` seconds from the latest of `start` and the anchors.
 
-    def __init__(self, start: Seconds, limit: Seconds, anchors: Iterable[str] = ()) -> None:
+    patience: how much longer to wait for an anchor that does not come, though nobody says that the block has ended.
+    """
+
+    def __init__(
+        self, start: Seconds, limit: Seconds, anchors: Iterable[str] = (), patience: Seconds = math.inf
+    ) -> None:
         self.limit = limit
+        self._patience = patience
         self._from = start
         self._not_before = start
         self._waiting = dict(filter(None, map(anchor, anchors)))
@@ -67,8 +74,11 @@ class LimitClock:
         return tuple(self._waiting)
 
     @property
-    def deadline(self) -> Seconds | None:
-        return None if self._waiting else max(self._from + self.limit, self._not_before)
+    def deadline(self) -> Seconds:
+        """When the limit passes, or the patience, as long as there is somebody `waiting`."""
+        if self._waiting:
+            return self._from + self.limit + self._patience
+        return max(self._from + self.limit, self._not_before)
 
     def realised(self, name: str, at: Seconds) -> None:
         if name in self._waiting:

@@ -7,6 +7,7 @@ from schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost
 from schemas.attention import HeadOwner
 from schemas.faults import Fault
 from schemas.perception import HeadPose, VoiceActivity
+from schemas.presence import PeerGone
 from schemas.recognition import ConnectionEvent, EventOutcome, RequestEvent, SignalTurn, TurnOutcome, session_of
 from schemas.requests import Accepted, Cancel, Refused
 from schemas.units import Seconds, Stamp
@@ -108,7 +109,7 @@ class _Recognition:
         match observation:
             case HeadOwner(since=stamp) | World(at=stamp):
                 pass
-            case Cancel():
+            case Cancel() | PeerGone():
                 stamp = None
             case _:
                 stamp = observation.at

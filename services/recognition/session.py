@@ -15,6 +15,7 @@ from schemas.attention import HeadOwner
 from schemas.behaviors import Action, Event, TurnSignal
 from schemas.faults import Fault
 from schemas.feedback import BlockProgress, SyncPointProgress
+from schemas.presence import PeerGone
 from schemas.recognition import EventOutcome, RequestEvent, SignalTurn, TurnOutcome
 from schemas.requests import Accepted, Cancel, Refused
 from schemas.units import Seconds
@@ -30,7 +31,7 @@ from services.recognition.shared_gaze import SharedGaze
 
 Observation = (
     ActionBegan | ActionEnded | ActorFound | ActorLost | RequestEvent | SignalTurn | Cancel
-    | SyncPointProgress | BlockProgress | HeadOwner | World
+    | SyncPointProgress | BlockProgress | HeadOwner | World | PeerGone
 )  # fmt: skip
 TURNS_KEPT = 64
 """Ended turns that are remembered, for an adjacency pair that is announced after its turn's end."""
@@ -55,7 +56,8 @@ class Session:
         self._ledger = Ledger(clock, name)
         self._due: Due | None = None
         self._ended_turns: Latest[str, Seconds] = Latest(TURNS_KEPT)
-        self._robot_speech: set[str] = set()
+        self._robot_does: dict[tuple[str, Action], ActionBegan] = {}
+        """Its speech and gestures, by behavior."""
         self._live: dict[str, tuple[Person, Machine]] = {}
         """Undecided requests."""
         self._answering_blocks: Latest[str, Person] = Latest(BLOCKS_KEPT)
@@ -122,6 +124,9 @@ class Session:
                         machine.clock.realised(name, at)
             case BlockProgress(block=str() as block, progress="end"):
                 self._block_ended(block, at, aborted=observation.status in ("failed", "interrupted"))
+            case PeerGone(participant="control"):
+                self._robot_stops(at)
+                self.scene.gaze.end((), at)
             case HeadOwner(owner=owner):
                 self.scene.head_owner = owner
                 for person in self.persons.values():
@@ -150,25 +155,27 @@ class Session:
                 if self.scene.gaze.begin(began.targets, at):
                     self._robot_gaze_changed(at)
             case "speak":
-                self._robot_speech.add(began.behavior)
+                self._robot_does[began.behavior, "speak"] = began
                 if self.scene.robot_speaks_since is None:
                     self.scene.robot_speaks_since = at
                     self.scene.speaks(self.robot)
                     for person in self.persons.values():
                         person.robot_speaks(at)
             case "nod" | "shake" | "point":
+                self._robot_does[began.behavior, began.action] = began
                 for person in self.persons.values():
                     person.robot_gestures(began.action, at)
 
     def _robot_ends(self, ended: ActionEnded, at: Seconds) -> None:
         if not self._is_news(ended, at):
             return
+        self._robot_does.pop((ended.behavior, ended.action), None)
         match ended.action:
             case "look":
                 self.scene.gaze.end(ended.targets, at)
             case "speak":
-                self._robot_speech.discard(ended.behavior)
-                if self.scene.robot_speaks_since is not None and not self._robot_speech:
+                speaks = any(action == "speak" for _, action in self._robot_does)
+                if self.scene.robot_speaks_since is not None and not speaks:
                     self.scene.robot_speaks_since = None
                     self.scene.falls_silent(self.robot, at)
                     for person in self.persons.values():
@@ -176,6 +183,18 @@ class Session:
             case "nod" | "shake" | "point":
                 for person in self.persons.values():
                     person.robot_gesture_ends(ended.action, at)
+
+    def _robot_stops(self, at: Seconds, behaviors: str = "") -> None:
+        """Whatever ends have been lost: what the robot says and does with its hands and head is over.
+
+        behaviors: what their ids begin with.
+        """
+        for began in list(self._robot_does.values()):
+            if began.behavior.startswith(behaviors):
+                ended = ActionEnded(
+                    actor=self.robot, action=began.action, at=began.at, targets=began.targets, behavior=began.behavior
+                )
+                self._robot_ends(ended, at)
 
     def _person_begins(self, person: Person, began: ActionBegan, at: Seconds) -> None:
         if not self._is_news(began, at) or not person.presence.seen(at):
@@ -283,7 +302,7 @@ class Session:
 
     def _clock(self, event: UnderWay, wanted: Event, default: Seconds) -> LimitClock:
         event.limit = wanted.limit or default
-        clock = LimitClock(event.started, event.limit, wanted.anchors)
+        clock = LimitClock(event.started, event.limit, wanted.anchors, self._config.turn_patience)
         for name in clock.waiting:
             realised = self.blocks.point(event.block, name)
             if realised is not None:
@@ -353,6 +372,7 @@ class Session:
 
     def _block_ended(self, block: str, at: Seconds, *, aborted: bool) -> None:
         self.blocks.end(block, at)
+        self._robot_stops(at, f"{block}:")
         for person in self.persons.values():
             person.block_ended(block, at, aborted=aborted)
         answered = self._answering_blocks.pop(block, None)

@@ -40,7 +40,9 @@ class SharedGaze(Machine):
         return self.clock.deadline
 
     def expire(self, at: Seconds) -> None:
-        self.step("limit", at)
+        """Nobody came within the limit; or the robot has never shown what it meant."""
+        never_shown = self.clock is not None and self.clock.waiting
+        self.step("withdraw" if never_shown else "limit", at)
 
     def robot_begins(self, event: UnderWay, clock: LimitClock, *, robot_on: bool, look: Gaze | None) -> None:
         """The robot's request. look: the person's, if it is there already."""

@@ -82,7 +82,7 @@ def test_limit_runs_from_the_latest_anchor():
     log = Log()
     anchors = ("gaze-1:stroke", "point-1:stroke_start", "phrase-1:start")
     log.requests_event("directed_gaze", 1.0, BLUE, anchors=anchors)
-    assert log.session.deadline is None
+    assert log.session.deadline == 1.0 + 2.5 + 12.0
     log.passes("gaze-1:stroke", 1.4)
     log.passes("phrase-1:start", 2.0)
     log.passes("point-1:strokeStart", 1.9)
@@ -113,6 +113,16 @@ def test_the_end_of_the_block_ends_the_wait_for_anchors():
     log.until(9.0)
 
     assert log.told() == [("dg-1", "started", 1.0), ("dg-1", "failed", 9.0)]
+
+
+def test_what_the_robot_never_shows_is_withdrawn_though_its_block_never_ends():
+    log = Log()
+    log.requests_event("directed_gaze", 1.0, BLUE, anchors=("gaze-1:stroke", "phrase-1:start"))
+    log.passes("gaze-1:stroke", 1.5)
+    log.until(60.0)
+
+    assert log.told() == [("dg-1", "started", 1.0), ("dg-1", "withdrawn", 1.5 + 2.5 + 12.0)]
+    assert log.session.deadline is None
 
 
 def test_a_request_after_the_end_of_its_block_waits_for_no_anchor():
