@@ -29,8 +29,9 @@ class _Piece(Struct):
     """When it was last seen there."""
     hands_then: dict[str, Entity]
     pause: Vector
-    """Where it may be coming to rest, since `moved_at`."""
+    """Where it may be coming to rest, from `moved_at` until `paused_at` at least."""
     moved_at: Seconds
+    paused_at: Seconds
     holder: str = ""
     """The hand that moves it."""
     grip: Vector = (0.0, 0.0, 0.0)
@@ -117,7 +118,7 @@ class Manipulation:
         piece = self._pieces.get(id)
         if piece is None:
             place = entity.position
-            self._pieces[id] = piece = _Piece(place, at, self._hands, pause=place, moved_at=at)
+            self._pieces[id] = piece = _Piece(place, at, self._hands, pause=place, moved_at=at, paused_at=at)
         place = self._averaged(piece, entity.position, at)
         self._pause(piece, place, at)
         found = []
@@ -162,6 +163,7 @@ class Manipulation:
     def _pause(self, piece: _Piece, place: Vector, at: Seconds) -> None:
         if math.dist(place, piece.pause) > self._sensing.tremor:
             piece.pause, piece.moved_at = place, at
+        piece.paused_at = at
 
     def _grip(self, piece: _Piece, place: Vector) -> None:
         if piece.holder in self._hands:
@@ -171,7 +173,7 @@ class Manipulation:
     def _rest(self, piece: _Piece) -> None:
         """It lies where it is."""
         piece.holder, piece.place = "", piece.pause
-        piece.still_at, piece.hands_then = piece.moved_at, self._hands
+        piece.still_at, piece.hands_then = piece.paused_at, self._hands
 
     def _reappears(self, id: str, piece: _Piece, entity: Entity, at: Seconds) -> list[Acts]:
         if math.dist(entity.position, piece.place) < self._sensing.moved:

@@ -82,6 +82,17 @@ def test_trembling_vision_moves_nothing_though_hands_pass(seed):
     assert watch.told == []
 
 
+def test_a_piece_that_once_seemed_elsewhere_is_manipulated_only_from_when_it_leaves():
+    watch = Watch()
+    for at in frames(0.1, 8.0, 15.0):
+        palm, piece = carried(at - 3.0)
+        off = 0.0 if at < 1.0 else 0.011 if at < 1.2 else 0.002
+        watch.sees(at, hand(palm), blue=(piece[0] - off, piece[1], piece[2]))
+
+    assert [told[:2] for told in watch.told] == [("act", "blue"), ("act ends", "blue")]
+    assert 5.2 <= watch.told[0][2] <= 5.45
+
+
 @pytest.mark.parametrize("seed", range(5))
 def test_trembling_vision_sees_one_manipulation_as_one(seed):
     random, watch = Random(seed), Watch()
