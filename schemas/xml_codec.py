@@ -10,6 +10,7 @@ becomes `Unknown`; the realizer warns of both. A fragment is read strictly: it i
 stands behind a reference in it is speech: `<ebml:reference .../>, and then`.
 """
 
+from itertools import chain, count
 from typing import Any
 
 import msgspec
@@ -192,9 +193,12 @@ class _Document:
         return self._is_strict and local == "reference" and namespace in ("", EBML)
 
     def _after_reference(self, element: etree._Element, words: str, required: bool) -> of.Speech:
-        id, line = element.get("id"), self._source.line(element)
-        timing = (of.Timing("start", f"{id}:end"),)
-        return of.Speech(id=f"{id}-text", text=words, timing=timing, required=required, line=line)
+        reference, line = element.get("id"), self._source.line(element)
+        taken = {each.get("id") for each in self._source.root.iter()}
+        wishes = chain([f"{reference}-text"], (f"{reference}-text-{number}" for number in count(2)))
+        id = next(wish for wish in wishes if wish not in taken)
+        timing = (of.Timing("start", f"{reference}:end"),)
+        return of.Speech(id=id, text=words, timing=timing, required=required, line=line)
 
     def _unknown(self, element: etree._Element, local: str, required: bool) -> of.Unknown:
         raw = {"id": self._id(element), "element": local, "line": self._source.line(element)}

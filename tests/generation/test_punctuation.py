@@ -63,6 +63,12 @@ def test_text_behind_a_reference_survives_both_forms() -> None:
     assert fragment.unread == ()
 
 
+def test_text_behind_a_reference_takes_no_id_of_the_author() -> None:
+    fragment = decode_xml(XML.replace('"s"', '"r1-text"'))
+
+    assert [behavior.id for behavior in fragment.behaviors] == ["r1-text", "r1", "r1-text-2", "r2", "r2-text"]
+
+
 def test_text_behind_a_required_reference_is_required() -> None:
     required = XML.replace(REFERENCE.format("r1"), f"<required>{REFERENCE.format('r1')}").replace(
         "rather", "rather</required>"
