@@ -39,9 +39,14 @@ class Block(Struct, frozen=True, kw_only=True, tag="block", omit_defaults=True):
 
 
 class PerformBlock(Request, frozen=True, kw_only=True, tag="perform_block", omit_defaults=True):
-    """cmd: collaboration or generation -> realizer. Terminal state: `BlockOutcome`."""
+    """cmd: collaboration or generation -> realizer. Terminal state: `BlockOutcome`.
+
+    follows: ids of live blocks whose turn it goes on with. If one of them fails, is refused or is interrupted, this
+    one is interrupted in the same instant, and says so after it. Refused if one of them is not live.
+    """
 
     block: Block
+    follows: tuple[str, ...] = ()
 
 
 class InterruptBehavior(Request, frozen=True, kw_only=True, tag="interrupt_behavior", omit_defaults=True):

@@ -1,7 +1,7 @@
 """Fragments from their acceptance to their outcomes: what each sends, follows and waits for."""
 
 import asyncio
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Iterable
 from functools import reduce
 
 from schemas import keys
@@ -216,7 +216,7 @@ class Conductor:
                 )
                 performance.begin(made)
                 try:
-                    pending = await self._send_block(performance)
+                    pending = await self._send_block(performance, company)
                 except RequestRefused:
                     if not any(each.is_over for each in company):
                         raise
@@ -232,9 +232,15 @@ class Conductor:
         self._block_ended(performance)
         return None
 
-    async def _send_block(self, performance: Performance) -> Pending:
+    async def _send_block(self, performance: Performance, company: Iterable[Performance]) -> Pending:
+        """company: what must not go wrong, or it is not performed, either."""
         assert performance.plan is not None
-        request = PerformBlock(id=performance.block_id, requester=self._bus.name, block=performance.plan.block)
+        request = PerformBlock(
+            id=performance.block_id,
+            requester=self._bus.name,
+            block=performance.plan.block,
+            follows=tuple([each.fragment.id for each in company]),
+        )
         self._turns.fragment_begins(performance.turn.turn)
         pending = self._requests.send(keys.BLOCK, request)
         await pending.accepted

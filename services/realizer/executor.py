@@ -7,7 +7,7 @@ import asyncio
 from collections.abc import Iterable, Mapping
 
 from schemas.behaviors import BlockBehavior, Event, TurnSignal, Wait
-from schemas.blocks import Block, BlockOutcome, PerformBlock
+from schemas.blocks import Block, BlockOutcome
 from schemas.body import BehaviorOutcome, SyncPointArrived, SyncPointReached
 from schemas.faults import EngageError, Fault, InputRefused
 from schemas.feedback import WarningKind
@@ -22,26 +22,24 @@ from services.realizer.points import Point, performer, sync_points
 from services.realizer.recognition_link import RecognitionLink
 from services.realizer.reporting import Reporter
 from services.realizer.spoken import Spoken
-from services.realizer.surroundings import Ending, Surroundings
+from services.realizer.surroundings import Ending, Live, Surroundings
 from services.requests import Pending, RequestRefused
 
 
 class Performance:
     """A block being performed."""
 
-    def __init__(
-        self, request: PerformBlock, plan: Plan, around: Surroundings, elsewhere: Mapping[str, Block]
-    ) -> None:
+    def __init__(self, live: Live, plan: Plan, around: Surroundings, elsewhere: Mapping[str, Block]) -> None:
         """elsewhere: the blocks whose points the plan may name."""
         loop = asyncio.get_running_loop()
-        self.request = request
+        self._live = live
         self.plan = plan
         self._around = around
         self._bus = around.bus
         self._requests = around.requests
         self._config = around.config
         self._recognition = RecognitionLink(around.bus, around.requests, around.config, around.peers)
-        self._body = BodyLink(around.bus, around.requests, request.id, plan.block.id)
+        self._body = BodyLink(around.bus, around.requests, live.request.id, plan.block.id)
         self._loop = loop
         self._report = Reporter(around.bus, plan.block.id, around.config.skew)
         self._begun: dict[str, asyncio.Future[None]] = {id: loop.create_future() for id in plan.chains}
@@ -59,7 +57,7 @@ class Performance:
         self._performed: dict[str, BlockBehavior] = {}
         """As they were begun: a later plan may have chosen another hand."""
         self.spoken = Spoken(plan.block.behaviors)
-        self._ending: asyncio.Future[Ending] = loop.create_future()
+        self._ending = live.ending
         self._timer: asyncio.TimerHandle | None = None
         self._is_stale = False
 
@@ -95,7 +93,7 @@ class Performance:
         self._report.ended(ending.status, began)
         self._around.ledger.reach(self.plan.block.id, Point(BLOCK_ITSELF, "end"), self._bus.now())
         return BlockOutcome(
-            id=self.request.id,
+            id=self._live.request.id,
             block=self.plan.block.id,
             status=ending.status,
             spoken=self.spoken.texts,
@@ -104,11 +102,6 @@ class Performance:
             replaced_by=ending.replaced_by,
             fault=ending.fault,
         )
-
-    def stop(self, ending: Ending) -> None:
-        """End the block now. The first to end it decides how."""
-        if not self._ending.done():
-            self._ending.set_result(ending)
 
     def is_going_on(self, behavior: str) -> bool:
         """Is it of this block, and has it neither ended nor been dropped?"""
@@ -218,7 +211,7 @@ class Performance:
             self._timer.cancel()
             self._timer = None
         if self.authority.is_over:
-            self.stop(Ending("done"))
+            self._live.stop(Ending("done"))
         elif self.authority.deadline is not None and not self._ending.done():
             self._timer = self._loop.call_at(self.authority.deadline, self._advance)
 
@@ -263,7 +256,6 @@ class Performance:
         if id in self._dropped or self._ending.done():
             return
         self._dropped.append(id)
-        self._around.ledger.lose(self.plan.block.id, id)
         if id in self._unwanted:
             # Its parts go home by themselves: the body does not need to be told, nor to forget what it looked at.
             self._report.interrupted(id, self.spoken.of(id))
@@ -272,7 +264,7 @@ class Performance:
             if id in self.authority.begun and not at_rest:
                 self._go_home(self._parts(id), id)
             if id in self.plan.required:
-                self.stop(Ending("failed", Fault(reason=fault.reason, where=f"{self.plan.block.id}: {id}")))
+                self._live.stop(Ending("failed", Fault(reason=fault.reason, where=f"{self.plan.block.id}: {id}")))
         self._is_stale = True  # Planned anew once for all that is lost in one go.
         self._loop.call_soon(self._advance)
 
@@ -283,9 +275,11 @@ class Performance:
         try:
             plan = plan_block(self.plan.block, self.plan.estimates.values(), dropped=gone, elsewhere=self._elsewhere)
         except InputRefused as error:
-            self.stop(Ending("failed", error.fault))
+            self._live.stop(Ending("failed", error.fault))
             return
         self.authority.replan(plan)
+        for id in self._dropped:  # Only now that it goes on without: else those that follow it end with it.
+            self._around.ledger.lose(self.plan.block.id, id)
         for problem in plan.problems:
             # What is too late now that something else is gone.
             if problem.behavior in plan.dropped and problem.behavior not in gone:
@@ -323,7 +317,7 @@ class Performance:
             fault = Fault(reason=error.fault.reason, where=self.plan.block.id)
             if not self._ending.done():
                 self._report.warn("EXECUTION_FAILURE", str(fault))
-            self.stop(Ending("failed", fault))
+            self._live.stop(Ending("failed", fault))
             return
         if not isinstance(outcome, BehaviorOutcome):
             self._lose(behavior.id, Fault(reason=f"control ended it with a {type(outcome).__name__}"))

@@ -93,8 +93,10 @@ class Ledger:
                     follower.foresee(_abroad(block, point), at)
 
     def lose(self, block: str, behavior: str) -> None:
-        """A behavior of a live block is dropped."""
+        """A behavior of a live block is dropped. Said again, it is no news."""
         page = self._pages[block]
+        if behavior in page.lost:
+            return
         page.lost.add(behavior)
         for follower in list(page.followers):
             follower.miss((f"{block}:{behavior}",))

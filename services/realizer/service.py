@@ -30,33 +30,11 @@ from services.realizer.ledger import Ledger
 from services.realizer.planner import Plan, plan_block, poses_before, poses_left
 from services.realizer.points import Point, performer
 from services.realizer.relations import BlockRefused, extent, relations
-from services.realizer.surroundings import Ending, Presence, Surroundings
+from services.realizer.surroundings import Ending, Live, Presence, Surroundings
 from services.requests import RequestDesk, Requester
 from services.runtime import Ready
 
 Result = TypeVar("Result")
-
-
-class _Live:
-    """A block from its request to its outcome.
-
-    earlier: those that were there when it came. ended: resolved when its outcome is out. stopped: how it is to end.
-    """
-
-    def __init__(self, request: PerformBlock, earlier: list["_Live"]) -> None:
-        loop = asyncio.get_running_loop()
-        self.request = request
-        self.earlier = earlier
-        self.ended: asyncio.Future[None] = loop.create_future()
-        self.stopped: asyncio.Future[Ending] = loop.create_future()
-        self.performance: Performance | None = None
-
-    def stop(self, ending: Ending) -> None:
-        """The first who stops it says how it ends."""
-        if not self.stopped.done():
-            self.stopped.set_result(ending)
-        if self.performance is not None:
-            self.performance.stop(ending)
 
 
 class _Realizer:
@@ -65,7 +43,7 @@ class _Realizer:
         self.config = config
         self.requests = Requester(bus)
         self.desk = RequestDesk(bus, "realizer", self.cancel)
-        self.live: dict[str, _Live] = {}
+        self.live: dict[str, Live] = {}
         self.routes: dict[str, Performance] = {}
         self.peers = Presence()
         self.ledger = Ledger()
@@ -101,12 +79,12 @@ class _Realizer:
             if performance.plan.block.id == word.block:
                 performance.spoken.hear(word.behavior, word.position)
 
-    def admit(self, request: PerformBlock) -> _Live:
-        live = _Live(request, list(self.live.values()))
+    def admit(self, request: PerformBlock) -> Live:
+        live = Live(request, tuple(self.live.values()))
         self.live[request.id] = live
         return live
 
-    async def perform(self, live: _Live) -> None:
+    async def perform(self, live: Live) -> None:
         """A block from request to outcome."""
         block = live.request.block
         elsewhere = self.ledger.blocks
@@ -114,22 +92,26 @@ class _Realizer:
             fault = Fault(reason="a block of this id is still being performed", where=block.id)
             self._refuse(live, BlockRefused(fault))
             return
+        if absent := set(live.request.follows) - {each.request.block.id for each in live.leaders}:
+            fault = Fault(reason=f"it follows {', '.join(sorted(absent))}: no such live block", where=block.id)
+            self._refuse(live, BlockRefused(fault))
+            return
         with self.ledger.opened(block):
             try:
-                plan = await _unless(live.stopped, self._plan(block, elsewhere))
+                plan = await _unless(live.ending, self._plan(block, elsewhere))
             except EngageError as error:
                 self._refuse(live, error)
                 return
             if plan is not None:
                 self.desk.accept(live.request.id)
-                plan = await _unless(live.stopped, self._await_turn(live, plan, elsewhere))
+                plan = await _unless(live.ending, self._await_turn(live, plan, elsewhere))
             if plan is None:
-                self._end(live, _never_begun(live.request, live.stopped.result()))
+                await self._end(live, live.never_begun())
                 return
             named = {point.behavior.partition(":")[0] for point in plan.foreign}
             tied_to = {id: elsewhere[id] for id in named}
-            live.performance = Performance(live.request, plan, self.around, tied_to)
-            self._end(live, await live.performance.run())
+            live.performance = Performance(live, plan, self.around, tied_to)
+            await self._end(live, await live.performance.run())
 
     async def _plan(self, block: Block, elsewhere: Mapping[str, Block]) -> Plan:
         """The body is asked again from where it will be by then, and about the hands that the plan has chosen."""
@@ -187,7 +169,7 @@ class _Realizer:
             raise BlockRefused(fault, "CANNOT_CREATE_BEHAVIOR")
         return answer.items
 
-    async def _await_turn(self, live: _Live, plan: Plan, elsewhere: Mapping[str, Block]) -> Plan:
+    async def _await_turn(self, live: Live, plan: Plan, elsewhere: Mapping[str, Block]) -> Plan:
         """What composition asks of the blocks that are already there; the plan, anew if that took its time."""
         earlier, live.earlier = live.earlier, []
         replaces, block = live.request.block.composition == "REPLACE", live.request.block.id
@@ -214,7 +196,7 @@ class _Realizer:
             live.stop(Ending("failed", error.fault))
             return plan
 
-    def _send_home(self, live: _Live, replaced: list[Performance]) -> None:
+    def _send_home(self, live: Live, replaced: list[Performance]) -> None:
         parts = {part for other in replaced for part in other.parts_used}
         parts = parts.difference(*(other.parts_moving for other in self.performing() if other not in replaced))
         if parts:
@@ -223,7 +205,7 @@ class _Realizer:
             self.homing.add(way)
             way.add_done_callback(self.homing.discard)
 
-    def _warn(self, live: _Live, error: EngageError) -> None:
+    def _warn(self, live: Live, error: EngageError) -> None:
         kind = error.kind if isinstance(error, BlockRefused) else "PARSING_FAILURE"
         block = live.request.block
         warning = WarningFeedback(
@@ -231,28 +213,22 @@ class _Realizer:
         )
         self.bus.publish(keys.FEEDBACK, warning)
 
-    def _refuse(self, live: _Live, error: EngageError) -> None:
+    def _refuse(self, live: Live, error: EngageError) -> None:
         self._warn(live, error)
+        live.stop(Ending("failed", error.fault))
         self.desk.refuse(live.request.id, error.fault)
         self._forget(live)
 
-    def _end(self, live: _Live, outcome: BlockOutcome) -> None:
+    async def _end(self, live: Live, outcome: BlockOutcome) -> None:
+        """Who ended with what he follows says so after that has: its outcome is the cause."""
+        if live.ended_by is not None:
+            await asyncio.wait([live.ended_by.ended])
         self.desk.end(outcome)
         self._forget(live)
 
-    def _forget(self, live: _Live) -> None:
+    def _forget(self, live: Live) -> None:
         del self.live[live.request.id]
         live.ended.set_result(None)
-
-
-def _never_begun(request: PerformBlock, ending: Ending) -> BlockOutcome:
-    return BlockOutcome(
-        id=request.id,
-        block=request.block.id,
-        status=ending.status,
-        replaced_by=ending.replaced_by,
-        fault=ending.fault,
-    )
 
 
 async def _unless(stopped: asyncio.Future[Ending], work: Coroutine[Any, Any, Result]) -> Result | None:

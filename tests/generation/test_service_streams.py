@@ -68,6 +68,17 @@ async def test_the_next_fragment_of_a_turn_is_sent_at_once_and_follows_the_words
         assert asyncio.get_running_loop().time() == 0.0
 
 
+async def test_a_fragment_is_not_to_be_performed_without_those_of_its_turn_that_go_on(hub: MemoryHub) -> None:
+    async with stage(hub) as partners:
+        for id, status in (("a", "beginning"), ("b", "middle"), ("c", "end")):
+            partners.send(says(id, status))
+            await partners.fragment_block(id)
+            if id == "a":
+                partners.reach("a", "s", "end")
+
+        assert [partners.request(id).follows for id in "abc"] == [(), ("a",), ("a", "b")]
+
+
 async def test_words_that_have_been_said_are_not_waited_for(hub: MemoryHub) -> None:
     async with stage(hub) as partners:
         partners.send(says("a", "beginning"))

@@ -314,6 +314,26 @@ async def test_a_fault_in_one_fragment_ends_all_of_the_turn_in_the_same_moment(s
     assert [each.signal.signal for each in stage.signals] == ["aborted"]
 
 
+async def test_required_words_that_are_broken_off_are_the_last_of_their_turn(stage: Robot) -> None:
+    must = Speech(id="s", text="one two three four", required=True)
+    stage.send(TurnFragment(id="a", turn_status="beginning", behaviors=(must,)))
+    stage.send(shows("b", "middle"))
+    stage.send(says("c", "end"))
+    await asyncio.sleep(0.4)
+    stage.bus.publish(keys.BEHAVIOR, AbortBehavior(id="ask-a.block/s", requester="test"))
+    await asyncio.sleep(10.0)
+
+    assert [(id, outcome.status) for id, (_, outcome) in stage.outcomes.items()] == [
+        ("a", "failed"), ("b", "interrupted"), ("c", "interrupted"),
+    ]  # fmt: skip
+    assert [str(stage.outcomes[id][1].fault) for id in "bc"] == [
+        f"{id}: a, which it follows, failed: the body aborted it" for id in "bc"
+    ]
+    assert [(closed.status, closed.reason) for _, closed in stage.closed] == [("aborted", "a failed")]
+    assert [id for id, _, _ in stage.words()] == ["a:s"]
+    assert not [point for point in stage.reached if point.startswith(("b:", "c:")) and point.count(":") > 1]
+
+
 async def test_words_that_fail_are_followed_by_the_next_ones(stage: Robot) -> None:
     stage.send(says("a", "beginning", "one two three four"))
     stage.send(says("b", "end"))

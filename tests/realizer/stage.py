@@ -90,8 +90,9 @@ class Stage(Struct):
     feedback: list[object] = field(default_factory=list)
     news: asyncio.Event = field(default_factory=asyncio.Event)
 
-    def ask(self, block: Block) -> Pending:
-        return self.requests.send(keys.BLOCK, PerformBlock(id=f"r-{block.id}", requester="test", block=block))
+    def ask(self, block: Block, *follows: str) -> Pending:
+        request = PerformBlock(id=f"r-{block.id}", requester="test", block=block, follows=follows)
+        return self.requests.send(keys.BLOCK, request)
 
     async def perform(self, block: Block) -> BlockOutcome:
         outcome = await self.ask(block).outcome
