@@ -44,8 +44,8 @@ class Discourse(Struct, frozen=True):
 
     def hearing(self, event: ConnectionEvent, robot: str) -> "Discourse":
         """A person who directs to something else makes that the topic: "it" is not what the robot named before."""
-        is_theirs = event.kind == "directed_gaze" and event.initiator != robot
-        if not is_theirs or not event.objects or set(event.objects) == {self.topic}:
+        directs = event.kind == "directed_gaze" and event.state == "started" and event.initiator != robot
+        if not directs or not event.objects or set(event.objects) == {self.topic}:
             return self
         return replace(self, named=(), before=())
 

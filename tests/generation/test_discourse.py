@@ -3,6 +3,8 @@
 import asyncio
 from unittest.mock import patch
 
+from msgspec.structs import replace
+
 from schemas.behaviors import Reference
 from schemas.faults import Fault
 from schemas.fragments import FragmentOutcome, TurnFragment
@@ -94,6 +96,7 @@ def test_a_person_who_directs_to_something_else_changes_the_topic() -> None:
     assert named.hearing(directs(B), "robot") == Discourse("t", "ann")
     assert named.hearing(directs(A), "robot") == named
     assert named.hearing(directs(B, initiator="robot"), "robot") == named
+    assert named.hearing(replace(directs(B), state="succeeded"), "robot") == named  # it began before
 
 
 # -- in the service ------------------------------------------------------------------------------------------------
