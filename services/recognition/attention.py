@@ -20,6 +20,7 @@ from schemas.world import World
 from services.recognition.config import RecognitionConfig
 from services.recognition.looking import ROUNDING, Change, Looking
 from services.recognition.manipulation import Manipulation
+from services.recognition.scene import Covered
 from services.recognition.sight import Sight, is_direction, is_place
 from services.recognition.voice import Voice
 
@@ -87,6 +88,12 @@ class Attention:
     def undecided(self) -> list[Seconds]:
         """Since when gazes and voices do something that may be a look, or speech, or the end of one."""
         return [since for actor in self._actors.values() for since in actor.undecided]
+
+    @property
+    def covered(self) -> Covered:
+        """Which pieces are under hands of people of whom nobody says when they move some."""
+        of = self._manipulation.covering
+        return Covered(frozenset(one for one in of if "act" not in self._actor(one.actor).told))
 
     def feed(self, observation: Raw, at: Seconds) -> list[Symbolic]:
         """What has begun and ended, in order. at: when the observation was made."""

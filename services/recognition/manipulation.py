@@ -15,6 +15,7 @@ from schemas.units import Probability, Seconds, Vector
 from schemas.world import Entity, World
 from services.recognition.config import RecognitionConfig
 from services.recognition.looking import ROUNDING, Change
+from services.recognition.scene import Covering
 
 ALONG = 0.5
 """Share of the piece's way that a hand must have gone meanwhile, to have moved it."""
@@ -72,6 +73,17 @@ class Manipulation:
 
     def acts(self, actor: str) -> bool:
         return actor in self._acts
+
+    @property
+    def covering(self) -> frozenset[Covering]:
+        """Whose hands may have taken what they hide, as long as that is believed in."""
+        return frozenset(
+            Covering(self._hands[hand].owner, id, until < self._before)
+            for id, piece in self._pieces.items()
+            if piece.hidden and not piece.holder
+            for hand, until in piece.touched.items()
+            if hand in self._hands and self._before - until < self._sensing.memory
+        )
 
     @property
     def deadline(self) -> Seconds | None:

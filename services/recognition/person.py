@@ -138,6 +138,11 @@ class Person:
             for past in self._robot_directed
         ):
             self.gaze.spent = True
+        self.hands_changed()
+
+    def hands_changed(self) -> None:
+        """What the person's hands hide may be on the move: a look that goes with it directs nothing."""
+        self.gaze.spent = self.gaze.spent or self._scene.goes_with_hand(self.id, self.gaze.targets)
 
     def head_owner_changed(self, at: Seconds) -> None:
         """What the robot can no longer answer, because its fragment looks elsewhere, is preempted."""

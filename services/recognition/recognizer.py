@@ -16,6 +16,7 @@ from schemas.world import World
 from services.recognition.attention import Attention, Symbolic
 from services.recognition.config import RecognitionConfig
 from services.recognition.machine import Effect
+from services.recognition.scene import Covered
 from services.recognition.session import Observation, Session
 
 Perceived = Observation | HeadPose | VoiceActivity | RobotState
@@ -31,8 +32,9 @@ class Recognizer:
         self._robot = robot
         self._config = config
         self._attention = Attention(robot, config, clock)
-        self._waiting: list[tuple[Seconds, int, Observation]] = []
+        self._waiting: list[tuple[Seconds, int, Observation | Covered]] = []
         self._numbers = count()
+        self._covered = Covered(frozenset())
         self._now: Seconds = -math.inf
 
     @property
@@ -60,6 +62,9 @@ class Recognizer:
             case World():
                 derived = self._attention.feed(observation, at)
                 self._wait(observation, at)
+                if (covered := self._attention.covered) != self._covered:
+                    self._covered = covered
+                    self._wait(covered, at)
             case ActionBegan(confidence=confidence) if confidence < self._config.least_confidence:
                 pass
             case ActionBegan() | ActionEnded() | ActorFound() | ActorLost():
@@ -88,7 +93,7 @@ class Recognizer:
             results += self.session.feed(observation, at)
         return results
 
-    def _wait(self, observation: Observation, at: Seconds) -> None:
+    def _wait(self, observation: Observation | Covered, at: Seconds) -> None:
         heapq.heappush(self._waiting, (at, next(self._numbers), observation))
 
     @property

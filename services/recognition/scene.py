@@ -1,5 +1,7 @@
 """What recognition knows besides the events: where everybody looks, who speaks, what is on the table."""
 
+from typing import NamedTuple
+
 from msgspec import Struct
 
 from schemas.attention import Claim
@@ -9,6 +11,20 @@ from services.recognition.config import GazeResolution
 
 SAME_INSTANT: Seconds = 0.001
 """A look that ends and begins again at the same target within this has not been interrupted."""
+
+
+class Covering(NamedTuple):
+    """A person's hand hides a piece, and may be moving it. left: it has gone on, maybe with the piece."""
+
+    actor: str
+    piece: str
+    left: bool
+
+
+class Covered(Struct, frozen=True):
+    """All pieces under hands: an observation, from raw perception alone."""
+
+    by: frozenset[Covering]
 
 
 class Gaze(Struct):
@@ -59,6 +75,7 @@ class Scene:
         self.robot_speaks_since: Seconds | None = None
         self.head_owner = Claim(kind="none", priority=0)
         self.people_in_world: frozenset[str] = frozenset()
+        self.covered = Covered(frozenset())
         self._objects: set[str] = set()
         self._surfaces: set[str] = {"table"}
         self._others: set[str] = set()
@@ -103,6 +120,10 @@ class Scene:
             return False
         on_table = any(target in self._surfaces or self.is_object(target) for target in gaze.targets)
         return on_table and any(map(self.is_object, objects))
+
+    def goes_with_hand(self, actor: str, targets: tuple[str, ...]) -> bool:
+        """Does a look at these accompany the person's own hand, that may be moving what it hides?"""
+        return any(one.actor == actor and (one.left or one.piece in targets) for one in self.covered.by)
 
     def robot_looks_at(self, entities: tuple[str, ...]) -> bool:
         return any(target in entities for target in self.gaze.targets)

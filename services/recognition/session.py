@@ -26,7 +26,7 @@ from services.recognition.limits import BLOCKS_KEPT, Blocks, LimitClock
 from services.recognition.machine import Effect, Ledger, Machine, UnderWay
 from services.recognition.person import Due, Person
 from services.recognition.presence import NEVER
-from services.recognition.scene import Scene
+from services.recognition.scene import Covered, Scene
 from services.recognition.shared_gaze import SharedGaze
 
 Observation = (
@@ -95,7 +95,7 @@ class Session:
 
     # -- observations -------------------------------------------------------------------------------------------
 
-    def feed(self, observation: Observation, at: Seconds) -> list[Effect]:
+    def feed(self, observation: Observation | Covered, at: Seconds) -> list[Effect]:
         """Take what happened at `at`. Slightly late or repeated observations are put right or ignored."""
         self._advance_before(at)
         match observation:
@@ -135,6 +135,10 @@ class Session:
                 self.scene.see(observation)
                 for person_id in sorted(self.scene.people_in_world):
                     self._person(person_id)
+            case Covered():
+                self.scene.covered = observation
+                for person in self.persons.values():
+                    person.hands_changed()
         self._due = self._first_due()
         return self._take()
 
