@@ -19,14 +19,14 @@ from services.bus import Bus
 from services.generation.arbiter import Arbiter
 from services.generation.body_link import BodyLink
 from services.generation.config import GenerationConfig
-from services.generation.discourse import SILENCE
+from services.generation.discourse import SILENCE, Discourse
 from services.generation.fragment_check import checked
 from services.generation.leases import Leases
 from services.generation.performance import GazesOfFragments, Performance
 from services.generation.planning import glance, plan, targets
 from services.generation.trail import NOTHING, Trail
 from services.generation.turn_events import TurnEvents, TurnOutcomes
-from services.generation.turn_policy import Aborted, TurnPolicy
+from services.generation.turn_policy import Aborted, TurnPlan, TurnPolicy
 from services.requests import Pending, RequestDesk, Requester, RequestRefused
 
 
@@ -209,11 +209,8 @@ class Conductor:
                 if body is not None:
                     self._arbiter.gaze_perceived_within(body.gaze_half_angle)
                 before = reduce(Trail.then, (each.trail for each in company), NOTHING)
-                if not turn.backchannel:
-                    self._discourse = self._discourse.in_turn(turn.turn, turn.addressee)
-                made = plan(
-                    fragment, turn, self._world, body, motions, permits(), self._config, before, self._discourse
-                )
+                heard = self._heard_in(turn)
+                made = plan(fragment, turn, self._world, body, motions, permits(), self._config, before, heard)
                 performance.begin(made)
                 try:
                     pending = await self._send_block(performance, company)
@@ -223,7 +220,7 @@ class Conductor:
                     # It has named blocks that ended while it was on its way: once more, without them.
                 else:
                     named = [mention.object for mention in made.mentions]
-                    self._discourse = self._discourse.naming(fragment.id, named)
+                    self._discourse = self._heard_in(turn).naming(fragment.id, named)
                     return pending
         except RequestRefused as error:
             performance.refuse(error.fault, self._bus.now())  # the realizer did
@@ -231,6 +228,10 @@ class Conductor:
             performance.fail(error, self._bus.now())
         self._block_ended(performance)
         return None
+
+    def _heard_in(self, turn: TurnPlan) -> Discourse:
+        """What was referred to before, as `turn` finds it. A backchannel is said in the other's."""
+        return self._discourse if turn.backchannel else self._discourse.in_turn(turn.turn, turn.addressee)
 
     async def _send_block(self, performance: Performance, company: Iterable[Performance]) -> Pending:
         """company: what must not go wrong, or it is not performed, either."""

@@ -171,3 +171,20 @@ async def test_what_is_sent_again_is_not_its_own_topic(hub: MemoryHub) -> None:
 
         assert partners.request("b").id == "ask-b.block-2"
         assert not await its(partners, again)
+
+
+async def test_a_refused_turn_leaves_the_one_before_it_the_last(hub: MemoryHub) -> None:
+    async with stage(hub) as partners:
+        partners.send(refers("a", "full", "left"))
+        await partners.fragment_block("a")
+        partners.reach("a", "r0-phrase", "end")
+        partners.end(partners.request("a"))
+        partners.refusal = Fault(reason="impossible")
+        partners.send(refers("b", "full", "right"))
+        await asyncio.sleep(0.1)
+        partners.refusal = None
+        last = partners.send(refers("c", "full", "left"))
+        await partners.fragment_block("c")
+        partners.end(partners.request("c"))
+
+        assert await its(partners, last)
