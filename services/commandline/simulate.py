@@ -99,9 +99,7 @@ def _plotting() -> Draw:
     try:
         from services.study.plots import draw
     except ImportError as error:
-        if not (error.name or "").startswith("matplotlib"):
-            raise
-        fault = Fault(reason="plots need matplotlib", advice="pip install 'engage-hri[study]'")
+        fault = Fault(reason=f"plots need matplotlib: {error}", advice="pip install 'engage-hri[study]'")
         raise InputRefused(fault) from error
     return draw
 
@@ -206,7 +204,7 @@ def shown(table: Table) -> RenderableType:
     """For a terminal."""
     drawn = RichTable(title=table.title, title_justify="left", box=box.HORIZONTALS, show_edge=False, padding=0)
     for index, column in enumerate(table.columns):
-        drawn.add_column(column, justify="right" if index else "left")
+        drawn.add_column(column, justify="right" if index else "left", overflow="fold")
     for row in table.rows:
         drawn.add_row(*map(escape, row))
     return Group(drawn, *(Text(note, style="dim") for note in table.notes))

@@ -104,6 +104,9 @@ def _each_session(groups: Groups, label: str, measure: Callable[[SessionRecord],
         step = 0.36 / max(1, len(sample) - 1)
         places = [index - 0.18 + number * step for number in range(len(sample))] if len(sample) > 1 else [index]
         axes.plot(places[: len(sample)], sample, "o", markersize=3, color="0.25", alpha=0.6, linestyle="none")
+    if not any(samples):
+        axes.text(0.5, 0.5, "no session has any", ha="center", transform=axes.transAxes)
+        axes.set_yticks([])
     axes.set_ylabel(label)
     axes.set_xlabel("box: quartiles and median; a point for each session", fontsize=8)
     axes.set_ylim(bottom=0)
@@ -155,7 +158,8 @@ def _boxes(axes: Axes, groups: Groups, samples: Sequence[Sequence[float]], whisk
                 boxprops={"facecolor": COLORS[index % len(COLORS)], "alpha": 0.7},
             )  # fmt: skip
     names = [
-        f"{name.replace('-', chr(10))}\n(n = {len(sample)})" for name, sample in zip(groups, samples, strict=True)
+        f"{name.replace('degraded-', 'degraded' + chr(10))}\n(n = {len(sample)})"
+        for name, sample in zip(groups, samples, strict=True)
     ]
     axes.set_xticks(range(len(groups)), names, fontsize=8)
     axes.set_xlim(-0.6, len(groups) - 0.4)

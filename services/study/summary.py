@@ -76,7 +76,7 @@ def known(values: Iterable[float | None]) -> list[float]:
 
 
 def overview(records: Sequence[SessionRecord]) -> Table:
-    """One column for each condition."""
+    """One column for each condition; what is known of none of them is left out."""
     groups = by_condition(records)
     ordered = Counter(record.condition for record in records)
     rows = [("finished", *(f"{len(group)} of {ordered[name]}" for name, group in groups.items()))]
@@ -91,14 +91,19 @@ def overview(records: Sequence[SessionRecord]) -> Table:
             rows.append(("- failure rate", *(number(one.failure_rate, 3) for one in all_of)))
             delays = ((one.delay_min, one.delay_mean, one.delay_max) for one in all_of)
             rows.append(("- delay (s)", *map(numbers, delays)))
+    known_rows = tuple(row for row in rows if set(row[1:]) != {MISSING})
+    face = any(row[0].startswith("face") for row in known_rows)
     return Table(
-        title="Sessions", columns=("", *(name.replace("-", " ") for name in groups)), rows=tuple(rows),
+        title="Sessions", columns=("", *groups), rows=known_rows,
         notes=(
-            "Finished sessions; mean ± standard deviation of a session. Face: how much of that third of the session "
-            "the person is seen to look at the robot's face. Failure rates, and delays of what succeeded (least, "
-            "mean, most), are of all events together; optional events that fail are no failures.",
+            "Finished sessions; mean ± standard deviation of a session. Failure rates, and delays of what succeeded "
+            "(least, mean, most), are of all events together; optional events that fail are no failures.",
+            *((_FACE,) if face else ()),
         ),
     )  # fmt: skip
+
+
+_FACE = "Face: how much of that third of the session the person is seen to look at the robot's face."
 
 
 _MEASURES: tuple[tuple[str, int, Callable[[SessionRecord], float | None]], ...] = (
@@ -119,14 +124,14 @@ def hypotheses(found: Sequence[Finding]) -> Table:
         (
             finding.hypothesis, finding.condition.removeprefix("degraded-"), str(finding.n),
             number(finding.operational), number(finding.degraded), number(finding.difference),
-            f"{number(finding.low)} .. {number(finding.high)}", number(finding.effect, 1),
+            _interval(finding.low, finding.high), number(finding.effect, 1),
             number(finding.p_corrected, 4), finding.verdict,
         )
         for finding in found
     )  # fmt: skip
     return Table(
-        title="Hypotheses of the thesis (5.2.2)",
-        columns=("", "degraded", "n", "oper.", "degr.", "diff.", "95 %", "d", "p", "in simulation"),
+        title="Hypotheses of the thesis (5.2.2), in simulation",
+        columns=("", "degraded", "n", "oper.", "degr.", "diff.", "95 %", "d", "p", "verdict"),
         rows=tuple(rows),
         notes=(
             *(f"{one.name}: {one.claim} ({one.measure}, {one.unit})." for one in HYPOTHESES),
@@ -136,6 +141,10 @@ def hypotheses(found: Sequence[Finding]) -> Table:
             CAVEAT,
         ),
     )
+
+
+def _interval(low: float | None, high: float | None) -> str:
+    return MISSING if low is None or high is None else f"{number(low)}..{number(high)}"
 
 
 def unfinished(records: Sequence[SessionRecord]) -> Table:
