@@ -25,6 +25,9 @@ class Faults(Struct, frozen=True, kw_only=True):
     delay: Seconds = 0.0
 
 
+NONE = Faults()
+
+
 class _Past(NamedTuple):
     """A message that late subscribers still get. number: of all that were sent, so states keep their place."""
 
@@ -37,7 +40,7 @@ class MemoryHub(Hub):
 
     def __init__(self, robot: str = "robot", *, faults: Faults | None = None, seed: int = 0) -> None:
         self.robot = robot
-        self.faults = faults or Faults()
+        self.faults = faults or NONE
         self._chance = random.Random(seed)
         self._loop = asyncio.get_running_loop()
         self._buses: dict[str, MemoryBus] = {}
@@ -107,11 +110,12 @@ class MemoryHub(Hub):
             self._carry(past, sender, bus)
 
     def _carry(self, past: _Past, sender: str, bus: "MemoryBus") -> None:
-        if bus.name == sender or self.faults == Faults():
-            if not self._is_cut(sender, bus.name):
-                bus.deliver(past.received, past.number)
+        if self._is_cut(sender, bus.name):
             return
-        if self._is_cut(sender, bus.name) or self._chance.random() < self.faults.loss:
+        if bus.name == sender or self.faults == NONE:
+            bus.deliver(past.received, past.number)
+            return
+        if self._chance.random() < self.faults.loss:
             return
         copies = 2 if self._chance.random() < self.faults.duplicate else 1
         for _ in range(copies):

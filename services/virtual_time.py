@@ -38,15 +38,15 @@ class _InstantSelector(selectors.SelectSelector):
 class _Timer(asyncio.TimerHandle):
     """Of timers due together the one set first fires first; asyncio's heap leaves it to chance."""
 
-    __slots__ = ("_number",)
+    __slots__ = ("_place",)
 
     def __init__(self, number: int, when: float, *rest: Any) -> None:
         super().__init__(when, *rest)
-        self._number = number
+        self._place = (when, number)
 
     def __lt__(self, other: object) -> bool:
         assert isinstance(other, _Timer)
-        return (self.when(), self._number) < (other.when(), other._number)
+        return self._place < other._place
 
 
 class VirtualTimeLoop(asyncio.SelectorEventLoop):
