@@ -29,8 +29,6 @@ def events(count: int, delay: float | None) -> list[EventRecord]:
 @pytest.mark.parametrize(
     ("records", "seen"),
     [
-        pytest.param([], [], id="no session"),
-        pytest.param([session("operational", 0)], [], id="no event"),
         pytest.param([session("operational", 0, reason="died")], events(1, 1.0), id="none finished"),
         pytest.param([session("operational", 0, mtbce=5.0, completion=9.0)], events(1, None), id="one session"),
         pytest.param(
