@@ -55,6 +55,8 @@ class Sensing(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
         for name in ("gaze_margin", "dwell", "voice_onset", "voice_pause", "smoothing", "settling"):
             if not getattr(self, name) >= 0:
                 raise ValueError(f"sensing.{name} must not be negative, but is {getattr(self, name)}")
+        if not self.gaze_half_angle + self.gaze_margin < 90:
+            raise ValueError("sensing.gaze_half_angle and gaze_margin must be less than 90 degrees together")
         if not 0 <= self.tremor < self.moved:
             raise ValueError("sensing.tremor must be less than sensing.moved, and not negative")
 

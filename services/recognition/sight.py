@@ -5,12 +5,8 @@ What is covered stays where it was last seen, with a confidence that decays (the
 """
 
 import math
-from collections.abc import Iterator
+from functools import cached_property, lru_cache
 from typing import NamedTuple
-
-import numpy as np
-from msgspec import Struct
-from numpy.typing import NDArray
 
 from schemas.units import Meters, Probability, Radians, Seconds, Vector
 from schemas.world import Entity, World
@@ -24,6 +20,7 @@ FARTHEST: Meters = 1e6
 """No place is farther off; nor is it one that is no number."""
 SAME_ANGLE: Radians = 1e-6
 """Closer angles are the same; then the nearer thing is in front."""
+ROUNDING: Meters = 1e-9
 
 
 class Seen(NamedTuple):
@@ -33,16 +30,27 @@ class Seen(NamedTuple):
     confidence: Probability
 
 
-class _Thing(Struct):
+class _Thing:
     """radius: of a sphere, 0 for what has an outline. bound: of a sphere around all of it."""
 
-    entity: Entity
-    outline: tuple[Vector, ...]
-    """The corners of its footprint where it is."""
-    radius: Meters
-    bound: Meters
-    hidden_since: Seconds | None = None
-    """When it was covered; None while it is in view."""
+    def __init__(self, entity: Entity, face_radius: Meters) -> None:
+        self.entity = entity
+        self.radius = 0.0 if entity.footprint else entity.radius or (face_radius if entity.kind == "person" else 0.0)
+        self.bound = _extent(entity.footprint) if entity.footprint else self.radius
+        self.hidden_since: Seconds | None = None
+        """When it was covered; None while it is in view."""
+
+    @cached_property
+    def outline(self) -> tuple[Vector, ...]:
+        """The corners of its footprint where it is. Made when a gaze comes near: most things are never looked at."""
+        x, y, z = self.entity.position
+        cos, sin = math.cos(self.entity.yaw), math.sin(self.entity.yaw)
+        return tuple((x + cos * u - sin * v, y + sin * u + cos * v, z) for u, v in self.entity.footprint)
+
+
+@lru_cache(maxsize=256)
+def _extent(footprint: tuple[tuple[float, float], ...]) -> Meters:
+    return max(math.hypot(x, y) for x, y in footprint)
 
 
 class _Candidate(NamedTuple):
@@ -112,10 +120,8 @@ class Sight:
         self._margin = math.radians(config.sensing.gaze_margin)
         self._known: dict[str, _Thing] = {}
         self._surfaces: list[_Thing] = []
-        self._others: list[_Thing] = []
-        self._rows: dict[str, int] = {}
-        self._spheres: NDArray[np.float64] | None = None
-        """Around each of the `others`: center and radius, (n, 4); None: to be made anew."""
+        self._spheres: dict[str, tuple[float, float, float, Meters, _Thing]] | None = None
+        """Around each thing that is no surface: center and radius; None: to be made anew."""
         self.see_face(robot, config.sensing.robot_face)
 
     def see(self, world: World, at: Seconds) -> None:
@@ -137,19 +143,13 @@ class Sight:
         thing = self._thing(Entity(id=actor, kind="person", position=position))
         thing.hidden_since = at
         self._known[actor] = thing
-        if self._spheres is not None and actor in self._rows:
-            row = self._rows[actor]
-            self._others[row], self._spheres[row] = thing, (*position, thing.bound)
+        if self._spheres is not None and actor in self._spheres:
+            self._spheres[actor] = (*position, thing.bound, thing)
         else:
             self._spheres = None
 
     def _thing(self, entity: Entity) -> _Thing:
-        x, y, z = entity.position
-        cos, sin = math.cos(entity.yaw), math.sin(entity.yaw)
-        outline = tuple((x + cos * u - sin * v, y + sin * u + cos * v, z) for u, v in entity.footprint)
-        face = self._sensing.face_radius if entity.kind == "person" else 0.0
-        radius = 0.0 if outline else entity.radius or face
-        return _Thing(entity, outline, radius, max((math.hypot(u, v) for u, v in entity.footprint), default=radius))
+        return _Thing(entity, self._sensing.face_radius)
 
     def target(
         self, looker: str, gaze: tuple[Vector, Vector], *, present: Targets | None, at: Seconds, sure: Probability
@@ -162,7 +162,7 @@ class Sight:
         ray = _Gaze(*gaze)
         found: list[_Candidate] = []
         nearest = self._half_angle
-        for thing, least in self._around(ray):
+        for least, _, thing in self._around(ray):
             if least > nearest + self._margin:
                 break
             confidence = sure * self._confidence(thing, at)
@@ -184,22 +184,26 @@ class Sight:
                 return Seen((surface.entity.id,), confidence)
         return Seen(AWAY, sure)
 
-    def _around(self, gaze: _Gaze) -> Iterator[tuple[_Thing, Radians]]:
-        """All that may be in the cone, and at least how far from the gaze: the nearest first."""
+    def _around(self, gaze: _Gaze) -> list[tuple[Radians, int, _Thing]]:
+        """All that may be in the cone, each with the least that its angle may be: the nearest first."""
         if self._spheres is None:
             self._surfaces = [thing for thing in self._known.values() if thing.entity.kind == "surface"]
-            self._others = [thing for thing in self._known.values() if thing.entity.kind != "surface"]
-            self._rows = {thing.entity.id: row for row, thing in enumerate(self._others)}
-            self._spheres = np.array([(*thing.entity.position, thing.bound) for thing in self._others])
-        reach, bounds = self._spheres[:, :3] - gaze.eye, self._spheres[:, 3]
-        along = reach @ np.array(gaze.axis)
-        squares = np.einsum("ij,ij->i", reach, reach)
-        across = np.sqrt(np.maximum(0.0, squares - along * along))
-        width = np.arcsin(np.minimum(1.0, bounds / np.maximum(np.sqrt(squares), 1e-9)))
-        least = np.arctan2(across, along) - width
-        (near,) = np.nonzero(least <= self._half_angle + self._margin)
-        for index in near[np.argsort(least[near])]:
-            yield self._others[index], float(least[index])
+            others = [thing for thing in self._known.values() if thing.entity.kind != "surface"]
+            self._spheres = {thing.entity.id: (*thing.entity.position, thing.bound, thing) for thing in others}
+        (eye_x, eye_y, eye_z), (right, up, ahead) = gaze.eye, gaze.axis
+        half = self._half_angle + self._margin
+        cos_square, sin, near = math.cos(half) ** 2, math.sin(half), []
+        for number, (x, y, z, bound, thing) in enumerate(self._spheres.values()):
+            x, y, z = x - eye_x, y - eye_y, z - eye_z
+            along, square = x * right + y * up + z * ahead, x * x + y * y + z * z
+            reach = bound + along * sin + ROUNDING
+            if reach < 0.0 or (square - along * along) * cos_square > reach * reach:
+                continue  # its center is farther than the bound from the cone
+            across = math.sqrt(abs(square - along * along))
+            width = math.asin(min(1.0, bound / max(math.sqrt(square), ROUNDING)))
+            if (least := math.atan2(across, along) - width) <= half:
+                near.append((least, number, thing))
+        return sorted(near)
 
     def _confidence(self, thing: _Thing, at: Seconds) -> Probability:
         age = 0.0 if thing.hidden_since is None else max(0.0, at - thing.hidden_since)
@@ -223,7 +227,7 @@ def _dot(a: Vector, b: Vector) -> float:
 def _is_inside(corners: list[tuple[float, float]]) -> bool:
     """Is (0, 0) inside the polygon?"""
     inside = False
-    for (x, y), (u, v) in zip(corners, [*corners[1:], *corners[:1]], strict=True):
+    for (x, y), (u, v) in zip(corners, corners[1:] + corners[:1], strict=True):
         if (y > 0.0) != (v > 0.0) and x - y * (u - x) / (v - y) > 0.0:
             inside = not inside
     return inside
@@ -234,7 +238,7 @@ def _to_polygon(corners: list[tuple[float, float]]) -> Radians:
     if _is_inside(corners):
         return 0.0
     nearest = math.inf
-    for (x, y), (u, v) in zip(corners, [*corners[1:], *corners[:1]], strict=True):
+    for (x, y), (u, v) in zip(corners, corners[1:] + corners[:1], strict=True):
         dx, dy = u - x, v - y
         square = dx * dx + dy * dy
         s = 0.0 if square == 0.0 else max(0.0, min(1.0, -(x * dx + y * dy) / square))
