@@ -1,5 +1,6 @@
 """How the simulated human and table behave."""
 
+import math
 from typing import Literal
 
 from msgspec import Struct
@@ -41,12 +42,12 @@ class PerceptionFaults(Struct, frozen=True, kw_only=True, forbid_unknown_fields=
 
     def __post_init__(self) -> None:
         for name in ("gaze", "lost_faces", "occlusion", "position", "yaw"):
-            if not getattr(self, name) >= 0:
-                raise ValueError(f"simulation.faults.{name} must not be negative, not {getattr(self, name)}")
+            if not 0 <= getattr(self, name) < math.inf:
+                raise ValueError(f"simulation.faults.{name} must be 0 or more, and finite, not {getattr(self, name)}")
         for name in ("wrong_look", "missed_look", "dropped_frames", "dropped_speech"):
             if not 0 <= getattr(self, name) <= 1:
                 raise ValueError(f"simulation.faults.{name} must be in 0..1, not {getattr(self, name)}")
-        if not 0 <= self.lost_for[0] <= self.lost_for[1]:
+        if not 0 <= self.lost_for[0] <= self.lost_for[1] < math.inf:
             raise ValueError(f"simulation.faults.lost_for must be shortest and longest, not {self.lost_for}")
 
     @property
@@ -111,11 +112,11 @@ class Habits(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
         for name in self.__struct_fields__:
             value = getattr(self, name)
             if isinstance(value, tuple):
-                if not 0 <= value[0] < value[1] < value[2]:
+                if not 0 <= value[0] < value[1] < value[2] < math.inf:
                     raise ValueError(f"simulation.stochastic.{name}: 0 <= least < mean < longest, not {value}")
             elif name in ("looks_up_every", "directs_every", "glance"):
-                if not value > 0:
-                    raise ValueError(f"simulation.stochastic.{name} must be positive, not {value}")
+                if not 0 < value < math.inf:
+                    raise ValueError(f"simulation.stochastic.{name} must be positive and finite, not {value}")
             elif not 0 <= value <= 1:
                 raise ValueError(f"simulation.stochastic.{name} must be in 0..1, not {value}")
 
@@ -154,8 +155,8 @@ class SimulationConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=
 
     def __post_init__(self) -> None:
         for name in ("frame", "hand_speed", "shortest_movement"):
-            if getattr(self, name) <= 0:
-                raise ValueError(f"simulation.{name} must be positive, not {getattr(self, name)}")
+            if not 0 < getattr(self, name) < math.inf:
+                raise ValueError(f"simulation.{name} must be positive and finite, not {getattr(self, name)}")
         for name in ("entrance", "jitter", "head_turn"):
-            if getattr(self, name) < 0:
-                raise ValueError(f"simulation.{name} must not be negative, not {getattr(self, name)}")
+            if not 0 <= getattr(self, name) < math.inf:
+                raise ValueError(f"simulation.{name} must be 0 or more, and finite, not {getattr(self, name)}")

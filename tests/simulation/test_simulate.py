@@ -1,5 +1,6 @@
 """The simulation on the bus: the world, the person's coming, and what moves."""
 
+import math
 from collections import Counter
 from functools import partial
 
@@ -115,7 +116,7 @@ async def test_who_does_not_come_is_never_found(hub: MemoryHub) -> None:
         assert await perceived(hub.join("test"), until=60.0) == []
 
 
-@pytest.mark.parametrize("wrong", [{"frame": 0.0}, {"hand_speed": -1.0}, {"entrance": -0.1}, {"jitter": -0.1}])
+@pytest.mark.parametrize("wrong", [{"frame": 0.0}, {"hand_speed": math.inf}, {"entrance": -0.1}, {"jitter": -0.1}])
 def test_a_wrong_number_in_the_configuration_is_refused_by_name(wrong: dict[str, float]) -> None:
     with pytest.raises(ValueError, match=next(iter(wrong))):
         SimulationConfig(**wrong)  # type: ignore[arg-type]

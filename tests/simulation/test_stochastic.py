@@ -1,5 +1,6 @@
 """The person who looks, answers and errs by chance: how often, how fast, and what changes it."""
 
+import math
 import random
 from statistics import mean
 from typing import Any
@@ -359,8 +360,12 @@ def test_whatever_they_begin_they_end_one_at_a_time(seed: int):
 
 
 @pytest.mark.parametrize(
-    ("name", "value"), [("hears", 1.5), ("glance", 0.0), ("study", (4.0, 3.0, 9.0)), ("reciprocity", -0.1)]
-)
+    ("name", "value"),
+    [
+        ("hears", 1.5), ("glance", 0.0), ("looks_up_every", math.inf), ("reciprocity", -0.1),
+        ("study", (4.0, 3.0, 9.0)), ("study", (4.0, 9.0, math.inf)),
+    ],
+)  # fmt: skip
 def test_impossible_habits_are_refused(name: str, value: Any):
     with pytest.raises(ValueError, match=f"simulation.stochastic.{name}"):
         Habits(**{name: value})
