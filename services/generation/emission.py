@@ -246,10 +246,13 @@ class _Emitter:
         )
 
     def _keep_in_line(self, speech: Speech, preceding: str) -> None:
-        """Speeches without timing follow one another by document order, but only while nothing names them; we do."""
-        if preceding and preceding != self.before.speech and speech.id not in self.named_behaviors:
+        """Speeches whose start nobody times follow one another by document order. The realizer has them do so only
+        while nothing names them, but we do, and so does an author who ties something to a word."""
+        if preceding and preceding != self.before.speech and (speech.id, "start") not in self.named:
             start = f"{speech.id}:start"
-            operator: Operator = same(f"{preceding}:end", start) if self.figure else after(f"{preceding}:end", start)
+            is_free = speech.id not in self.named_behaviors
+            relate = same if self.figure and is_free else after
+            operator: Operator = relate(f"{preceding}:end", start)
             id = self.names.fresh(f"{speech.id}-timing")
             self.constraints.append(Constraint(id=id, operators=(operator,), line=speech.line))
 
