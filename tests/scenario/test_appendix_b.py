@@ -68,9 +68,14 @@ EXPECTED["object"] = EXPECTED["table"] | {
 }
 
 
-@cache
 def played(human: str = "scripted", resolution: str = "table", seed: int = 0, **manager: Any) -> Record:
-    return run_virtual(play(human, resolution, seed, **manager))
+    return _played(human, resolution, seed, **manager)
+
+
+@cache
+def _played(*person: Any, **manager: Any) -> Record:
+    """Once each, whether the defaults are spelled out or not."""
+    return run_virtual(play(*person, **manager))
 
 
 def step_of(block: str) -> str:
@@ -276,7 +281,7 @@ def test_every_action_of_the_person_that_began_has_ended() -> None:
 
 def test_the_same_seed_gives_the_same_run_and_another_seed_the_same_events() -> None:
     again = run_virtual(play())
-    other = played(seed=7)
+    other = played(seed=3)
 
     assert [event.at for event in again.robot_initiated()] == [event.at for event in played().robot_initiated()]
     assert by_step(other) == EXPECTED["table"]
