@@ -48,10 +48,16 @@ def read_source(path: Path) -> Source:
 
 
 def read_world(path: Path | None) -> World:
-    """The entities of a JSON file; the tangram table without one. Raises InputRefused with the JSON path."""
+    """The entities of a JSON file; the tangram table without one. Raises InputRefused with the JSON path.
+
+    If there is nobody in the file, the person of the tangram table is, so that there is somebody to speak to.
+    """
     from services.simulation.still import load_world, tangram_world
 
-    return tangram_world() if path is None else load_world(path)
+    if path is None:
+        return tangram_world()
+    world = load_world(path)
+    return world if world.people else World(entities=(*world.entities, *tangram_world().people))
 
 
 def still(world: World) -> Service:

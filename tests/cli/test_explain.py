@@ -144,6 +144,19 @@ def test_the_world_decides_what_may_be_meant(engage: Engage, tmp_path: Path, two
     assert pointed["distractors"] == ["rectangle", "red-square"]  # all in one place
 
 
+def test_a_world_of_things_alone_is_enough(engage: Engage, tmp_path: Path, two: Path) -> None:
+    things = [
+        {"id": id, "kind": "object", "position": [0.5, y, 0.72]}
+        for id, y in (("rectangle", 0.2), ("blue-square", 0.0), ("red-square", -0.2))
+    ]
+    world = tmp_path / "world.json"
+    world.write_text(json.dumps({"entities": things}))
+
+    pairs = rows(engage, two, "--world", world)
+
+    assert [pair["reference"] for pair in pairs if pair["chosen"]] == ["first", "second"]
+
+
 def test_all_fragments_of_a_file_are_explained_and_blocks_passed_over(engage: Engage, tmp_path: Path) -> None:
     block = {"type": "block", "id": "b", "behaviors": []}
     path = written(tmp_path, [fragment("f1", "beginning"), block, fragment("f2", "end"), fragment("f3", "full")])
