@@ -202,9 +202,14 @@ def _study(options: Options, orders: Sequence[Order], played: int) -> Study:
 
 def shown(table: Table) -> RenderableType:
     """For a terminal."""
-    drawn = RichTable(title=table.title, title_justify="left", box=box.HORIZONTALS, show_edge=False, padding=0)
+    return Group(drawn(table), *(Text(note, style="dim") for note in table.notes))
+
+
+def drawn(table: Table) -> RichTable:
+    """Without the notes."""
+    grid = RichTable(title=table.title, title_justify="left", box=box.HORIZONTALS, show_edge=False, padding=0)
     for index, column in enumerate(table.columns):
-        drawn.add_column(column, justify="right" if index else "left", overflow="fold")
+        grid.add_column(column, justify="right" if index else "left", overflow="fold")
     for row in table.rows:
-        drawn.add_row(*map(escape, row))
-    return Group(drawn, *(Text(note, style="dim") for note in table.notes))
+        grid.add_row(*map(escape, row))
+    return grid

@@ -146,4 +146,4 @@ def _verdict(hypothesis: Hypothesis, test: Paired, p: Probability | None) -> str
         return "too few sessions"
     if p >= LEVEL:
         return "not shown"
-    return "supported" if test.mean * hypothesis.sign > 0 else "the opposite"
+    return "supported" if test.mean * hypothesis.sign > 0 else "opposite"

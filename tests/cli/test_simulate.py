@@ -8,12 +8,15 @@ import sys
 from pathlib import Path
 
 import pytest
+from rich.console import Console
 
 from services.commandline import session as playing
 from services.commandline import simulate, workers
 from services.commandline.session import Order, Played, play
 from services.commandline.workers import play_all
 from services.config import Config
+from services.study import summary
+from services.study.hypotheses import Finding
 from services.study.records import SessionRecord
 from services.virtual_time import Deadlock
 from tests.cli.command import Engage, start, threads
@@ -211,6 +214,23 @@ def test_the_users_settings_are_stronger_than_a_conditions_but_not_than_its_name
     assert [order.config.generation.condition for order in worse] == ["degraded-recognition"] * 2
     assert [order.config.simulation.seed for order in orders] == [40, 41] * 3
     assert {order.config.collaboration.mode for order in orders} == {"task"}
+
+
+def test_tables_of_many_sessions_fit_a_narrow_terminal() -> None:
+    """Three conditions of 200 sessions, in 80 columns."""
+    found = Finding(
+        hypothesis="11a", claim="", measure="", unit="s", condition="degraded-recognition", n=200, operational=189.66,
+        degraded=195.47, difference=-26.46, low=-126.46, high=118.13, effect=-0.5, p=1.0, p_corrected=1.0,
+        verdict="opposite",
+    )  # fmt: skip
+    records = [
+        SessionRecord(session=number, condition=condition, seed=0, finished=True, completion_time=150.0 + number)
+        for condition in simulate.CONDITIONS
+        for number in range(200)
+    ]
+
+    for table in (summary.hypotheses([found]), summary.overview(records)):
+        assert Console(width=200).measure(simulate.drawn(table)).maximum <= 80
 
 
 # -- what goes wrong --------------------------------------------------------------------------------------------

@@ -49,7 +49,7 @@ def test_the_verdict_needs_direction_and_significance():
     assert found["6"].p == pytest.approx(2 / 1024)
     assert found["6"].p_corrected == pytest.approx(5 * 2 / 1024)  # five questions
     assert {name: finding.verdict for name, finding in found.items()} == {
-        "6": "supported", "7": "supported", "8": "the opposite", "11a": "supported", "11b": "supported",
+        "6": "supported", "7": "supported", "8": "opposite", "11a": "supported", "11b": "supported",
     }  # fmt: skip
 
 

@@ -40,6 +40,18 @@ def test_the_overview_counts_finished_sessions_only():
     assert rows["backchannel"] == ("5.0 ± 1.4", "-")
 
 
+def test_what_nobody_measured_is_left_out():
+    records = [session("human-human", 0, kind("backchannel", 4))]
+
+    table = summary.overview(records)
+
+    assert table.columns == ("", "human-human")
+    assert {row[0] for row in table.rows} == {
+        "finished", "connection events", "directed gaze", "mutual facial gaze", "adjacency pair", "backchannel",
+    }  # fmt: skip
+    assert not any("Face" in note for note in table.notes)
+
+
 def test_a_table_in_markdown():
     table = summary.Table(title="T", columns=("", "a"), rows=(("x", "1"), ("y", "2")), notes=("Why.",))
 
@@ -57,7 +69,7 @@ def test_the_table_of_hypotheses_explains_its_letters():
     text = summary.hypotheses(findings(records)).markdown()
 
     for expected in (
-        "| 6 | recognition | 1 | 7.00 | 7.00 | 0.00 |",
+        "| 6 | recognition | 1 | 7.00 | 7.00 | 0.00 | - | - | 1.0000 | too few sessions |",
         "11a: people make",
         "Holm",
         "The person is a model",
