@@ -7,7 +7,7 @@ from schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost
 from schemas.attention import HeadOwner
 from schemas.faults import Fault
 from schemas.perception import HeadPose, VoiceActivity
-from schemas.presence import PeerGone
+from schemas.presence import PeerAlive, PeerGone
 from schemas.recognition import ConnectionEvent, EventOutcome, RequestEvent, SignalTurn, TurnOutcome, session_of
 from schemas.requests import Accepted, Cancel, Refused
 from schemas.units import Seconds, Stamp
@@ -17,6 +17,7 @@ from services.recognition.config import RecognitionConfig
 from services.recognition.open_events import OpenBook
 from services.recognition.recognizer import Perceived, Recognizer, Result
 from services.recognition.standings import Standings
+from services.recognition.witnesses import Witnesses
 from services.requests import RequestDesk
 from services.runtime import Ready
 
@@ -50,6 +51,7 @@ class _Recognition:
         self.desk = RequestDesk(bus, "recognition", self._cancel)
         self._bus = bus
         self._nameless: set[str] = set()
+        self._witnesses = Witnesses()
         session = session_of(bus.run)
         self._recognizer = Recognizer(bus.robot, config, clock=bus.clock, name=f"{session}-")
         self._open = OpenBook(bus.robot, session)
@@ -68,8 +70,13 @@ class _Recognition:
         observation = request or received.message
         if isinstance(observation, RequestEvent | SignalTurn | Cancel) and request is None:
             return
-        if isinstance(observation, Perceived) and self._is_credible(received):
+        if not self._is_credible(received):
+            return
+        if isinstance(observation, Perceived):
             self._feed(observation, self._when(observation, received.at))
+        if received.key == keys.PERCEIVED_ACTION or isinstance(received.message, PeerGone | PeerAlive):
+            for change in self._witnesses.feed(received.message, received.source, self._bus.stamp()):
+                self._feed(change, self._bus.now())
 
     def _cancel(self, cancel: Cancel) -> None:
         self._feed(cancel, self._bus.now())

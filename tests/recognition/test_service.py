@@ -163,6 +163,25 @@ async def test_the_death_of_the_requester_withdraws_its_events(hub: MemoryHub):
     assert ended.at == 2.0
 
 
+async def test_the_death_of_perception_closes_what_is_open_with_the_people_it_reports(hub: MemoryHub):
+    cameras, others, control = hub.join("cameras"), hub.join("others"), hub.join("control")
+    cameras.declare_alive()
+    async with running(hub, recognition()):
+        cameras.publish(keys.WORLD, world(HUMAN, "ann"))
+        control.publish(
+            keys.ROBOT_ACTION, ActionBegan(actor=ROBOT, action="look", at=control.stamp(), targets=(HUMAN,))
+        )
+        with control.subscribe(keys.ANY_CONNECTION_EVENT) as inbox:
+            others.publish(keys.PERCEIVED_ACTION, ActionBegan(actor="ann", action="speak", at=others.stamp()))
+            perceive(cameras, ROBOT)
+            hub._loop.call_at(1.0, hub.kill, "cameras")
+            while (received := await inbox.next()) and received.at < 1.0:
+                continue
+
+    assert received is not None
+    assert (received.message.id, received.message.state, received.at) == ("4-mfg-1", "completed", 1.5)  # type: ignore[union-attr]
+
+
 async def test_a_block_that_ends_stops_the_wait_for_its_anchors(hub: MemoryHub):
     bus = hub.join("realizer")
     async with running(hub, recognition()), Requester(bus) as requests:

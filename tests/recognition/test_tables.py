@@ -7,7 +7,7 @@ import pytest
 from schemas.behaviors import EventKind
 from schemas.recognition import ENDINGS
 from services.recognition import adjacency_pair, backchannel, directed_gaze, mutual_facial_gaze
-from services.recognition.config import RecognitionConfig
+from services.recognition.config import RecognitionConfig, Sensing
 from services.recognition.machine import (
     DECISIONS,
     IDLE,
@@ -142,3 +142,17 @@ def test_ids_count_by_kind_and_carry_the_session():
 def test_bad_configuration_is_refused(setting, value, reason):
     with pytest.raises(ValueError, match=reason):
         RecognitionConfig(**{setting: value})
+
+
+@pytest.mark.parametrize(
+    ("setting", "value", "reason"),
+    [
+        ("memory", 0.0, "sensing.memory must be greater than 0"),
+        ("dwell", -0.1, "sensing.dwell must not be negative"),
+        ("tremor", 0.025, "sensing.tremor must be less than sensing.moved"),
+        ("gaze_half_angle", 89.0, "less than 90 degrees together"),
+    ],
+)
+def test_bad_configuration_of_sensing_is_refused(setting, value, reason):
+    with pytest.raises(ValueError, match=reason):
+        Sensing(**{setting: value})

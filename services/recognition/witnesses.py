@@ -1,0 +1,29 @@
+"""Who says what people do: when such a perception vanishes from the bus nobody will report their ends."""
+
+from schemas.actions import ActionBegan, ActorFound, ActorLost
+from schemas.messages import Message
+from schemas.presence import PeerAlive, PeerGone
+from schemas.units import Stamp
+
+
+class Witnesses:
+    """Those whom a perception reports are lost with it, and found again if the same life of it comes back."""
+
+    def __init__(self) -> None:
+        self._reported: dict[str, set[str]] = {}
+        self._runs: dict[str, str] = {}
+
+    def feed(self, message: Message, source: str, at: Stamp) -> list[ActorLost | ActorFound]:
+        """What follows from a message of, or about, a perception. at: now."""
+        match message:
+            case ActionBegan(actor=actor) | ActorFound(actor=actor):
+                self._reported.setdefault(source, set()).add(actor)
+            case PeerGone(participant=name):
+                return [ActorLost(actor=actor, at=at) for actor in sorted(self._reported.get(name, ()))]
+            case PeerAlive(participant=name, run=run):
+                before = self._runs.get(name, run)
+                self._runs[name] = run
+                if before != run:
+                    self._reported.pop(name, None)
+                return [ActorFound(actor=actor, at=at) for actor in sorted(self._reported.get(name, ()))]
+        return []

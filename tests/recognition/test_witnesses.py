@@ -1,0 +1,38 @@
+"""People are lost with the perception that reports them."""
+
+from schemas.actions import ActionBegan, ActorFound, ActorLost
+from schemas.presence import PeerAlive, PeerGone
+from services.recognition.witnesses import Witnesses
+from tests.recognition.observations import stamp
+
+ALIVE, GONE = PeerAlive(participant="cameras", run="one"), PeerGone(participant="cameras")
+
+
+def watching(*messages: object) -> list[ActorLost | ActorFound]:
+    """What follows, after "cameras" have told of ann and bob and others of eve."""
+    witnesses = Witnesses()
+    changes = witnesses.feed(ALIVE, "", stamp(0.0))
+    changes += witnesses.feed(ActorFound(actor="bob", at=stamp(1.0)), "cameras", stamp(1.0))
+    changes += witnesses.feed(ActionBegan(actor="ann", action="speak", at=stamp(1.0)), "cameras", stamp(1.0))
+    changes += witnesses.feed(ActionBegan(actor="eve", action="speak", at=stamp(1.0)), "others", stamp(1.0))
+    for at, message in enumerate(messages, 2):
+        changes += witnesses.feed(message, "", stamp(at))  # type: ignore[arg-type]
+    return changes
+
+
+def test_who_is_reported_by_a_perception_is_lost_with_it():
+    assert watching(GONE) == [ActorLost(actor="ann", at=stamp(2.0)), ActorLost(actor="bob", at=stamp(2.0))]
+
+
+def test_they_are_found_when_it_was_only_out_of_reach():
+    found = [ActorFound(actor="ann", at=stamp(3.0)), ActorFound(actor="bob", at=stamp(3.0))]
+
+    assert watching(GONE, ALIVE)[2:] == found
+
+
+def test_another_life_of_it_has_yet_to_see_them():
+    assert watching(GONE, PeerAlive(participant="cameras", run="two"))[2:] == []
+
+
+def test_others_who_come_and_go_change_nothing():
+    assert watching(PeerGone(participant="generation"), PeerAlive(participant="generation", run="x")) == []
