@@ -1,9 +1,11 @@
 """Relations between points, assembled into a Petri net: the middle part of planning."""
 
 import heapq
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
+from functools import reduce
 from itertools import pairwise
 from math import inf
+from operator import or_
 
 from msgspec import Struct
 from msgspec.structs import replace
@@ -84,9 +86,8 @@ class Assembler:
         for relation in relations.orders:
             self._order(relation)
         self._foreign = frozenset(self.at[point] for point in foreign)
-        for here in sorted(self._foreign):
-            classmates = [each for each in range(self.size) if found[each].class_id == found[here].class_id]
-            self._set_out_late(classmates)
+        if foreign:
+            self._set_out_late([instant.class_id for instant in found])
         self._fixed = (self.places, self.bounds)
         self.waived: set[tuple[str, str]] = set()
 
@@ -130,26 +131,31 @@ class Assembler:
                 self.places.append(Place("delay", source, target, seconds, seconds))
                 self.bounds.append(Bound("delay", target, source, -seconds))
 
-    def _set_out_late(self, elsewhere: list[int]) -> None:
-        """Whose stroke comes after these instants of another block, but not his start, comes just in time.
+    def _set_out_late(self, class_ids: Sequence[int]) -> None:
+        """Whose stroke comes after a point of another block, but not his start, comes just in time.
 
         Ours begins when it is sent, which may be long before: nobody is to hold his arm up all the while.
+        class_ids: of each instant.
         """
+        bits = {class_ids[here]: 1 << number for number, here in enumerate(sorted(self._foreign))}
+        after = [bits.get(each, 0) for each in class_ids]
+        """Which of those points each instant comes after, or is tied to: a bit for each."""
         out: dict[int, list[int]] = {}
         for place in self.places:
             out.setdefault(place.source, []).append(place.target)
         for chain in self.chains.values():
             for since, to in pairwise(chain.points):
                 out.setdefault(self.at[since], []).append(self.at[to])
-        after, todo = set(elsewhere), list(elsewhere)
-        while todo:
-            fresh = set(out.get(todo.pop(), ())) - after
-            after |= fresh
-            todo += fresh
+        for circle in components(self.size, out):  # what comes before it has been here
+            known = reduce(or_, (after[each] for each in circle))
+            for here in circle:
+                after[here] = known
+                for each in out.get(here, ()):
+                    after[each] |= known
         for id, chain in self.chains.items():
-            if chain.type in WITH_STROKE and self.at[chain.points[0]] not in after:
+            if chain.type in WITH_STROKE:
                 here, stroke = (self.at[Point(id, sync)] for sync in ("stroke_start", "stroke"))
-                if stroke in after and self.kinds[id, here] == "hold":
+                if after[stroke] & ~after[self.at[chain.points[0]]] and self.kinds[id, here] == "hold":
                     self.kinds[id, here] = "prompt"
                     self.members[here] = tuple(
                         [replace(each, kind="prompt") if each.behavior == id else each for each in self.members[here]]

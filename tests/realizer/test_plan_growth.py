@@ -102,10 +102,18 @@ def rivals(size: int) -> Parts:
     ], []
 
 
+def preparing(size: int) -> Parts:
+    """Points that set out in time for words of another block, each for its own."""
+    behaviors: list[BlockBehavior] = [Pointing(id=f"p{number}", target="a") for number in range(size)]
+    return behaviors, [After(ref=f"other:s{number}:end", syncs=(f"p{number}:stroke",)) for number in range(size)]
+
+
 def calls(size: int, shape: Callable[[int], Parts]) -> int:
     """Python functions called, and list and dictionary methods, to plan a block, check its net and fire it."""
     behaviors, operators = shape(size)
     block = Block(id="b", behaviors=tuple(behaviors), constraints=(Constraint(operators=tuple(operators)),))
+    said = tuple(Speech(id=f"s{number}", text="one") for number in range(size))
+    elsewhere = {"other": Block(id="other", behaviors=said)}
     count = 0
 
     def counted(frame: FrameType, event: str, argument: object) -> None:
@@ -115,7 +123,7 @@ def calls(size: int, shape: Callable[[int], Parts]) -> int:
     before = sys.getprofile()
     sys.setprofile(counted)
     try:
-        plan = plan_block(block)
+        plan = plan_block(block, elsewhere=elsewhere)
         assert is_live(plan.net)
         assert is_safe(plan.net)
         fire_once_each(plan.net, plan.net.initial)
@@ -124,7 +132,10 @@ def calls(size: int, shape: Callable[[int], Parts]) -> int:
     return count
 
 
-@pytest.mark.parametrize("shape", [references, looks, series, measured_words, joined, fixed, hopeless, rivals])
+@pytest.mark.parametrize(
+    "shape",
+    [references, looks, series, measured_words, joined, fixed, hopeless, rivals, preparing],
+)
 def test_twice_the_block_costs_twice_the_work(shape: Callable[[int], Parts]) -> None:
     calls(20, shape)  # what is remembered from now on
 
