@@ -43,8 +43,9 @@ from services.control.config import ControlConfig, Displaced, Slow, Stall, Varia
 from services.control.service import embody
 from services.memory_bus import MemoryHub
 from services.realizer.config import RealizerConfig
-from services.realizer.planner import Plan, plan_block, poses_before
+from services.realizer.planner import Plan, plan_block
 from services.realizer.points import Point
+from services.realizer.poses import poses_before
 from services.realizer.service import realize
 from services.requests import Requester
 from services.runtime import running

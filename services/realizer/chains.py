@@ -8,12 +8,12 @@ from schemas.behaviors import BlockBehavior, Gesture, Head, Pointing
 from schemas.body import Estimate
 from schemas.references import type_name
 from schemas.units import Seconds
-from services.realizer.points import ON_TARGET, Point, Segment, family, segments
+from services.realizer.points import BENEATH, ON_TARGET, Point, Segment, family, segments
 from services.realizer.relations import Relations
 
 _ARMS = {"LEFT_HAND": ("left_arm",), "RIGHT_HAND": ("right_arm",), "BOTH_HANDS": ("left_arm", "right_arm")}
-_SHARED = ON_TARGET | {"pointing", "gesture", "head", "speech", "faceShift", "postureShift", "pose"}
-"""Types of which another behavior of the same part takes the place. A gazeShift is beneath any gaze."""
+_SHARED = ON_TARGET | BENEATH | {"pointing", "gesture", "head", "speech", "faceShift", "postureShift", "pose"}
+"""Types of which another behavior of the same part takes the place."""
 
 
 class Chain(Struct, frozen=True):

@@ -1,7 +1,8 @@
 """Behaviors of one block that move the same part: who takes it from whom, and who must wait for his turn."""
 
-from collections.abc import Collection, Container, Iterable, Mapping, Sequence
+from collections.abc import Collection, Container, Iterable, Iterator, Mapping, Sequence
 from itertools import pairwise
+from math import inf
 from typing import NamedTuple
 
 from msgspec import Struct
@@ -11,7 +12,7 @@ from schemas.syncref import SYNC_POINTS
 from schemas.units import Seconds
 from services.realizer.chains import Chain
 from services.realizer.classes import Classes
-from services.realizer.points import WITH_STROKE, Point
+from services.realizer.points import BENEATH, WITH_STROKE, Point
 from services.realizer.relations import Relations
 from services.realizer.schedule import EPSILON
 
@@ -69,7 +70,10 @@ def arrange(
     mentioned = {point.behavior for point in relations.constrained}
     successors, cuts = dict(before.successors), dict(before.cuts)
     conflicts = []
-    for id, successor in _successors(chains, mentioned, times, rounds).items():
+    ranked = entering(chains, mentioned, times, rounds)
+    users = _users(chains, ranked)
+    cuts.update(dict.fromkeys(_overlaid(chains, users, times), 0))
+    for id, successor in _successors(chains, ranked, users).items():
         chain = chains[id]
         if before.successors.get(successor, ("",))[0] == id:
             # Cut short by the other, each comes first. So nobody is: the one that was to be the later waits.
@@ -84,7 +88,8 @@ def arrange(
             # Cut short, what the successor itself is to come after would come at once.
             own = awaited.get(successor, set())
             kept = {point for point in chain.points if point in held or point in own}
-            last = _not_given_up(chain, first, kept, is_natural, is_asked=successor in mentioned)
+            is_asked = successor in mentioned or _is_overlaid(chain, chains[successor])
+            last = _not_given_up(chain, first, kept, is_natural, is_asked=is_asked)
             turn = (successor, chain.points[last]) if last is not None else None
             # Who has made his stroke hands over; else the other arm is better, if that is free.
             is_worth_it = turn is not None or first <= _STROKE_END
@@ -138,24 +143,51 @@ def _is_tied(later: Chain, speech: Chain, classes: Classes) -> bool:
     return any(classes.find(point)[0] == begins for point in speech.points)
 
 
-def _successors(
-    chains: Mapping[str, Chain],
-    mentioned: Collection[str],
-    times: Mapping[Point, Seconds],
-    rounds: Mapping[Point, int],
-) -> dict[str, str]:
-    """The next of each behavior on any of its parts."""
-    rank = {id: number for number, id in enumerate(entering(chains, mentioned, times, rounds))}
+def _users(chains: Mapping[str, Chain], order: Iterable[str]) -> Mapping[str, Sequence[str]]:
+    """Of each part, in the order in which they take it."""
     users: dict[str, list[str]] = {}
-    for id in rank:
+    for id in order:
         for part in chains[id].parts:
             users.setdefault(part, []).append(id)
+    return users
+
+
+def _successors(
+    chains: Mapping[str, Chain], ranked: Sequence[str], users: Mapping[str, Sequence[str]]
+) -> dict[str, str]:
+    """The next of each behavior on any of its parts."""
+    rank = {id: number for number, id in enumerate(ranked)}
     found: dict[str, str] = {}
     for those in users.values():
-        for earlier, later in pairwise(those):
+        for earlier, later in _pairs(those, chains):
             if earlier not in found or rank[later] < rank[found[earlier]]:
                 found[earlier] = later
     return found
+
+
+def _pairs(users: Sequence[str], chains: Mapping[str, Chain]) -> Iterator[tuple[str, str]]:
+    """Each user of a part, in order, with the next that takes it from him: a shift takes nothing from a gaze."""
+    above = [id for id in users if chains[id].type not in BENEATH]
+    yield from pairwise(above)
+    yield from ((one, other) for one, other in pairwise(users) if chains[one].type in BENEATH)
+
+
+def _is_overlaid(earlier: Chain, later: Chain) -> bool:
+    return earlier.type in BENEATH and later.type not in BENEATH
+
+
+def _overlaid(
+    chains: Mapping[str, Chain], users: Mapping[str, Sequence[str]], times: Mapping[Point, Seconds]
+) -> Iterator[str]:
+    """Shifts that start during a gaze."""
+    for those in users.values():
+        until = -inf
+        for id in those:
+            since, to = _window(chains[id], times)
+            if chains[id].type not in BENEATH:
+                until = max(until, to)
+            elif since < until - EPSILON:
+                yield id
 
 
 def _free_hand(

@@ -13,7 +13,7 @@ from msgspec.structs import replace
 
 from schemas.behaviors import BlockBehavior, Event, Hand, Head, Unknown
 from schemas.blocks import Block
-from schemas.body import BodyPose, Estimate, Estimates
+from schemas.body import Estimate, Estimates
 from schemas.faults import Fault
 from schemas.feedback import WarningKind
 from schemas.units import Seconds
@@ -37,8 +37,6 @@ from services.realizer.relations import (
 )
 from services.realizer.schedule import EPSILON, Solution
 from services.realizer.verdict import Losses, clashes, judge
-
-EVERYTHING_HOME: Mapping[str, BodyPose] = {}
 
 
 class Plan(Struct, frozen=True, kw_only=True):
@@ -343,43 +341,3 @@ def _critical(solution: Solution) -> tuple[int, ...]:
     while (cause := solution.causes.get(path[-1])) is not None:
         path.append(cause.source)
     return tuple(path[::-1])
-
-
-def poses_before(plan: Plan, left: Mapping[str, BodyPose] = EVERYTHING_HOME) -> dict[str, BodyPose]:
-    """Where the body will be when a behavior takes another's place, by the id of the later: on the earlier's target.
-
-    How long a look takes depends on what was looked at before it, not on where the head is as the block comes in.
-    left: how other blocks will leave parts, see `poses_left`.
-    """
-    latest: dict[str, Estimate] = {}
-    poses = {}
-    order = {id: (plan.predicted(each.points[0]), number) for number, (id, each) in enumerate(plan.chains.items())}
-    for id in sorted(plan.chains, key=order.__getitem__):
-        estimate = plan.estimates.get(id)
-        for part in plan.chains[id].parts:
-            before = latest.get(part)
-            if before is None and part in left:
-                poses[id] = left[part]
-            if before is not None and before.pose_after is not None and not _is_home(plan, before.behavior, id):
-                poses[id] = before.pose_after
-            if estimate is not None:
-                latest[part] = estimate
-    return poses
-
-
-def poses_left(plan: Plan, times: Mapping[Point, Seconds], until: Seconds) -> dict[str, BodyPose]:
-    """Where the body will be at `until`, by part: on the target of what goes on then. times: when each point is."""
-    going = [
-        (times[chain.points[0]], number, chain.parts, estimate.pose_after)
-        for number, (id, chain) in enumerate(plan.chains.items())
-        if times[chain.points[0]] <= until < times[chain.points[-1]]
-        and (estimate := plan.estimates.get(id)) is not None
-        and estimate.pose_after is not None
-    ]
-    return {part: pose for *_, parts, pose in sorted(going, key=lambda each: each[:2]) for part in parts}
-
-
-def _is_home(plan: Plan, earlier: str, later: str) -> bool:
-    """Has the earlier had the time to take its part home?"""
-    relax, end = (plan.predicted(point) for point in plan.chains[earlier].points[-2:])
-    return relax + EPSILON < end <= plan.predicted(plan.chains[later].points[0]) + EPSILON

@@ -37,8 +37,11 @@ prompt: holding there too, but it sets out so late that it need not. Who looks t
 WITH_STROKE = frozenset({"gesture", "pointing", "head"})
 ON_TARGET = frozenset({"gaze", "face", "faceLexeme", "faceFacs", "posture"})
 """They last: having arrived, they stay until something ends them."""
+BENEATH = frozenset({"gazeShift", "headDirectionShift"})
+"""They turn what a gaze returns to: one that starts during a gaze moves nothing, and ends at once."""
 _FAMILY = {
-    "faceLexeme": "face", "faceFacs": "face", "faceShift": "face", "postureShift": "posture", "pose": "posture"
+    "faceLexeme": "face", "faceFacs": "face", "faceShift": "face", "postureShift": "posture", "pose": "posture",
+    "gazeShift": "gaze", "headDirectionShift": "gaze",
 }  # fmt: skip
 _PERFORMERS: dict[str, Performer] = {
     "event": "recognition", "turn": "recognition", "wait": "clock", "emit": "clock", "unknown": "clock"

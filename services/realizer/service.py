@@ -27,8 +27,9 @@ from services.bus import Bus
 from services.realizer.config import RealizerConfig
 from services.realizer.executor import Performance
 from services.realizer.ledger import Ledger
-from services.realizer.planner import Plan, plan_block, poses_before, poses_left
+from services.realizer.planner import Plan, plan_block
 from services.realizer.points import Point, performer
+from services.realizer.poses import poses_before, poses_left
 from services.realizer.relations import BlockRefused, extent, relations
 from services.realizer.surroundings import Ending, Live, Presence, Surroundings
 from services.requests import RequestDesk, Requester

@@ -45,7 +45,7 @@ HOLDS = {
     "faceFacs": ("stroke", "relax"),
     "posture": ("stroke", "relax"),
 }
-PART = {"head": "nod", "gaze": "head", "gazeShift": "head", "speech": "voice"}
+PART = {"head": "nod", "gaze": "head", "gazeShift": "head", "headDirectionShift": "head", "speech": "voice"}
 ARMS = {None: ("right_arm",), "RIGHT_HAND": ("right_arm",), "LEFT_HAND": ("left_arm",)}
 DURATIONS: dict[str, tuple[Seconds, ...]] = {
     "pointing": (0.5, 0.25, 0.5, 0.25, 0.25, 0.5),

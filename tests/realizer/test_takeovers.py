@@ -6,7 +6,8 @@ from schemas.behaviors import After, BlockBehavior, Constraint, Gaze, Gesture, P
 from schemas.blocks import Block
 from schemas.body import BodyPose, Estimate, JointAngle, Phase
 from schemas.faults import Fault
-from services.realizer.planner import plan_block, poses_before
+from services.realizer.planner import plan_block
+from services.realizer.poses import poses_before
 from tests.realizer.fake_body import FakeBody
 from tests.realizer.stage import after, block, stage
 

@@ -1,0 +1,80 @@
+"""Shifts of the head, and the looks before, over and after them: planned as a body performs them."""
+
+from collections.abc import Sequence
+
+import pytest
+
+from schemas.behaviors import BlockBehavior, Gaze, GazeShift, HeadDirectionShift, Mark, Speech
+from schemas.body import Estimate, Phase
+from services.control.config import Variability
+from tests.realizer.planning import at, plan, timed, warnings
+from tests.realizer.stage import after, block, together
+from tests.realizer.test_simulated_body import robot
+
+SHIFT = GazeShift(id="g", target="a")
+OTHER = HeadDirectionShift(id="h", target="b")
+LOOK = Gaze(id="z", target="human")
+SLOWER = Estimate(
+    behavior="g", feasible=True, parts=("head",), phases=(Phase(since="start", to="end", shortest=0.5, natural=1.0),)
+)
+WORDS = Speech(id="s", text="one two three", marks=(Mark("m", 7),))
+
+
+def test_a_shift_that_nobody_times_ends_where_the_next_takes_the_head() -> None:
+    made = plan(block((timed(SHIFT, start="0"), timed(OTHER, start="0.25"))))
+
+    assert made.problems == ()
+    assert at(made, "g:end") == at(made, "h:start") == 0.25
+
+
+def test_the_end_of_a_shift_that_is_asked_for_is_waited_for() -> None:
+    made = plan(block((timed(SHIFT, start="0", end="3"), WORDS, LOOK), together("z:stroke", "s:m")), SLOWER)
+
+    assert made.problems == ()
+    assert at(made, "g:end") == at(made, "z:start") == 3.0
+    assert at(made, "z:stroke") == at(made, "s:m") == 3.5
+
+
+def test_of_two_shifts_at_fixed_times_the_later_is_dropped() -> None:
+    made = plan(block((timed(SHIFT, start="0", end="3"), timed(OTHER, start="1"))), SLOWER)
+
+    assert warnings(made) == [("IMPOSSIBLE_TO_SCHEDULE", "h")]
+    assert at(made, "g:end") == 3.0
+
+
+@pytest.mark.parametrize("behaviors", [(SHIFT, LOOK), (LOOK, SHIFT)])
+def test_a_look_lies_over_a_shift_of_the_same_instant(behaviors: Sequence[BlockBehavior]) -> None:
+    made = plan(block((*behaviors, WORDS)))
+
+    assert made.problems == ()
+    assert at(made, "g:start") == at(made, "g:end") == at(made, "z:start") == 0.0
+
+
+def test_a_shift_beneath_a_look_takes_nothing_from_it() -> None:
+    made = plan(block((timed(LOOK, relax="3"), timed(SHIFT, start="1"), WORDS), after("g:end", "s:start")))
+
+    assert made.problems == ()
+    assert at(made, "z:relax") == 3.0
+    assert at(made, "g:start") == at(made, "g:end") == at(made, "s:start") == 1.0
+
+
+TIMED = [
+    (timed(SHIFT, start="0", end="3"), timed(LOOK, stroke="s:m", relax="6"), WORDS),
+    (SHIFT, timed(LOOK, start="0", relax="1.5"), timed(Gaze(id="y", target="b"), start="3", stroke_end="6")),
+    (timed(LOOK, start="0", relax="2"), timed(SHIFT, start="1"), timed(Gaze(id="y", target="b"), start="4")),
+    (timed(LOOK, relax="1"), timed(OTHER, start="2"), timed(SHIFT, start="3"), timed(WORDS, start="g:end")),
+]
+
+
+@pytest.mark.parametrize("behaviors", TIMED)
+async def test_looks_before_and_after_shifts_take_as_long_as_planned(behaviors: Sequence[BlockBehavior]) -> None:
+    async with robot(Variability(seed=0, noise=0.0)) as seen:
+        await seen.perform(block(behaviors))
+
+    homes = {"z:end", "y:end"}  # of the way home the estimate does not know where that will be
+    times = {name: each for name, each in seen.times().items() if name not in homes}
+    assert len(times) > 8
+    assert {name: each.time for name, each in times.items()} == pytest.approx(
+        {name: each.predicted for name, each in times.items()}, abs=1e-6
+    )
+    assert seen.kinds() == []
