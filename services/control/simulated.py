@@ -76,7 +76,7 @@ class SimulatedBody(Body):
             case Wait():
                 return speaking.wait(behavior, authority)
             case GazeShift() | HeadDirectionShift() if self._is_overlaid():
-                return self._shift_beneath(behavior)
+                return self._shift_beneath(behavior, authority)
             case _:
                 return self._move(behavior, authority)
 
@@ -302,15 +302,24 @@ class SimulatedBody(Body):
     def _is_overlaid(self) -> bool:
         return "head" in self._runs and isinstance(self._runs["head"].behavior, Gaze)
 
-    async def _shift_beneath(self, behavior: BlockBehavior) -> AsyncGenerator[Progress, None]:
-        """A new base while a gaze lies over it: nothing moves until that gaze ends."""
+    async def _shift_beneath(self, behavior: BlockBehavior, authority: Authority) -> AsyncGenerator[Progress, None]:
+        """A new base while a gaze lies over it: nothing moves until that gaze ends. As slow as it is asked to be."""
         try:
             self._attention.shift(behavior, choreography.plan(behavior, self._scene(self._world)))
         except Impossible as impossible:
             raise BehaviorRefused(_fault(behavior, impossible.reason)) from impossible
         now = self._loop.time()
         yield Reached("start", now, now)
-        yield Reached("end", now, now)
+        bell = Bell()
+        unwatch = authority.watch(bell.ring)
+        try:
+            while authority.revoked is None and not bell.is_past(due := authority.pace.get("end", now)):
+                await bell.heard(due)
+        finally:
+            unwatch()
+        if authority.revoked is None:
+            now = self._loop.time()
+            yield Reached("end", now, now)
 
     def _follow(self) -> None:
         """Turn the head after what it looks at, or is about to look at."""

@@ -62,6 +62,7 @@ TIMED = [
     (timed(SHIFT, start="0", end="3"), timed(LOOK, stroke="s:m", relax="6"), WORDS),
     (SHIFT, timed(LOOK, start="0", relax="1.5"), timed(Gaze(id="y", target="b"), start="3", stroke_end="6")),
     (timed(LOOK, start="0", relax="2"), timed(SHIFT, start="1"), timed(Gaze(id="y", target="b"), start="4")),
+    (timed(LOOK, start="0", relax="5"), timed(SHIFT, start="1", end="4"), timed(WORDS, start="g:end")),
     (timed(LOOK, relax="1"), timed(OTHER, start="2"), timed(SHIFT, start="3"), timed(WORDS, start="g:end")),
 ]
 
