@@ -51,7 +51,7 @@ def main(path: Path, format: str, world: Path | None, where: Where) -> int:
         for warning in (warning for plan in plans for warning in plan.warnings):
             print(f"warning: {warning}", file=sys.stderr)
     else:
-        console = Terminal(highlight=False, markup=False, emoji=False)
+        console = Terminal(highlight=False, markup=False)
         show(plans, console)
         show_tables(impossible, console)
     if failure:

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from contextlib import ExitStack
 from pathlib import Path
 from types import TracebackType
-from typing import Literal, Self, TextIO
+from typing import Any, Literal, Self, TextIO
 
 import msgspec
 from rich.console import Console
@@ -26,7 +26,13 @@ FeedbackFormat = Literal["json", "xml"]
 
 
 class Terminal(Console):
-    """Rich's console, but it leaves it to `services.cli` what becomes of us when nobody reads on."""
+    """Rich's console, but it leaves it to `services.cli` what becomes of us when nobody reads on.
+
+    And an id between colons is no emoji: `b:x:start`.
+    """
+
+    def __init__(self, **settings: Any) -> None:
+        super().__init__(emoji=False, **settings)
 
     def on_broken_pipe(self) -> None:
         raise  # the BrokenPipeError; Rich would end the process here

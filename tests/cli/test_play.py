@@ -198,6 +198,13 @@ def test_the_log_says_what_happens(engage: Engage, files: dict[str, Path]) -> No
     assert "block hello: done" in result.out
 
 
+def test_an_id_that_names_an_emoji_is_printed_as_it_is(engage: Engage, tmp_path: Path) -> None:
+    (tmp_path / "x.xml").write_text('<bml id="b"><wait id="x" duration="0.1"/></bml>')
+    result = engage(*PLAY, tmp_path / "x.xml")
+
+    assert "b:x:start" in result.out
+
+
 def test_quiet_prints_nothing(engage: Engage, files: dict[str, Path]) -> None:
     assert engage(*PLAY, "--quiet", files["hello"]) == (0, "", "")
 
