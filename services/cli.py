@@ -273,9 +273,7 @@ def simulate(
     ] = None,
     limit: Annotated[
         float,
-        typer.Option(
-            metavar="SECONDS", min=1, max=86_400, help="Break a session off after so long in its own time."
-        ),
+        typer.Option(metavar="SECONDS", min=1, max=86_400, help="Break a session off after so long in its own time."),
     ] = 3600.0,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace the results that are there.")] = False,
     config: ConfigFile = None,
