@@ -42,6 +42,13 @@ BY_WORDS = ("collaboration.mode=task",)
 """For people who follow the robot's words and no script: it may choose its own."""
 USUAL = {"listening": BY_WORDS, "stochastic": BY_WORDS, PEOPLE: ()}
 """What suits a human, weaker than the user's settings; all others act the transcript."""
+DECIDED = {
+    "simulation.human": "--human",
+    "simulation.seed": "--seed",
+    "control.variability.seed": "--seed",
+    "generation.condition": "--condition",
+}
+"""Keys that the command line decides for each session."""
 PLOTS = ("events.png", "delays.png", "failure_rates.png", "mtbce.png", "completion_time.png")
 FILES = ("study.json", "events.csv", "sessions.csv", "hypotheses.csv", "summary.md", "failures.txt", *PLOTS)
 
@@ -109,6 +116,10 @@ def _plotting() -> Draw:
 
 def orders_of(options: Options) -> list[Order]:
     """By condition, then by number. The same number is the same seed in each condition. Raises InputRefused."""
+    for setting in options.where.settings:
+        key = setting.partition("=")[0].strip()
+        if key in DECIDED:
+            raise InputRefused(Fault(reason=f"a study decides {key!r} itself", advice=f"use {DECIDED[key]}"))
     if options.human == PEOPLE:
         if options.conditions:
             raise InputRefused(Fault(reason=f"--human {PEOPLE} has no conditions", advice="leave out --condition"))

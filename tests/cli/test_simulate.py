@@ -192,6 +192,8 @@ def test_without_matplotlib_nothing_is_played(
         (("--sessions", "0"), "--sessions"),
         (("--limit", "nan"), "--limit"),
         (("--set", "simulation.sede=1"), "do you mean `seed`"),
+        (("--set", "simulation.human=listening"), "use --human"),
+        (("--set", "generation.condition=operational"), "use --condition"),
     ],
 )
 def test_bad_arguments_are_refused(arguments: tuple[str, ...], reason: str, engage: Engage, tmp_path: Path) -> None:
@@ -202,9 +204,11 @@ def test_bad_arguments_are_refused(arguments: tuple[str, ...], reason: str, enga
     assert not (tmp_path / "new").exists()
 
 
-def test_the_users_settings_are_stronger_than_a_conditions_but_not_than_its_name() -> None:
-    settings = ("simulation.faults.missed_look=0.1", "generation.condition=operational", "simulation.seed=9")
-    options = simulate.Options(2, 40, Path(), where=simulate.Where(settings=settings))
+def test_the_users_settings_are_stronger_than_a_conditions_but_not_than_its_name(tmp_path: Path) -> None:
+    file = tmp_path / "engage.toml"
+    file.write_text("[generation]\ncondition = 'operational'\n[simulation]\nseed = 9\n")
+    where = simulate.Where(config=file, settings=("simulation.faults.missed_look=0.1",))
+    options = simulate.Options(2, 40, Path(), where=where)
 
     orders = simulate.orders_of(options)
 
