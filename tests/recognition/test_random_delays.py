@@ -126,14 +126,18 @@ class Raw:
         return next((since for since, until in self.looks(actor, places) if until > known), float("inf"))
 
     def together(self, life: Life) -> Seconds:
-        """For how long initiator and responder both looked there during the event's shared phase."""
+        """For how long initiator and responder both looked there during the event's shared phase.
+
+        What the responder looked at before the event could be known, and no longer then, is no response.
+        """
         assert life.completed is not None
         first, second = life.places
-        begin, end = life.since, life.completed.at.seconds
+        begin, end, known = life.since, life.completed.at.seconds, life.started.at.seconds
         return sum(
             max(0.0, min(until, other_until, end) - max(since, other_since, begin))
             for since, until in self.looks(life.started.initiator, first)
             for other_since, other_until in self.looks(life.started.responder, second)
+            if other_until > known
         )
 
 

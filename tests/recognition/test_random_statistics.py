@@ -114,8 +114,7 @@ def test_the_estimate_follows_its_definition_and_no_level_changes_in_silence(str
             judge.look(replay, now)
             assert recomputed.alike(statistics.engagement, judge.value)
             assert statistics.level == judge.level
-        if replay.deadline is not None:
-            before_next = max(now, replay.deadline - 2 * JUST_AFTER)
+        if replay.deadline is not None and (before_next := replay.deadline - 2 * JUST_AFTER) >= now:
             for moment in ((now + before_next) / 2, before_next):
                 assert all(judge.foresees(replay, moment) == judge.level for judge in judges.values())
 
