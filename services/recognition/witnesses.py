@@ -18,6 +18,8 @@ class Witnesses:
         match message:
             case ActionBegan(actor=actor) | ActorFound(actor=actor):
                 self._reported.setdefault(source, set()).add(actor)
+            case ActorLost(actor=actor):
+                self._reported.get(source, set()).discard(actor)
             case PeerGone(participant=name):
                 return [ActorLost(actor=actor, at=at) for actor in sorted(self._reported.get(name, ()))]
             case PeerAlive(participant=name, run=run):

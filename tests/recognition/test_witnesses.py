@@ -30,6 +30,17 @@ def test_they_are_found_when_it_was_only_out_of_reach():
     assert watching(GONE, ALIVE)[2:] == found
 
 
+def test_who_had_left_before_is_not_found_again():
+    witnesses = Witnesses()
+    witnesses.feed(ALIVE, "", stamp(0.0))
+    for found in (ActorFound(actor="ann", at=stamp(1.0)), ActorFound(actor="bob", at=stamp(1.0))):
+        witnesses.feed(found, "cameras", stamp(1.0))
+    witnesses.feed(ActorLost(actor="ann", at=stamp(2.0)), "cameras", stamp(2.0))
+
+    assert witnesses.feed(GONE, "", stamp(3.0)) == [ActorLost(actor="bob", at=stamp(3.0))]
+    assert witnesses.feed(ALIVE, "", stamp(4.0)) == [ActorFound(actor="bob", at=stamp(4.0))]
+
+
 def test_another_life_of_it_has_yet_to_see_them():
     assert watching(GONE, PeerAlive(participant="cameras", run="two"))[2:] == []
 
