@@ -42,6 +42,7 @@ class EventStream:
         self._opening = opening
         self._session = ""
         self._lost: tuple[ConnectionEvent, ...] = ()
+        self._ended: dict[str, ConnectionEvent] = {}
 
     def feed(self, message: Message, at: Seconds, now: Seconds, *, past: bool = False) -> list[ConnectionEvent]:
         """What is new. at: the local instant that the message speaks of. past: it is from before the subscription."""
@@ -78,23 +79,22 @@ class EventStream:
     def _compare(self, state: OpenEvents, now: Seconds) -> list[ConnectionEvent]:
         """Usually nothing: the changes have come already."""
         still_open = {event.id for event in state.events}
-        ended = [
-            event
-            for event in self.open.values()
-            if state.actor in (event.initiator, event.responder) and event.id not in still_open
-        ]
+        ended = [event for event in self.open.values() if _is_with(state.actor, event) and event.id not in still_open]
         told = self._lose(ended, now)
+        # Copies of a change come before the state that follows it.
+        self._ended = {id: event for id, event in self._ended.items() if not _is_with(state.actor, event)}
         for event in state.events:
             if self._opening or event.id in self.open:
                 told += self._change(event)
         return told
 
     def _change(self, event: ConnectionEvent) -> list[ConnectionEvent]:
-        known = self.open.get(event.id)
+        known = self.open.get(event.id) or self._ended.get(event.id)
         if (self._kinds and event.kind not in self._kinds) or (known and _progress(known) >= _progress(event)):
             return []
         if event.state in ENDINGS:
             self.open.pop(event.id, None)
+            self._ended[event.id] = event
         else:
             self.open[event.id] = event
         return [event]
@@ -103,6 +103,10 @@ class EventStream:
         for event in events:
             del self.open[event.id]
         return [replace(event, state="lost", at=self._stamp(now)) for event in events]
+
+
+def _is_with(person: str, event: ConnectionEvent) -> bool:
+    return person in (event.initiator, event.responder)
 
 
 def _progress(event: ConnectionEvent) -> int:

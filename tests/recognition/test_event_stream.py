@@ -288,3 +288,15 @@ def test_a_state_heals_what_never_came():
 
     assert [(event.id, event.state) for event in told] == [(lost.id, "lost"), (decided.id, "succeeded")]
     assert reader.feed(decided, 1.0, 1.1) == []
+
+
+@pytest.mark.parametrize("opening", [True, False])
+def test_what_comes_twice_is_told_once(opening: bool):
+    reader, book = EventStream(0.0, partial(Stamp, "loop"), opening=opening), OpenBook(ROBOT, "life")
+    life = [change(1, "ann", state, 0.0) for state in ("started", "failed")]
+    told = []
+    for each in life:
+        for message in (each, *book.feed([each], each.at)):
+            told += [*reader.feed(message, 0, 0), *reader.feed(message, 0, 0)]
+
+    assert told == life
