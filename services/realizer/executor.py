@@ -82,7 +82,7 @@ class Performance:
                     for behavior in self.plan.behaviors
                 }
                 self._around.ledger.perform(self.plan.block.id, self)
-                with self._around.ledger.followed(self, self._foreign):
+                with self._around.ledger.followed(self, self._foreign, self._elsewhere):
                     self._advance()
                     ending = await self._ending
                     await self._end_what_moves(ending)

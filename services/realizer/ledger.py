@@ -1,5 +1,6 @@
 """What live blocks may be to one another: whose points others can name, when each is to be, or was, or never will."""
 
+from collections import deque
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from math import inf
@@ -53,6 +54,9 @@ class Ledger:
 
     def __init__(self) -> None:
         self._pages: dict[str, _Page] = {}
+        self._untold: deque[tuple[_Page, Point, Seconds]] = deque()
+        """What followers have not been told yet: they foresee otherwise for it, and theirs are told after that."""
+        self._is_telling = False
 
     @contextmanager
     def opened(self, block: Block) -> Iterator[None]:
@@ -89,8 +93,20 @@ class Ledger:
         for point, at in expected.items():
             if abs(at - page.expected.get(point, inf)) > EPSILON:
                 page.expected[point] = at
-                for follower in list(page.followers):
-                    follower.foresee(_abroad(block, point), at)
+                self._untold.append((page, point, at))
+        if not self._is_telling:
+            self._is_telling = True
+            try:
+                self._tell()
+            finally:
+                self._is_telling = False
+
+    def _tell(self) -> None:
+        """One after the other: a turn may be a chain of more blocks than calls may be nested."""
+        while self._untold:
+            page, point, at = self._untold.popleft()
+            for follower in list(page.followers):
+                follower.foresee(_abroad(page.block.id, point), at)
 
     def lose(self, block: str, behavior: str) -> None:
         """A behavior of a live block is dropped. Said again, it is no news."""
@@ -102,10 +118,14 @@ class Ledger:
             follower.miss((f"{block}:{behavior}",))
 
     @contextmanager
-    def followed(self, follower: Follower, points: Iterable[Point]) -> Iterator[None]:
-        """Tell `follower` what becomes of these points of other blocks, and what already has."""
+    def followed(self, follower: Follower, points: Iterable[Point], blocks: Mapping[str, Block]) -> Iterator[None]:
+        """Tell `follower` what becomes of these points of other `blocks`, and what already has.
+
+        A block that has taken the id of one of them since is another block.
+        """
         wanted = sorted(points)
-        pages = {block: self._pages[block] for block in map(_home, wanted) if block in self._pages}
+        there = ((id, self._pages.get(id)) for id in map(_home, wanted))
+        pages = {id: page for id, page in there if page is not None and page.block is blocks.get(id)}
         for page in pages.values():
             page.followers.append(follower)
         for point in wanted:

@@ -1,11 +1,14 @@
 """A block that is tied to words of another prepares for them: strokes come just in time, and no arm before that."""
 
 import asyncio
+from contextlib import ExitStack
 
 import pytest
 
 from schemas.behaviors import Gaze, Gesture, Mark, Pointing, Speech, Wait
 from schemas.blocks import Block
+from services.realizer.ledger import Ledger
+from services.realizer.points import Point
 from tests.realizer.fake_body import FakeBody, Script
 from tests.realizer.stage import Stage, after, block, stage, together
 
@@ -115,3 +118,32 @@ async def test_nobody_is_late_for_a_look_that_another_block_has_ended() -> None:
 
     assert seen.times("one")["z:end"] == 1.0
     assert seen.warnings() == []
+
+
+def test_foresight_goes_through_a_chain_of_any_length() -> None:
+    class Link:
+        def __init__(self, block: str) -> None:
+            self.block = block
+            self.told: list[float] = []
+
+        def foresee(self, point: Point, at: float) -> None:
+            self.told.append(at)
+            ledger.foresee(self.block, {Point("s", "end"): at + 1.0})
+
+        def hear(self, point: Point, at: float) -> None:
+            raise AssertionError
+
+        def miss(self, behaviors: object) -> None:
+            """The end of the test."""
+
+    ledger = Ledger()
+    links = [Link(f"b{number}") for number in range(2000)]
+    with ExitStack() as live:
+        for number, link in enumerate(links):
+            live.enter_context(ledger.opened(block((WORDS,), id=link.block)))
+            if number:
+                ties = [Point(f"b{number - 1}:s", "end")]
+                live.enter_context(ledger.followed(link, ties, ledger.blocks))
+        ledger.foresee("b0", {Point("s", "end"): 1.0})
+
+    assert [link.told for link in links[1:]] == [[float(number)] for number in range(1, 2000)]

@@ -7,7 +7,7 @@ from schemas.behaviors import Speech, Wait
 from schemas.blocks import BlockOutcome, Composition, PerformBlock
 from schemas.feedback import BlockProgress
 from services.requests import Pending, RequestRefused
-from tests.realizer.stage import Stage, block, stage
+from tests.realizer.stage import Stage, after, block, stage
 
 STORY = Speech(id="s", text="one")
 """Takes a second."""
@@ -58,3 +58,19 @@ async def test_after_its_end_an_id_is_free_again(composition: Composition) -> No
     told = [each.progress for each in seen.feedback if isinstance(each, BlockProgress)]
     assert told == ["start", "end", "start", "end"]
     assert seen.warnings() == []
+
+
+async def test_who_has_waited_for_his_turn_is_not_tied_to_a_later_block_of_the_id_he_names() -> None:
+    async with stage() as seen:
+        first = seen.ask(block((STORY,), id="one"))
+        others = [seen.ask(block((Wait(id="w", duration=3.0),), id="other"))]
+        tied = block((STORY,), after("one:s:end", "s:start"), id="two", composition="APPEND")
+        others.append(seen.ask(tied))
+        await first.outcome
+        again = block((STORY,), after("two:s:end", "s:start"), id="one")
+        others.append(seen.requests.send(keys.BLOCK, PerformBlock(id="again", requester="test", block=again)))
+        outcomes = [await each.outcome for each in others]
+
+    assert [each.status for each in outcomes if isinstance(each, BlockOutcome)] == ["done"] * 3
+    assert seen.times("two") == {"s:start": 0.0, "s:end": 1.0}
+    assert seen.times("one")["s:start"] == 3.0

@@ -179,11 +179,11 @@ def test_a_ledger_forgets_a_block_when_it_is_over() -> None:
     ledger, early, late = Ledger(), Ears(), Ears()
     end, start = Point("one:s", "end"), Point("one:s", "start")
     one = block((Speech(id="s", text="so"),), id="one")
-    with ledger.followed(late, [end]):
+    with ledger.followed(late, [end], {}):
         pass
     with ledger.opened(one):
         ledger.reach("one", Point("s", "start"), 1.0)
-        follows = ledger.followed(early, [start, end])
+        follows = ledger.followed(early, [start, end], {"one": one})
         follows.__enter__()
     follows.__exit__(None, None, None)
 
