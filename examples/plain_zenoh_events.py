@@ -23,30 +23,29 @@ def follow(session: zenoh.Session, robot: str, actor: str, kind: str) -> None:
     # Subscribe first and ask then: what happens in between comes twice, and never not at all.
     session.declare_subscriber(f"{recognition.format('evt')}/connection_event/{actor}/{kind}", samples.put)
     session.declare_subscriber(f"{recognition.format('state')}/statistics/{actor}", samples.put)
-    session.liveliness().declare_subscriber(f"{robot}/engage/v1/@bus/*/alive/recognition", samples.put)
+    session.liveliness().declare_subscriber(f"{robot}/engage/v1/@bus/*/alive/recognition", samples.put, history=True)
 
     states: dict[str, zenoh.Sample] = {}
-    for reply in session.get(f"{recognition.format('state')}/*/{actor}"):
-        if reply.ok is not None:
-            states[str(reply.ok.key_expr)] = reply.ok
     open_events: dict[str, Any] = {}
-    for sample in states.values():
-        state = json.loads(sample.payload.to_bytes())
-        if state["type"] == "statistics":
-            tell_statistics(state)
-        for event in state.get("events", ()):
-            if kind in ("*", event["kind"]):
-                open_events[event["id"]] = event
-                tell_event(event)
-
     while True:
         sample = samples.get()
         key = str(sample.key_expr)
         if "/@bus/" in key:
-            if sample.kind == zenoh.SampleKind.DELETE:  # recognition has gone: its events will never end
-                for event in open_events.values():
-                    tell_event({**event, "state": "lost"})
-                open_events.clear()
+            if sample.kind == zenoh.SampleKind.DELETE:  # recognition has gone: the events of this run will never end
+                run = key.split("/")[-3][:8]
+                for id in [id for id in open_events if id.startswith(f"{run}-")]:
+                    tell_event({**open_events.pop(id), "state": "lost"})
+                continue
+            replies = session.get(f"{recognition.format('state')}/*/{actor}")  # it is there, or there again
+            states = {str(reply.ok.key_expr): reply.ok for reply in replies if reply.ok is not None}
+            for each in states.values():
+                state = json.loads(each.payload.to_bytes())
+                if state["type"] == "statistics":
+                    tell_statistics(state)
+                for event in state.get("events", ()):
+                    if kind in ("*", event["kind"]) and open_events.get(event["id"]) != event:
+                        open_events[event["id"]] = event
+                        tell_event(event)
             continue
         message = json.loads(sample.payload.to_bytes())
         # What a state was told of already has an older timestamp than the state.

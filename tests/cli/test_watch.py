@@ -22,6 +22,7 @@ from services.bus import Bus
 from services.client import Robot, connect
 from services.feeds import EventFeed
 from services.zenoh_bus import open_hub
+from tests.bus.cable import Cable
 from tests.bus.places import free_endpoint
 from tests.cli.command import engage, start
 from tests.cli.test_processes import PATIENCE, line, stopped
@@ -125,6 +126,33 @@ async def test_late_joiners_of_all_kinds_and_the_death_of_recognition(endpoint: 
     assert [one["id"] for one in watched] == [lost.id, again.id]
     assert [text.split(":")[0] for text in plain_watched] == [lost.id, again.id]
     assert codes == [0, 0]
+
+
+async def test_the_plain_example_goes_on_after_a_cut(endpoint: str) -> None:
+    cable = Cable(endpoint)
+    await cable.join()
+    async with scene("seen", endpoint) as our:
+        with our.robot.connection_events("ann") as events:
+            our.look("seen", "ann")
+            our.look("ann", "seen")
+            shared = await heard(events, "succeeded")
+            plain = await asyncio.create_subprocess_exec(
+                sys.executable, EXAMPLE, "--robot", "seen", "--actor", "ann", cable.endpoint, stdout=PIPE, stderr=PIPE
+            )
+            try:
+                before = await line(plain, ": succeeded", log=False)
+                await cable.cut()
+                await line(plain, ": lost", log=False)
+                await cable.join()
+                after = await line(plain, ": succeeded", log=False)
+                our.look_away("ann")
+                ended = await line(plain, ": completed", log=False)
+            finally:
+                await stopped(plain)
+                await cable.cut()
+
+    assert before == after
+    assert [text.split(":")[0] for text in (after, ended)] == [shared.id] * 2
 
 
 async def test_a_reader_who_has_had_enough_ends_watch_without_a_word(endpoint: str) -> None:
