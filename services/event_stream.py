@@ -51,7 +51,7 @@ class EventStream:
                 self.deadline = None
                 return [*self._follow(session_of(run), now), *self._regain()]
             case PeerGone(participant="recognition"):
-                self.deadline = now + GRACE
+                self.deadline = at + GRACE
             case ConnectionEvent() if not past or at > self._began:  # of what is older, the state tells what is open
                 return [*self._follow(message.session, now), *self._change(message)]
             case OpenEvents(session=session):

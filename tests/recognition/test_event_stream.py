@@ -1,5 +1,6 @@
 """Connection events as a product: what is open for who comes late, then each change once; one person, one kind."""
 
+import asyncio
 from functools import partial
 from typing import Any
 
@@ -145,6 +146,29 @@ async def test_the_events_of_a_dead_recognition_are_lost_after_the_grace(hub: Me
         assert events.open == ()
         with robot.connection_events(open=True) as late:
             assert await told(late, 5.0) == []
+
+
+async def test_the_grace_counts_from_the_death_however_late_it_is_read(hub: MemoryHub):
+    async with running(hub, recognition()), connect(hub=hub) as robot:
+        events = await watched(hub, robot, hub.join("perception"))
+        hub.kill("recognition")
+        await asyncio.sleep(1.5)
+
+        assert await events.next(0.25) is None
+        assert await told(events, 0.5) == [("ann", MUTUAL, "lost")]
+
+
+async def test_a_return_is_heard_before_the_loss_however_late_it_is_read(hub: MemoryHub):
+    async with running(hub, recognition()), connect(hub=hub) as robot:
+        events = await watched(hub, robot, hub.join("perception"))
+        run = hub._buses["recognition"].run
+        hub.announce("recognition", PeerGone(participant="recognition"))
+        await asyncio.sleep(1.0)
+        hub.announce("recognition", PeerAlive(participant="recognition", run=run))
+        await asyncio.sleep(5.0)
+
+        assert await told(events) == []
+        assert len(events.open) == 1
 
 
 async def test_the_events_of_the_former_life_are_lost_as_the_next_one_comes(hub: MemoryHub):
