@@ -57,8 +57,10 @@ class Authority(Outlook):
             if point in plan.at:
                 self._note(point)
         for behavior in self.begun:
-            if self.forecast is not None:
-                for point in self._points.get(behavior, ()):
+            points = self._points.get(behavior, ())
+            if self.forecast is not None and points:
+                self.forecast.overdue(plan.at[points[0]], self.begun[behavior])
+                for point in points:
                     self.forecast.require(plan.at[point])
             if behavior not in plan.chains:
                 self.patience.forget(behavior)
@@ -175,7 +177,7 @@ class Authority(Outlook):
     def deadline(self) -> Seconds | None:
         """When to ask again, whatever happens until then."""
         wake = self._wakes[0][0] if self._wakes else None
-        return min((at for at in (wake, self.patience.deadline) if at is not None), default=None)
+        return min((at for at in (wake, self.patience.deadline, self._overdue_at) if at is not None), default=None)
 
     def _conclude(self, now: Seconds) -> None:
         """What is expected at another time than before is decided anew."""
@@ -229,6 +231,8 @@ class Authority(Outlook):
                     self._open(transition)
             if self.forecast is not None:
                 self.forecast.require(transition)
+                if member.kind == "start":
+                    self.forecast.overdue(transition, now)
         self._conclude(now)
 
     def _decide_pause(self, transition: int, member: Member, due: Seconds, now: Seconds) -> None:

@@ -165,6 +165,7 @@ class Performance:
     def miss(self, behaviors: Iterable[str]) -> None:
         """What has not been reached of these, in other blocks, never will be."""
         lost = {point.behavior for point in self._foreign - self.authority.reached.keys()}.intersection(behaviors)
+        lost -= self._vanished
         if lost and not self._ending.done():
             self._vanished |= lost
             self._replan()

@@ -65,6 +65,11 @@ class Outlook(Facts):
         coming = (self._followed & self.plan.at.keys()) - self.reached.keys() if forecast is not None else ()
         return {point: forecast.times[self.plan.at[point]] for point in coming}  # type: ignore[union-attr]
 
+    @property
+    def _overdue_at(self) -> Seconds | None:
+        """When to look who is late, though nothing here depends on it: others prepare for what comes after."""
+        return self._arrivals[0][0] + SURPRISE if self._followed and self._arrivals else None
+
     # -- behaviors under way -------------------------------------------------------------------------------------
 
     def _learn(self, point: Point, at: Seconds) -> None:

@@ -100,6 +100,17 @@ async def test_words_that_are_dropped_are_waited_for_no_longer() -> None:
     assert (seen.times("two")["g:start"], seen.times("two")["t:start"]) == (1.0, 2.25)
 
 
+async def test_nobody_sets_out_for_words_after_those_that_are_overdue_nor_for_what_follows_them() -> None:
+    other_arm = Pointing(id="p", target="b", mode="LEFT_HAND")
+    third = follower(other_arm, tie="p:stroke_start", id="three", words="two:t:end")
+    async with stage(FakeBody({"s": Script(stall="m2")})) as seen:
+        await performed(seen, block((WORDS,), id="one"), follower(BEAT, tie="g:stroke"), third)
+
+    times = seen.times("two")
+    assert (times["g:start"], times["g:stroke"], times["t:start"]) == (10.0, 11.25, 11.25)
+    assert (seen.times("three")["p:start"], seen.times("three")["t:start"]) == (11.5, 12.25)
+
+
 async def test_a_gesture_in_words_to_come_is_not_held_up_during_those_before() -> None:
     marked = Speech(id="t", text="five six", marks=(Mark("m", 4),))
     tied = block((marked, BEAT), after("one:s:end", "t:start"), together("g:stroke", "t:m"), id="two")
