@@ -35,6 +35,7 @@ async def recognize(bus: Bus, ready: Ready, config: RecognitionConfig) -> None:
     )  # fmt: skip
     with bus.subscribe(*patterns) as inbox:
         ready()
+        recognition.begin()
         try:
             while True:
                 received = await inbox.next(recognition.deadline)
@@ -61,6 +62,10 @@ class _Recognition:
     def deadline(self) -> Seconds | None:
         times = (self._recognizer.deadline, self._standings.deadline)
         return min((at for at in times if at is not None), default=None)
+
+    def begin(self) -> None:
+        """Who asks before anything has happened is told so."""
+        self._bus.publish(keys.statistics("all"), self._standings.overall(self._bus.now()))
 
     def advance(self) -> None:
         self._tell(self._recognizer.advance(self._bus.now()))

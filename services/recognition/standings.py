@@ -45,6 +45,10 @@ class Standings:
             self._busy = frozenset(busy)
         return [self._statistics(actor, now) for actor in sorted(touched)]
 
+    def overall(self, now: Seconds) -> Statistics:
+        """Of all together, as they are."""
+        return self._statistics(EVERYBODY, now)
+
     def _standing(self, actor: str) -> _Standing:
         if actor not in self._standings:
             self._standings[actor] = _Standing(self._config, self._clock)

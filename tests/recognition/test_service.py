@@ -211,3 +211,13 @@ async def test_bad_names_never_end_the_service(hub: MemoryHub):
     assert received.message.initiator == "ann"  # type: ignore[union-attr]
     told = [queued.message.reason for queued in faults._queue]  # type: ignore[union-attr]
     assert told == [f"{name!r} can't be in a key" for name in ("", "a/b", "**", "#", "@b")]
+
+
+async def test_who_asks_before_anything_has_happened_is_told_so(hub: MemoryHub) -> None:
+    async with running(hub, recognition()):
+        with hub.join("watcher").subscribe(keys.statistics("all")) as inbox:
+            received = await inbox.next(10.0)
+
+    assert received is not None
+    assert isinstance(received.message, Statistics)
+    assert (received.message.session.events, received.message.level) == (0, "unknown")
