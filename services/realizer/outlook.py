@@ -68,6 +68,8 @@ class Outlook(Facts):
     @property
     def _overdue_at(self) -> Seconds | None:
         """When to look who is late, though nothing here depends on it: others prepare for what comes after."""
+        while self._arrivals and self._next.get(self._arrivals[0][2]) != self._arrivals[0][3]:
+            heapq.heappop(self._arrivals)  # It has come.
         return self._arrivals[0][0] + SURPRISE if self._followed and self._arrivals else None
 
     # -- behaviors under way -------------------------------------------------------------------------------------
