@@ -10,7 +10,7 @@ from collections import deque
 from collections.abc import Callable, Iterable
 from enum import Enum, auto
 from types import TracebackType
-from typing import Self
+from typing import Generic, Self, TypeVar
 
 from msgspec import Struct
 
@@ -46,7 +46,39 @@ class Received(Struct, frozen=True):
     past: bool = False
 
 
-class Subscription:
+T = TypeVar("T")
+
+
+class Reading(ABC, Generic[T]):
+    """What comes one by one: `next`, or `async for` until that has no more; `with` closes it."""
+
+    @abstractmethod
+    async def next(self, until: Seconds | None = None, /) -> T | None:
+        """The next one; None if there is none by then, or none any more."""
+
+    @abstractmethod
+    def close(self) -> None:
+        """Nothing comes any more."""
+
+    def __aiter__(self) -> Self:
+        return self
+
+    async def __anext__(self) -> T:
+        one = await self.next()
+        if one is None:
+            raise StopAsyncIteration
+        return one
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+
+class Subscription(Reading[Received]):
     """A bounded queue of received messages, in order across all its keys; read it with `async for` or `next`.
 
     Used by one task at a time. When full the oldest message is dropped and counted in `overflowed`.
@@ -112,28 +144,11 @@ class Subscription:
                     timer.cancel()
         return self._queue.popleft() if self._queue else None
 
-    def __aiter__(self) -> Self:
-        return self
-
-    async def __anext__(self) -> Received:
-        received = await self.next()
-        if received is None:
-            raise StopAsyncIteration
-        return received
-
     def close(self) -> None:
         if not self._closed:
             self._closed = True
             self._on_close(self)
             self._wake()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
 
 
 Answer = Callable[[Message], Message]

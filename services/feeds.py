@@ -2,18 +2,17 @@
 
 from collections import deque
 from collections.abc import Callable, Iterable
-from types import TracebackType
-from typing import Generic, Self, TypeVar
+from typing import TypeVar
 
 from schemas.recognition import ConnectionEvent
 from schemas.units import Seconds
-from services.bus import Bus, Subscription
+from services.bus import Bus, Reading, Subscription
 from services.event_stream import EventStream
 
 M = TypeVar("M")
 
 
-class Feed(Generic[M]):
+class Feed(Reading[M]):
     """Messages of one kind, from when it was made: `async for`, or `next` with a timeout. Ends with the client."""
 
     def __init__(self, subscription: Subscription, kinds: tuple[type, ...], now: Callable[[], Seconds]) -> None:
@@ -29,25 +28,8 @@ class Feed(Generic[M]):
                 return received.message  # type: ignore[return-value]
         return None
 
-    def __aiter__(self) -> Self:
-        return self
-
-    async def __anext__(self) -> M:
-        message = await self.next()
-        if message is None:
-            raise StopAsyncIteration
-        return message
-
     def close(self) -> None:
         self._subscription.close()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
 
 
 class EventFeed(Feed[ConnectionEvent]):
