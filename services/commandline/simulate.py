@@ -30,7 +30,7 @@ from services.config import Config
 from services.runtime import installed_version
 from services.study import files, summary
 from services.study.conditions import CONDITIONS, WORSE
-from services.study.hypotheses import findings
+from services.study.hypotheses import Finding, findings
 from services.study.records import EventRecord, SessionRecord
 from services.study.summary import Table
 
@@ -91,8 +91,10 @@ def main(options: Options) -> int:
     if played:
         place = {(order.condition, order.session): number for number, order in enumerate(orders)}
         played.sort(key=lambda one: place[one.record.condition, one.record.session])
-        tables = tables_of([one.record for one in played], people=options.human == PEOPLE)
-        folder.write(contents(options, orders, played, tables, draw))
+        records = [one.record for one in played]
+        found = findings(records)
+        tables = tables_of(records, found, people=options.human == PEOPLE)
+        folder.write(contents(options, orders, played, found, tables, draw))
         for table in tables:
             console.print("", shown(table), sep="\n")
         console.print(f"\nresults in {options.out}", markup=False, highlight=False, soft_wrap=True)
@@ -148,8 +150,7 @@ def _order(options: Options, condition: str, number: int) -> Order:
 # -- what came of it --------------------------------------------------------------------------------------------
 
 
-def tables_of(records: Sequence[SessionRecord], *, people: bool) -> list[Table]:
-    found = findings(records)
+def tables_of(records: Sequence[SessionRecord], found: Sequence[Finding], *, people: bool) -> list[Table]:
     tables = [summary.overview(records)]
     if people:
         tables.append(beside_table_2_1(records))
@@ -161,12 +162,16 @@ def tables_of(records: Sequence[SessionRecord], *, people: bool) -> list[Table]:
 
 
 def contents(
-    options: Options, orders: Sequence[Order], played: Sequence[Played], tables: Sequence[Table], draw: Draw
+    options: Options,
+    orders: Sequence[Order],
+    played: Sequence[Played],
+    found: Sequence[Finding],
+    tables: Sequence[Table],
+    draw: Draw,
 ) -> dict[str, bytes]:
     """The results by file name. Nothing in them depends on the number of processes."""
     records = [one.record for one in played]
     events = [event for one in played for event in one.events]
-    found = findings(records)
     texts = {
         "events.csv": files.events(events),
         "sessions.csv": files.sessions(records),
