@@ -20,13 +20,13 @@ from schemas.world import World
 from services.recognition.config import RecognitionConfig
 from services.recognition.looking import ROUNDING, Change, Looking
 from services.recognition.manipulation import Manipulation
+from services.recognition.presence import NEVER
 from services.recognition.scene import Covered
 from services.recognition.sight import Sight, is_direction, is_place
 from services.recognition.voice import Voice
 
 Raw = HeadPose | VoiceActivity | World | RobotState
 Symbolic = ActionBegan | ActionEnded | ActorFound | ActorLost
-NEVER = float("-inf")
 
 
 class _Actor:
