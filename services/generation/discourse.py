@@ -36,11 +36,11 @@ class Discourse(Struct, frozen=True):
 
     def without(self, fragment: str, unsaid: Collection[str]) -> "Discourse":
         """The fragment has ended and never came to refer to some of its objects."""
-        return replace(
-            self,
-            named=tuple(each for each in self.named if each.fragment != fragment or each.object not in unsaid),
-            before=tuple(each for each in self.before if each.fragment != fragment or each.object not in unsaid),
-        )
+
+        def said(named: tuple[Named, ...]) -> tuple[Named, ...]:
+            return tuple(each for each in named if each.fragment != fragment or each.object not in unsaid)
+
+        return replace(self, named=said(self.named), before=said(self.before))
 
     def hearing(self, event: ConnectionEvent, robot: str) -> "Discourse":
         """A person who directs to something else makes that the topic: "it" is not what the robot named before."""
