@@ -32,8 +32,10 @@ from schemas import (
     world,
 )
 from schemas.messages import COMMANDS, OUTWARD
+from services.serving import LIFELESS_KEPT
 from services.zenoh_order import KEPT
 
+ROLES = ", ".join(f"`{role}`" for role in keys.ROLES)
 PAGE = Path(__file__).parent / "protocol.md"
 
 
@@ -41,20 +43,26 @@ def _taken(key: str) -> str:
     return ", ".join(f"`{kind.__name__}`" for kind in COMMANDS[key])
 
 
+def _address(expression: str) -> str:
+    """The key of a command, with names for what a requester puts in."""
+    return expression.replace("*/*", "<role>/<requester>")
+
+
 KEYS: tuple[tuple[str, str, str], ...] = (
-    (keys.FRAGMENT, "manager → generation", _taken(keys.FRAGMENT)),
-    (keys.INHIBIT, "anyone → generation", _taken(keys.INHIBIT)),
-    (keys.BLOCK, "manager, generation → realizer", _taken(keys.BLOCK)),
-    (keys.EVENT, "realizer → recognition", _taken(keys.EVENT)),
-    (keys.TURN, "realizer, generation → recognition", _taken(keys.TURN)),
-    (keys.BEHAVIOR, "realizer → control", _taken(keys.BEHAVIOR)),
-    (keys.cancel("<server>"), "requester → the request's server", "`Cancel`"),
+    (_address(keys.FRAGMENT), "manager → generation", _taken(keys.FRAGMENT)),
+    (_address(keys.INHIBIT), "anyone → generation", _taken(keys.INHIBIT)),
+    (_address(keys.BLOCK), "manager, generation → realizer", _taken(keys.BLOCK)),
+    (_address(keys.EVENT), "realizer → recognition", _taken(keys.EVENT)),
+    (_address(keys.TURN), "realizer, generation → recognition", _taken(keys.TURN)),
+    (_address(keys.BEHAVIOR), "realizer → control", _taken(keys.BEHAVIOR)),
+    (_address(keys.cancel("<server>")), "requester → the request's server", "`Cancel`"),
+    (_address(keys.keep_alive("<server>")), "requester → the server of its live requests", "`KeepAlive`"),
     (
         keys.request_state("<server>"),
         "server → requester",
-        "`Accepted`, `Refused`; from generation `FragmentOutcome`, `InhibitionEnded`; from the realizer"
-        " `BlockOutcome`, `BehaviorInterrupted`; from control `BehaviorOutcome`, `HomeReached`; from recognition"
-        " `EventOutcome`, `TurnOutcome`",
+        "`Heard`, `Accepted`, `Outdated`, `Refused`; from generation `FragmentOutcome`, `InhibitionEnded`; from the"
+        " realizer `BlockOutcome`, `BehaviorInterrupted`; from control `BehaviorOutcome`, `BehaviorAborted`,"
+        " `HomeReached`; from recognition `EventOutcome`, `TurnOutcome`",
     ),
     (
         keys.FEEDBACK,
@@ -153,10 +161,29 @@ block or fragment.
 
 ## Requests
 
-A request has an `id` of its requester's making and ends exactly once: `Accepted` or `Refused`, then one outcome with
-the same id. Send it again (after 0.3 s, doubling to 2 s) until it has ended; the server repeats its last state. Same
-id, same request: nothing is done twice. `Cancel` with that id ends it as interrupted. When the requester's liveliness
-token stays away for 2 s, the server ends its requests; a requester that never had a token is left alone.
+A command travels on `<robot>/{keys.PREFIX}/cmd/<server>/<role>/<requester>/<subject>`. The role is one of {ROLES}; rules
+for access are given by it. The requester is a name of its own making, unique on the robot's bus; a process with a
+liveliness token has its participant's name.
+
+A request is known by its requester, the requester's life, its kind (`type`) and its `id`, and an answer names all four.
+Among the live requests of one life no two have the same id, of whatever kind: the second is refused by name. `life` is a
+word that a program makes up at each start, so that it never gets what its former life had asked for. Who leaves it out
+gets one from its connection, where Zenoh tells (a source info, or a timestamp of its own); else its ended requests are
+remembered for {LIFELESS_KEPT:g} s, and then, or with other content, the same id is a new request.
+
+It ends exactly once: `Refused`, or `Accepted` and then one outcome. Send it again (after 0.3 s, doubling to 2 s) until
+one of these has come; the server repeats its last state, and says `Heard` while there is none. Same life and id, same
+request: nothing is done twice. Other content under the id of a live request replaces it where its kind says so
+(`PerformBehavior`, `Inhibit`), and is ignored with a `Fault` else. `Cancel` ends it as interrupted; it is sent again
+until the outcome has come.
+
+What was accepted is not sent again. Where a request names a `lease`, it must be renewed within so many seconds: by being
+sent again, or by a `KeepAlive` that names it with all others (Engage's own once a second, leases of 5 s); else the
+server ends it. The lease of a `PerformBehavior` is that of the movement authority. `Outdated` answers a `KeepAlive` that
+speaks of newer content than the server has, `Refused` one that names what it does not know.
+
+When the requester's liveliness token stays away for 2 s, or comes back as another life, the server ends its requests. A
+requester without a token and without a lease is left alone, but by control.
 
 ## Speaking it from elsewhere
 
@@ -171,11 +198,10 @@ config.insert_json5("connect/endpoints", '["tcp/127.0.0.1:7447"]')
 with zenoh.open(config) as session:
     states = session.declare_subscriber("robot/{keys.request_state("generation")}")
     session.put(
-        "robot/{keys.FRAGMENT}",
+        "robot/{keys.command(keys.FRAGMENT, "manager", "my-manager")}",
         json.dumps({{
             "type": "perform_fragment",
             "id": "greeting-1",
-            "requester": "my-manager",
             "fragment": {{
                 "type": "fragment",
                 "id": "greeting-1",
@@ -329,7 +355,8 @@ def _rows(owner: type, meanings: dict[str, str]) -> list[str]:
     assert isinstance(node, ast.ClassDef)
     rows = []
     for field, following in zip(node.body, [*node.body[1:], None], strict=True):
-        if not (isinstance(field, ast.AnnAssign) and isinstance(field.target, ast.Name)):
+        is_field = isinstance(field, ast.AnnAssign) and isinstance(field.target, ast.Name)
+        if not is_field or field.target.id not in owner.__struct_fields__:
             continue
         kind = ast.unparse(field.annotation).replace("|", "\\|")
         default = "" if field.value is None else f"`{ast.unparse(field.value)}`"

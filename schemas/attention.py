@@ -1,6 +1,6 @@
 """Who owns the robot's head and why; leases that inhibit gaze or pointing. Design: generation, maintenance policy."""
 
-from typing import Literal
+from typing import ClassVar, Literal
 
 from msgspec import Struct
 
@@ -31,17 +31,23 @@ class HeadOwner(Struct, frozen=True, kw_only=True, tag="head_owner", omit_defaul
 
 
 class Inhibit(Request, frozen=True, kw_only=True, tag="inhibit", omit_defaults=True):
-    """cmd: anyone -> generation. A lease, renewed by sending it again; ends after `ttl` or with its owner's life.
+    """cmd: anyone -> generation. Ends after `ttl` without `KeepAlive` or being sent again, or with its owner's life.
 
     Ends in `InhibitionEnded`. A gaze or point of a fragment that runs is aborted, others are left out. mode, of gaze:
     release: the head is free and goes back to the base gaze; hold: it stays on what it is on; target: it keeps to
     `target`. Of an arm every mode is the same: it does not point. The newest lease on a part counts.
     """
 
+    is_updatable: ClassVar[bool] = True
+
     part: Literal["gaze", "point-left", "point-right"] = "gaze"
     mode: Literal["release", "hold", "target"] = "hold"
     ttl: Seconds = 5.0
     target: str = ""
+
+    @property
+    def term(self) -> Seconds:
+        return self.ttl
 
 
 class InhibitionEnded(Outcome, frozen=True, kw_only=True, tag="inhibition_ended", omit_defaults=True):

@@ -2,13 +2,15 @@
 
 Movement authority. `PerformBehavior.through` names the last sync point the body may pass without asking; it
 holds at the hold point before the next one and says so (`SyncPointArrived`). The realizer extends the authority
-by sending the request again, same id, with a later `through`. Authority never shrinks. Where each type can hold is in
+by sending the request again, same id, with a later `through`; it lasts as long as `KeepAlive` renews it (decision
+0001). Authority never shrinks. Where each type can hold is in
 docs/control.md: before and after the stroke of an arm or a nod, on target (`stroke` and `relax`) what lasts there.
 """
 
-from typing import Literal
+from typing import ClassVar, Literal, Self
 
 from msgspec import Struct
+from msgspec.structs import replace
 
 from schemas.behaviors import BlockBehavior
 from schemas.faults import Fault
@@ -29,6 +31,8 @@ class PerformBehavior(Request, frozen=True, kw_only=True, tag="perform_behavior"
     through: sync point in the body's own (draft, snake_case) spelling; at least `start`.
     """
 
+    is_updatable: ClassVar[bool] = True
+
     block: str
     behavior: BlockBehavior
     through: str
@@ -36,11 +40,27 @@ class PerformBehavior(Request, frozen=True, kw_only=True, tag="perform_behavior"
     """Where its own pace would miss them, instants of its coming points: it is to be slower, or faster, or smaller,
     as near to them as it can. The newest says all; empty: as is natural."""
 
+    @property
+    def authority(self) -> str:
+        return self.through
+
+    def with_authority(self, authority: str) -> Self:
+        return replace(self, through=authority)
+
 
 class AbortBehavior(Request, frozen=True, kw_only=True, tag="abort_behavior", omit_defaults=True):
-    """cmd: realizer -> control: end request `id` now, relaxing, or freezing and then relaxing."""
+    """cmd: generation -> control: end a behavior of a block, whoever asked for it. Ends in `BehaviorAborted`.
 
+    how: relaxing, or freezing and then relaxing. Who asked for the behavior itself sends a `Cancel`.
+    """
+
+    block: str
+    behavior: str
     how: Literal["relax", "freeze"] = "relax"
+
+
+class BehaviorAborted(Outcome, frozen=True, kw_only=True, tag="behavior_aborted", omit_defaults=True):
+    """evt: terminal state of `AbortBehavior`: the behavior has ended, one way or another."""
 
 
 class GoHome(Request, frozen=True, kw_only=True, tag="go_home", omit_defaults=True):
@@ -62,6 +82,8 @@ class SyncPointArrived(Struct, frozen=True, kw_only=True, tag="sync_point_arrive
     behavior: str
     sync: str
     at: Stamp
+    requester: str = ""
+    """Of that request; empty where the body does not say."""
 
 
 class SyncPointReached(Struct, frozen=True, kw_only=True, tag="sync_point_reached", omit_defaults=True):
@@ -77,6 +99,7 @@ class SyncPointReached(Struct, frozen=True, kw_only=True, tag="sync_point_reache
     sync: str
     at: Stamp
     arrived: Stamp
+    requester: str = ""
 
 
 class WordSpoken(Struct, frozen=True, kw_only=True, tag="word_spoken", omit_defaults=True):

@@ -1,6 +1,7 @@
 """Key expressions, spelled once. Relative to the robot's namespace: on the wire `<robot>/engage/v1/...`.
 
-`engage/v1/<class>/<producer or server>/<subject>`; the class decides how a key travels (`QUALITY`):
+`engage/v1/<class>/<producer or server>/<subject>`; of a command `cmd/<server>/<role>/<requester>/<subject>`,
+in which rules for access can see who asks. The class decides how a key travels:
 
 | class  | for | how |
 |--------|-----|-----|
@@ -21,12 +22,13 @@ KeyClass = Literal["cmd", "evt", "state", "stream", "rpc", "alive"]
 HISTORY_MAX_AGE = 2.0
 """Seconds: how old a command or event may be when a late subscriber still gets it."""
 
-FRAGMENT = f"{PREFIX}/cmd/generation/fragment"
-INHIBIT = f"{PREFIX}/cmd/generation/inhibit"
-BLOCK = f"{PREFIX}/cmd/realizer/block"
-EVENT = f"{PREFIX}/cmd/recognition/event"
-TURN = f"{PREFIX}/cmd/recognition/turn"
-BEHAVIOR = f"{PREFIX}/cmd/control/behavior"
+# Of a command: the expression for all who may send it. `command` makes the key of one requester.
+FRAGMENT = f"{PREFIX}/cmd/generation/*/*/fragment"
+INHIBIT = f"{PREFIX}/cmd/generation/*/*/inhibit"
+BLOCK = f"{PREFIX}/cmd/realizer/*/*/block"
+EVENT = f"{PREFIX}/cmd/recognition/*/*/event"
+TURN = f"{PREFIX}/cmd/recognition/*/*/turn"
+BEHAVIOR = f"{PREFIX}/cmd/control/*/*/behavior"
 
 FEEDBACK = f"{PREFIX}/evt/realizer/feedback"
 FRAGMENT_FEEDBACK = f"{PREFIX}/evt/generation/feedback"
@@ -63,13 +65,44 @@ def of_class(kind: KeyClass) -> str:
     return f"{PREFIX}/{kind}/**"
 
 
+ROLES = ("manager", "generation", "realizer", "recognition", "control", "perception", "observer")
+"""What a participant may be to the others. Rules for access are given by role, not by name."""
+
+
 def commands(server: str) -> str:
-    """Every command for `server`; cancellations too."""
-    return f"{PREFIX}/cmd/{server}/*"
+    """Every command for `server`; cancellations too, and whatever is sent there that is no command's key."""
+    return f"{PREFIX}/cmd/{server}/**"
 
 
 def cancel(server: str) -> str:
-    return f"{PREFIX}/cmd/{server}/cancel"
+    """Of all requesters, as `BLOCK` and its like."""
+    return f"{PREFIX}/cmd/{server}/*/*/cancel"
+
+
+def keep_alive(server: str) -> str:
+    """Of all requesters, as `BLOCK` and its like."""
+    return f"{PREFIX}/cmd/{server}/*/*/keep_alive"
+
+
+def command(expression: str, role: str, requester: str) -> str:
+    """The key on which one requester sends this command. Raises ValueError for a name that can't be in a key."""
+    *before, _, _, subject = expression.split("/")
+    for name in (role, requester):
+        if not is_chunk(name):
+            raise ValueError(f"{name!r} can't be in a key: {CHUNK}")
+    return "/".join((*before, role, requester, subject))
+
+
+def expression_of(key: str) -> str:
+    """Of a command's key, the expression for all requesters; empty for one that has no role and requester in it."""
+    chunks = key.split("/")
+    return "/".join((*chunks[:4], "*", "*", chunks[6])) if len(chunks) == 7 else ""
+
+
+def requester_of(key: str) -> str:
+    """`cmd/<server>/<role>/<requester>/...` -> requester; empty where there is none."""
+    chunks = key.split("/")
+    return chunks[5] if len(chunks) == 7 else ""
 
 
 def request_state(server: str) -> str:

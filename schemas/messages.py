@@ -11,6 +11,7 @@ from schemas.attention import HeadOwner, Inhibit, InhibitionEnded
 from schemas.blocks import BehaviorInterrupted, BlockOutcome, InterruptBehavior, PerformBlock
 from schemas.body import (
     AbortBehavior,
+    BehaviorAborted,
     BehaviorOutcome,
     Capabilities,
     DescribeBody,
@@ -38,18 +39,18 @@ from schemas.recognition import (
     Statistics,
     TurnOutcome,
 )
-from schemas.requests import Accepted, Cancel, Refused, Request, Unreadable
+from schemas.requests import Accepted, Cancel, Heard, KeepAlive, Outdated, Refused, Request, Unreadable
 from schemas.status import AskStatus, Status
 from schemas.world import World
 
 MAJOR = 1
 
 Message = (
-    Accepted | Refused | Cancel | Unreadable | Fault
+    Heard | Accepted | Outdated | Refused | Cancel | KeepAlive | Unreadable | Fault
     | PerformFragment | FragmentOutcome | TurnClosed | Inhibit | InhibitionEnded | HeadOwner
     | PerformBlock | BlockOutcome | InterruptBehavior | BehaviorInterrupted
     | BlockProgress | SyncPointProgress | PredictionFeedback | WarningFeedback
-    | PerformBehavior | AbortBehavior | GoHome | HomeReached | BehaviorOutcome
+    | PerformBehavior | AbortBehavior | BehaviorAborted | GoHome | HomeReached | BehaviorOutcome
     | SyncPointArrived | SyncPointReached | WordSpoken | RobotState
     | DescribeBody | Capabilities | EstimateBehaviors | Estimates
     | ActionBegan | ActionEnded | ActorFound | ActorLost | World | HeadPose | VoiceActivity
@@ -66,7 +67,7 @@ COMMANDS: Mapping[str, tuple[type[Request], ...]] = {
     keys.TURN: (SignalTurn,),
     keys.BEHAVIOR: (PerformBehavior, AbortBehavior, GoHome),
 }
-"""What each command key is for. A `Cancel` is understood on any of its server's."""
+"""What each command key is for; besides, `keys.cancel` takes `Cancel`, `keys.keep_alive` takes `KeepAlive`."""
 
 OUTWARD = (ConnectionEvent, OpenEvents, Statistics)
 """What recognition tells programs of others, a few times a second at most: published as JSON, which all can read.

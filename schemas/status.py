@@ -10,7 +10,7 @@ class AskStatus(Struct, frozen=True, kw_only=True, tag="ask_status"):
 
 
 class BusHealth(Struct, frozen=True, kw_only=True, omit_defaults=True):
-    """Counts since the process opened the bus. The last three are the participant's own, all others its process'."""
+    """Counts since the process opened the bus. The last four are the participant's own, all others its process'."""
 
     peers: tuple[str, ...] = ()
     """Names of the participants that are there, this one included."""
@@ -32,6 +32,8 @@ class BusHealth(Struct, frozen=True, kw_only=True, omit_defaults=True):
     """How often one of its subscriptions missed something, and asked for it."""
     lost: int = 0
     """Messages that were gone for good by then."""
+    failures: int = 0
+    """How often something went wrong here that no message should be able to cause: each a fault, and in the log."""
 
 
 class Status(Struct, frozen=True, kw_only=True, tag="status", omit_defaults=True):

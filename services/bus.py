@@ -5,9 +5,11 @@ the class of the key (`schemas.keys`). Messages are frozen structs. Nothing here
 """
 
 import asyncio
+import logging
 from abc import ABC, abstractmethod
 from collections import deque
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
 from enum import Enum, auto
 from types import TracebackType
 from typing import Generic, Self, TypeVar
@@ -16,13 +18,16 @@ from msgspec import Struct
 
 from schemas import keys
 from schemas.blocks import Block, PerformBlock
-from schemas.faults import EngageError
+from schemas.faults import EngageError, Fault
 from schemas.fragments import PerformFragment
 from schemas.messages import Message, decode
 from schemas.requests import Unreadable
 from schemas.status import BusHealth
 from schemas.units import Seconds, Stamp
 from schemas.xml_codec import decode_xml
+
+LOG = logging.getLogger("engage")
+"""What is written here at level ERROR is a bug, and fails a test that did not expect it."""
 
 
 class Keep(Enum):
@@ -36,7 +41,8 @@ class Keep(Enum):
 class Received(Struct, frozen=True):
     """A message as it arrived. source: the participant that published it. at: local time of arrival.
 
-    past: from before the subscription, given to a late subscriber as the class of its key says.
+    life: of the process or connection that it came from, where that is known. past: from before the subscription,
+    given to a late subscriber as the class of its key says.
     """
 
     key: str
@@ -44,6 +50,7 @@ class Received(Struct, frozen=True):
     source: str
     at: Seconds
     past: bool = False
+    life: str = ""
 
 
 T = TypeVar("T")
@@ -158,14 +165,19 @@ class Bus(ABC):
     """One participant's view of the bus.
 
     robot: the namespace. name: who this is; appears as `Received.source` and on its liveliness token.
+    role: what it may be to the others, one of `keys.ROLES`; stands in the keys of its commands.
     clock: the clock that `now` reads, the same for all processes that can compare their times directly.
-    run: which life of the participant this is.
+    run: which life of the participant this is. failures: how often something went wrong here that was contained.
     """
 
     robot: str
     name: str
+    role: str
     clock: str
     run: str
+    failures: int = 0
+    _life_numbers: Iterator[int]
+    """What no former participant of this name in this run has used."""
 
     @property
     @abstractmethod
@@ -183,6 +195,40 @@ class Bus(ABC):
     @abstractmethod
     def local(self, stamp: Stamp) -> Seconds:
         """The stamp as local loop time, through the estimated offset of its clock."""
+
+    def new_life(self) -> str:
+        """A life of its own for each of the requesters on this bus, so that their ids need not differ."""
+        return f"{self.run[:16]}.{next(self._life_numbers)}"
+
+    # -- what goes wrong ------------------------------------------------------------------------------------------
+
+    @contextmanager
+    def containing(self, what: str, then: Callable[[Fault], None] | None = None) -> Iterator[None]:
+        """An exception in the body of `with` ends nothing else: it is logged, counted and told as a fault.
+
+        what: is being done, for the reader of the fault. then: ends what the exception makes impossible.
+        """
+        try:
+            yield
+        except Exception as error:
+            fault = self.failed(error, what)
+            if then is not None:
+                then(fault)
+
+    def failed(self, error: Exception, what: str) -> Fault:
+        """Log, count and tell an exception that nobody has foreseen."""
+        reason = error.fault.reason if isinstance(error, EngageError) else f"{type(error).__name__}: {error}"
+        fault = Fault(reason=reason, where=what, advice="this is a bug: the log has its traceback", service=self.name)
+        self.failures += 1
+        LOG.error("%s: %s", self.name, fault, exc_info=error)
+        self.publish(keys.fault(self.name), fault)
+        return fault
+
+    def report(self, fault: Fault) -> None:
+        """Log, count and tell a mistake of this participant."""
+        self.failures += 1
+        LOG.error("%s: %s", self.name, fault)
+        self.publish(keys.fault(self.name), fault)
 
     @abstractmethod
     def publish(self, key: str, message: Message) -> None:
@@ -221,7 +267,7 @@ class Hub(ABC):
     robot: str
 
     @abstractmethod
-    def join(self, name: str) -> Bus:
+    def join(self, name: str, role: str = "manager") -> Bus:
         """A participant's own view. Names are unique on a robot's bus; a client makes its own unique."""
 
     @abstractmethod
@@ -251,9 +297,10 @@ def read_payload(payload: bytes, encoding: str, key: str, source: str) -> Messag
     if encoding.partition(";")[0] not in ("application/xml", "text/xml"):
         return decode(payload, encoding)
     thing = decode_xml(payload, key)
+    requester = keys.requester_of(key) or source
     if isinstance(thing, Block):
-        return PerformBlock(id=thing.id, requester=source, block=thing)
-    return PerformFragment(id=thing.id, requester=source, fragment=thing)
+        return PerformBlock(id=thing.id, requester=requester, block=thing)
+    return PerformFragment(id=thing.id, requester=requester, fragment=thing)
 
 
 def unreadable(error: EngageError, key: str) -> Unreadable | None:

@@ -51,9 +51,6 @@ FragmentSource = TurnFragment | str | bytes | Path | dict[str, Any]
 ANSWER_PATIENCE = 20.0
 """Seconds after a fragment's end: longer than any answer of a person is waited for."""
 
-RENEWALS_PER_LEASE = 3
-"""An inhibition is renewed this many times within its time to live, so that two renewals may be lost."""
-
 
 class PerformFailed(RunFailed):
     """A fragment or block failed while it ran. `outcome` tells what was done of it."""
@@ -102,10 +99,17 @@ class Robot:
         Raises InputRefused (nothing has moved), PerformFailed, or RunFailed (generation is gone, or never came).
         """
         parsed = _fragment(fragment, f"{self._bus.name}-{next(self._numbers)}")
-        request = PerformFragment(id=self._request_id(parsed.id), requester=self._bus.name, fragment=parsed)
+        request = self._fragment_request(parsed)
         answered = await_answer and parsed.turn_status in ("end", "full")
         outcome = await (self._answered(request, timeout) if answered else self._performed(request, timeout))
         return _unless_failed(outcome, parsed.id)
+
+    def begin_to_perform(self, fragment: TurnFragment) -> None:
+        """Send a fragment and do not wait for what becomes of it."""
+        self._requests.send(keys.FRAGMENT, self._fragment_request(fragment))
+
+    def _fragment_request(self, fragment: TurnFragment) -> PerformFragment:
+        return PerformFragment(id=self._request_id(fragment.id), fragment=fragment)
 
     async def _performed(self, request: PerformFragment, timeout: Seconds | None) -> FragmentOutcome:
         outcome = await self._ask(keys.FRAGMENT, request, timeout)
@@ -140,7 +144,7 @@ class Robot:
             block = Block(
                 id=block, behaviors=tuple(behaviors), constraints=tuple(constraints), composition=composition
             )
-        request = PerformBlock(id=self._request_id(block.id), requester=self._bus.name, block=block)
+        request = PerformBlock(id=self._request_id(block.id), block=block)
         outcome = await self._ask(keys.BLOCK, request, timeout)
         assert isinstance(outcome, BlockOutcome)
         return _unless_failed(outcome, block.id)
@@ -152,7 +156,7 @@ class Robot:
         Raises InputRefused if it is not being performed, or as `perform` does.
         """
         id = self._request_id(f"{block}:{behavior}")
-        request = InterruptBehavior(id=id, requester=self._bus.name, block=block, behavior=behavior)
+        request = InterruptBehavior(id=id, block=block, behavior=behavior)
         outcome = await self._ask(keys.BLOCK, request, timeout)
         assert isinstance(outcome, BehaviorInterrupted)
         return outcome
@@ -171,25 +175,19 @@ class Robot:
 
         Raises InputRefused, for example when `target` is unknown. If the lease is lost the body runs on.
         """
-        request = Inhibit(
-            id=self._request_id("inhibit"), requester=self._bus.name, part=part, mode=mode, target=target, ttl=ttl
-        )
+        request = Inhibit(id=self._request_id("inhibit"), part=part, mode=mode, target=target, ttl=ttl)
         pending = self._requests.send(keys.INHIBIT, request)
-        await self._answer_of(pending, pending.accepted, timeout)
-        renewal = asyncio.create_task(self._renew(request, pending), name=f"renew {request.id}")
+        try:
+            await self._answer_of(pending, pending.accepted, timeout)
+        except (asyncio.CancelledError, RunFailed):
+            self._requests.cancel(request.id, "requester gave up")
+            raise
         try:
             yield
         finally:
-            renewal.cancel()
-            await asyncio.gather(renewal, return_exceptions=True)
             if not pending.outcome.done():
                 self._requests.cancel(request.id, "released")
                 await self._answer_of(pending, asyncio.shield(pending.outcome), ttl)
-
-    async def _renew(self, request: Inhibit, pending: Pending) -> None:
-        while not pending.outcome.done():
-            await asyncio.sleep(request.ttl / RENEWALS_PER_LEASE)
-            self._bus.publish(keys.INHIBIT, request)
 
     async def _ask(self, key: str, request: Request, timeout: Seconds | None) -> Outcome:
         pending = self._requests.send(key, request)
@@ -230,6 +228,7 @@ class Robot:
         kinds = (kind,) if isinstance(kind, str) else tuple(kind)
         if unknown := set(kinds) - set(get_args(EventKind)):
             raise ValueError(f"{', '.join(map(repr, unknown))}: the kinds are {', '.join(get_args(EventKind))}")
+        self._requests.check()
         stream = EventStream(self.now(), self._bus.stamp, kinds=kinds, opening=open)
         return EventFeed(self._bus, stream, keys.event_stream(actor, kinds))
 
@@ -281,6 +280,7 @@ class Robot:
             return _there(await feed.next(timeout), f"statistics of {actor}", timeout)
 
     def _feed(self, kinds: tuple[type, ...], *patterns: str, keep: Keep = Keep.EVERY) -> Feed[Any]:
+        self._requests.check()
         return Feed(self._bus.subscribe(*patterns, keep=keep), kinds, self._bus.now)
 
 

@@ -3,6 +3,7 @@
 import asyncio
 import random
 from collections import deque
+from itertools import count
 from typing import NamedTuple
 
 import msgspec
@@ -52,11 +53,11 @@ class MemoryHub(Hub):
         self._cut: set[str] = set()
         self._last_arrival: dict[tuple[str, str], Seconds] = {}
 
-    def join(self, name: str) -> "MemoryBus":
+    def join(self, name: str, role: str = "manager") -> "MemoryBus":
         if name in self._buses:
             raise ValueError(f"participant {name!r} is on the bus already")
         self._lives += 1
-        self._buses[name] = bus = MemoryBus(self, name, run=str(self._lives))
+        self._buses[name] = bus = MemoryBus(self, name, role, run=str(self._lives))
         return bus
 
     async def vacant(self, *names: str) -> None:
@@ -82,7 +83,8 @@ class MemoryHub(Hub):
     # -- for MemoryBus ------------------------------------------------------------------------------------------
 
     def send(self, sender: str, key: str, message: Message) -> None:
-        self._pass_on(sender, Received(key, decode(*published(message)), sender, self._loop.time()))
+        life = self._buses[sender].run
+        self._pass_on(sender, Received(key, decode(*published(message)), sender, self._loop.time(), life=life))
 
     def inject(self, key: str, payload: bytes, encoding: str) -> None:
         """A payload from outside, as another program would send it. A bad one is answered with a Fault."""
@@ -151,12 +153,12 @@ class MemoryHub(Hub):
         for bus in list(self._buses.values()):
             bus.deliver(Received(keys.alive(name), message, name, self._loop.time()), self.sent + 1)
 
-    async def answerer(self, key: str, asker: str, deadline: Seconds) -> Answer | None:
+    async def answerer(self, key: str, asker: str, deadline: Seconds) -> "MemoryBus | None":
         """Who serves the key, as soon as somebody does; None at the deadline."""
         while self._loop.time() < deadline:
             for bus in self._buses.values():
                 if key in bus.answers and not self._is_cut(asker, bus.name):
-                    return bus.answers[key]
+                    return bus
             change: asyncio.Future[None] = self._loop.create_future()
             self._askers.append(change)
             timer = self._loop.call_at(deadline, self.wake_askers)
@@ -182,10 +184,12 @@ class MemoryHub(Hub):
 class MemoryBus(Bus):
     clock = "loop"
 
-    def __init__(self, hub: MemoryHub, name: str, run: str) -> None:
+    def __init__(self, hub: MemoryHub, name: str, role: str, run: str) -> None:
         self.robot = hub.robot
         self.name = name
+        self.role = role
         self.run = run
+        self._life_numbers = count(1)
         self.is_alive = False
         self.answers: dict[str, Answer] = {}
         self._hub = hub
@@ -197,7 +201,8 @@ class MemoryBus(Bus):
     @property
     def health(self) -> BusHealth:
         overflowed = self._overflowed + sum(subscription.overflowed for subscription in self._subscriptions)
-        return BusHealth(peers=self._hub.alive, passed=self._hub.sent, overflowed=overflowed)
+        health = BusHealth(peers=self._hub.alive, passed=self._hub.sent, overflowed=overflowed)
+        return msgspec.structs.replace(health, failures=self.failures)
 
     def now(self) -> Seconds:
         return self._loop.time()
@@ -230,13 +235,16 @@ class MemoryBus(Bus):
 
     async def query(self, key: str, message: Message, timeout: Seconds = 1.0) -> Message:
         await asyncio.sleep(0)
-        answer = None if self._gone else await self._hub.answerer(key, self.name, self.now() + timeout)
-        if answer is None:
+        server = None if self._gone else await self._hub.answerer(key, self.name, self.now() + timeout)
+        if server is None:
             raise NoReply(Fault(reason=f"no reply within {timeout} s", where=key, advice="is its server running?"))
+        answer = server.answers[key]
         try:
             return decode(encode(answer(decode(encode(message)))))
         except EngageError as error:
             raise InputRefused(error.fault) from error
+        except Exception as error:
+            raise InputRefused(server.failed(error, f"a question on {key}")) from error
 
     def answer(self, key: str, answer: Answer, *, empty: Message | None = None) -> None:
         self.answers[key] = answer

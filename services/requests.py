@@ -1,44 +1,45 @@
 """Long requests over a bus that neither raises nor acknowledges: both ends of `schemas.requests`.
 
-Zenoh drops silently, a server may start late, restart or die, a link may be cut. So the requester sends its
-request again until it has ended, the server answers duplicates with its last state, and the death of either
-side ends the request at the other: exactly one terminal state, whatever happens in between.
+Zenoh drops silently, a server may start late, restart or die, a link may be cut, a caller may be cancelled at any
+moment. What follows from each of these is in two tables (services/asking_table.py, services/serving_table.py), which
+two pure machines follow (services/asking.py, services/serving.py). Here they meet the bus, the clock and the futures
+that callers await: each request has exactly one terminal state, whatever happens in between.
 
 A restarted server remembers nothing. What its former life had accepted fails at the requester and is not sent
 again: a robot must not say and do things twice. What had not been accepted is sent again. The gap that remains
 is an acceptance lost in the same moment as its server; its request is performed again from the start.
-A server leaves commands that it gets from history to their requester, who knows what became of them.
+A server leaves commands that it gets from history to their requester, which knows what became of them.
 """
 
 import asyncio
-from collections import OrderedDict
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from functools import partial
 from types import TracebackType
-from typing import Protocol, Self
+from typing import Self
 
-import msgspec
+from msgspec.structs import replace
 
 from schemas import keys
 from schemas.faults import EngageError, Fault, RunFailed
 from schemas.messages import COMMANDS, Message
 from schemas.presence import PeerAlive, PeerGone
-from schemas.requests import Accepted, Cancel, Outcome, Refused, Request, Unreadable
+from schemas.requests import Accepted, Answer, Cancel, KeepAlive, Outcome, Refused, Request, Unreadable, kind_of
 from schemas.units import Seconds
+from services import asking, serving
+from services.asking import Asking, NeverEnded, Patience, RequestRefused, ServerRestarted
+from services.asking_table import State
 from services.bus import Bus, Received
+from services.serving import Serving
 
-FIRST_RESEND: Seconds = 0.3
-LONGEST_RESEND: Seconds = 2.0
-GRACE: Seconds = 2.0
-"""How long the other side may be gone before its requests fail: a router's restart looks like a death."""
-ENDED_KEPT = 1024
-"""How many ended requests a server remembers, to answer duplicates."""
-
-
-class RequestRefused(EngageError):
-    """The server refused; nothing of the request was done."""
+__all__ = ["NeverEnded", "Patience", "Pending", "RequestDesk", "RequestRefused", "Requester", "ServerRestarted"]
 
 
 class Pending:
-    """A request on its way. Both futures raise RequestRefused, or RunFailed if the server died."""
+    """A request on its way. Both futures raise RequestRefused, or RunFailed if the server died or does not answer.
+
+    Cancelling a future only stops waiting; `Requester.cancel` ends the request.
+    """
 
     def __init__(self, key: str, request: Request) -> None:
         loop = asyncio.get_running_loop()
@@ -46,11 +47,6 @@ class Pending:
         self.request = request
         self.accepted: asyncio.Future[None] = loop.create_future()
         self.outcome: asyncio.Future[Outcome] = loop.create_future()
-        self.run = ""
-        """The life of the server that accepted."""
-        self.resend_after = FIRST_RESEND
-        self.resend: asyncio.TimerHandle | None = None
-        self.doom: asyncio.TimerHandle | None = None
         # A caller may care for only one of the two.
         for future in (self.accepted, self.outcome):
             future.add_done_callback(_mark_seen)
@@ -59,10 +55,50 @@ class Pending:
     def server(self) -> str:
         return keys.server_of(self.key)
 
+    def accept(self) -> None:
+        if not self.accepted.done():
+            self.accepted.set_result(None)
+
+    def end(self, end: Outcome | EngageError) -> None:
+        if isinstance(end, Outcome):
+            self.accept()
+            if not self.outcome.done():
+                self.outcome.set_result(end)
+            return
+        for future in (self.accepted, self.outcome):
+            if not future.done():
+                future.set_exception(end)
+
 
 def _mark_seen(future: "asyncio.Future[None] | asyncio.Future[Outcome]") -> None:
     if not future.cancelled():
         future.exception()
+
+
+class _Alarm:
+    """Calls `ring` when a deadline has come. It is set anew only for an earlier one: it may ring in vain."""
+
+    def __init__(self, ring: Callable[[], None]) -> None:
+        self._ring = ring
+        self._loop = asyncio.get_running_loop()
+        self._timer: asyncio.TimerHandle | None = None
+        self._at: Seconds = 0.0
+
+    def set(self, at: Seconds | None) -> None:
+        if at is None or (self._timer is not None and self._at <= at):
+            return
+        self.stop()
+        self._at = at
+        self._timer = self._loop.call_at(at, self._rings)
+
+    def _rings(self) -> None:
+        self._timer = None
+        self._ring()
+
+    def stop(self) -> None:
+        if self._timer is not None:
+            self._timer.cancel()
+            self._timer = None
 
 
 class Requester:
@@ -70,137 +106,131 @@ class Requester:
 
     `async with Requester(bus) as requests` listens by itself. A service that wants request states in order with
     its other messages subscribes to `Requester.PATTERNS` itself and passes every message to `feed` instead.
-    A request to a server that has not come yet waits for it.
+    A request to a server that has not come yet waits for it. Raises ValueError if the bus' name can't be in a key.
     """
 
     PATTERNS = (keys.ANY_REQUEST_STATE, keys.ANY_ALIVE)
 
-    def __init__(self, bus: Bus) -> None:
+    def __init__(self, bus: Bus, patience: Patience | None = None) -> None:
+        keys.chunk(bus.name)
         self._bus = bus
-        self._loop = asyncio.get_running_loop()
+        self._life = bus.new_life()
+        self._asking = Asking(bus.name, self._life, patience or Patience())
         self._pending: dict[str, Pending] = {}
-        self._runs: dict[str, str] = {}
+        self._alarm = _Alarm(self._tick)
         self._listening: asyncio.Task[None] | None = None
+        self._broken: EngageError | None = None
 
     def send(self, key: str, request: Request) -> Pending:
         """Publish the request and keep at it. A known id is an update: the newest content is what is sent again.
 
-        An update of a request that is being cancelled is void.
+        key: the expression of the command (`keys.BLOCK`). An update of a request that is being cancelled is void.
+        An id that a live request of another kind has, or one that was given up, is refused at once.
         """
-        pending = self._pending.get(request.id)
+        if self._broken is not None:
+            return self._failed(key, request, self._broken)
+        known = self._pending.get(request.id)
+        effects = self._asking.send(key, request, self._bus.now())
+        match effects:
+            case [asking.TellEnd(end=EngageError() as error)]:
+                return self._failed(key, request, error)
+        pending = known
         if pending is None:
             pending = self._pending[request.id] = Pending(key, request)
-        elif isinstance(pending.request, Cancel):
-            return pending
-        else:
-            revision = pending.request.revision + 1
-            pending.key, pending.request = key, msgspec.structs.replace(request, revision=revision)
-        self._publish_anew(pending)
+        pending.request = self._asking.request(request.id) or request
+        self._carry_out(effects)
+        return pending
+
+    def _failed(self, key: str, request: Request, error: EngageError) -> Pending:
+        pending = Pending(key, request)
+        pending.end(error)
         return pending
 
     def cancel(self, id: str, reason: str = "") -> None:
-        """Ask the server to end request `id` as interrupted; its outcome still comes.
+        """Ask the server to end request `id` as interrupted; its outcome still comes, or it fails for want of it.
 
         A server that has never got the request refuses it.
         """
-        pending = self._pending.get(id)
-        if pending is not None and not isinstance(pending.request, Cancel):
-            pending.key = keys.cancel(pending.server)
-            pending.request = Cancel(id=id, requester=self._bus.name, reason=reason)
-            self._publish_anew(pending)
+        self._carry_out(self._asking.cancel(id, reason, self._bus.now()))
+
+    def state(self, id: str) -> State:
+        return self._asking.state(id)
 
     def feed(self, received: Received) -> bool:
         """Take a message of `PATTERNS`; False if it was none of ours."""
+        now = self._bus.now()
         match received.message:
-            case Accepted(id=id) if id in self._pending:
-                pending = self._pending[id]
-                pending.run = self._runs.get(pending.server, "")
-                if not pending.accepted.done():
-                    pending.accepted.set_result(None)
-            case Refused(id=id, fault=fault) if id in self._pending:
-                # A server that has forgotten what it accepted has failed at it.
-                known = self._pending[id].accepted.done()
-                self._fail(id, RunFailed(fault) if known else RequestRefused(fault))
-            case Outcome(id=id) if id in self._pending:
-                pending = self._forget(id)
-                if not pending.accepted.done():
-                    pending.accepted.set_result(None)
-                pending.outcome.set_result(received.message)
+            case Answer() as answer:
+                self._carry_out(self._asking.hear(answer, now))
             case PeerGone(participant=server):
-                self._server_gone(server)
+                self._carry_out(self._asking.server_gone(server, now))
             case PeerAlive(participant=server, run=run):
-                self._server_back(server, run)
+                self._carry_out(self._asking.server_there(server, run, now))
             case _:
                 return False
         return True
 
-    def _publish_anew(self, pending: Pending) -> None:
-        if pending.resend is not None:
-            pending.resend.cancel()
-        pending.resend_after = FIRST_RESEND
-        self._bus.publish(pending.key, _as_message(pending.request))
-        self._arm(pending)
+    def _tick(self) -> None:
+        self._carry_out(self._asking.tick(self._bus.now()))
 
-    def _arm(self, pending: Pending) -> None:
-        pending.resend = self._loop.call_later(pending.resend_after, self._send_again, pending)
+    def _carry_out(self, effects: list[asking.Effect]) -> None:
+        for effect in effects:
+            match effect:
+                case asking.Publish(expression=expression, message=message):
+                    self._publish(expression, _as_message(message))
+                case asking.Renew(server=server, live=live):
+                    still = KeepAlive(live=live, at=self._bus.stamp(), requester=self._bus.name, life=self._life)
+                    self._publish(keys.keep_alive(server), still)
+                case asking.TellAccepted(id=id) if id in self._pending:
+                    self._pending[id].accept()
+                case asking.TellEnd(id=id, end=end) if id in self._pending:
+                    self._pending.pop(id).end(end)
+                case asking.Complain(fault=fault):
+                    self._bus.publish(keys.fault(self._bus.name), fault)
+        self._alarm.set(self._asking.deadline)
 
-    def _send_again(self, pending: Pending) -> None:
-        self._bus.publish(pending.key, _as_message(pending.request))
-        pending.resend_after = min(2 * pending.resend_after, LONGEST_RESEND)
-        self._arm(pending)
-
-    def _server_gone(self, server: str) -> None:
-        for pending in self._pending.values():
-            if pending.server == server and pending.doom is None:
-                pending.doom = self._loop.call_later(GRACE, self._server_lost, pending, f"{server} is gone")
-
-    def _server_back(self, server: str, run: str) -> None:
-        self._runs[server] = run
-        for pending in [pending for pending in self._pending.values() if pending.server == server]:
-            if pending.doom is not None:
-                pending.doom.cancel()
-                pending.doom = None
-            if pending.run and run and pending.run != run:
-                self._server_lost(pending, f"{server} was restarted")
-            else:
-                pending.run = run if pending.accepted.done() else ""
-                self._publish_anew(pending)
-
-    def _server_lost(self, pending: Pending, reason: str) -> None:
-        fault = Fault(reason=reason, where=pending.request.id, advice="send it again under a new id")
-        self._fail(pending.request.id, RunFailed(fault))
-        # In case a new life has got it after all.
-        cancel = Cancel(id=pending.request.id, requester=self._bus.name, reason=reason)
-        self._bus.publish(keys.cancel(pending.server), cancel)
-
-    def _fail(self, id: str, error: EngageError) -> None:
-        pending = self._forget(id)
-        for future in (pending.accepted, pending.outcome):
-            if not future.done():
-                future.set_exception(error)
-
-    def _forget(self, id: str) -> Pending:
-        pending = self._pending.pop(id)
-        for timer in (pending.resend, pending.doom):
-            if timer is not None:
-                timer.cancel()
-        return pending
+    def _publish(self, expression: str, message: Message) -> None:
+        self._bus.publish(keys.command(expression, self._bus.role, self._bus.name), message)
 
     def close(self) -> None:
         """Stop sending again; what has not ended is cancelled at its server."""
-        for id in list(self._pending):
+        for id in self._asking.ids:
             self.cancel(id, "requester closed")
-            pending = self._forget(id)
+        self._alarm.stop()
+        for pending in self._pending.values():
             pending.accepted.cancel()
             pending.outcome.cancel()
+        self._pending.clear()
+        self._broken = self._broken or RunFailed("the client is closed")
+
+    # -- listening by itself ----------------------------------------------------------------------------------------
+
+    def check(self) -> None:
+        """Raises RunFailed if this hears nothing any more."""
+        if self._broken is not None:
+            raise self._broken
 
     async def _listen(self) -> None:
         with self._bus.subscribe(*self.PATTERNS) as inbox:
             async for received in inbox:
-                self.feed(received)
+                with self._bus.containing(f"{received.key} from {received.source}"):
+                    self.feed(received)
+
+    def _stopped_listening(self, task: "asyncio.Task[None]") -> None:
+        """It ends with the client and not before; who awaits an answer would wait for ever."""
+        if self._broken is not None or task.cancelled():
+            return
+        error = task.exception()
+        reason = f"the client hears nothing any more: {error or 'it has left the bus'}"
+        self._broken = RunFailed(Fault(reason=reason, advice="connect again", service=self._bus.name))
+        for pending in self._pending.values():
+            pending.end(self._broken)
+        self._pending.clear()
+        self._alarm.stop()
 
     async def __aenter__(self) -> Self:
         self._listening = asyncio.create_task(self._listen(), name=f"requests of {self._bus.name}")
+        self._listening.add_done_callback(self._stopped_listening)
         await asyncio.sleep(0)
         return self
 
@@ -213,23 +243,6 @@ class Requester:
             await asyncio.gather(self._listening, return_exceptions=True)
 
 
-class _Record(msgspec.Struct):
-    """run: the requester's life. ended: `state` is terminal."""
-
-    request: Request
-    run: str = ""
-    state: Message | None = None
-    ended: bool = False
-    cancelled: bool = False
-    doom: asyncio.TimerHandle | None = None
-
-
-class Clerk(Protocol):
-    """What a server does when a requester has died: the cancellation it would have sent."""
-
-    def __call__(self, cancel: Cancel) -> None: ...
-
-
 class RequestDesk:
     """The serving side: takes commands from the service's own subscription, answers, and never serves one twice.
 
@@ -238,155 +251,144 @@ class RequestDesk:
             case Cancel(id=id): ...                     # only for live requests
             case None: ...                              # not ours, a duplicate, or already ended
 
-    on_cancel: called when a requester has been gone for longer than the grace, or has come back as another life.
-    The service's subscription must hold `RequestDesk.patterns(server)`.
+    `request.id` is its name at this server: its own id, or `id~2` where another requester's, or a former life's, has
+    that. The answers carry the id that was asked with.
+
+    on_cancel: called when a requester has been gone for longer than the grace, has come back as another life, or has
+    not renewed its request. on_extend: called with a request that a `KeepAlive` gives more authority. term: the lease
+    of requests that name none. The service's subscription must hold `RequestDesk.patterns(server)`.
     """
 
-    def __init__(self, bus: Bus, server: str, on_cancel: Clerk) -> None:
+    def __init__(
+        self,
+        bus: Bus,
+        server: str,
+        on_cancel: Callable[[Cancel], None],
+        *,
+        on_extend: Callable[[Request], None] | None = None,
+        term: Seconds | None = None,
+    ) -> None:
         self._bus = bus
         self._server = server
         self._on_cancel = on_cancel
-        self._loop = asyncio.get_running_loop()
-        self._live: dict[str, _Record] = {}
-        self._ended: OrderedDict[str, _Record] = OrderedDict()
-        self._runs: dict[str, str] = {}
+        self._on_extend = on_extend
+        self._serving = Serving(server, term)
+        self._alarm = _Alarm(self._tick)
 
     @staticmethod
     def patterns(server: str) -> tuple[str, str]:
         return (keys.commands(server), keys.ANY_ALIVE)
 
-    def is_live(self, id: str) -> bool:
-        return id in self._live
+    def is_live(self, name: str) -> bool:
+        return self._serving.is_live(name)
+
+    @property
+    def live(self) -> int:
+        """How many requests have not ended."""
+        return self._serving.live
+
+    def asked(self, name: str) -> Request:
+        """The request as it came, with its own id. Raises KeyError if it was never made, or is forgotten."""
+        request = self._serving.asked(name)
+        if request is None:
+            raise KeyError(name)
+        return request
 
     def take(self, received: Received) -> Request | None:
         """The request, if it is new, changed or a cancellation of a live one; each of these once."""
+        now, serving_ = self._bus.now(), self._serving
         match received.message:
-            case Request() as request if keys.matches(keys.commands(self._server), received.key):
-                if received.past and request.requester in self._runs:
-                    return None
-                if (fault := _misplaced(request, received.key)) is not None:
-                    self._refuse_unseen(request.id, fault)
-                    return None
-                return self._take_cancel(request) if isinstance(request, Cancel) else self._take(request)
+            case Request() | KeepAlive() as message if keys.matches(keys.commands(self._server), received.key):
+                return self._take(message, received, now)
             case Unreadable(id=id, fault=fault) if id:
-                self._refuse_unseen(id, fault)
+                refused = Refused(id=id, requester=keys.requester_of(received.key), fault=fault)
+                self._bus.publish(keys.request_state(self._server), refused)
             case PeerGone(participant=requester):
-                self._requester_gone(requester)
+                return self._carry_out(serving_.requester_gone(requester, now))
             case PeerAlive(participant=requester, run=run):
-                self._requester_back(requester, run)
+                return self._carry_out(serving_.requester_there(requester, run, now))
         return None
 
-    def _refuse_unseen(self, id: str, fault: Fault) -> None:
-        """What was no request of ours. A live one of that id is somebody else's, and goes on."""
-        if id not in self._live:
-            self._bus.publish(keys.request_state(self._server), Refused(id=id, fault=fault))
-
-    def _take(self, request: Request) -> Request | None:
-        record = self._live.get(request.id) or self._ended.get(request.id)
-        if record is None or (record.ended and not self._is_same_requester(record, request)):
-            self._ended.pop(request.id, None)
-            self._live[request.id] = _Record(request, self._runs.get(request.requester, ""))
-            return request
-        older = request.revision < record.request.revision
-        if record.ended or record.cancelled or older or request == record.request:
-            self._repeat(record)
+    def _take(self, message: Request | KeepAlive, received: Received, now: Seconds) -> Request | None:
+        requester = keys.requester_of(received.key)
+        message = replace(message, requester=requester or message.requester, life=message.life or received.life)
+        if isinstance(message, KeepAlive):
+            sent = min(now, self._bus.local(message.at))
+            return None if received.past else self._carry_out(self._serving.keep_alive(message, sent, now))
+        if received.past and self._serving.is_there(message.requester):
             return None
-        record.request = request
-        return request
+        if (fault := _misplaced(message, received.key)) is not None:
+            return self._carry_out(self._serving.refuse(message, fault))
+        return self._carry_out(self._serving.take(message, now))
 
-    def _take_cancel(self, cancel: Cancel) -> Cancel | None:
-        record = self._live.get(cancel.id)
-        if record is not None and not record.cancelled:
-            record.cancelled = True
-            return cancel
-        record = record or self._ended.get(cancel.id)
-        if record is not None:
-            self._repeat(record)
-        else:
-            # The command was lost; from here on it is too late for it, and its requester waits for an end.
-            self._live[cancel.id] = _Record(cancel, self._runs.get(cancel.requester, ""))
-            reason = f"{self._server} has never heard of it"
-            self.refuse(cancel.id, Fault(reason=reason, where=cancel.id, service=self._server))
-        return None
+    def accept(self, name: str) -> None:
+        self._answer(name, Accepted(id=name))
 
-    def _is_same_requester(self, record: _Record, request: Request) -> bool:
-        """A new life, or somebody else, who uses an id again means a new request."""
-        run = self._runs.get(request.requester, "")
-        return record.request.requester == request.requester and (not record.run or not run or record.run == run)
-
-    def accept(self, id: str) -> None:
-        self._answer(id, Accepted(id=id), ended=False)
-
-    def refuse(self, id: str, fault: Fault) -> None:
-        self._answer(id, Refused(id=id, fault=fault), ended=True)
+    def refuse(self, name: str, fault: Fault) -> None:
+        self._answer(name, Refused(id=name, fault=fault))
 
     def end(self, outcome: Message) -> None:
-        """Answer with a terminal state. Raises ValueError if the request has one already, or never was."""
+        """Answer the request whose name is the outcome's id with a terminal state."""
         assert isinstance(outcome, Outcome)
-        self._answer(outcome.id, outcome, ended=True)
+        self._answer(outcome.id, outcome)
 
-    def _answer(self, id: str, state: Message, *, ended: bool) -> None:
-        record = self._live.get(id)
-        if record is None:
-            before = f"has ended already, with {self._ended[id].state}" if id in self._ended else "was never made"
-            raise ValueError(f"request {id} {before}")
-        record.state, record.ended = state, ended
-        self._bus.publish(keys.request_state(self._server), state)
-        if ended:
-            if record.doom is not None:
-                record.doom.cancel()
-            self._ended[id] = self._live.pop(id)
-            if len(self._ended) > ENDED_KEPT:
-                self._ended.popitem(last=False)
+    def _answer(self, name: str, answer: Answer) -> None:
+        self._carry_out(self._serving.answer(name, answer, self._bus.now()))
 
-    def _repeat(self, record: _Record) -> None:
-        if record.state is not None:
-            self._bus.publish(keys.request_state(self._server), record.state)
+    def _tick(self) -> None:
+        self._carry_out(self._serving.tick(self._bus.now()))
 
-    def _live_of(self, requester: str) -> list[_Record]:
-        return [record for record in self._live.values() if record.request.requester == requester]
+    def _carry_out(self, effects: list[serving.Effect], /) -> Request | None:
+        """The one request to be handed over at once; what more there is goes to the clerks."""
+        handed: Request | None = None
+        for effect in effects:
+            match effect:
+                case serving.Publish(answer=answer):
+                    self._bus.publish(keys.request_state(self._server), answer)  # type: ignore[arg-type]
+                case serving.Hand(request=request, is_asked=True):
+                    handed = request
+                case serving.Hand(request=Cancel() as cancel):
+                    with self._bus.containing(f"the end of request {cancel.id}"):
+                        self._on_cancel(cancel)
+                case serving.Hand(request=request) if self._on_extend is not None:
+                    with self._bus.containing(f"request {request.id}"):
+                        self._on_extend(request)
+                case serving.Complain(fault=fault, is_ours=True):
+                    self._bus.report(fault)
+                case serving.Complain(fault=fault):
+                    self._bus.publish(keys.fault(self._server), fault)
+        self._alarm.set(self._serving.deadline)
+        return handed
 
-    def _requester_gone(self, requester: str) -> None:
-        self._runs.pop(requester, None)
-        for record in self._live_of(requester):
-            if record.doom is None:
-                record.doom = self._loop.call_later(GRACE, self._requester_lost, record)
+    @contextmanager
+    def serving(self, request: Request) -> Iterator[None]:
+        """An exception in the body of `with` ends this request, and nothing else."""
+        with self._bus.containing(f"{kind_of(request)} {request.id}", partial(self._refuse_if_live, request.id)):
+            yield
 
-    def _requester_back(self, requester: str, run: str) -> None:
-        self._runs[requester] = run
-        for record in self._live_of(requester):
-            if record.doom is not None:
-                record.doom.cancel()
-                record.doom = None
-            if record.run and run and record.run != run:
-                self._requester_lost(record)
-            record.run = run
-
-    def _requester_lost(self, record: _Record) -> None:
-        if not record.cancelled:
-            record.cancelled = True
-            request = record.request
-            self._on_cancel(Cancel(id=request.id, requester=request.requester, reason="requester is gone"))
+    def _refuse_if_live(self, name: str, fault: Fault) -> None:
+        if self.is_live(name):
+            self.refuse(name, fault)
 
     def close(self) -> None:
-        for record in self._live.values():
-            if record.doom is not None:
-                record.doom.cancel()
+        self._alarm.stop()
 
 
 def _misplaced(request: Request, key: str) -> Fault | None:
-    """What is wrong with sending this request there; nothing on a key that we know nothing of."""
-    expected = COMMANDS.get(key)
-    if expected is None or isinstance(request, (Cancel, *expected)):
-        return None
+    """What is wrong with sending this request there."""
+    expression, server = keys.expression_of(key), keys.server_of(key)
     name = type(request).__name__
     home = next((known for known, kinds in COMMANDS.items() if isinstance(request, kinds)), "")
-    return Fault(
-        reason=f"{name} came on {key}, which takes {' and '.join(kind.__name__ for kind in expected)}",
-        where=request.id,
-        service=keys.server_of(key),
-        advice=f"send it on {home}" if home else "",
+    home = keys.cancel(server) if isinstance(request, Cancel) else home
+    expected = COMMANDS.get(expression, (Cancel,) if expression == keys.cancel(server) else ())
+    if isinstance(request, expected) or (expression and isinstance(request, Cancel)):
+        return None
+    takes = (
+        f", which takes {' and '.join(kind.__name__ for kind in expected)}" if expected else ", which is no command"
     )
+    who = key.split("/")[4:6] if expression else ["<role>", "<requester>"]
+    advice = f"send it on {home.replace('*/*', '/'.join(who))}" if home else ""
+    return Fault(reason=f"{name} came on {key}{takes}", where=request.id, service=server, advice=advice)
 
 
 def _as_message(request: Request) -> Message:

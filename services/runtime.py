@@ -1,8 +1,8 @@
 """How a service lives: joins the hub under its name, subscribes, shows its token, serves until cancelled.
 
 A service is one coroutine function of its bus, its configuration and `ready`, which it calls once its
-subscribers stand. Each answers how it is (`keys.status`). A bug in a service ends its process, loudly; bad messages
-from others never do.
+subscribers stand. Each answers how it is (`keys.status`). No message ends a service: what goes wrong while one is
+taken ends at most what the message is about (`Bus.containing`). What goes wrong elsewhere ends the process, loudly.
 """
 
 import asyncio
@@ -25,7 +25,7 @@ Service = Callable[[Bus, Ready], Awaitable[None]]
 async def serve(hub: Hub, name: str, service: Service, ready: Ready = lambda: None) -> None:
     """Run one service on the hub until it is cancelled or fails. Raises InputRefused if another one is there."""
     await hub.vacant(name)
-    bus = hub.join(name)
+    bus = hub.join(name, role=name if name in keys.ROLES else "manager")
     joined = bus.stamp()
     since: Stamp | None = None
 

@@ -67,9 +67,13 @@ async def stream(
     raised. Cancelling this interrupts the robot, and so does what `pieces` raises; it comes as an ExceptionGroup.
     """
     speaking = _Speaking(robot, id, turn, await_answer)
-    async with asyncio.TaskGroup() as tasks:
-        reading = tasks.create_task(_read(pieces, chunker or Chunker(), speaking), name=f"read {id}")
-        speaking.begin(tasks, reading)
+    try:
+        async with asyncio.TaskGroup() as tasks:
+            reading = tasks.create_task(_read(pieces, chunker or Chunker(), speaking), name=f"read {id}")
+            speaking.begin(tasks, reading)
+    except BaseException:
+        speaking.break_off()
+        raise
     await speaking.leave_no_turn_open()
     return speaking.outcomes
 
@@ -91,6 +95,7 @@ class _Speaking:
         self._await_answer = await_answer
         self._performing: list[asyncio.Task[FragmentOutcome]] = []
         self._refused: set[str] = set()
+        self._is_finished = False
 
     def begin(self, tasks: asyncio.TaskGroup, reading: "asyncio.Task[None]") -> None:
         self._tasks = tasks
@@ -114,7 +119,15 @@ class _Speaking:
             with suppress(EngageError):  # there was none
                 await self._robot.perform(self._fragment((), "end"))
 
+    def break_off(self) -> None:
+        """Where the robot was just silent there was no fragment to interrupt, and the turn is still open."""
+        performed = [task for task in self._performing if not task.cancelled() and task.exception() is None]
+        is_silent = bool(performed) and len(performed) == len(self._performing)
+        if is_silent and not self._is_finished and all(task.result().status == "done" for task in performed):
+            self._robot.begin_to_perform(self._fragment((), "end"))
+
     def _send(self, chunk: Chunk, status: TurnStatus) -> None:
+        self._is_finished = status in ("end", "full")
         fragment = self._fragment(chunk, status)
         # Requests keep the order of these tasks: each is sent in its task's first step.
         self._performing.append(self._tasks.create_task(self._perform(fragment), name=fragment.id))

@@ -7,6 +7,7 @@ subscribers, loss in a cut (it never raises), who is there, and answers that do 
 import asyncio
 import time
 from collections.abc import Sequence
+from itertools import count
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +19,7 @@ from schemas.faults import EngageError, Fault, InputRefused, NoReply
 from schemas.messages import Message, decode, encode, encoding_of, published
 from schemas.status import BusHealth
 from schemas.units import Seconds, Stamp
-from services.bus import Answer, Bus, Hub, Keep, Received, Subscription
+from services.bus import LOG, Answer, Bus, Hub, Keep, Received, Subscription
 from services.zenoh_clocks import Clocks
 from services.zenoh_order import Envelope, Ledger, Pulse
 from services.zenoh_peers import Peers, finish, pack
@@ -64,7 +65,8 @@ class ZenohHub(Hub):
         self.robot = robot
         self.run = str(session.zid())
         self.session = session
-        self.doorway = Doorway()
+        self.doorway = Doorway(self.failed)
+        self.life_numbers = count(1)
         self._loop = asyncio.get_running_loop()
         self.clocks = Clocks(_clock_name(self._loop, self.run), self._loop.time)
         self._ledger = Ledger(self.run)
@@ -87,10 +89,10 @@ class ZenohHub(Hub):
             waiting=self.doorway.waiting,
         )  # fmt: skip
 
-    def join(self, name: str) -> "ZenohBus":
+    def join(self, name: str, role: str = "manager") -> "ZenohBus":
         if name in self._buses:
             raise ValueError(f"participant {name!r} is on the bus already")
-        self._buses[name] = bus = ZenohBus(self, name)
+        self._buses[name] = bus = ZenohBus(self, name, role)
         return bus
 
     async def vacant(self, *names: str) -> None:
@@ -104,6 +106,13 @@ class ZenohHub(Hub):
 
     def forget(self, name: str) -> None:
         self._buses.pop(name, None)
+
+    def failed(self, error: Exception, what: str) -> None:
+        """Something went wrong before it was known which participant it concerns: the first one says so."""
+        if (bus := next(iter(self._buses.values()), None)) is not None:
+            bus.failed(error, what)
+        else:
+            LOG.error("%s: %s", what, error, exc_info=error)
 
     async def close(self) -> None:
         if self._closed:
@@ -138,7 +147,7 @@ class ZenohHub(Hub):
         else:
             envelope = Envelope(bus.name, self.clocks.own, now, self.run)
         self._publisher(key, ordered).put(payload, encoding=encoding, attachment=pack(envelope), timestamp=stamp)
-        self.readers.offer(Received(key, message, bus.name, now))
+        self.readers.offer(Received(key, message, bus.name, now, life=self.run))
 
     def _publisher(self, key: str, ordered: bool) -> zenoh.Publisher:
         publisher = self._publishers.get(key)
@@ -159,9 +168,11 @@ class ZenohHub(Hub):
 
 
 class ZenohBus(Bus):
-    def __init__(self, hub: ZenohHub, name: str) -> None:
+    def __init__(self, hub: ZenohHub, name: str, role: str) -> None:
         self.robot = hub.robot
         self.name = name
+        self.role = role
+        self._life_numbers = hub.life_numbers
         self.clock = hub.clocks.own
         self.run = hub.run
         self._hub = hub
@@ -176,7 +187,9 @@ class ZenohBus(Bus):
     def health(self) -> BusHealth:
         overflowed = self._overflowed + sum(subscription.overflowed for subscription in self._subscriptions)
         gaps, lost = self._hub.readers.missed(self)
-        return msgspec.structs.replace(self._hub.health, overflowed=overflowed, gaps=gaps, lost=lost)
+        return msgspec.structs.replace(
+            self._hub.health, overflowed=overflowed, gaps=gaps, lost=lost, failures=self.failures
+        )
 
     def now(self) -> Seconds:
         return self._loop.time()
@@ -209,7 +222,10 @@ class ZenohBus(Bus):
             if reply is not None and reply.ok is not None:
                 return decode(reply.ok.payload.to_bytes(), str(reply.ok.encoding))
             if reply is not None and reply.err is not None:
-                raise InputRefused(_fault(reply.err.payload.to_bytes(), str(reply.err.encoding)))
+                payload, form = reply.err.payload.to_bytes(), str(reply.err.encoding)
+                if form.startswith("application/"):
+                    raise InputRefused(_fault(payload, form))
+                break  # Zenoh's own error: a timeout on the way, which nobody has answered
             # Nobody serves it, or its server died over it: there is hope only if somebody comes.
             if not await self._hub.peers.change(deadline, since=known):
                 break
@@ -236,6 +252,8 @@ class ZenohBus(Bus):
                 query.reply(key, payload, encoding=encoding)
             except EngageError as error:
                 refuse(query, error.fault, form)
+            except Exception as error:
+                refuse(query, self.failed(error, f"a question on {key}"), form)
             finally:
                 finish(query)
 

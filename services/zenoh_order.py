@@ -28,7 +28,8 @@ PULSE_FOR: Seconds = 3.0
 class Envelope(Struct, frozen=True, array_like=True):
     """The attachment of a sample: who sent it, when by which clock, and its place in the order.
 
-    run: the publishing process' life. number: of all its ordered messages, from 1; 0 on a stream.
+    run: the publishing process' life, or what a stranger's connection tells of it. number: of all its ordered
+    messages, from 1; 0 on a stream, and from a stranger.
     nth: of its messages on this key.
     """
 

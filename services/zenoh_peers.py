@@ -20,6 +20,8 @@ FLUSH: Seconds = 2.0
 CLOCK_TRIPS = 5
 CLOCK_TIMEOUT: Seconds = 1.0
 
+BAD = (msgspec.DecodeError, UnicodeDecodeError)
+"""What decoding raises for bytes that are none of ours."""
 pack = msgspec.msgpack.encode
 _missings = msgspec.msgpack.Decoder(Missing)
 _pasts = msgspec.msgpack.Decoder(Past)
@@ -168,7 +170,7 @@ class Peers:
     def _tell_past(self, query: zenoh.Query) -> None:
         try:
             missing = _missings.decode(query.payload.to_bytes() if query.payload else b"")
-        except msgspec.DecodeError as error:
+        except BAD as error:
             query.reply_err(str(error))
         else:
             query.reply(query.key_expr, pack(self._ledger.past(missing, self._loop.time())))

@@ -14,7 +14,7 @@ from schemas.presence import PeerAlive, PeerGone
 from schemas.requests import Unreadable
 from services.bus import Bus, Received, Subscription, read_payload, unreadable
 from services.zenoh_order import Envelope, Follower, Ledger, Missing, Past, Pulse, Written
-from services.zenoh_peers import Peers, finish
+from services.zenoh_peers import BAD, Peers, finish
 from services.zenoh_session import Doorway
 
 _envelopes = msgspec.msgpack.Decoder(Envelope)
@@ -99,7 +99,7 @@ class Readers:
         if sample.kind != zenoh.SampleKind.PUT:
             return
         key, payload, encoding = str(sample.key_expr), sample.payload.to_bytes(), str(sample.encoding)
-        written = Written(key, encoding, payload, self._envelope(sample.attachment))
+        written = Written(key, encoding, payload, self._envelope(sample))
         envelope = written.envelope
         if self._peers.clocks.heard(envelope.clock, envelope.sent, self._loop.time()) and envelope.run:
             self._peers.measure_clock(envelope.run, envelope.clock)
@@ -115,14 +115,27 @@ class Readers:
                 self._deliver(reader, one, past=False)
             self._ask_past(reader, envelope.run, follower)
 
-    def _envelope(self, attachment: zenoh.ZBytes | None) -> Envelope:
+    def _envelope(self, sample: zenoh.Sample) -> Envelope:
         """Samples of other languages may come without one."""
-        if attachment is not None:
+        if sample.attachment is not None:
             try:
-                return _envelopes.decode(attachment.to_bytes())
-            except msgspec.DecodeError:
+                return _envelopes.decode(sample.attachment.to_bytes())
+            except BAD:
                 self.refused += 1
-        return Envelope("", "", 0.0)
+        return Envelope("", "", 0.0, self._stranger(sample))
+
+    def _stranger(self, sample: zenoh.Sample) -> str:
+        """Which life of a program without an envelope this is, as far as Zenoh tells.
+
+        What a program has not stamped itself is stamped by the process that passes it on.
+        """
+        if sample.source_info is not None:
+            return str(sample.source_info.source_id.zid)
+        if sample.timestamp is None:
+            return ""
+        stamped_by = str(sample.timestamp.get_id())
+        passed_on_by = {self._ledger.run, *self._peers.processes, *map(str, self._session.info.routers_zid())}
+        return "" if stamped_by in passed_on_by else stamped_by
 
     def _deliver(self, reader: _Reader, written: Written, *, past: bool) -> None:
         # One sample often has several readers: it is decoded once.
@@ -132,7 +145,8 @@ class Readers:
         if isinstance(message, Unreadable) and reader.bus.name != keys.server_of(written.key):
             return
         if message is not None:
-            received = Received(written.key, message, written.envelope.source, self._loop.time(), past)
+            envelope = written.envelope
+            received = Received(written.key, message, envelope.source, self._loop.time(), past, envelope.run)
             reader.subscription.offer(received)
 
     def _decode(self, bus: Bus, written: Written) -> Message | None:
@@ -190,7 +204,7 @@ class Readers:
         run = keys.run_of(str(sample.key_expr))
         try:
             pulse = _pulses.decode(sample.payload.to_bytes())
-        except msgspec.DecodeError:
+        except BAD:
             self.refused += 1
         else:
             if run != self._ledger.run:
@@ -205,7 +219,7 @@ class Readers:
     def _flush_asked(self, query: zenoh.Query) -> None:
         try:
             run, pulse = _flushes.decode(query.payload.to_bytes() if query.payload else b"")
-        except msgspec.DecodeError as error:
+        except BAD as error:
             query.reply_err(str(error))
             finish(query)
             return

@@ -114,8 +114,10 @@ class Doorway:
     A callback appends and wakes the loop if nobody has, nothing else: whatever blocks there stalls the link.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, failed: Callable[[Exception, str], None]) -> None:
+        """failed: told what goes wrong while one item is let in; the others go on."""
         self.traffic = Traffic()
+        self._failed = failed
         self._loop = asyncio.get_running_loop()
         self._ordered: deque[tuple[Callable[[Any], None], Any]] = deque()
         self._streams: deque[tuple[Callable[[Any], None], Any]] = deque(maxlen=STREAM_CROWD)
@@ -185,7 +187,10 @@ class Doorway:
                     return
                 enter, item = (self._ordered or self._streams).popleft()
                 self.traffic.passed += 1
-                enter(item)
+                try:
+                    enter(item)
+                except Exception as error:
+                    self._failed(error, f"what came in: {str(item)[:80]}")
         finally:
             if (self._ordered or self._streams) and not self._woken:
                 self._woken = True

@@ -4,7 +4,8 @@ Property tests try the same examples each time. To search for new ones: `pytest 
 """
 
 import asyncio
-from collections.abc import AsyncIterator, Callable, Mapping
+import logging
+from collections.abc import AsyncIterator, Callable, Iterator, Mapping
 
 import pytest
 import pytest_asyncio
@@ -27,6 +28,7 @@ def virtual_loop() -> asyncio.AbstractEventLoop:
 
 def pytest_configure(config: pytest.Config) -> None:
     config.addinivalue_line("markers", "real_time: runs on the wall clock (real sockets and processes)")
+    config.addinivalue_line("markers", "contained: something goes wrong here on purpose, and is contained")
     config.addinivalue_line("markers", "each_bus: runs twice: virtual time (memory bus) and wall clock (Zenoh)")
 
 
@@ -38,6 +40,28 @@ def pytest_asyncio_loop_factories(
     if item.get_closest_marker("real_time"):
         return {"real": asyncio.SelectorEventLoop}
     return {"virtual": virtual_loop}
+
+
+class _Bugs(logging.Handler):
+    """What `Bus.containing` has kept from ending a service or a client."""
+
+    def __init__(self) -> None:
+        super().__init__(logging.ERROR)
+        self.found: list[str] = []
+
+    def emit(self, record: logging.LogRecord) -> None:
+        self.found.append(logging.Formatter().format(record))
+
+
+@pytest.fixture(autouse=True)
+def _a_bug_is_loud(request: pytest.FixtureRequest) -> Iterator[None]:
+    """Contained or not, an exception that nobody has foreseen fails the test, unless it is what the test is about."""
+    bugs, log = _Bugs(), logging.getLogger("engage")
+    log.addHandler(bugs)
+    yield
+    log.removeHandler(bugs)
+    expected = request.node.get_closest_marker("contained") is not None
+    assert expected or not bugs.found, "\n".join(bugs.found)
 
 
 @pytest.fixture(autouse=True)

@@ -77,8 +77,8 @@ class ControlConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
     """The section `control`.
 
     state_rate: `RobotState` messages per second while anything moves; once a second else.
-    dead_man: seconds without a word from the requester of a live behavior (it repeats its request at least every
-        2 s) before the body goes home by itself. Longer than two repetitions.
+    dead_man: seconds after which a behavior ends whose requester neither names a lease (`Request.lease`) nor sends
+        it again, at least every 2 s. After the last one the body goes home by itself. Longer than two repetitions.
     covered_for: how long an object that the world no longer reports is taken to be covered, and looked at where it
         was.
     no_point_zones: spheres that are never pointed into.

@@ -9,6 +9,7 @@ from schemas import keys
 from schemas.behaviors import BlockBehavior, Gaze, GazeShift, HeadDirectionShift, Speech
 from schemas.body import (
     AbortBehavior,
+    BehaviorAborted,
     BehaviorOutcome,
     BodyPose,
     DescribeBody,
@@ -28,7 +29,7 @@ from schemas.messages import Message
 from schemas.requests import Cancel, Request
 from schemas.units import Seconds
 from schemas.world import World
-from services.bus import Bus
+from services.bus import Bus, Received
 from services.control import variability
 from services.control.actions import ActionMessage, Deeds
 from services.control.body import Arrived, Authority, BehaviorRefused, Body, BodyFailed, Progress, Reached, Spoke
@@ -53,13 +54,8 @@ async def embody(bus: Bus, ready: Ready, config: ControlConfig, body: Body | Non
             try:
                 control.publish_state()
                 async for received in inbox:
-                    if isinstance(received.message, World):
-                        control.see(received.message)
-                        continue
-                    if (request := control.desk.take(received)) is not None:
-                        control.serve(request)
-                    if isinstance(received.message, Request):
-                        control.heard_from(received.message.requester)
+                    with bus.containing(f"{received.key} from {received.source or 'a stranger'}"):
+                        control.take(received)
             finally:
                 control.close()
 
@@ -67,11 +63,15 @@ async def embody(bus: Bus, ready: Ready, config: ControlConfig, body: Body | Non
 class _Performance:
     """A `PerformBehavior` that is under way."""
 
-    def __init__(self, request: PerformBehavior, authority: Authority) -> None:
+    def __init__(self, request: PerformBehavior, id: str, authority: Authority) -> None:
+        """id: what the requester calls it, unlike `request.id`, which is its name here."""
         self.request = request
+        self.id = id
         self.authority = authority
         self.position = 0
         self.status: Literal["done", "aborted", "failed"] = "aborted"
+        self.aborts: list[str] = []
+        """Requests that end with it."""
 
     @property
     def label(self) -> str:
@@ -88,7 +88,7 @@ class _Control:
     """What the loop of `embody` feeds."""
 
     def __init__(self, bus: Bus, config: ControlConfig, body: Body, tasks: asyncio.TaskGroup) -> None:
-        self.desk = RequestDesk(bus, "control", self._requester_lost)
+        self.desk = RequestDesk(bus, "control", self._requester_lost, on_extend=self.serve, term=config.dead_man)
         self._bus = bus
         self._config = config
         self._body = body
@@ -99,7 +99,6 @@ class _Control:
         self._live: dict[str, _Performance] = {}
         self._sent = 0
         self._loop = asyncio.get_running_loop()
-        self._silence: dict[str, asyncio.TimerHandle] = {}
         self._next_state: asyncio.TimerHandle | None = None
         self._next_state_at = inf
         self._published: Seconds = -inf
@@ -121,6 +120,13 @@ class _Control:
 
     # -- requests -----------------------------------------------------------------------------------------------
 
+    def take(self, received: Received) -> None:
+        if isinstance(received.message, World):
+            self.see(received.message)
+        elif (request := self.desk.take(received)) is not None:
+            with self.desk.serving(request):
+                self.serve(request)
+
     def see(self, world: World) -> None:
         self._world = self._objects.see(world, self._bus.now())
         self._body.see(self._world)
@@ -136,15 +142,13 @@ class _Control:
                 self._extend(live, request)
             case PerformBehavior():
                 self._begin(request)
-            case AbortBehavior(how=how) if live is not None:
-                live.authority.revoke(how)
+            case AbortBehavior():
+                self._abort(request)
             case Cancel() if live is not None:
                 live.authority.revoke()
             case GoHome():
                 self.desk.accept(request.id)
                 self._tasks.create_task(self._go_home(request), name=f"home {request.id}")
-            case AbortBehavior():
-                self.desk.refuse(request.id, Fault(reason="no such behavior", where=request.id, service="control"))
 
     def _begin(self, request: PerformBehavior) -> None:
         try:
@@ -152,8 +156,21 @@ class _Control:
         except ValueError as error:
             self.desk.refuse(request.id, Fault(reason=str(error), where=request.behavior.id, service="control"))
             return
-        live = self._live[request.id] = _Performance(request, authority)
+        id = self.desk.asked(request.id).id
+        live = self._live[request.id] = _Performance(request, id, authority)
         self._tasks.create_task(self._perform(live), name=f"behavior {request.id}")
+
+    def _abort(self, request: AbortBehavior) -> None:
+        """Whoever has asked for the behavior."""
+        label = f"{request.block}:{request.behavior}"
+        meant = [live for live in self._live.values() if live.label == label]
+        if not meant:
+            self.desk.refuse(request.id, Fault(reason="no such behavior", where=label, service="control"))
+            return
+        self.desk.accept(request.id)
+        for live in meant:
+            live.authority.revoke(request.how)
+            live.aborts.append(request.id)
 
     def _pace(self, request: PerformBehavior) -> dict[str, Seconds]:
         return {planned.sync: self._bus.local(planned.at) for planned in request.pace}
@@ -183,6 +200,10 @@ class _Control:
             return
         except BodyFailed as error:
             live.status, fault = "failed", error.fault
+        except Exception as error:
+            # A mistake of the body's driver ends this behavior. Where its parts are nobody knows: all go home.
+            live.status, fault = "failed", self._bus.failed(error, f"behavior {live.label}")
+            self._take_home(f"after {live.label} broke")
         del self._live[request.id]
         at = self._bus.now()
         self._publish(self._deeds.ended(request.id, at))
@@ -199,20 +220,36 @@ class _Control:
                 fault=fault,
             )
         )
+        for id in live.aborts:
+            self.desk.end(BehaviorAborted(id=id))
 
     async def _go_home(self, request: GoHome) -> None:
-        await self._body.home(request.parts)
-        self.note_look()
-        self.desk.end(HomeReached(id=request.id, at=self._bus.stamp()))
+        with self.desk.serving(request):
+            await self._body.home(request.parts)
+            self.note_look()
+            self.desk.end(HomeReached(id=request.id, at=self._bus.stamp()))
+
+    def _take_home(self, name: str) -> None:
+        """The whole body, at nobody's request."""
+
+        async def go() -> None:
+            with self._bus.containing(f"way home {name}"):
+                await self._body.home()
+
+        self._tasks.create_task(go(), name=f"home {name}")
+        self._keep_publishing()
 
     # -- reports ------------------------------------------------------------------------------------------------
 
     def _report(self, live: _Performance, progress: Progress) -> None:
         request = live.request
-        id, block, behavior = request.id, request.block, request.behavior.id
+        id, block, behavior, requester = live.id, request.block, request.behavior.id, request.requester
         match progress:
             case Arrived(sync=sync, at=at):
-                self._tell(SyncPointArrived(id=id, block=block, behavior=behavior, sync=sync, at=self._bus.stamp(at)))
+                stamp = self._bus.stamp(at)
+                self._tell(
+                    SyncPointArrived(id=id, block=block, behavior=behavior, sync=sync, at=stamp, requester=requester)
+                )
                 self.note_look(live, at)
             case Reached(sync=sync, at=at, arrived=arrived):
                 self._tell(
@@ -223,6 +260,7 @@ class _Control:
                         sync=sync,
                         at=self._bus.stamp(at),
                         arrived=self._bus.stamp(arrived),
+                        requester=requester,
                     )
                 )
                 live.status = "done" if sync == "end" else live.status
@@ -247,11 +285,17 @@ class _Control:
         """Publish what the eyes rest on, if that has changed."""
         of_head = live is not None and isinstance(live.request.behavior, Gaze | GazeShift | HeadDirectionShift)
         label = live.label if live is not None and of_head else ""
-        entity = self._body.state().looking_at
-        self._publish(self._deeds.looks_at(entity, label, self._bus.now() if at is None else at))
+        with self._bus.containing("what the body looks at"):
+            entity = self._body.state().looking_at
+            self._publish(self._deeds.looks_at(entity, label, self._bus.now() if at is None else at))
 
     def publish_state(self) -> None:
         """Tell how the body stands, and once more after a while: soon if it moves."""
+        self._schedule_state(self._bus.now() + IDLE)
+        with self._bus.containing("the state of the body"):
+            self._publish_state()
+
+    def _publish_state(self) -> None:
         now, state = self._bus.now(), self._body.state()
         self._publish(self._deeds.looks_at(state.looking_at, "", now))
         self._published = now
@@ -278,27 +322,17 @@ class _Control:
 
     # -- dead man -----------------------------------------------------------------------------------------------
 
-    def heard_from(self, requester: str) -> None:
-        """Requests are repeated while they live: a requester that falls silent in mid-behavior is gone."""
-        if timer := self._silence.pop(requester, None):
-            timer.cancel()
-        if any(live.request.requester == requester for live in self._live.values()):
-            self._silence[requester] = self._loop.call_later(self._config.dead_man, self._let_go, requester)
-
     def _requester_lost(self, cancel: Cancel) -> None:
-        self._let_go(cancel.requester)
-
-    def _let_go(self, requester: str) -> None:
-        """Nobody directs these behaviors any more: end them, and take everything to the safe pose."""
-        abandoned = [live for live in self._live.values() if live.request.requester == requester]
-        for live in abandoned:
-            live.authority.revoke()
-        if abandoned:
-            self._tasks.create_task(self._body.home(), name=f"home after {requester}")
-            self._keep_publishing()
+        """Nobody directs this behavior any more. After the last one of its requester the body takes its safe pose."""
+        live = self._live.get(cancel.id)
+        if live is None:
+            return
+        live.authority.revoke()
+        others = (each for each in self._live.values() if each.request.requester == cancel.requester)
+        if all(each.authority.revoked for each in others):
+            self._take_home(f"after {cancel.requester}")
 
     def close(self) -> None:
         self.desk.close()
-        for timer in (self._next_state, *self._silence.values()):
-            if timer is not None:
-                timer.cancel()
+        if self._next_state is not None:
+            self._next_state.cancel()

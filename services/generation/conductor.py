@@ -3,6 +3,7 @@
 import asyncio
 from collections.abc import Callable, Collection, Iterable
 from functools import reduce
+from typing import Literal
 
 from schemas import keys
 from schemas.actions import ActionBegan, ActionEnded
@@ -28,6 +29,7 @@ from services.generation.trail import NOTHING, Trail
 from services.generation.turn_events import TurnEvents, TurnOutcomes
 from services.generation.turn_policy import Aborted, TurnPlan, TurnPolicy
 from services.requests import Pending, RequestDesk, Requester, RequestRefused
+from services.serving import GRACE
 
 
 class Conductor:
@@ -66,6 +68,7 @@ class Conductor:
         self._session = f"{bus.name}@{bus.now():.6f}"
         """Makes request ids of our own unique after a restart."""
         self._signals = 0
+        self._recognition_lost_at: Seconds | None = None
 
     # -- what arrives ---------------------------------------------------------------------------------------------
 
@@ -110,6 +113,14 @@ class Conductor:
             case SyncPointProgress():
                 self._follow(message)
 
+    def recognition_gone(self, now: Seconds) -> None:
+        """It may only be cut off."""
+        self._recognition_lost_at = now + GRACE
+
+    def recognition_there(self, session: str) -> None:
+        self._recognition_lost_at = None
+        self._events.lose(session)
+
     def body_lost(self) -> None:
         """Another may come."""
         self._body.forget()
@@ -142,13 +153,16 @@ class Conductor:
 
     @property
     def deadline(self) -> Seconds | None:
-        due = [self._turns.deadline, self._outcomes.deadline]
+        due = [self._turns.deadline, self._outcomes.deadline, self._recognition_lost_at]
         due += [performance.deadline for performance in self._live.values()]
         return min((each for each in due if each is not None), default=None)
 
     def settle(self, now: Seconds) -> list[tuple[str, Fault]]:
         """End what has come to its end by now. Requests that turned out to be impossible, and why."""
         refused: list[tuple[str, Fault]] = []
+        if self._recognition_lost_at is not None and now >= self._recognition_lost_at:
+            self._recognition_lost_at = None
+            self._events.lose()
         while (aborted := self._turns.tick(now)) is not None:
             self._abort(aborted, now)
         for performance in list(self._live.values()):
@@ -168,11 +182,11 @@ class Conductor:
         return refused
 
     def _enforce_inhibitions(self, performance: Performance) -> None:
-        for id in performance.forbid(self._leases.permits()):
-            abort = AbortBehavior(
-                id=id, requester=self._bus.name, how="freeze" if self._leases.holds_head else "relax"
-            )
-            self._bus.publish(keys.BEHAVIOR, abort)
+        block = performance.fragment.id
+        for behavior in performance.forbid(self._leases.permits()):
+            how: Literal["freeze", "relax"] = "freeze" if self._leases.holds_head else "relax"
+            id = f"{performance.block_id}/{behavior}:abort"
+            self._requests.send(keys.BEHAVIOR, AbortBehavior(id=id, block=block, behavior=behavior, how=how))
 
     # -- fragments: those of a turn at once, turns one after the other --------------------------------------------
 
@@ -188,7 +202,8 @@ class Conductor:
                     block = tasks.create_task(self._await_end(performance, pending), name=performance.block_id)
                     self._blocks[block] = turn
                     block.add_done_callback(self._blocks.pop)
-                self._changed(self._bus.now())
+                with self._bus.containing(f"what follows the beginning of fragment {performance.fragment.id}"):
+                    self._changed(self._bus.now())
 
     async def _begin(self, performance: Performance) -> Pending | None:
         """The request for its block, accepted; None if nothing comes of it."""
@@ -226,6 +241,9 @@ class Conductor:
             performance.refuse(error.fault, self._bus.now())  # the realizer did
         except EngageError as error:
             performance.fail(error, self._bus.now())
+        except Exception as error:
+            fault = self._bus.failed(error, f"fragment {fragment.id}")
+            performance.fail(RunFailed(fault), self._bus.now())
         self._block_ended(performance)
         return None
 
@@ -238,7 +256,6 @@ class Conductor:
         assert performance.plan is not None
         request = PerformBlock(
             id=performance.block_id,
-            requester=self._bus.name,
             block=performance.plan.block,
             follows=tuple([each.fragment.id for each in company]),
         )
@@ -260,8 +277,9 @@ class Conductor:
             performance.end_with(outcome, self._bus.now())
         except EngageError as error:
             performance.fail(error, self._bus.now())
-        self._block_ended(performance)
-        self._changed(self._bus.now())
+        with self._bus.containing(f"the end of fragment {performance.fragment.id}"):
+            self._block_ended(performance)
+            self._changed(self._bus.now())
 
     def _block_ended(self, performance: Performance) -> None:
         """Or there will be none."""
@@ -299,7 +317,5 @@ class Conductor:
         self._signals += 1
         id = f"turn-aborted-{self._signals}"
         signal = TurnSignal(id=id, turn=aborted.turn, signal="aborted", actor=aborted.addressee)
-        request = SignalTurn(
-            id=f"{self._session}/{id}", requester=self._bus.name, signal=signal, at=self._bus.stamp(now)
-        )
+        request = SignalTurn(id=f"{self._session}/{id}", signal=signal, at=self._bus.stamp(now))
         self._requests.send(keys.TURN, request)

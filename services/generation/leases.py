@@ -1,4 +1,4 @@
-"""Inhibition of gaze and of pointing: leases that end by themselves when their owner dies or lets them lapse."""
+"""Inhibition of gaze and of pointing: leases, which end when their request does (`schemas.requests`)."""
 
 from math import inf
 from typing import Literal
@@ -8,7 +8,6 @@ from msgspec import Struct
 from schemas.attention import Claim, Inhibit
 from schemas.behaviors import Hand
 from schemas.faults import Fault, InputRefused
-from schemas.units import Seconds
 from services.generation.config import GenerationConfig
 from services.generation.permits import HANDS, Permits
 
@@ -26,54 +25,32 @@ SPEECH_ONLY = Inhibition(Claim(kind="inhibition", priority=1, reason="speech onl
 """Stands in degraded generation: the study had the head there, so that nobody takes it for a look. Thesis 5.3."""
 
 
-class _Lease(Struct):
-    request: Inhibit
-    ends: Seconds
-
-
 class Leases:
-    """The leases in force, newest last. `deadline`: when the next one lapses if nobody renews it."""
+    """The leases in force, newest last."""
 
     def __init__(self, config: GenerationConfig) -> None:
         self._config = config
-        self._leases: dict[str, _Lease] = {}
+        self._leases: dict[str, Inhibit] = {}
 
-    def take(self, request: Inhibit, now: Seconds) -> None:
+    def take(self, request: Inhibit) -> None:
         """A new lease, or one whose owner has changed its mind. Raises InputRefused."""
         if not 0 < request.ttl < inf:
             reason = f"ttl {request.ttl} is not a positive number of seconds"
             raise InputRefused(Fault(reason=reason, where=f"{request.id}: ttl"))
         if request.mode == "target" and not request.target:
             raise InputRefused(Fault(reason="mode 'target' without a target", where=f"{request.id}: target"))
-        self._leases[request.id] = _Lease(request, now + request.ttl)
-
-    def renew(self, id: str, now: Seconds) -> None:
-        """It has been sent again."""
-        if (lease := self._leases.get(id)) is not None:
-            lease.ends = now + lease.request.ttl
+        self._leases[request.id] = request
 
     def release(self, id: str) -> bool:
         """End a lease early. False if there is none of this id."""
         return self._leases.pop(id, None) is not None
 
     @property
-    def deadline(self) -> Seconds | None:
-        return min((lease.ends for lease in self._leases.values()), default=None)
-
-    def lapse(self, now: Seconds) -> tuple[str, ...]:
-        """End what nobody has renewed; their ids."""
-        lapsed = tuple(id for id, lease in self._leases.items() if now >= lease.ends)
-        for id in lapsed:
-            del self._leases[id]
-        return lapsed
-
-    @property
     def inhibition(self) -> Inhibition | None:
         """Of the newest lease on gaze."""
         if self._config.speech_only:
             return SPEECH_ONLY
-        for lease in reversed(self._leases.values()):
-            request = lease.request
+        for request in reversed(self._leases.values()):
             if request.part == "gaze":
                 target = request.target if request.mode == "target" else ""
                 reason = f"{request.requester}: {request.mode}"
@@ -87,7 +64,7 @@ class Leases:
 
     def permits(self) -> Permits:
         """What fragments may do now."""
-        inhibited = {lease.request.part for lease in self._leases.values()}
+        inhibited = {request.part for request in self._leases.values()}
         return Permits(
             gaze="gaze" not in inhibited,
             hands=tuple(hand for hand in HANDS if hand not in {_HAND_OF.get(part) for part in inhibited}),

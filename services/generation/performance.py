@@ -39,7 +39,7 @@ class Ended(Struct, frozen=True):
 
 
 class Performance:
-    """block_id: of the request for its block. Its body requests are called `<block_id>/<behavior>`."""
+    """block_id: of the request for its block."""
 
     def __init__(self, request: PerformFragment, fragment: TurnFragment, turn: TurnPlan, patience: Seconds) -> None:
         self.request = request
@@ -129,12 +129,12 @@ class Performance:
         )
 
     def forbid(self, permits: Permits) -> tuple[str, ...]:
-        """Body requests under way that an inhibition forbids, each once."""
+        """Behaviors under way that an inhibition forbids, each once."""
         ids = []
         for behavior in self._running.values():
             if permits.stops(behavior) and behavior.id not in self._forbidden:
                 self._forbidden.add(behavior.id)
-                ids.append(f"{self.block_id}/{behavior.id}")
+                ids.append(behavior.id)
         return tuple(ids)
 
     def end(

@@ -10,9 +10,9 @@ from schemas.body import RobotState
 from schemas.faults import EngageError, Fault, InputRefused
 from schemas.feedback import SyncPointProgress, WarningFeedback, WarningKind
 from schemas.fragments import PerformFragment
-from schemas.presence import PeerGone
-from schemas.recognition import ConnectionEvent, Statistics
-from schemas.requests import Cancel, Unreadable
+from schemas.presence import PeerAlive, PeerGone
+from schemas.recognition import ConnectionEvent, Statistics, session_of
+from schemas.requests import Cancel, Request, Unreadable
 from schemas.units import Seconds
 from schemas.world import World
 from services.bus import Bus, Received
@@ -23,6 +23,7 @@ from services.generation.config import GenerationConfig
 from services.generation.leases import Leases
 from services.requests import RequestDesk, Requester
 from services.runtime import Ready
+from services.serving import GONE, LAPSED
 
 NAME = "generation"
 PATTERNS = (
@@ -41,7 +42,8 @@ async def generate(bus: Bus, ready: Ready, config: GenerationConfig) -> None:
                 tasks.create_task(generation.keep_deadlines(), name="deadlines")
                 ready()
                 async for received in inbox:
-                    generation.take(received)
+                    with bus.containing(f"{received.key} from {received.source or 'a stranger'}"):
+                        generation.take(received)
         finally:
             generation.close()
 
@@ -74,15 +76,9 @@ class _Generation:
         now = self._bus.now()
         self._requests.feed(received)
         message = received.message
-        if isinstance(message, Inhibit) and self._desk.is_live(message.id):
-            self._leases.renew(message.id, now)
-        match self._desk.take(received):
-            case PerformFragment() as request:
-                self._admit(request, now)
-            case Inhibit() as request:
-                self._grant(request, now)
-            case Cancel() as cancel:
-                self._cancel(cancel)
+        if (request := self._desk.take(received)) is not None:
+            with self._desk.serving(request):
+                self._serve(request, now)
         match message:
             case World():
                 world = self._objects.see(message, now)
@@ -90,7 +86,8 @@ class _Generation:
                 self._arbiter.feed(world, now)
                 early, self._early = self._early, {}
                 for request, _ in early.values():
-                    self._admit(request, now)
+                    with self._desk.serving(request):
+                        self._admit(request, now)
             case ConnectionEvent():
                 self._conductor.feed(message, now)
                 self._arbiter.feed(message, now)
@@ -110,8 +107,20 @@ class _Generation:
             case PeerGone(participant="realizer"):
                 self._arbiter.body_lost()
             case PeerGone(participant="recognition"):
+                self._conductor.recognition_gone(now)
                 self._arbiter.recognition_lost()
+            case PeerAlive(participant="recognition", run=run):
+                self._conductor.recognition_there(session_of(run))
         self._after(now)
+
+    def _serve(self, request: Request, now: Seconds) -> None:
+        match request:
+            case PerformFragment():
+                self._admit(request, now)
+            case Inhibit():
+                self._grant(request, now)
+            case Cancel():
+                self._cancel(request)
 
     def _admit(self, request: PerformFragment, now: Seconds) -> None:
         world = self._objects.at(now)
@@ -129,7 +138,7 @@ class _Generation:
         try:
             if request.target and world is not None and world.entity(request.target) is None:
                 raise InputRefused(Fault(reason=f"the world does not know {request.target!r}", where=request.id))
-            self._leases.take(request, now)
+            self._leases.take(request)
         except EngageError as error:
             self._leases.release(request.id)
             self._refuse(request.id, error.fault)
@@ -145,10 +154,10 @@ class _Generation:
         self._bus.publish(keys.FRAGMENT_FEEDBACK, WarningFeedback(block=fragment or None, kind=kind, message=message))
 
     def _cancel(self, cancel: Cancel) -> None:
-        """On request, or because the requester is gone."""
+        """On request, because the requester is gone, or because nobody has renewed it."""
         now = self._bus.now()
         if self._leases.release(cancel.id):
-            reason = "owner_lost" if cancel.reason == "requester is gone" else "released"
+            reason = {GONE: "owner_lost", LAPSED: "lapsed"}.get(cancel.reason, "released")
             self._desk.end(InhibitionEnded(id=cancel.id, reason=reason))  # type: ignore[arg-type]
         elif self._early.pop(cancel.id, None):
             self._desk.refuse(cancel.id, Fault(reason="cancelled", where=cancel.id))
@@ -170,10 +179,11 @@ class _Generation:
                 async with asyncio.timeout_at(self._deadline()):
                     await self._changed.wait()
             except TimeoutError:
-                self._after(self._bus.now())
+                with self._bus.containing("what is due by now"):
+                    self._after(self._bus.now())
 
     def _deadline(self) -> Seconds | None:
-        due = [self._conductor.deadline, self._arbiter.deadline, self._leases.deadline]
+        due = [self._conductor.deadline, self._arbiter.deadline]
         due += [until for _, until in self._early.values()]
         return min((each for each in due if each is not None), default=None)
 
@@ -184,8 +194,6 @@ class _Generation:
                 del self._early[id]
                 fault = Fault(reason="the world is unknown", where=id, advice="is perception running?")
                 self._refuse(id, fault)
-        for id in self._leases.lapse(now):
-            self._desk.end(InhibitionEnded(id=id, reason="lapsed"))
         for id, fault in self._conductor.settle(now):
             self._refuse(id, fault)
         self._rule(now)
@@ -204,8 +212,7 @@ class _Generation:
 
     def _send(self, shift: Shift) -> None:
         id = f"{self._session}/{shift.id}"
-        request = PerformBlock(id=id, requester=self._bus.name, block=shift.block)
-        pending = self._requests.send(keys.BLOCK, request)
+        pending = self._requests.send(keys.BLOCK, PerformBlock(id=id, block=shift.block))
 
         def ended(outcome: "asyncio.Future[object]") -> None:
             if outcome.cancelled():

@@ -29,6 +29,12 @@ class TurnEvents:
         if event.block in self._turn_of and (event.state == "started" or event.id in self._events):
             self._events[event.id] = event
 
+    def lose(self, session: str = "") -> None:
+        """Recognition is gone, or there as this session: no other's undecided events will ever be decided."""
+        for id, event in self._events.items():
+            if event.state == "started" and event.session != session:
+                self._events[id] = replace(event, state="lost")
+
     def of(self, turn: str) -> tuple[ConnectionEvent, ...]:
         """By start."""
         events = [event for event in self._events.values() if self._turn_of[event.block] == turn]

@@ -4,7 +4,7 @@ from collections.abc import Iterable
 
 from schemas import keys
 from schemas.behaviors import BlockBehavior
-from schemas.body import AbortBehavior, GoHome, PerformBehavior, PlannedInstant
+from schemas.body import GoHome, PerformBehavior, PlannedInstant
 from services.bus import Bus
 from services.realizer.effects import Begin, Extend
 from services.requests import Pending, Requester
@@ -27,7 +27,6 @@ class BodyLink:
         """Begin, or go on as far as is asked."""
         perform = PerformBehavior(
             id=self.id(behavior.id),
-            requester=self._bus.name,
             block=self._block,
             behavior=behavior,
             through=asked.through.partition(":")[0],  # nobody asks for a repetition
@@ -36,9 +35,9 @@ class BodyLink:
         return self._requests.send(keys.BEHAVIOR, perform)
 
     def abort(self, behavior: str) -> None:
-        self._requests.send(keys.BEHAVIOR, AbortBehavior(id=self.id(behavior), requester=self._bus.name))
+        self._requests.cancel(self.id(behavior), "aborted")
 
     def go_home(self, parts: Iterable[str], behavior: str = "") -> None:
         """behavior: for whose sake; empty: the block's."""
-        going = GoHome(id=f"{self.id(behavior)}:home", requester=self._bus.name, parts=tuple(sorted(parts)))
+        going = GoHome(id=f"{self.id(behavior)}:home", parts=tuple(sorted(parts)))
         self._requests.send(keys.BEHAVIOR, going)

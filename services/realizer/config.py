@@ -16,6 +16,10 @@ class RealizerConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
     skew: a sync point that misses its instant by more is reported as LATE. Below what people notice (0.1 s).
     estimate: how long the body may take to answer what it expects of a block.
     abort: how long the body may take to end what was aborted before the block ends without it.
+    pulse: between two renewals of what the body, and recognition, are asked for. lease: how long movement authority
+    lasts that is not renewed, so that a body stops by itself when the realizer is gone. At least three pulses.
+    blocks: live blocks; one more is refused. The default is where a command follows its sync point within 50 ms in 99
+    of 100 cases on two cores (benchmarks/live_blocks.py).
     event_grace: an event ends as failed this much after its limit if recognition is not there to decide it.
     event_patience: and this much if it is there, but says nothing.
     most: behaviors, marks and sync references in a block; more is refused, as planning takes the loop 0.1 ms each.
@@ -31,6 +35,9 @@ class RealizerConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
     skew: Seconds = 0.1
     estimate: Seconds = 2.0
     abort: Seconds = 5.0
+    pulse: Seconds = 1.0
+    lease: Seconds = 5.0
+    blocks: int = 300
     event_grace: Seconds = 0.5
     event_patience: Seconds = 10.0
     most: int = 2000
@@ -45,6 +52,10 @@ class RealizerConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
                 raise ValueError(f"{name} must be a finite number of at least 0, not {getattr(self, name)}")
         if self.stall < self.late or self.stall_factor < self.late_factor:
             raise ValueError("stall and stall_factor must not be below late and late_factor")
+        if not 0.0 < 3.0 * self.pulse <= self.lease:
+            raise ValueError(
+                f"lease {self.lease} s must be at least three times pulse {self.pulse} s, which is above 0"
+            )
 
     def limit_of(self, kind: EventKind) -> Seconds:
         return float(getattr(self, f"{kind}_limit"))

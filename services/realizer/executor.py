@@ -4,7 +4,11 @@ Decides nothing: what was measured goes to the `Authority`, and what that says i
 """
 
 import asyncio
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
+from contextlib import AbstractContextManager
+from functools import partial
+
+from msgspec.structs import replace
 
 from schemas.behaviors import BlockBehavior, Event, TurnSignal, Wait
 from schemas.blocks import Block, BlockOutcome
@@ -23,7 +27,7 @@ from services.realizer.recognition_link import RecognitionLink
 from services.realizer.reporting import Reporter
 from services.realizer.spoken import Spoken
 from services.realizer.surroundings import Ending, Live, Surroundings
-from services.requests import Pending, RequestRefused
+from services.requests import NeverEnded, Pending, RequestRefused
 
 
 class Performance:
@@ -40,7 +44,6 @@ class Performance:
         self._config = around.config
         self._recognition = RecognitionLink(around.bus, around.requests, around.config, around.peers)
         self._body = BodyLink(around.bus, around.requests, live.request.id, plan.block.id)
-        self._loop = loop
         self._report = Reporter(around.bus, plan.block.id, around.config.skew)
         self._begun: dict[str, asyncio.Future[None]] = {id: loop.create_future() for id in plan.chains}
         self._asked: dict[str, Begin | Extend] = {}
@@ -60,6 +63,17 @@ class Performance:
         self._ending = live.ending
         self._timer: asyncio.TimerHandle | None = None
         self._is_stale = False
+
+    def containing(self) -> AbstractContextManager[None]:
+        """An exception in the body of `with` ends this block, and no other."""
+        where = f"block {self.plan.block.id}"
+        return self._bus.containing(where, lambda fault: self._live.stop(Ending("failed", fault)))
+
+    def abandon(self) -> None:
+        """Its end has gone wrong, too: stop what it asked for, and take its parts home."""
+        for behavior in self._pending:
+            self._requests.cancel(self._body.id(behavior), "its block broke")
+        self._go_home(self.parts_used)
 
     # -- life ------------------------------------------------------------------------------------------------------
 
@@ -84,7 +98,7 @@ class Performance:
                 self._around.ledger.perform(self.plan.block.id, self)
                 with self._around.ledger.followed(self, self._foreign, self._elsewhere):
                     self._advance()
-                    ending = await self._ending
+                    ending = await asyncio.shield(self._ending)  # which others wait for, too
                     await self._end_what_moves(ending)
                 for task in self._running.values():
                     task.cancel()
@@ -92,15 +106,11 @@ class Performance:
             self._close()
         self._report.ended(ending.status, began)
         self._around.ledger.reach(self.plan.block.id, Point(BLOCK_ITSELF, "end"), self._bus.now())
-        return BlockOutcome(
-            id=self._live.request.id,
-            block=self.plan.block.id,
-            status=ending.status,
+        return replace(
+            self._live.outcome,
             spoken=self.spoken.texts,
             dropped=tuple(id for id in self._dropped if id not in self._unwanted),
             interrupted=tuple(id for id in self._dropped if id in self._unwanted),
-            replaced_by=ending.replaced_by,
-            fault=ending.fault,
         )
 
     def is_going_on(self, behavior: str) -> bool:
@@ -128,48 +138,43 @@ class Performance:
             return
         point = Point(message.behavior, message.sync)
         at = self.authority.plausible(point, self._bus.local(message.at), self._bus.now())
-        match message:
-            case SyncPointArrived():
-                self.authority.arrive(point, at)
-            case SyncPointReached(arrived=arrived):
-                self._reach(
-                    point, at, arrived=self.authority.plausible(point, self._bus.local(arrived), at), by_body=True
-                )
+        if isinstance(message, SyncPointArrived):
+            self.authority.arrive(point, at)
+        else:
+            arrived = self.authority.plausible(point, self._bus.local(message.arrived), at)
+            self._reach(point, at, arrived=arrived, by_body=True)
         self._advance()
-
-    def _tell_prediction(self) -> None:
-        """Say when the rest is expected, if something was not when it was expected."""
-        if self.authority.is_surprised and self._report.may_expect() and not self._ending.done():
-            self._report.expect(self.authority.plan, self.authority.began, self.authority.expected(self._bus.now()))
 
     # -- other blocks ------------------------------------------------------------------------------------------------
 
     def hear(self, point: Point, at: Seconds) -> None:
         """A point of another block is reached."""
-        if point in self._foreign and not self._ending.done():
-            self.authority.reach(point, at)
-            self._advance()
+        if point in self._foreign:
+            self._take_in(partial(self.authority.reach, point, at))
 
     def foresee(self, point: Point, at: Seconds) -> None:
         """A point of another block is expected at `at` now."""
-        if point in self._foreign and not self._ending.done():
-            self.authority.foresee(point, at)
-            self._advance()
+        if point in self._foreign:
+            self._take_in(partial(self.authority.foresee, point, at))
 
     def follow(self, points: Iterable[Point]) -> None:
         """Other blocks are tied to these."""
-        if points and not self._ending.done():
-            self.authority.follow(points)
-            self._advance()
+        if points:
+            self._take_in(partial(self.authority.follow, points))
 
     def miss(self, behaviors: Iterable[str]) -> None:
         """What has not been reached of these, in other blocks, never will be."""
         lost = {point.behavior for point in self._foreign - self.authority.reached.keys()}.intersection(behaviors)
         lost -= self._vanished
-        if lost and not self._ending.done():
+        if lost:
             self._vanished |= lost
-            self._replan()
-            self._advance()
+            self._take_in(self._replan)
+
+    def _take_in(self, news: Callable[[], object] = lambda: None) -> None:
+        if not self._ending.done():
+            with self.containing():
+                news()
+                self._advance()
 
     async def _end_what_moves(self, ending: Ending) -> None:
         """Abort what still runs, and wait until all has ended, or for as long as the body is given."""
@@ -206,7 +211,8 @@ class Performance:
         while again and not self._ending.done():
             made_facts = [self._apply(effect) for effect in self.authority.advance(self._bus.now())]
             again = any(made_facts)
-        self._tell_prediction()
+        if self.authority.is_surprised and self._report.may_expect() and not self._ending.done():
+            self._report.expect(self.authority.plan, self.authority.began, self.authority.expected(self._bus.now()))
         self._around.ledger.foresee(self.plan.block.id, self.authority.ahead)
         if self._timer is not None:
             self._timer.cancel()
@@ -214,14 +220,19 @@ class Performance:
         if self.authority.is_over:
             self._live.stop(Ending("done"))
         elif self.authority.deadline is not None and not self._ending.done():
-            self._timer = self._loop.call_at(self.authority.deadline, self._advance)
+            self._timer = asyncio.get_running_loop().call_at(self.authority.deadline, self._take_in)
 
     def _apply(self, effect: Effect) -> bool:
         """Do what the authority says; whether that made new facts at once."""
         match effect:
             case Extend(behavior=id):
                 self._asked[id] = effect
-                return self._extend(id)
+                behavior, end = self._performed.get(id), Point(id, "end")
+                if isinstance(behavior, Wait) and end in self.authority.arrived:
+                    self._reach(end, self._bus.now(), arrived=self.authority.arrived[end])
+                    return True
+                if behavior is not None and id in self._pending and performer(behavior) == "body":
+                    self._send(behavior)
             case Begin(behavior=id):
                 self._asked[id] = effect
                 self._begun[id].set_result(None)
@@ -234,15 +245,6 @@ class Performance:
                 self._body.abort(id)
                 self._lose(id, Fault(reason=f"stalled before {sync}, {overdue:.1f} s overdue"))
                 return True
-        return False
-
-    def _extend(self, id: str) -> bool:
-        behavior, end = self._performed.get(id), Point(id, "end")
-        if isinstance(behavior, Wait) and end in self.authority.arrived:
-            self._reach(end, self._bus.now(), arrived=self.authority.arrived[end])
-            return True
-        if behavior is not None and id in self._pending and performer(behavior) == "body":
-            self._send(behavior)
         return False
 
     def _reach(self, point: Point, at: Seconds, *, arrived: Seconds | None = None, by_body: bool = False) -> None:
@@ -267,7 +269,7 @@ class Performance:
             if id in self.plan.required:
                 self._live.stop(Ending("failed", Fault(reason=fault.reason, where=f"{self.plan.block.id}: {id}")))
         self._is_stale = True  # Planned anew once for all that is lost in one go.
-        self._loop.call_soon(self._advance)
+        asyncio.get_running_loop().call_soon(self._take_in)
 
     def _replan(self) -> None:
         """Go on as if what was dropped, or vanished elsewhere, had never been written."""
@@ -310,8 +312,9 @@ class Performance:
         self._around.routes[self._body.id(behavior.id)] = self
         try:
             outcome = await self._send(behavior).outcome
-        except RequestRefused as error:
-            self._lose(behavior.id, error.fault, kind="CANNOT_CREATE_BEHAVIOR")
+        except (RequestRefused, NeverEnded) as error:
+            refused = isinstance(error, RequestRefused)
+            self._lose(behavior.id, error.fault, "CANNOT_CREATE_BEHAVIOR" if refused else "EXECUTION_FAILURE")
             return
         except EngageError as error:
             self._pending.pop(behavior.id)

@@ -18,7 +18,7 @@ from services.realizer.patience import event_deadline
 from services.realizer.points import Point
 from services.realizer.schedule import EPSILON
 from services.realizer.surroundings import Presence
-from services.requests import Pending, Requester, RequestRefused
+from services.requests import Pending, Requester, RequestRefused, ServerRestarted
 
 
 class Decision(Struct, frozen=True):
@@ -39,7 +39,7 @@ class RecognitionLink:
 
     def signal(self, id: str, block: str, signal: TurnSignal) -> None:
         """Tell it what became of a turn. Nobody waits for the answer."""
-        message = SignalTurn(id=id, requester=self._bus.name, signal=signal, at=self._bus.stamp(), block=block)
+        message = SignalTurn(id=id, signal=signal, at=self._bus.stamp(), block=block)
         if "recognition" in self._peers:
             self._requests.send(keys.TURN, message)
         else:
@@ -49,7 +49,7 @@ class RecognitionLink:
         """Request the event; None if nobody is there to decide it."""
         if "recognition" not in self._peers:
             return None
-        request = RequestEvent(id=id, requester=self._bus.name, block=block, event=event, at=self._bus.stamp(began))
+        request = RequestEvent(id=id, block=block, event=event, at=self._bus.stamp(began))
         return self._requests.send(keys.EVENT, request)
 
     async def decision(
@@ -62,6 +62,8 @@ class RecognitionLink:
                     decided = await pending.outcome
                 except RequestRefused:
                     raise
+                except ServerRestarted:
+                    return Decision(self._bus.now(), False)  # Its new life knows nothing of the event.
                 except EngageError:
                     pending = None  # It died.
                     continue

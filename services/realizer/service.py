@@ -4,6 +4,8 @@ import asyncio
 from collections.abc import Coroutine, Iterable, Mapping
 from typing import Any, TypeVar
 
+from msgspec.structs import replace
+
 from schemas import keys
 from schemas.behaviors import Gesture, Hand, Pointing
 from schemas.blocks import BehaviorInterrupted, Block, BlockOutcome, InterruptBehavior, PerformBlock
@@ -22,8 +24,8 @@ from schemas.check import sound
 from schemas.faults import EngageError, Fault, NoReply
 from schemas.feedback import WarningFeedback
 from schemas.presence import PeerAlive, PeerGone
-from schemas.requests import Cancel, Outcome, Unreadable
-from services.bus import Bus
+from schemas.requests import Cancel, Outcome, Request, Unreadable
+from services.bus import Bus, Received
 from services.realizer.config import RealizerConfig
 from services.realizer.executor import Performance
 from services.realizer.ledger import Ledger
@@ -32,7 +34,7 @@ from services.realizer.points import Point, performer
 from services.realizer.poses import poses_before, poses_left
 from services.realizer.relations import BlockRefused, extent, relations
 from services.realizer.surroundings import Ending, Live, Presence, Surroundings
-from services.requests import RequestDesk, Requester
+from services.requests import Patience, RequestDesk, Requester
 from services.runtime import Ready
 
 Result = TypeVar("Result")
@@ -42,7 +44,7 @@ class _Realizer:
     def __init__(self, bus: Bus, config: RealizerConfig) -> None:
         self.bus = bus
         self.config = config
-        self.requests = Requester(bus)
+        self.requests = Requester(bus, Patience(pulse=config.pulse, lease=config.lease, cancel=config.abort))
         self.desk = RequestDesk(bus, "realizer", self.cancel)
         self.live: dict[str, Live] = {}
         self.routes: dict[str, Performance] = {}
@@ -51,6 +53,47 @@ class _Realizer:
         self.homing: set[asyncio.Future[Outcome]] = set()
         """Outcomes of what was sent home for a block that replaces others, as long as it is on its way."""
         self.around = Surroundings(bus, self.requests, config, self.peers, self.routes, self.performing, self.ledger)
+
+    # -- what arrives ---------------------------------------------------------------------------------------------
+
+    def take(self, received: Received, tasks: asyncio.TaskGroup) -> None:
+        match received.message:
+            case SyncPointArrived() | SyncPointReached() as report:
+                self._hear(report)
+            case WordSpoken() as word:
+                self._hear_word(word)
+            case PeerAlive() | PeerGone() as change:
+                self.peers.feed(change)
+            case Unreadable(id=id, fault=fault):
+                self.bus.publish(keys.FEEDBACK, unread(id, fault))
+        self.requests.feed(received)
+        if (request := self.desk.take(received)) is not None:
+            with self.desk.serving(request):
+                self._serve(request, tasks)
+
+    def _serve(self, request: Request, tasks: asyncio.TaskGroup) -> None:
+        match request:
+            case PerformBlock():
+                if len(self.live) >= self.config.blocks:
+                    self.desk.refuse(request.id, self._too_many(request.block.id))
+                    return
+                live = self.admit(request)
+                tasks.create_task(self._perform(live), name=f"block {request.block.id}")
+            case InterruptBehavior():
+                tasks.create_task(self.interrupt(request), name=f"interruption {request.id}")
+            case Cancel():
+                self.cancel(request)
+
+    def _too_many(self, block: str) -> Fault:
+        reason = f"{len(self.live)} blocks are live, the most that are performed in time"
+        advice = "wait until one has ended; `realizer.blocks` is the limit"
+        return Fault(reason=reason, where=block, advice=advice, service="realizer")
+
+    def _hear(self, report: SyncPointArrived | SyncPointReached) -> None:
+        performance = self.routes.get(report.id)
+        if performance is not None and report.requester in ("", self.bus.name):
+            with performance.containing():
+                performance.feed(report)
 
     def performing(self) -> list[Performance]:
         return [live.performance for live in self.live.values() if live.performance is not None]
@@ -62,6 +105,10 @@ class _Realizer:
 
     async def interrupt(self, request: InterruptBehavior) -> None:
         """End one behavior of a block, and say what came of it."""
+        with self.desk.serving(request):
+            await self._interrupt(request)
+
+    async def _interrupt(self, request: InterruptBehavior) -> None:
         block, behavior = request.block, request.behavior
         performance = next((each for each in self.performing() if each.plan.block.id == block), None)
         if performance is None or not performance.is_going_on(behavior):
@@ -75,7 +122,7 @@ class _Realizer:
             BehaviorInterrupted(id=request.id, block=block, behavior=behavior, spoken=text, was_done=was_done)
         )
 
-    def hear_word(self, word: WordSpoken) -> None:
+    def _hear_word(self, word: WordSpoken) -> None:
         for performance in self.performing():
             if performance.plan.block.id == word.block:
                 performance.spoken.hear(word.behavior, word.position)
@@ -84,6 +131,20 @@ class _Realizer:
         live = Live(request, tuple(self.live.values()))
         self.live[request.id] = live
         return live
+
+    async def _perform(self, live: Live) -> None:
+        """A block from request to outcome. What nobody has foreseen ends this block, and takes its parts home."""
+        with self.bus.containing(f"block {live.request.block.id}", lambda fault: self._abandon(live, fault)):
+            await self.perform(live)
+
+    def _abandon(self, live: Live, fault: Fault) -> None:
+        live.stop(Ending("failed", fault))
+        if live.request.id in self.live:
+            self.desk.end(replace(live.outcome, status="failed", fault=fault))
+            self._forget(live)
+        if live.performance is not None:
+            with self.bus.containing(f"the rest of block {live.request.block.id}"):
+                live.performance.abandon()
 
     async def perform(self, live: Live) -> None:
         """A block from request to outcome."""
@@ -107,7 +168,7 @@ class _Realizer:
                 self.desk.accept(live.request.id)
                 plan = await _unless(live.ending, self._await_turn(live, plan, elsewhere))
             if plan is None:
-                await self._end(live, live.never_begun())
+                await self._end(live, live.outcome)
                 return
             named = {point.behavior.partition(":")[0] for point in plan.foreign}
             tied_to = {id: elsewhere[id] for id in named}
@@ -201,7 +262,7 @@ class _Realizer:
         parts = {part for other in replaced for part in other.parts_used}
         parts = parts.difference(*(other.parts_moving for other in self.performing() if other not in replaced))
         if parts:
-            home = GoHome(id=f"{live.request.id}/:way", requester=self.bus.name, parts=tuple(sorted(parts)))
+            home = GoHome(id=f"{live.request.id}/:way", parts=tuple(sorted(parts)))
             way = self.requests.send(keys.BEHAVIOR, home).outcome
             self.homing.add(way)
             way.add_done_callback(self.homing.discard)
@@ -271,24 +332,8 @@ async def realize(bus: Bus, ready: Ready, config: RealizerConfig) -> None:
             ready()
             async with asyncio.TaskGroup() as tasks:
                 async for received in inbox:
-                    match received.message:
-                        case SyncPointArrived(id=id) | SyncPointReached(id=id) as report if id in realizer.routes:
-                            realizer.routes[id].feed(report)
-                        case WordSpoken() as word:
-                            realizer.hear_word(word)
-                        case PeerAlive() | PeerGone() as change:
-                            realizer.peers.feed(change)
-                        case Unreadable(id=id, fault=fault):
-                            bus.publish(keys.FEEDBACK, unread(id, fault))
-                    realizer.requests.feed(received)
-                    match realizer.desk.take(received):
-                        case PerformBlock(id=id) as request if id not in realizer.live:
-                            live = realizer.admit(request)
-                            tasks.create_task(realizer.perform(live), name=f"block {request.block.id}")
-                        case InterruptBehavior(id=id) as request:
-                            tasks.create_task(realizer.interrupt(request), name=f"interruption {id}")
-                        case Cancel() as cancel:
-                            realizer.cancel(cancel)
+                    with bus.containing(f"{received.key} from {received.source or 'a stranger'}"):
+                        realizer.take(received, tasks)
     finally:
         realizer.desk.close()
         realizer.requests.close()

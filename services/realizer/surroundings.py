@@ -75,8 +75,9 @@ class Live:
         self.ending.set_result(Ending("interrupted", fault, ending.replaced_by))
         return True
 
-    def never_begun(self) -> BlockOutcome:
-        """Its outcome, if it was ended before it was performed."""
+    @property
+    def outcome(self) -> BlockOutcome:
+        """As it is if nothing of it was performed."""
         ending = self.ending.result()
         return BlockOutcome(
             id=self.request.id,

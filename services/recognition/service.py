@@ -39,10 +39,12 @@ async def recognize(bus: Bus, ready: Ready, config: RecognitionConfig) -> None:
         try:
             while True:
                 received = await inbox.next(recognition.deadline)
-                if received is None:
-                    recognition.advance()
-                else:
-                    recognition.take(received)
+                source = "the clock" if received is None else f"{received.key} from {received.source or 'a stranger'}"
+                with bus.containing(source):
+                    if received is None:
+                        recognition.advance()
+                    else:
+                        recognition.take(received)
         finally:
             recognition.desk.close()
 

@@ -3,16 +3,29 @@
 import asyncio
 from typing import Any
 
+from msgspec.structs import replace
+
 from schemas.behaviors import Wait
 from schemas.blocks import Block, BlockOutcome, PerformBlock
 from schemas.body import PerformBehavior
-from schemas.requests import Cancel, Request
+from schemas.requests import A, Cancel, Request, answering
 from services.memory_bus import MemoryHub
-from services.requests import RequestDesk
+from services.requests import Pending, RequestDesk
 
 
-def block(id: str = "b", requester: str = "client") -> PerformBlock:
-    return PerformBlock(id=id, requester=requester, block=Block(id=id))
+def block(id: str = "b", requester: str = "client", of: str = "") -> PerformBlock:
+    """of: its block, if that is called otherwise."""
+    return PerformBlock(id=id, requester=requester, block=Block(id=of or id))
+
+
+def bare(request: Request) -> Request:
+    """Without what a requester adds to it."""
+    return replace(request, life="", lease=0.0)
+
+
+def answered(pending: Pending, answer: A) -> A:
+    """`answer` as it travels."""
+    return answering(pending.request, answer)
 
 
 def extent(through: str, id: str = "b") -> PerformBehavior:
@@ -37,10 +50,10 @@ class Server:
             async for received in inbox:
                 match self.desk.take(received):
                     case Cancel() as cancel:
-                        self.taken.append(cancel)
+                        self.taken.append(bare(cancel))
                         self.cancel(cancel)
                     case Request(id=id) as request:
-                        self.taken.append(request)
+                        self.taken.append(bare(request))
                         if id not in self.timers:
                             self.desk.accept(id)
                             loop = asyncio.get_running_loop()

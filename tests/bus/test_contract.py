@@ -13,6 +13,7 @@ from schemas.requests import Accepted
 from schemas.units import Stamp
 from services.bus import Keep
 from tests.bus.places import Place, echo, heard, messages, numbers, state, take
+from tests.commanding import command
 
 pytestmark = pytest.mark.each_bus
 
@@ -89,7 +90,7 @@ async def test_a_late_subscriber_gets_commands_and_events_of_the_last_two_second
     there = process.join("there")
     here = (await place.process() if apart else process).join("here")
     ways = [keys.BLOCK, keys.FEEDBACK, keys.cancel("realizer")]
-    there.publish(keys.BLOCK, state(1000))
+    command(there, keys.BLOCK, state(1000))
     with there.subscribe(keys.INHIBIT) as never:
         assert await never.next(there.now() + keys.HISTORY_MAX_AGE + 0.1) is None
     for number in range(30):

@@ -107,9 +107,9 @@ async def test_other_programs_may_send_bml_as_it_is(place: Place, encoding: str)
     inbox = here.subscribe(keys.commands("realizer"))
     bml = b'<bml id="b1"><speech id="s1"><text>Hello.</text></speech></bml>'
 
-    await place.inject(keys.BLOCK, bml, encoding)
+    await place.inject(keys.command(keys.BLOCK, "manager", "me"), bml, encoding)
 
     [request] = await messages(inbox)
     assert isinstance(request, PerformBlock)
-    assert (request.id, request.block.id, request.requester) == ("b1", "b1", "")
+    assert (request.id, request.block.id, request.requester) == ("b1", "b1", "me")
     assert [behavior.id for behavior in request.block.behaviors] == ["s1"]

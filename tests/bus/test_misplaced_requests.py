@@ -20,6 +20,7 @@ from services.config import Config
 from services.memory_bus import MemoryHub
 from services.requests import Requester, RequestRefused
 from services.runtime import running
+from tests.commanding import command
 
 FRAGMENT = PerformFragment(id="r", requester="test", fragment=TurnFragment(id="f", turn_status="full"))
 BLOCK = PerformBlock(id="r", requester="test", block=Block(id="b"))
@@ -53,9 +54,10 @@ async def test_it_is_refused_by_every_service(request_: Request, key: str, expec
         await bus.leave()
 
     fault = refusal.value.fault
-    assert fault.reason.startswith(f"{type(request_).__name__} came on {key}, which takes ")
+    here, there = (keys.command(expression, "manager", "test") for expression in (key, home))
+    assert fault.reason.startswith(f"{type(request_).__name__} came on {here}, which takes ")
     assert expected in fault.reason
-    assert fault.advice == f"send it on {home}"
+    assert fault.advice == f"send it on {there}"
     assert (fault.where, fault.service) == ("r", keys.server_of(key))
 
 
@@ -70,12 +72,14 @@ async def test_so_is_xml_by_its_id(key: str, xml: str, home: str) -> None:
     services = {name: service(name, Config()) for name in SERVERS}
     async with MemoryHub() as hub, running(hub, services):
         with hub.join("test").subscribe(keys.ANY_REQUEST_STATE) as inbox:
-            hub.inject(key, xml.encode(), "application/xml")
+            hub.inject(keys.command(key, "manager", "me"), xml.encode(), "application/xml")
             received = await asyncio.wait_for(inbox.next(), 1.0)
 
     assert received is not None
     assert isinstance(received.message, Refused)
-    assert (received.message.id, received.message.fault.advice) == ("x", f"send it on {home}")
+    told = received.message
+    there = keys.command(home, "manager", "me")
+    assert (told.id, told.requester, told.fault.advice) == ("x", "me", f"send it on {there}")
 
 
 async def test_what_is_under_way_by_the_same_id_goes_on() -> None:
@@ -85,7 +89,7 @@ async def test_what_is_under_way_by_the_same_id_goes_on() -> None:
         async with Requester(bus) as requests:
             inhibited = requests.send(keys.INHIBIT, Inhibit(id="r", requester="test", part="gaze", ttl=5.0))
             await inhibited.accepted
-            bus.publish(keys.INHIBIT, BLOCK)
+            command(bus, keys.INHIBIT, BLOCK)
             await asyncio.sleep(1.0)
 
             assert not inhibited.outcome.done()

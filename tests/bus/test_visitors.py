@@ -132,7 +132,7 @@ async def test_recent_events_and_commands_come_in_order_across_keys_unless_zenoh
 
     everything = {"consolidation": zenoh.ConsolidationMode.NONE}
     both = await visitor.samples("engage/v1/evt/**", **everything)
-    commands = await visitor.samples("engage/v1/cmd/realizer/*", **everything)
+    commands = await visitor.samples("engage/v1/cmd/realizer/**", **everything)
     last = await visitor.samples("engage/v1/evt/**")
 
     assert texts(both) == [str(number) for number in range(100) if number % 3 != 2]

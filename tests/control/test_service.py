@@ -32,6 +32,7 @@ from services.control.config import Displaced, Slow, Variability
 from services.memory_bus import MemoryHub
 from services.requests import RequestRefused
 from services.virtual_time import VirtualTimeLoop
+from tests.commanding import command
 from tests.control.contract import WORLD
 from tests.control.directing import robot, tip
 from tests.control.motions import STEP
@@ -107,7 +108,7 @@ async def test_an_abort_ends_the_request_and_tells_what_was_said(hub: MemoryHub)
     async with robot(hub) as client:
         pending = client.perform(Speech(id="speech-1", text="one two three four five"))
         await asyncio.sleep(0.5)
-        client.requests.send(keys.BEHAVIOR, AbortBehavior(id="block-1/speech-1", requester="realizer"))
+        client.requests.send(keys.BEHAVIOR, AbortBehavior(id="stop", block="block-1", behavior="speech-1"))
         outcome = await client.outcome(pending)
 
     assert outcome.status == "aborted"
@@ -117,7 +118,7 @@ async def test_an_abort_ends_the_request_and_tells_what_was_said(hub: MemoryHub)
 
 async def test_an_abort_of_what_is_unknown_is_refused(hub: MemoryHub):
     async with robot(hub) as client:
-        pending = client.requests.send(keys.BEHAVIOR, AbortBehavior(id="never", requester="realizer"))
+        pending = client.requests.send(keys.BEHAVIOR, AbortBehavior(id="stop", block="never", behavior="b"))
 
         with pytest.raises(RequestRefused, match="no such behavior"):
             await pending.outcome
@@ -296,7 +297,7 @@ async def test_it_goes_home_by_itself_when_the_realizer_dies(hub: MemoryHub):
 async def test_it_goes_home_by_itself_when_commands_stop_in_mid_behavior(hub: MemoryHub):
     async with robot(hub, dead_man=5.0) as client:
         request = PerformBehavior(id="once", requester="stranger", block="b", behavior=POINT, through="stroke")
-        client.bus.publish(keys.BEHAVIOR, request)
+        command(client.bus, keys.BEHAVIOR, request)
         await asyncio.sleep(4.9)
         before = tip(client)
         await asyncio.sleep(3.0)

@@ -13,6 +13,7 @@ from schemas.behaviors import Gaze, GazeShift, Pointing
 from schemas.blocks import Block, BlockOutcome, PerformBlock
 from schemas.body import (
     AbortBehavior,
+    BehaviorAborted,
     BodyPose,
     Capabilities,
     DescribeBody,
@@ -103,6 +104,7 @@ class Partners:
         self.requests = Requester(client)
         self.desk = RequestDesk(realizer, "realizer", lambda cancel: None)
         self.turns = RequestDesk(bus, "recognition", lambda cancel: None)
+        self.body = RequestDesk(bus, "control", lambda cancel: None)
         self.blocks: list[PerformBlock] = []
         self.cancelled: list[str] = []
         self.owners: list[HeadOwner] = []
@@ -138,7 +140,9 @@ class Partners:
                             self.signals.append(signal)
                             self.turns.end(TurnOutcome(id=signal.id, at=self.bus.stamp()))
                     case AbortBehavior() as abort:
-                        self.aborts.append(abort)
+                        if self.body.take(received):
+                            self.aborts.append(abort)
+                            self.body.end(BehaviorAborted(id=abort.id))
                     case WarningFeedback() as warning:
                         self.warnings.append(warning)
                     case Fault() as fault:

@@ -11,6 +11,7 @@ from schemas.attention import Inhibit
 from schemas.behaviors import Gaze
 from services.control.simulated import SimulatedBody
 from services.memory_bus import MemoryHub
+from tests.commanding import command
 from tests.generation.robots import robot, says
 
 STEP = 0.002
@@ -27,7 +28,7 @@ async def test_the_head_stops_and_never_turns_back_towards_home(hub: MemoryHub, 
         head = body._tracks["head"]
         there = np.array(head.motion.at(math.inf).q)
         ahead = there - np.array(head.at(loop.time()).q)
-        stage.bus.publish(keys.INHIBIT, Inhibit(id="l", requester="t", part="gaze", mode="hold", ttl=60.0))
+        command(stage.bus, keys.INHIBIT, Inhibit(id="l", requester="t", part="gaze", mode="hold", ttl=60.0))
         velocities = []
         for _ in range(int(4.0 / STEP)):
             await asyncio.sleep(STEP)
@@ -46,7 +47,7 @@ async def test_a_head_on_its_target_does_not_move_at_all(hub: MemoryHub) -> None
         await stage.until("a:g:start")
         await asyncio.sleep(1.0)
         stood = body._tracks["head"].at(loop.time()).q
-        stage.bus.publish(keys.INHIBIT, Inhibit(id="l", requester="t", part="gaze", mode="hold", ttl=60.0))
+        command(stage.bus, keys.INHIBIT, Inhibit(id="l", requester="t", part="gaze", mode="hold", ttl=60.0))
         moved = []
         for _ in range(int(6.0 / STEP)):
             await asyncio.sleep(STEP)

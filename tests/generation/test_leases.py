@@ -1,4 +1,4 @@
-"""Leases that inhibit gaze or pointing: renewed, lapsed, released, and what is still permitted."""
+"""Leases that inhibit gaze or pointing: taken, released, and what is still permitted."""
 
 import pytest
 
@@ -14,24 +14,21 @@ def lease(id: str = "l", **fields: object) -> Inhibit:
     return Inhibit(id=id, requester="manager", **fields)  # type: ignore[arg-type]
 
 
-def test_a_lease_lapses_unless_it_is_renewed() -> None:
+def test_a_lease_forbids_until_it_is_released() -> None:
     leases = Leases(GenerationConfig())
-    leases.take(lease(ttl=5.0), 0.0)
-    leases.renew("l", 3.0)
+    leases.take(lease())
 
-    assert leases.deadline == 8.0
-    assert leases.lapse(7.9) == ()
     assert not leases.permits().gaze
-    assert leases.lapse(8.0) == ("l",)
+    assert leases.release("l")
     assert leases.permits() == Permits()
     assert leases.inhibition is None
 
 
 def test_the_newest_lease_on_gaze_claims_the_head() -> None:
     leases = Leases(GenerationConfig())
-    leases.take(lease("a"), 0.0)
-    leases.take(lease("b", mode="target", target="table"), 0.0)
-    leases.take(lease("c", part="point-left"), 0.0)
+    leases.take(lease("a"))
+    leases.take(lease("b", mode="target", target="table"))
+    leases.take(lease("c", part="point-left"))
 
     claim = Claim(kind="inhibition", priority=1, target="table", reason="manager: target")
     assert leases.inhibition == Inhibition(claim, "target")
@@ -54,7 +51,7 @@ def test_a_lease_that_means_nothing_is_refused(fields: dict[str, object], reason
     leases = Leases(GenerationConfig())
 
     with pytest.raises(InputRefused, match=reason):
-        leases.take(lease(**fields), 0.0)
+        leases.take(lease(**fields))
 
     assert leases.permits() == Permits()
 
@@ -71,7 +68,7 @@ def test_a_lease_that_means_nothing_is_refused(fields: dict[str, object], reason
 def test_each_arm_is_inhibited_by_itself(parts: list[str], hands: tuple[str, ...]) -> None:
     leases = Leases(GenerationConfig())
     for part in parts:
-        leases.take(lease(part, part=part), 0.0)
+        leases.take(lease(part, part=part))
 
     permits = leases.permits()
 

@@ -11,7 +11,8 @@ from schemas.fragments import FragmentOutcome, TurnFragment
 from schemas.world import World
 from services.generation.config import GenerationConfig
 from services.memory_bus import MemoryHub
-from services.requests import GRACE, RequestRefused
+from services.requests import RequestRefused
+from services.serving import GRACE
 from tests.generation.partners import TABLE, stage
 
 HELLO = Speech(id="s", text="Hello")

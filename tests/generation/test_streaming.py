@@ -13,6 +13,7 @@ from schemas.fragments import TurnFragment
 from services.generation.config import GenerationConfig
 from services.memory_bus import MemoryHub
 from services.requests import RequestRefused
+from tests.commanding import command
 from tests.generation.robots import Robot, robot, says, shows
 
 
@@ -305,7 +306,7 @@ async def test_a_fault_in_one_fragment_ends_all_of_the_turn_in_the_same_moment(s
     stage.send(says("c", "end"))
     await stage.until("b:s:start")
     await asyncio.sleep(0.3)
-    stage.bus.publish(keys.BEHAVIOR, AbortBehavior(id="ask-b.block/s", requester="test"))
+    command(stage.bus, keys.BEHAVIOR, AbortBehavior(id="stop", block="b", behavior="s"))
     await asyncio.sleep(10.0)
 
     statuses = {id: outcome.status for id, (_, outcome) in stage.outcomes.items()}
@@ -320,7 +321,7 @@ async def test_required_words_that_are_broken_off_are_the_last_of_their_turn(sta
     stage.send(shows("b", "middle"))
     stage.send(says("c", "end"))
     await asyncio.sleep(0.4)
-    stage.bus.publish(keys.BEHAVIOR, AbortBehavior(id="ask-a.block/s", requester="test"))
+    command(stage.bus, keys.BEHAVIOR, AbortBehavior(id="stop", block="a", behavior="s"))
     await asyncio.sleep(10.0)
 
     assert [(id, outcome.status) for id, (_, outcome) in stage.outcomes.items()] == [
@@ -338,7 +339,7 @@ async def test_words_that_fail_are_followed_by_the_next_ones(stage: Robot) -> No
     stage.send(says("a", "beginning", "one two three four"))
     stage.send(says("b", "end"))
     await asyncio.sleep(0.6)
-    stage.bus.publish(keys.BEHAVIOR, AbortBehavior(id="ask-a.block/s", requester="test"))
+    command(stage.bus, keys.BEHAVIOR, AbortBehavior(id="stop", block="a", behavior="s"))
     await stage.until("b:end")
 
     assert stage.reached["b:s:start"] == stage.reached["a:end"] < 1.2

@@ -15,6 +15,7 @@ from schemas import keys
 from schemas.behaviors import BlockBehavior, Gesture, Pointing, Speech
 from schemas.body import (
     AbortBehavior,
+    BehaviorAborted,
     BehaviorOutcome,
     Estimate,
     EstimateBehaviors,
@@ -160,8 +161,10 @@ class FakeBody:
                         match self.desk.take(received):
                             case PerformBehavior() as perform:
                                 self._perform(perform)
-                            case AbortBehavior(id=id) | Cancel(id=id):
+                            case Cancel(id=id):
                                 self._abort(id)
+                            case AbortBehavior() as abort:
+                                self._abort_by_name(abort)
                             case GoHome(id=id, parts=parts):
                                 self.desk.accept(id)
                                 self.homes.append(parts)
@@ -172,6 +175,12 @@ class FakeBody:
     async def _home(self, id: str) -> None:
         await asyncio.sleep(self.homing)
         self.desk.end(HomeReached(id=id, at=self.bus.stamp()))
+
+    def _abort_by_name(self, abort: AbortBehavior) -> None:
+        for id, act in list(self.acts.items()):
+            if (act.perform.block, act.perform.behavior.id) == (abort.block, abort.behavior):
+                self._abort(id)
+        self.desk.end(BehaviorAborted(id=abort.id))
 
     def _cancelled(self, cancel: Cancel) -> None:
         self._abort(cancel.id)

@@ -10,7 +10,6 @@ from schemas import keys
 from schemas.behaviors import BlockBehavior
 from schemas.blocks import Block, BlockOutcome, PerformBlock
 from schemas.body import (
-    AbortBehavior,
     BehaviorOutcome,
     Estimate,
     EstimateBehaviors,
@@ -29,7 +28,7 @@ from schemas.feedback import (
     WarningFeedback,
 )
 from schemas.messages import Message
-from schemas.requests import Accepted, Refused, Request
+from schemas.requests import Accepted, Answer, Cancel, Refused, Request, answering
 from schemas.units import Seconds, Stamp
 from schemas.xml_codec import decode_xml
 from services.bus import Bus, Hub
@@ -146,10 +145,15 @@ class Puppet:
         self.bus.publish(key, message)
 
     def accept(self, behavior: str, block: str = "b") -> None:
-        self.say(Accepted(id=f"r-{block}/{behavior}"), keys.request_state("control"))
+        self.answer_to(behavior, block, Accepted(id=""))
 
     def refuse(self, behavior: str, block: str = "b") -> None:
-        self.say(Refused(id=f"r-{block}/{behavior}", fault=Fault(reason="conflict")), keys.request_state("control"))
+        self.answer_to(behavior, block, Refused(id="", fault=Fault(reason="conflict")))
+
+    def answer_to(self, behavior: str, block: str, answer: Answer) -> None:
+        """To the command to perform it, if there was one."""
+        for request in self.performs.get(f"{block}:{behavior}", ())[-1:]:
+            self.say(answering(request, answer), keys.request_state("control"))  # type: ignore[arg-type]
 
     def reach(self, behavior: str, *syncs: str, at: Seconds | None = None, block: str = "b") -> None:
         stamp = self.stamp(at)
@@ -180,7 +184,7 @@ class Puppet:
 
     def end(self, behavior: str, status: Any = "done", spoken: str = "", block: str = "b") -> None:
         outcome = BehaviorOutcome(
-            id=f"r-{block}/{behavior}",
+            id="",
             block=block,
             behavior=behavior,
             status=status,
@@ -188,7 +192,7 @@ class Puppet:
             spoken=spoken,
             fault=Fault(reason="overheated") if status == "failed" else None,
         )
-        self.say(outcome, keys.request_state("control"))
+        self.answer_to(behavior, block, outcome)
 
     def stamp(self, at: Seconds | None = None) -> Stamp:
         return self.bus.stamp(at)
@@ -230,15 +234,15 @@ class Puppet:
         match request:
             case PerformBehavior(block=block, behavior=behavior):
                 self.performs.setdefault(f"{block}:{behavior.id}", []).append(request)
-            case AbortBehavior(id=id):
+            case Cancel(id=id):
                 behavior = id.partition("/")[2]
                 self.aborted.append(behavior)
                 if self.aborts:
                     self.end(behavior, "aborted", block=id.partition("/")[0].removeprefix("r-"))
-            case GoHome(id=id, parts=parts):
+            case GoHome(parts=parts):
                 self.homes.append(parts)
                 if self.goes_home:
-                    self.say(HomeReached(id=id, at=self.stamp()), keys.request_state("control"))
+                    self.say(answering(request, HomeReached(id="", at=self.stamp())), keys.request_state("control"))
 
     def estimate(self, behavior: BlockBehavior) -> Estimate:
         return self.estimates.get(behavior.id) or FakeBody().estimate(behavior)

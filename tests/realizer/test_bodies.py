@@ -205,7 +205,7 @@ async def test_a_body_that_ends_a_behavior_with_nonsense_has_failed_at_it() -> N
     async with puppet() as body:
         pending = body.ask(bml(SPEECH))
         await body.told("s")
-        body.say(HomeReached(id="r-b/s", at=body.stamp()), keys.request_state("control"))
+        body.answer_to("s", "b", HomeReached(id="", at=body.stamp()))
         await pending.outcome
 
     assert body.warnings() == [("b:s", "EXECUTION_FAILURE")]

@@ -64,7 +64,7 @@ async def test_words_that_fail_and_must_not_are_followed_by_none() -> None:
 async def test_a_body_that_breaks_off_required_words_lets_none_follow() -> None:
     async with turn(FakeBody()) as (seen, asked):
         await seen.seen("s:m1", "one")
-        seen.requests.send(keys.BEHAVIOR, AbortBehavior(id="r-one/s", requester="test"))
+        seen.requests.send(keys.BEHAVIOR, AbortBehavior(id="stop", block="one", behavior="s"))
         made = await outcomes(asked)
 
     assert_only_the_first_moved(seen, 1.0, "failed")

@@ -16,6 +16,7 @@ from services.recognition.config import RecognitionConfig
 from services.recognition.service import recognize
 from services.requests import Requester, RequestRefused
 from services.runtime import Service, running
+from tests.commanding import command
 from tests.recognition.observations import HUMAN, ROBOT, world
 
 
@@ -151,7 +152,7 @@ async def test_the_death_of_the_requester_withdraws_its_events(hub: MemoryHub):
     realizer.declare_alive()
     async with running(hub, recognition()):
         realizer.publish(keys.WORLD, world())
-        realizer.publish(keys.EVENT, request(realizer, "directed_gaze", "blue-square", anchors=("gaze-1:stroke",)))
+        command(realizer, keys.EVENT, request(realizer, "directed_gaze", "blue-square", anchors=("gaze-1:stroke",)))
         with watcher.subscribe(keys.ANY_CONNECTION_EVENT) as inbox:
             started = await inbox.next()
             hub.kill("realizer")

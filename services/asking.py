@@ -1,0 +1,361 @@
+"""The asking side of long requests, pure: calls, answers, presence and time in; messages and endings out.
+
+What becomes of one request is `TABLE` in services/asking_table.py. `Asking` keeps any number of requests and their
+deadlines, and follows the table.
+
+    effects = asking.send(keys.BLOCK, request, now)
+    effects = asking.hear(answer, now)                 # and server_gone, server_there, cancel
+    effects = asking.tick(now)                         # whenever `asking.deadline` has come
+"""
+
+from collections.abc import Iterable
+from math import inf
+
+from msgspec import Struct
+from msgspec.structs import replace
+
+from schemas import keys
+from schemas.faults import EngageError, Fault, RunFailed
+from schemas.requests import Accepted, Answer, Cancel, Heard, Kept, Outcome, Outdated, Refused, Request, kind_of
+from schemas.units import Seconds
+from services.asking_table import TABLE, Do, Event, State
+from services.deadlines import Deadlines
+
+
+class RequestRefused(EngageError):
+    """The server refused; nothing of the request was done."""
+
+
+class ServerRestarted(RunFailed):
+    """The server that had accepted the request is there as another life, which knows nothing of it."""
+
+
+class NeverEnded(RunFailed):
+    """The server has not ended the request, though it was asked to."""
+
+
+class Patience(Struct, frozen=True, kw_only=True):
+    """How a requester waits, in seconds.
+
+    first_resend: until what nobody answers is sent again; doubling up to longest_resend.
+    grace: how long the other side may be gone before its requests fail: a router's restart looks like a death.
+    pulse: between two `KeepAlive`. lease: how long a request that is not renewed stays alive at its server.
+    cancel: how long after its cancellation a request may take to end. silence: how long a server that is there may
+    leave a request without any answer. swallow: how long answers to what was given up may still come.
+    """
+
+    first_resend: Seconds = 0.3
+    longest_resend: Seconds = 2.0
+    grace: Seconds = 2.0
+    pulse: Seconds = 1.0
+    lease: Seconds = 5.0
+    cancel: Seconds = 30.0
+    silence: Seconds = 30.0
+    swallow: Seconds = 60.0
+
+
+class Publish(Struct, frozen=True):
+    """Send this. expression: of the key, for all requesters."""
+
+    expression: str
+    message: Request
+
+
+class Renew(Struct, frozen=True):
+    """Send `server` a `KeepAlive` of these."""
+
+    server: str
+    live: tuple[Kept, ...]
+
+
+class TellAccepted(Struct, frozen=True):
+    id: str
+
+
+class TellEnd(Struct, frozen=True):
+    """How the request has ended for its caller: told exactly once."""
+
+    id: str
+    end: Outcome | EngageError
+
+
+class Complain(Struct, frozen=True):
+    """Everybody is to know."""
+
+    fault: Fault
+
+
+Effect = Publish | Renew | TellAccepted | TellEnd | Complain
+
+
+class _Asked:
+    """One request. run: the life of its server that accepted it."""
+
+    def __init__(self, expression: str, request: Request) -> None:
+        self.expression = expression
+        self.server = keys.server_of(expression)
+        self.request = request
+        self.cancel: Cancel | None = None
+        self.state = State.SENT
+        self.run = ""
+        self.resend_after: Seconds = 0.0
+
+
+class _Server:
+    """What one server is to be told to keep. period: between two `KeepAlive`; soon: the next one comes after this."""
+
+    def __init__(self, period: Seconds) -> None:
+        self.kept: dict[str, _Asked] = {}
+        self.period = period
+        self.soon = period
+
+
+_CLOCKS = (Event.RESEND_DUE, Event.GRACE_OVER, Event.PATIENCE_OVER, Event.SWALLOW_OVER)
+
+
+class Asking:
+    """All requests of one life of one requester."""
+
+    def __init__(self, requester: str, life: str, patience: Patience) -> None:
+        self._requester = requester
+        self._life = life
+        self._patience = patience
+        self._asked: dict[str, _Asked] = {}
+        self._servers: dict[str, _Server] = {}
+        self._runs: dict[str, str] = {}
+        """Participants that are there."""
+        self._deadlines: Deadlines[tuple[Event | None, str]] = Deadlines()
+        """Of a request by event and id; of the next `KeepAlive` by None and server."""
+        self._effects: list[Effect] = []
+
+    # -- what is known --------------------------------------------------------------------------------------------
+
+    @property
+    def deadline(self) -> Seconds | None:
+        """When to `tick`."""
+        return self._deadlines.earliest
+
+    def state(self, id: str) -> State:
+        asked = self._asked.get(id)
+        return State.ENDED if asked is None else asked.state
+
+    def request(self, id: str) -> Request | None:
+        """Its newest content."""
+        asked = self._asked.get(id)
+        return None if asked is None else asked.request
+
+    @property
+    def ids(self) -> tuple[str, ...]:
+        """Of all requests whose caller has not been told an end."""
+        return tuple(id for id, asked in self._asked.items() if asked.state is not State.GIVEN_UP)
+
+    # -- events ---------------------------------------------------------------------------------------------------
+
+    def send(self, expression: str, request: Request, now: Seconds) -> list[Effect]:
+        """A new request, or other content of a live one. One of another kind, or given up, is refused by name."""
+        asked = self._asked.get(request.id)
+        if asked is None:
+            request = replace(request, requester=self._requester, life=self._life, lease=self._lease(request))
+            asked = self._asked[request.id] = _Asked(expression, request)
+        elif (fault := self._taken(asked, request)) is not None:
+            return [TellEnd(request.id, RequestRefused(fault))]
+        elif asked.cancel is None:
+            of = asked.request
+            asked.request = replace(
+                request, requester=of.requester, life=of.life, lease=of.lease, revision=of.revision + 1
+            )
+        self._step(asked, Event.ASKED, now)
+        return self._told()
+
+    def _lease(self, request: Request) -> Seconds:
+        return request.term if 0.0 < request.term < inf else self._patience.lease
+
+    def _taken(self, asked: _Asked, request: Request) -> Fault | None:
+        theirs, ours = kind_of(asked.request), kind_of(request)
+        if asked.state is State.GIVEN_UP:
+            reason = f"{theirs} {request.id!r} was given up, and may still be answered"
+        elif theirs != ours:
+            reason = f"{request.id!r} is the id of a live {theirs}"
+        else:
+            return None
+        return Fault(reason=reason, where=request.id, advice=f"give this {ours} another id")
+
+    def cancel(self, id: str, reason: str, now: Seconds) -> list[Effect]:
+        asked = self._asked.get(id)
+        if asked is not None and asked.cancel is None:
+            asked.cancel = self._cancellation(asked, reason)
+            self._step(asked, Event.CANCELLED, now)
+        return self._told()
+
+    def hear(self, answer: Answer, now: Seconds) -> list[Effect]:
+        """What a server says. An answer to somebody else, or to another life, changes nothing."""
+        asked = self._asked.get(answer.id)
+        ours = (self._requester, self._life)
+        if asked is not None and (answer.requester, answer.life) == ours and answer.kind == kind_of(asked.request):
+            match answer:
+                case Heard():
+                    self._step(asked, Event.HEARD, now)
+                case Accepted():
+                    asked.run = self._runs.get(asked.server, "")
+                    self._step(asked, Event.ACCEPTED, now)
+                case Outdated():
+                    self._step(asked, Event.OUTDATED, now)
+                case Refused():
+                    self._step(asked, Event.REFUSED, now, answer)
+                case Outcome():
+                    self._step(asked, Event.FINISHED, now, answer)
+        return self._told()
+
+    def server_gone(self, server: str, now: Seconds) -> list[Effect]:
+        self._runs.pop(server, None)
+        for asked in self._of(server):
+            self._step(asked, Event.GONE, now)
+        return self._told()
+
+    def server_there(self, server: str, run: str, now: Seconds) -> list[Effect]:
+        """Its token has come. run: which life of it; empty: unknown."""
+        self._runs[server] = run
+        for asked in self._of(server):
+            is_another = bool(asked.run and run and asked.run != run)
+            self._step(asked, Event.REBORN if is_another else Event.BACK, now)
+        return self._told()
+
+    def tick(self, now: Seconds) -> list[Effect]:
+        while (due := self._deadlines.due(now)) is not None:
+            event, name = due
+            if event is None:
+                self._renew(name, now)
+            elif (asked := self._asked.get(name)) is not None:
+                self._step(asked, event, now)
+        return self._told()
+
+    # -- one request ----------------------------------------------------------------------------------------------
+
+    def _of(self, server: str) -> Iterable[_Asked]:
+        return [asked for asked in self._asked.values() if asked.server == server]
+
+    def _told(self) -> list[Effect]:
+        effects, self._effects = self._effects, []
+        return effects
+
+    def _step(self, asked: _Asked, event: Event, now: Seconds, answer: Answer | None = None) -> None:
+        before = asked.state
+        asked.state, actions = TABLE[before][event]
+        for action in actions:
+            self._act(asked, action, now, answer)
+        if asked.state is not before and asked.state in (State.GIVEN_UP, State.ENDED):
+            self._let_go(asked)
+            for clock in _CLOCKS if asked.state is State.ENDED else _CLOCKS[:3]:
+                self._deadlines.set((clock, asked.request.id), None)
+            if asked.state is State.ENDED:
+                del self._asked[asked.request.id]
+
+    def _act(self, asked: _Asked, action: Do, now: Seconds, answer: Answer | None) -> None:
+        id, wait = asked.request.id, self._patience
+        match action:
+            case Do.SEND:
+                asked.resend_after = wait.first_resend
+                self._send(asked)
+                self._set(Event.RESEND_DUE, id, now + asked.resend_after)
+            case Do.SEND_AGAIN:
+                asked.resend_after = min(2 * asked.resend_after, wait.longest_resend)
+                self._send(asked)
+                self._set(Event.RESEND_DUE, id, now + asked.resend_after)
+            case Do.SEND_ONCE:
+                self._send(asked)
+            case Do.CANCEL_ONCE:
+                cancel = asked.cancel or self._cancellation(asked, "given up")
+                self._effects.append(Publish(keys.cancel(asked.server), cancel))
+            case Do.KEEP:
+                self._set(Event.RESEND_DUE, id, None)
+                self._set(Event.PATIENCE_OVER, id, None)
+                self._keep(asked, now)
+            case Do.KEEP_SOON:
+                self._renew_soon(asked.server, now, wait.first_resend)
+            case Do.KEEP_NOW:
+                self._renew_soon(asked.server, now, 0.0)
+            case Do.LET_GO:
+                self._let_go(asked)
+            case Do.WAIT_GRACE:
+                self._set(Event.GRACE_OVER, id, now + wait.grace)
+                if asked.cancel is None:
+                    self._set(Event.PATIENCE_OVER, id, None)
+            case Do.STOP_GRACE:
+                self._set(Event.GRACE_OVER, id, None)
+            case Do.HOPE:
+                if asked.server in self._runs:
+                    self._set(Event.PATIENCE_OVER, id, now + wait.silence)
+            case Do.BE_PATIENT:
+                self._set(Event.PATIENCE_OVER, id, now + wait.cancel)
+            case Do.SWALLOW:
+                self._set(Event.SWALLOW_OVER, id, now + wait.swallow)
+            case _:
+                self._tell(asked, action, answer)
+
+    def _tell(self, asked: _Asked, action: Do, answer: Answer | None) -> None:
+        id, server = asked.request.id, asked.server
+        if action is Do.TELL_ACCEPTED:
+            self._effects.append(TellAccepted(id))
+            return
+        if isinstance(answer, Outcome):
+            self._effects.append(TellEnd(id, answer))
+            return
+        if isinstance(answer, Refused):
+            refused = RequestRefused if action is Do.TELL_REFUSED else RunFailed
+            self._effects.append(TellEnd(id, refused(answer.fault)))
+            return
+        reason = {
+            Do.TELL_GONE: f"{server} is gone",
+            Do.TELL_REBORN: f"{server} was restarted",
+            Do.TELL_SILENT: f"{server} is there, but has not answered for {self._patience.silence:g} s",
+            Do.TELL_UNSTOPPABLE: f"{server} has not ended it within {self._patience.cancel:g} s of its cancellation",
+        }[action]
+        fault = Fault(reason=reason, where=id, advice="send it again under a new id", service=server)
+        if action is Do.TELL_UNSTOPPABLE:
+            fault = replace(fault, advice=f"is {server} stuck? It is not asked any more")
+            self._effects += [TellEnd(id, NeverEnded(fault)), Complain(fault)]
+        else:
+            failed = ServerRestarted if action is Do.TELL_REBORN else RunFailed
+            self._effects.append(TellEnd(id, failed(fault)))
+
+    def _set(self, clock: Event, id: str, at: Seconds | None) -> None:
+        self._deadlines.set((clock, id), at)
+
+    def _send(self, asked: _Asked) -> None:
+        expression = asked.expression if asked.cancel is None else keys.cancel(asked.server)
+        self._effects.append(Publish(expression, asked.cancel or asked.request))
+
+    def _cancellation(self, asked: _Asked, reason: str) -> Cancel:
+        request = asked.request
+        return Cancel(id=request.id, requester=self._requester, life=self._life, of=kind_of(request), reason=reason)
+
+    # -- keeping alive --------------------------------------------------------------------------------------------
+
+    def _keep(self, asked: _Asked, now: Seconds) -> None:
+        server = self._servers.get(asked.server)
+        if server is None:
+            server = self._servers[asked.server] = _Server(self._patience.pulse)
+        server.kept[asked.request.id] = asked
+        server.period = min(server.period, asked.request.lease / 3)
+        self._renew_soon(asked.server, now, server.period)
+
+    def _let_go(self, asked: _Asked) -> None:
+        server = self._servers.get(asked.server)
+        if server is not None and server.kept.pop(asked.request.id, None) is not None and not server.kept:
+            del self._servers[asked.server]
+            self._deadlines.set((None, asked.server), None)
+
+    def _renew_soon(self, name: str, now: Seconds, after: Seconds) -> None:
+        if (server := self._servers.get(name)) is not None:
+            server.soon = min(server.period, max(after, self._patience.first_resend))
+            at = self._deadlines[None, name]
+            self._deadlines.set((None, name), min(inf if at is None else at, now + after))
+
+    def _renew(self, name: str, now: Seconds) -> None:
+        """Each time after twice as long, up to the period: a change that was lost is found soon."""
+        server = self._servers[name]
+        requests = [asked.request for asked in server.kept.values()]
+        kept = [Kept(kind_of(each), each.id, each.revision, each.authority, each.lease) for each in requests]
+        self._effects.append(Renew(name, tuple(kept)))
+        self._deadlines.set((None, name), now + server.soon)
+        server.soon = min(2 * server.soon, server.period)

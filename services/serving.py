@@ -1,0 +1,379 @@
+"""The serving side of long requests, pure: commands, the service's answers, presence and time in; messages out.
+
+What becomes of one request is `TABLE` in services/serving_table.py. `Serving` knows requests by requester, life, kind
+and id, and calls each by a name that no other request of this server has or had lately.
+
+    effects = serving.take(request, now)               # a command; keep_alive, requester_gone, requester_there, tick
+    effects = serving.answer(name, Accepted(id=name), now)      # what the service decides
+"""
+
+from collections import OrderedDict
+from collections.abc import Iterable
+from math import inf
+
+from msgspec import Struct
+from msgspec.structs import replace
+
+from schemas.faults import Fault
+from schemas.requests import (
+    Accepted,
+    Answer,
+    Cancel,
+    Heard,
+    KeepAlive,
+    Kept,
+    Outdated,
+    Refused,
+    Request,
+    answering,
+    kind_of,
+)
+from schemas.units import Seconds
+from services.deadlines import Deadlines
+from services.serving_table import TABLE, Do, Event, State
+
+GRACE: Seconds = 2.0
+"""How long a requester may be gone before its requests end: a router's restart looks like a death."""
+ENDED_KEPT = 1024
+"""How many ended requests are remembered, to answer what comes again."""
+LIFELESS_KEPT: Seconds = 10.0
+"""How long those of a requester that names no life are: longer than anything is sent again after."""
+NAMES_KEPT = 4096
+LAPSED = "nobody has renewed it"
+GONE = "requester is gone"
+
+
+class Names:
+    """Names for what ids call alike: `ask`, `ask~2`, `ask~3`."""
+
+    def __init__(self, kept: int = NAMES_KEPT) -> None:
+        self._kept = kept
+        self._used: OrderedDict[str, int] = OrderedDict()
+
+    def unique(self, id: str) -> str:
+        count = self._used.pop(id, 0) + 1
+        self._used[id] = count
+        if len(self._used) > self._kept:
+            self._used.popitem(last=False)
+        return id if count == 1 else self.unique(f"{id}~{count}")
+
+
+class Publish(Struct, frozen=True):
+    """Send this answer."""
+
+    answer: Answer
+
+
+class Hand(Struct, frozen=True):
+    """Give this to the service: a request, new or changed, or a `Cancel`; `id` is its name here.
+
+    is_asked: it is what has just come; else it follows from something else.
+    """
+
+    request: Request
+    is_asked: bool
+
+
+class Complain(Struct, frozen=True):
+    """Everybody is to know. is_ours: a mistake of the service itself."""
+
+    fault: Fault
+    is_ours: bool
+
+
+Effect = Publish | Hand | Complain
+_Key = tuple[str, str, str]
+"""Requester, life, id: what is live under it has one kind."""
+
+
+class _Record:
+    """One request. run: the requester's life by its token."""
+
+    def __init__(self, name: str, request: Request, run: str) -> None:
+        self.name = name
+        self.request = request
+        self.run = run
+        self.state = State.UNKNOWN
+        self.answer: Answer | None = None
+        self.ended_at: Seconds = inf
+
+    @property
+    def key(self) -> _Key:
+        return _key(self.request)
+
+    @property
+    def kind(self) -> str:
+        return _kind(self.request)
+
+
+class Serving:
+    """All requests to one server. term: the lease of a request that names none; None: it has none."""
+
+    def __init__(self, server: str, term: Seconds | None = None) -> None:
+        self._server = server
+        self._term = term
+        self._known: dict[tuple[_Key, str], _Record] = {}
+        """By kind, too."""
+        self._newest: dict[_Key, _Record] = {}
+        """Of whatever kind."""
+        self._named: dict[str, _Record] = {}
+        self._ended: OrderedDict[str, _Record] = OrderedDict()
+        self._names = Names()
+        self._runs: dict[str, str] = {}
+        self._deadlines: Deadlines[tuple[Event, str]] = Deadlines()
+        self._effects: list[Effect] = []
+
+    # -- what is known --------------------------------------------------------------------------------------------
+
+    @property
+    def deadline(self) -> Seconds | None:
+        """When to `tick`."""
+        return self._deadlines.earliest
+
+    def is_live(self, name: str) -> bool:
+        return name in self._named and self._named[name].state is not State.ENDED
+
+    @property
+    def live(self) -> int:
+        """How many requests have not ended."""
+        return len(self._named) - len(self._ended)
+
+    def asked(self, name: str) -> Request | None:
+        """The request as it came, with its own id."""
+        record = self._named.get(name)
+        return None if record is None else record.request
+
+    def is_there(self, requester: str) -> bool:
+        return requester in self._runs
+
+    # -- events ---------------------------------------------------------------------------------------------------
+
+    def take(self, request: Request, now: Seconds) -> list[Effect]:
+        """A command that has come; `requester` as its key names it."""
+        newest, kind = self._newest.get(_key(request)), _kind(request)
+        if newest is not None and newest.state is not State.ENDED and kind not in ("", newest.kind):
+            self._refuse(request, f"{request.id!r} is the id of a live {newest.kind}", "give it another id")
+        else:
+            unnamed = newest if newest is not None and not (kind and newest.kind) else None
+            record = self._known.get((_key(request), kind), unnamed)
+            if record is None or self._is_new(record, request, now):
+                record = self._new(request)
+            self._step(record, _event(record, request), now, request)
+        return self._told()
+
+    def refuse(self, request: Request, fault: Fault) -> list[Effect]:
+        """It is none of ours. One of the same id that is live here goes on."""
+        record = self._known.get((_key(request), _kind(request)))
+        if record is not None and record.state is not State.ENDED:
+            return [Complain(fault, False)]
+        return [Publish(answering(request, Refused(id=request.id, fault=fault)))]
+
+    def keep_alive(self, message: KeepAlive, sent: Seconds, now: Seconds) -> list[Effect]:
+        """sent: local time, not after `now`."""
+        for kept in message.live:
+            record = self._known.get(((message.requester, message.life, kept.id), kept.kind))
+            if record is None:
+                unknown = Cancel(id=kept.id, requester=message.requester, life=message.life, of=kept.kind)
+                record = _Record(kept.id, unknown, "")
+            is_newer = record.request.is_updatable and kept.revision > record.request.revision
+            self._step(record, Event.EXTENDED if is_newer else Event.NAMED, now, kept=kept, sent=sent)
+        return self._told()
+
+    def answer(self, name: str, answer: Answer, now: Seconds) -> list[Effect]:
+        """What the service says of the request that it knows by `name`."""
+        record = self._named.get(name)
+        if record is None:
+            self._warn_ended(name, answer, "was never made")
+        else:
+            event = (
+                Event.ACCEPT if isinstance(answer, Accepted)
+                else Event.REFUSE if isinstance(answer, Refused) else Event.END
+            )  # fmt: skip
+            self._step(record, event, now, answer=answer)
+        return self._told()
+
+    def requester_gone(self, requester: str, now: Seconds) -> list[Effect]:
+        self._runs.pop(requester, None)
+        for record in self._of(requester):
+            self._step(record, Event.GONE, now)
+        return self._told()
+
+    def requester_there(self, requester: str, run: str, now: Seconds) -> list[Effect]:
+        """Its token has come. run: which life of it; empty: unknown."""
+        self._runs[requester] = run
+        for record in self._of(requester):
+            is_another = bool(record.run and run and record.run != run)
+            self._step(record, Event.REBORN if is_another else Event.BACK, now)
+            record.run = run
+        return self._told()
+
+    def tick(self, now: Seconds) -> list[Effect]:
+        while (due := self._deadlines.due(now)) is not None:
+            event, name = due
+            if (record := self._named.get(name)) is not None:
+                self._step(record, event, now)
+        return self._told()
+
+    # -- one request ----------------------------------------------------------------------------------------------
+
+    def _told(self) -> list[Effect]:
+        effects, self._effects = self._effects, []
+        return effects
+
+    def _of(self, requester: str) -> Iterable[_Record]:
+        live = (record for record in self._named.values() if record.state is not State.ENDED)
+        return [record for record in live if record.request.requester == requester]
+
+    def _is_new(self, record: _Record, request: Request, now: Seconds) -> bool:
+        """Is it another than the one that has ended? Without a life nobody can tell a repetition for ever."""
+        if record.state is not State.ENDED or request.life:
+            return False
+        may_differ = not isinstance(request, Cancel) and not isinstance(record.request, Cancel)
+        differs = may_differ and _content(request) != _content(record.request)
+        return differs or now - record.ended_at > LIFELESS_KEPT
+
+    def _new(self, request: Request) -> _Record:
+        run = self._runs.get(request.requester, "")
+        record = _Record(self._names.unique(request.id), request, run)
+        if (before := self._known.get((record.key, record.kind))) is not None:
+            self._forget(before)
+        self._known[record.key, record.kind] = self._named[record.name] = self._newest[record.key] = record
+        return record
+
+    def _forget(self, record: _Record) -> None:
+        self._ended.pop(record.name, None)
+        self._named.pop(record.name, None)
+        if self._known.get((record.key, record.kind)) is record:
+            del self._known[record.key, record.kind]
+        if self._newest.get(record.key) is record:
+            del self._newest[record.key]
+
+    def _step(
+        self,
+        record: _Record,
+        event: Event,
+        now: Seconds,
+        request: Request | None = None,
+        *,
+        answer: Answer | None = None,
+        kept: Kept | None = None,
+        sent: Seconds | None = None,
+    ) -> None:
+        before = record.state
+        record.state, actions = TABLE[before][event]
+        for action in actions:
+            match action:
+                case Do.HAND:
+                    assert request is not None
+                    record.request = request
+                    self._hand(record, request, is_asked=True)
+                case Do.HAND_EXTENDED:
+                    assert kept is not None
+                    # The content itself is still the older one: the answer says so, and brings the newest.
+                    self._hand(record, record.request.with_authority(kept.authority))
+                case Do.HAND_CANCEL:
+                    assert request is not None
+                    self._hand(record, request, is_asked=True)
+                case Do.HAND_GONE | Do.HAND_LAPSED:
+                    reason = GONE if action is Do.HAND_GONE else LAPSED
+                    asked = record.request
+                    self._hand(record, Cancel(id=asked.id, requester=asked.requester, life=asked.life, reason=reason))
+                case Do.RENEW:
+                    self._renew(record, now if sent is None else sent, kept)
+                case Do.WAIT_GRACE:
+                    self._deadlines.set((Event.GRACE_OVER, record.name), now + GRACE)
+                case Do.STOP_GRACE:
+                    self._deadlines.set((Event.GRACE_OVER, record.name), None)
+                case Do.SAY_OUTDATED:
+                    self._effects.append(Publish(answering(record.request, Outdated(id=record.name))))
+                case Do.REPEAT:
+                    self._repeat(record, request or record.request)
+                case Do.ANSWER:
+                    assert answer is not None
+                    self._answer(record, answer)
+                case Do.REFUSE_UNHEARD:
+                    fault = self._fault(record.request.id, f"{self._server} has never heard of it")
+                    self._answer(record, Refused(id=record.name, fault=fault))
+                case Do.REFUSE_FORGOTTEN:
+                    reason = f"{self._server} does not know it any more"
+                    self._refuse(record.request, reason, "send it again under a new id")
+                case Do.WARN_DIFFERENT:
+                    assert request is not None
+                    reason = f"a live {record.kind} of this id has other content, and goes on"
+                    self._complain(request.id, reason, "give what is new another id", is_ours=False)
+                case Do.WARN_ENDED:
+                    assert answer is not None
+                    self._warn_ended(record.name, answer, f"has ended already, with {record.answer}")
+        if record.state is not before and record.state in (State.CANCELLED, State.ENDED):
+            for clock in (Event.GRACE_OVER, Event.LEASE_OVER):
+                self._deadlines.set((clock, record.name), None)
+            if record.state is State.ENDED:
+                record.ended_at = now
+                self._ended[record.name] = record
+                if len(self._ended) > ENDED_KEPT:
+                    self._forget(next(iter(self._ended.values())))
+
+    def _hand(self, record: _Record, request: Request, *, is_asked: bool = False) -> None:
+        self._effects.append(Hand(replace(request, id=record.name), is_asked))
+
+    def _renew(self, record: _Record, since: Seconds, kept: Kept | None) -> None:
+        """A late message never shortens what a newer one has granted."""
+        term = kept.valid if kept is not None else record.request.term
+        if not 0.0 < term < inf:
+            if self._term is None:
+                return
+            term = self._term
+        clock = (Event.LEASE_OVER, record.name)
+        self._deadlines.set(clock, max(self._deadlines[clock] or 0.0, since + term))
+
+    def _answer(self, record: _Record, answer: Answer) -> None:
+        record.answer = answering(record.request, answer)
+        self._effects.append(Publish(record.answer))
+
+    def _repeat(self, record: _Record, request: Request) -> None:
+        """To whoever asks now: of a request whose cancellation came first, that did not say which kind it is."""
+        if isinstance(request, Cancel):
+            request = record.request
+        self._effects.append(Publish(answering(request, record.answer or Heard(id=record.name))))
+
+    # -- what is wrong --------------------------------------------------------------------------------------------
+
+    def _fault(self, where: str, reason: str, advice: str = "") -> Fault:
+        return Fault(reason=reason, where=where, advice=advice, service=self._server)
+
+    def _refuse(self, request: Request, reason: str, advice: str) -> None:
+        refusal = Refused(id=request.id, fault=self._fault(request.id, reason, advice))
+        self._effects.append(Publish(answering(request, refusal)))
+
+    def _complain(self, where: str, reason: str, advice: str, *, is_ours: bool) -> None:
+        self._effects.append(Complain(self._fault(where, reason, advice), is_ours))
+
+    def _warn_ended(self, name: str, answer: Answer, why: str) -> None:
+        reason = f"request {name} {why}; now {type(answer).__name__}"
+        self._complain(name, reason, "a mistake of this service", is_ours=True)
+
+
+def _key(request: Request) -> _Key:
+    return (request.requester, request.life, request.id)
+
+
+def _kind(request: Request) -> str:
+    """Of a cancellation the kind of what it ends; empty if it does not say."""
+    return request.of if isinstance(request, Cancel) else kind_of(request)
+
+
+def _event(record: _Record, request: Request) -> Event:
+    """What this command is to what is known."""
+    if isinstance(request, Cancel):
+        return Event.CANCEL
+    known = record.request
+    if record.state is State.UNKNOWN or isinstance(known, Cancel) or request == known:
+        return Event.CAME
+    if not request.is_updatable:
+        return Event.CAME if _content(request) == _content(known) else Event.DIFFERED
+    return Event.CAME if request.revision < known.revision else Event.CHANGED
+
+
+def _content(request: Request) -> Request:
+    """Without what does not count as content."""
+    return replace(request, revision=0, lease=0.0)
