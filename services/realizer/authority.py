@@ -10,6 +10,7 @@ the prediction. Only what a fact touches is looked at again.
 
 import heapq
 from collections.abc import Iterable
+from math import isfinite
 
 from schemas.units import Seconds
 from services.realizer.assembly import Member
@@ -70,35 +71,42 @@ class Authority(Outlook):
     # -- facts ---------------------------------------------------------------------------------------------------
 
     def arrive(self, point: Point, at: Seconds) -> None:
-        """The behavior holds at `point`."""
-        if point in self.plan.at and point not in self.arrived:
+        """The behavior holds at `point`. What cannot be true is ignored."""
+        if isfinite(at) and point not in self.arrived and self._is_ahead(point):
+            at = self._heard[point.behavior] = self._not_before_last(point.behavior, at)
             self._learn(point, at)
             self.arrived[point] = at
             self._note(point)
             self._watch(point.behavior)
 
     def reach(self, point: Point, at: Seconds) -> tuple[Point, ...]:
-        """The behavior has passed `point`: it, and earlier points whose report was lost, unless known already."""
-        points = self._points.get(point.behavior, ())
-        if point not in points:
-            if point in self.plan.at and point not in self.reached:
+        """The behavior has passed `point`: it, and earlier points whose report was lost, unless known already.
+
+        What cannot be true is ignored.
+        """
+        if not isfinite(at):
+            return ()
+        if point in self._wiring.foreign:
+            if point not in self.reached:
                 self.reached[point] = at
                 self._note(point)
             return ()
-        known = self._next.get(point.behavior, 0)
+        if not self._is_ahead(point):
+            return ()
+        points, known = self._points[point.behavior], self.next_number(point.behavior)
         news = points[known : points.index(point) + 1]
+        at = self._heard[point.behavior] = self._not_before_last(point.behavior, at)
         if len(news) == 1 and not self.holds(point):
             self._learn(point, at)
         for each in news:
             self.reached[each] = at
             self._note(each)
             self.is_surprised = self.is_surprised or abs(at - self._expected.get(each, at)) > SURPRISE
-        if news:
-            self._next[point.behavior] = known + len(news)
-            if self.has_ended(point.behavior):
-                self._unended.discard(point.behavior)
-            self._watch(point.behavior)
-            self._await(point.behavior)
+        self._next[point.behavior] = known + len(news)
+        if self.has_ended(point.behavior):
+            self._unended.discard(point.behavior)
+        self._watch(point.behavior)
+        self._await(point.behavior)
         return news
 
     def _note(self, point: Point) -> None:

@@ -1,4 +1,10 @@
-"""What has been measured of a block so far, and what that says by itself."""
+"""What has been measured of a block so far, and what that says by itself.
+
+Bodies report late, twice, out of order, and about what nobody has asked them for. Such a report is no fact, and
+changes nothing.
+"""
+
+from math import isfinite
 
 from schemas.units import Seconds
 from services.realizer.assembly import Member
@@ -22,6 +28,8 @@ class Facts:
         self.begun: dict[str, Seconds] = {}
         self._next: dict[str, int] = {}
         """Of each behavior, how many of its points are reached."""
+        self._heard: dict[str, Seconds] = {}
+        """When each behavior was last heard of."""
 
     def _set_plan(self, plan: Plan) -> None:
         self.plan = plan
@@ -36,16 +44,24 @@ class Facts:
 
     def plausible(self, point: Point, at: Seconds, now: Seconds) -> Seconds:
         """`at`, but no later than now, nor earlier than the behavior was last heard of: clocks differ, bodies err."""
-        points, number = self._points.get(point.behavior, ()), self.next_number(point.behavior)
-        since = self.reached[points[number - 1]] if points and number else self.begun.get(point.behavior, at)
-        return max(since, min(at, now))
+        return self._not_before_last(point.behavior, min(at, now) if isfinite(at) else now)
+
+    def _not_before_last(self, behavior: str, at: Seconds) -> Seconds:
+        return max(at, self._heard.get(behavior, at), self.begun.get(behavior, at))
+
+    def _is_ahead(self, point: Point) -> bool:
+        """Has its behavior begun, and not passed it yet?"""
+        points = self._points.get(point.behavior, ())
+        return point.behavior in self.begun and point in points[self.next_number(point.behavior) :]
 
     def lateness(self, point: Point) -> Seconds:
         """How much later than its constraints allow a point was that is reached; 0 if it was not."""
-        at, transition = self.reached[point], self.plan.at[point]
+        at = self.reached.get(point)
+        if at is None or point not in self.plan.at:
+            return 0.0
         late = (
             at - since - seconds
-            for other, seconds in self._wiring.not_after[transition]
+            for other, seconds in self._wiring.not_after[self.plan.at[point]]
             if (since := self._instants.get(other)) is not None
         )
         return max((0.0, *late))

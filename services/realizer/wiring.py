@@ -8,7 +8,7 @@ from services.realizer.points import Point
 
 
 class Wiring:
-    """points: of each behavior, in order.
+    """points: of each behavior, in order. foreign: points of other blocks.
 
     waits_for: of each transition, what must have been measured, and how many seconds before. awaited_by: those that
     wait for it. not_after: those that it may be later than by no more than so many seconds.
@@ -17,6 +17,7 @@ class Wiring:
     def __init__(self, plan: Plan) -> None:
         size = len(plan.net.transitions)
         self.points = {id: chain.points for id, chain in plan.chains.items()}
+        self.foreign = frozenset(plan.foreign)
         self._at = plan.at
         self._members = {
             (member.behavior, transition): member
