@@ -29,6 +29,7 @@ class BlockProgress(Struct, frozen=True, kw_only=True, tag="block_progress", omi
 class SyncPointProgress(Struct, frozen=True, kw_only=True, tag="sync_point_progress", omit_defaults=True):
     """evt: a sync point as realised. Each default point of each behavior exactly once, in order.
 
+    at, time: as measured, but never before those of an earlier message about the block.
     sync: in the spelling of the block's dialect. predicted: where the plan had it, from the block's start.
     skew: from the first to this point of its class. source: who says so.
     """

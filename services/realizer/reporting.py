@@ -1,6 +1,7 @@
 """What the realizer says about a block while it runs, in the words of the block's dialect."""
 
 from collections.abc import Iterable, Mapping
+from math import inf
 
 from schemas import keys
 from schemas.blocks import SpokenText
@@ -37,7 +38,7 @@ def moved_noticeably(old: Mapping[Point, Seconds], new: Mapping[Point, Seconds])
 
 
 class Reporter:
-    """The feedback of one block."""
+    """The feedback of one block. It never goes back in time: what is told late is told as of the last message."""
 
     def __init__(self, bus: Bus, block: str, tolerance: Seconds) -> None:
         """tolerance: what misses its instant by more is late."""
@@ -47,15 +48,16 @@ class Reporter:
         self._late: set[Point] = set()
         """Instants of behaviors of which that has been said."""
         self._character = ""
+        self._latest: Seconds = -inf
+        """Of all that was told: nothing after it is told as of an earlier instant."""
         self._predicted: Mapping[Point, Seconds] = {}
         self._not_before = 0.0
         """When to look again whether the prediction has moved."""
 
     def started(self, plan: Plan, began: Seconds) -> None:
         self._character = plan.block.character_id
-        start = BlockProgress(
-            block=self._block, progress="start", at=self._bus.stamp(began), character_id=self._character
-        )
+        at = self._bus.stamp(self._no_earlier(began))
+        start = BlockProgress(block=self._block, progress="start", at=at, character_id=self._character)
         self._say(start)
         self._predict(plan, began, {point: plan.predicted(point) for point in _points(plan)})
 
@@ -85,7 +87,7 @@ class Reporter:
     def reached(
         self, first_plan: Plan, authority: Authority, point: Point, *, arrived: Seconds | None, by_body: bool
     ) -> None:
-        """Report a point, and how much later it was than the first of its instant.
+        """Report a point, and how much later it was than the first of its instant, as measured.
 
         first_plan: the one the block began with, which said when the point was to be.
         """
@@ -93,13 +95,14 @@ class Reporter:
         together = (authority.reached.get(member.point) for member in plan.members[plan.at[point]])
         skew = at - min(time for time in (*together, at) if time is not None)
         if (sync := _spelled(point, plan)) is not None:
+            told = self._no_earlier(at)
             self._say(
                 SyncPointProgress(
                     block=self._block,
                     behavior=point.behavior,
                     sync=sync,
-                    at=self._bus.stamp(at),
-                    time=at - authority.began,
+                    at=self._bus.stamp(told),
+                    time=told - authority.began,
                     predicted=first_plan.predicted(point),
                     arrived=None if arrived is None or arrived == at else arrived - authority.began,
                     skew=skew,
@@ -122,7 +125,7 @@ class Reporter:
             kind=kind,
             message=message,
             behavior=behavior,
-            at=self._bus.stamp(),
+            at=self._bus.stamp(self._no_earlier(self._bus.now())),
             character_id=self._character,
         )
         self._say(warning)
@@ -133,7 +136,7 @@ class Reporter:
         self.warn("INTERRUPTED", f"interrupted{said}", behavior)
 
     def ended(self, status: str, began: Seconds) -> None:
-        now = self._bus.now()
+        now = self._no_earlier(self._bus.now())
         progress = BlockProgress(
             block=self._block,
             progress="end",
@@ -143,6 +146,11 @@ class Reporter:
             character_id=self._character,
         )
         self._say(progress)
+
+    def _no_earlier(self, at: Seconds) -> Seconds:
+        """`at`, or when the last message was if that is later; the next is no earlier than that."""
+        self._latest = max(self._latest, at)
+        return self._latest
 
     def _say(self, feedback: Feedback) -> None:
         self._bus.publish(keys.FEEDBACK, feedback)
