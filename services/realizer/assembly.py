@@ -1,10 +1,8 @@
 """Relations between points, assembled into a Petri net: the middle part of planning."""
 
-import heapq
 from collections.abc import Iterable, Mapping, Sequence
 from functools import reduce
 from itertools import pairwise
-from math import inf
 from operator import or_
 
 from msgspec import Struct
@@ -16,11 +14,11 @@ from services.realizer.circles import components
 from services.realizer.classes import Classes, Instant, instants
 from services.realizer.handover import Arrangement
 from services.realizer.net import Bound, PetriNet, Place, PlaceKind, Transition
+from services.realizer.numbering import numbered
 from services.realizer.points import ORIGIN, WITH_STROKE, Gate, Point, gate, gate_point, one_instant, performer
 from services.realizer.relations import Order, Relations
 from services.realizer.schedule import EPSILON
-
-_Tie = tuple[int, int, PlaceKind, Seconds, str, tuple[int, ...], Seconds]
+from services.realizer.steps import PORTION, Steps, portions
 
 
 class Member(Struct, frozen=True, gc=False):
@@ -57,22 +55,35 @@ class Assembly(Struct, frozen=True):
 
 
 class Assembler:
-    """chains: in document order. waited_for: behaviors that the end of the block waits for."""
+    """chains: in document order. waited_for: behaviors that the end of the block waits for.
+
+    `assembling` makes one.
+    """
 
     def __init__(
         self, chains: Mapping[str, Chain], relations: Relations, classes: Classes, waited_for: frozenset[str]
     ) -> None:
         self.chains = chains
         self.relations = relations
+        self.classes = classes
         self.waited_for = waited_for
+        self.waived: set[tuple[str, str]] = set()
+
+    def prepare(self) -> Steps[None]:
+        """What does not depend on an arrangement."""
+        chains, relations = self.chains, self.relations
         foreign = sorted(point for point in relations.named if ":" in point.behavior)
         own = [point for id in sorted(chains) for point in chains[id].points]
-        found = instants(classes, [ORIGIN, *foreign, *own])
+        found = yield from instants(self.classes, [ORIGIN, *foreign, *own])
         # The start of the block first; the others keep their canonical order.
         found.sort(key=lambda instant: ORIGIN not in instant.points)
         self.size = len(found)
         self.at = {point: number for number, instant in enumerate(found) for point in instant.points}
-        self.members = [self._members(instant.points) for instant in found]
+        self.members: list[tuple[Member, ...]] = []
+        for portion in portions(found):
+            self.members += [self._members(instant.points) for instant in portion]
+            yield len(portion)
+        yield len(found) // 8
         self.kinds = {
             (member.behavior, number): member.kind for number, those in enumerate(self.members) for member in those
         }
@@ -82,26 +93,33 @@ class Assembler:
         ]
         self.places: list[Place] = []
         self.bounds: list[Bound] = []
+        yield len(found) // 8
         self._class_delays(found)
-        for relation in relations.orders:
-            self._order(relation)
+        for orders in portions(relations.orders):
+            for relation in orders:
+                self._order(relation)
+            yield len(orders)
         self._foreign = frozenset(self.at[point] for point in foreign)
         if foreign:
-            self._set_out_late([instant.class_id for instant in found])
+            yield from self._set_out_late([instant.class_id for instant in found])
         self._fixed = (self.places, self.bounds)
-        self.waived: set[tuple[str, str]] = set()
 
-    def assemble(self, arrangement: Arrangement) -> Assembly:
+    def assemble(self, arrangement: Arrangement) -> Steps[Assembly]:
         self.arrangement = arrangement
         places, bounds = self._fixed
         self.places, self.bounds = list(places), list(bounds)
-        for id in sorted(self.chains):
-            self._phases(self.chains[id])
+        for portion in portions(sorted(self.chains)):
+            for id in portion:
+                self._phases(self.chains[id])
+            yield 4 * len(portion)
         self._series()
+        yield 2 * len(self.chains)
         self._arranged()
-        self._never_too_soon()
+        yield len(self.arrangement.lasting) * len(self.chains) // 8
+        yield from self._never_too_soon()
         self._ending(self.size)
-        return self._in_firing_order()
+        yield 2 * len(self.chains)
+        return (yield from self._in_firing_order())
 
     def _members(self, points: tuple[Point, ...]) -> tuple[Member, ...]:
         if len(points) == 1 and (alone := self.chains.get(points[0].behavior)):
@@ -131,7 +149,7 @@ class Assembler:
                 self.places.append(Place("delay", source, target, seconds, seconds))
                 self.bounds.append(Bound("delay", target, source, -seconds))
 
-    def _set_out_late(self, class_ids: Sequence[int]) -> None:
+    def _set_out_late(self, class_ids: Sequence[int]) -> Steps[None]:
         """Whose stroke comes after a point of another block, but not his start, comes just in time.
 
         Ours begins when it is sent, which may be long before: nobody is to hold his arm up all the while.
@@ -146,8 +164,10 @@ class Assembler:
         for chain in self.chains.values():
             for since, to in pairwise(chain.points):
                 out.setdefault(self.at[since], []).append(self.at[to])
-        for circle in components(self.size, out):  # what comes before it has been here
+        yield self.size // 8
+        for circle in (yield from components(self.size, out)):  # what comes before it has been here
             known = reduce(or_, (after[each] for each in circle))
+            yield len(circle)
             for here in circle:
                 after[here] = known
                 for each in out.get(here, ()):
@@ -249,14 +269,16 @@ class Assembler:
         if source != target:
             self.places.append(Place(kind, source, target, seconds, seconds, behavior, lines))
 
-    def _never_too_soon(self) -> None:
+    def _never_too_soon(self) -> Steps[None]:
         """An order on a point that cannot wait is kept for certain by where its behavior can: it waits there.
 
         Unless what it would wait for waits for it in turn, or it has no time to; then prediction must do. So it does
         where others of the instant wait for another block: words that follow its words do not wait for a stroke, too.
         """
         waits = []
-        for place in self.places:
+        for number, place in enumerate(self.places):
+            if not number % PORTION:
+                yield PORTION // 4
             if place.source in self._foreign and any(each.kind != "passive" for each in self.members[place.target]):
                 continue
             if place.kind == "order" and place.source != 0:
@@ -272,7 +294,10 @@ class Assembler:
         out: dict[int, list[int]] = {}
         for place in (*self.places, *waits):
             out.setdefault(place.source, []).append(place.target)
-        circle = {each: number for number, group in enumerate(components(self.size, out)) for each in group}
+        yield len(self.places) // 32
+        groups = yield from components(self.size, out)
+        circle = {each: number for number, group in enumerate(groups) for each in group}
+        yield len(self.places) // 32
         self.places += [place for place in waits if circle[place.source] != circle[place.target]]
 
     def _name(self, transition: int) -> str:
@@ -312,80 +337,30 @@ class Assembler:
         self.places += [Place("order", each, end) for each in range(end) if each not in left]
         self.places.append(Place("idle", end, 0))
 
-    def _in_firing_order(self) -> Assembly:
-        """Numbered in an order in which they can fire: the same for any order of elements."""
-        ranked = _firing_order(len(self.transitions), self.places)
-        is_ordered = len(ranked) == len(self.transitions)
-        if not is_ordered:
-            known = set(ranked)
-            ranked += [each for each in range(len(self.transitions)) if each not in known]
-        number = [0] * len(ranked)
-        for new, old in enumerate(ranked):
-            number[old] = new
-        places = [
-            (number[it.source], number[it.target], it.kind, it.lag, it.behavior, it.lines, it.shortest)
-            for it in self.places
-        ]
-        bounds = [
-            (number[it.source], number[it.target], it.kind, it.lag, it.behavior, it.lines, _sortable(it.stretch))
-            for it in self.bounds
-        ]
-        net = PetriNet(
-            tuple([self.transitions[each] for each in ranked]),
-            tuple(
-                [
-                    Place(kind, source, target, lag, shortest, behavior, lines)
-                    for source, target, kind, lag, behavior, lines, shortest in _sorted(places)
-                ]
-            ),
-            tuple(
-                [
-                    Bound(kind, source, target, lag, None if stretch == inf else stretch, behavior, lines)
-                    for source, target, kind, lag, behavior, lines, stretch in _sorted(bounds)
-                ]
-            ),
-        )
+    def _in_firing_order(self) -> Steps[Assembly]:
+        net, ranked, is_ordered = yield from numbered(self.transitions, self.places, self.bounds)
+        number = {old: new for new, old in enumerate(ranked)}
         members = [*self.members, ()]
         at = {point: number[each] for point, each in self.at.items()}
         return Assembly(net, is_ordered, at, tuple([members[each] for each in ranked]))
 
-    def circles(self) -> list[list[Point]]:
+    def circles(self) -> Steps[list[list[Point]]]:
         """Points that wait for each other in a circle of no length, so are one instant: circular synchronization."""
         out: dict[int, list[int]] = {}
         for place in self.places:
             if place.kind != "idle" and place.shortest <= EPSILON:
                 out.setdefault(place.source, []).append(place.target)
-        groups = [group for group in components(len(self.transitions), out) if len(group) > 1]
+        yield len(self.places) // 16
+        groups = [group for group in (yield from components(len(self.transitions), out)) if len(group) > 1]
         return [[self.transitions[each].points[0] for each in group if each < self.size] for group in groups]
 
 
-def _firing_order(size: int, places: list[Place]) -> list[int]:
-    """The transitions as they can fire, the last one last, without those that wait for each other."""
-    out: list[list[int]] = [[] for _ in range(size)]
-    missing = [0] * size
-    for place in places:
-        if place.kind != "idle":
-            out[place.source].append(place.target)
-            missing[place.target] += 1
-    ready = [each for each in range(size - 1) if not missing[each]]
-    found = []
-    while ready:
-        found.append(here := heapq.heappop(ready))
-        for target in out[here]:
-            missing[target] -= 1
-            if not missing[target]:
-                heapq.heappush(ready, target)
-    return found
-
-
-def _sorted(ties: list[_Tie]) -> list[_Tie]:
-    """In order, each once."""
-    ties.sort()
-    return [tie for tie, before in zip(ties, [None, *ties], strict=False) if tie != before]
-
-
-def _sortable(stretch: Seconds | None) -> Seconds:
-    return inf if stretch is None else stretch
+def assembling(
+    chains: Mapping[str, Chain], relations: Relations, classes: Classes, waited_for: frozenset[str]
+) -> Steps[Assembler]:
+    assembler = Assembler(chains, relations, classes, waited_for)
+    yield from assembler.prepare()
+    return assembler
 
 
 def _lines(*lines: int) -> tuple[int, ...]:

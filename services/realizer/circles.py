@@ -2,16 +2,22 @@
 
 from collections.abc import Mapping, Sequence
 
+from services.realizer.steps import PORTION, Steps
 
-def components(size: int, out: Mapping[int, Sequence[int]]) -> list[list[int]]:
+
+def components(size: int, out: Mapping[int, Sequence[int]]) -> Steps[list[list[int]]]:
     """The strongly connected components of a graph of `size` nodes. Kosaraju, without recursion."""
     into: dict[int, list[int]] = {}
-    for source, targets in out.items():
+    for number, (source, targets) in enumerate(out.items()):
         for target in targets:
             into.setdefault(target, []).append(source)
+        if not number % PORTION:
+            yield PORTION // 2
     groups = []
     taken = bytearray(size)
-    for root in reversed(_finished(size, out)):
+    for number, root in enumerate(reversed((yield from _left(size, out)))):
+        if not number % PORTION:
+            yield PORTION // 2
         if taken[root]:
             continue
         taken[root] = 1
@@ -25,7 +31,7 @@ def components(size: int, out: Mapping[int, Sequence[int]]) -> list[list[int]]:
     return groups
 
 
-def _finished(size: int, out: Mapping[int, Sequence[int]]) -> list[int]:
+def _left(size: int, out: Mapping[int, Sequence[int]]) -> Steps[list[int]]:
     """Nodes in the order in which a depth-first search leaves them."""
     finished: list[int] = []
     seen = bytearray(size)
@@ -42,4 +48,6 @@ def _finished(size: int, out: Mapping[int, Sequence[int]]) -> list[int]:
             else:
                 finished.append(here)
                 stack.pop()
+                if not len(finished) % PORTION:
+                    yield PORTION // 2
     return finished

@@ -4,7 +4,7 @@ Synchronizations that share a point merge, whatever their number, direction and 
 """
 
 from collections import defaultdict, deque
-from collections.abc import Iterable
+from collections.abc import Collection
 
 from msgspec import Struct
 
@@ -13,6 +13,7 @@ from schemas.units import Seconds
 from services.realizer.points import ORIGIN, Point
 from services.realizer.relations import BlockRefused, Equal, Term
 from services.realizer.schedule import EPSILON
+from services.realizer.steps import PORTION, Steps, portions
 
 
 class Instant(Struct, frozen=True, gc=False):
@@ -140,15 +141,21 @@ class Classes:
         return chain[::-1]
 
 
-def instants(classes: Classes, points: Iterable[Point]) -> list[Instant]:
+def instants(classes: Classes, points: Collection[Point]) -> Steps[list[Instant]]:
     """`points` (in a canonical order) grouped into instants: classes by their first point, each by offset."""
     members: dict[Point, list[tuple[Seconds, int, Point]]] = {}
-    for number, point in enumerate(points):
-        classes.add(point)
-        root, offset = classes.find(point)
-        members.setdefault(root, []).append((offset, number, point))
+    number = 0
+    for portion in portions(points):
+        for point in portion:
+            classes.add(point)
+            root, offset = classes.find(point)
+            members.setdefault(root, []).append((offset, number, point))
+            number += 1
+        yield len(portion)
     found: list[Instant] = []
     for class_id, group in enumerate(members.values()):
+        if not class_id % PORTION:
+            yield PORTION
         if len(group) == 1:
             alone = group[0][2]
             found.append(Instant((alone,), class_id, 0.0, classes.at(alone)))

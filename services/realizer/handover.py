@@ -15,6 +15,7 @@ from services.realizer.classes import Classes
 from services.realizer.points import BENEATH, WITH_STROKE, Point
 from services.realizer.relations import Relations
 from services.realizer.schedule import EPSILON
+from services.realizer.steps import Steps
 
 _OTHER: dict[str, tuple[str, Hand]] = {
     "left_arm": ("right_arm", "RIGHT_HAND"),
@@ -57,7 +58,7 @@ def arrange(
     times: Mapping[Point, Seconds],
     rounds: Mapping[Point, int],
     barred: Container[tuple[str, Hand]] = (),
-) -> tuple[Arrangement, list[Conflict]]:
+) -> Steps[tuple[Arrangement, list[Conflict]]]:
     """Who else takes whose place in a schedule made with `before` and where that would break what was asked for.
 
     rounds: which comes before which, of points that come at one time.
@@ -65,15 +66,20 @@ def arrange(
     """
     held = relations.held
     awaited: dict[str, set[Point]] = {}
+    yield len(relations.orders) // 8
     for order in relations.orders:
         awaited.setdefault(order.later.point.behavior, set()).add(order.earlier.point)
     mentioned = {point.behavior for point in relations.constrained}
     successors, cuts = dict(before.successors), dict(before.cuts)
     conflicts = []
+    yield len(chains) // 4
     ranked = entering(chains, mentioned, times, rounds)
+    yield len(chains) // 4
     users = _users(chains, ranked)
     cuts.update(dict.fromkeys(_overlaid(chains, users, times), 0))
+    yield len(chains) // 4
     for id, successor in _successors(chains, ranked, users).items():
+        yield 1
         chain = chains[id]
         if before.successors.get(successor, ("",))[0] == id:
             # Cut short by the other, each comes first. So nobody is: the one that was to be the later waits.
@@ -94,6 +100,7 @@ def arrange(
             # Who has made his stroke hands over; else the other arm is better, if that is free.
             is_worth_it = turn is not None or first <= _STROKE_END
             hand = _free_hand((successor, id), chains, times, barred) if is_worth_it else None
+            yield 1 + len(chains) // 32  # it has looked at all others
             if turn or hand:
                 conflicts.append(Conflict(turn, hand))
         if id in successors:

@@ -5,7 +5,7 @@ each with a warning: what the body cannot do, and what cannot be on time. Docume
 equals; any other permutation of a block gives the same net.
 """
 
-from collections.abc import Container, Iterable, Mapping, Sequence
+from collections.abc import Collection, Container, Iterable, Mapping, Sequence
 from typing import get_args
 
 from msgspec import Struct
@@ -17,7 +17,7 @@ from schemas.body import Estimate, Estimates
 from schemas.faults import Fault
 from schemas.feedback import WarningKind
 from schemas.units import Seconds
-from services.realizer.assembly import Assembler, Assembly, Member
+from services.realizer.assembly import Assembler, Assembly, Member, assembling
 from services.realizer.chains import Chain, chain, natural_ends
 from services.realizer.classes import Classes
 from services.realizer.handover import Arrangement, Conflict, arrange, entering
@@ -33,9 +33,10 @@ from services.realizer.relations import (
     Relations,
     Term,
     at_line,
-    relations,
+    relation_steps,
 )
 from services.realizer.schedule import EPSILON, Solution
+from services.realizer.steps import PORTION, Steps, finished, portions
 from services.realizer.verdict import Losses, clashes, judge
 
 
@@ -92,8 +93,22 @@ def plan_block(
     dropped: behaviors to leave out as if never written. elsewhere: other live blocks, by id. barred: hands
     with which a behavior cannot be done.
     """
+    return finished(plan_steps(block, estimates, dropped=dropped, elsewhere=elsewhere, barred=barred))
+
+
+def plan_steps(
+    block: Block,
+    estimates: Estimates | Iterable[Estimate] = (),
+    *,
+    dropped: Iterable[str] = (),
+    elsewhere: Elsewhere | None = None,
+    barred: Container[tuple[str, Hand]] = (),
+) -> Steps[Plan]:
+    """See `plan_block`."""
     items = estimates.items if isinstance(estimates, Estimates) else tuple(estimates)
-    return _Planner(block, {each.behavior: each for each in items}, dropped, elsewhere, barred).plan()
+    planner = _Planner(block, {each.behavior: each for each in items}, dropped, barred)
+    yield from planner.read(elsewhere)
+    return (yield from planner.plan())
 
 
 class _Planner:
@@ -102,15 +117,12 @@ class _Planner:
         block: Block,
         estimates: Mapping[str, Estimate],
         dropped: Iterable[str],
-        elsewhere: Elsewhere | None,
         barred: Container[tuple[str, Hand]],
     ) -> None:
         self.block = block
         self.lines = {behavior.id: behavior.line for behavior in block.behaviors}
         self.estimates = estimates
         self.barred = barred
-        self.relations = relations(block, elsewhere)
-        self.problems = list(self.relations.problems)
         self.dropped = dict.fromkeys(dropped)
         """In the order in which they were; the values say nothing."""
         self.turns: frozenset[tuple[str, Point]] = frozenset()
@@ -118,20 +130,26 @@ class _Planner:
         """Turns that there is no time to wait for."""
         self.hands: dict[str, Hand] = {}
         self.chains: dict[str, Chain] = {}
-        for behavior in block.behaviors:
-            if behavior.id in self.dropped:
-                continue
-            if isinstance(behavior, Unknown):
-                self._drop(behavior.id, "BEHAVIOR_TYPE_NOT_SUPPORTED", f"unknown element <{behavior.element}>")
-            elif behavior.id in self.relations.unusable:
-                self._refuse_if_required(
-                    behavior.id, "its timing names a sync point it does not have", "PARSING_FAILURE"
-                )
-                self.dropped[behavior.id] = None
-            elif (estimate := estimates.get(behavior.id)) and not estimate.feasible:
-                self._drop(behavior.id, _kind(estimate.warning), str(estimate.fault or "the body cannot do it"))
-            else:
-                self.chains[behavior.id] = chain(behavior, estimate)
+
+    def read(self, elsewhere: Elsewhere | None) -> Steps[None]:
+        self.relations = yield from relation_steps(self.block, elsewhere)
+        self.problems = list(self.relations.problems)
+        for portion in portions(self.block.behaviors):
+            for behavior in portion:
+                if behavior.id not in self.dropped:
+                    self._read(behavior)
+            yield 4 * len(portion)
+
+    def _read(self, behavior: BlockBehavior) -> None:
+        if isinstance(behavior, Unknown):
+            self._drop(behavior.id, "BEHAVIOR_TYPE_NOT_SUPPORTED", f"unknown element <{behavior.element}>")
+        elif behavior.id in self.relations.unusable:
+            self._refuse_if_required(behavior.id, "its timing names a sync point it does not have", "PARSING_FAILURE")
+            self.dropped[behavior.id] = None
+        elif (estimate := self.estimates.get(behavior.id)) and not estimate.feasible:
+            self._drop(behavior.id, _kind(estimate.warning), str(estimate.fault or "the body cannot do it"))
+        else:
+            self.chains[behavior.id] = chain(behavior, estimate)
 
     def _refuse_if_required(self, id: str, reason: str, kind: WarningKind) -> None:
         if id in self.relations.required:
@@ -145,38 +163,46 @@ class _Planner:
         self.dropped[id] = None
         self.problems.append(Problem(kind, at_line(self.lines[id], f"{reason}; the behavior is dropped"), id))
 
-    def plan(self) -> Plan:
+    def plan(self) -> Steps[Plan]:
         """What cannot be on time is dropped, until the rest can be."""
         while True:
-            present, classes = self._present()
+            present, classes = yield from self._present()
             try:
-                return self._plan(present, classes)
+                return (yield from self._plan(present, classes))
             except Losses as found:
                 self.turns = frozenset()
-                for loss in found.losses:
+                for number, loss in enumerate(found.losses):
+                    if not number % PORTION:
+                        yield PORTION
                     if loss.turn is not None and self._may_speak_at_once(loss.turn[1].behavior, present):
                         self.overlaps.add(loss.turn)
                     else:
                         self._drop(loss.behavior, "IMPOSSIBLE_TO_SCHEDULE", loss.reason)
 
-    def _plan(self, present: Relations, classes: Classes) -> Plan:
+    def _plan(self, present: Relations, classes: Classes) -> Steps[Plan]:
         """Raises Losses: what cannot be on time."""
         natural = natural_ends(self.chains, present)
         waited_for = frozenset(self.chains) - self._unawaited_events(present)
         arrangement = Arrangement(natural=natural)
-        assembler = Assembler(self.chains, present, classes, waited_for)
+        assembler = yield from assembling(self.chains, present, classes, waited_for)
         mentioned = {point.behavior for point in present.constrained}
         while True:
-            assembler, assembly, solution = self._solved(assembler, arrangement, classes)
+            assembler, assembly, solution = yield from self._solved(assembler, arrangement, classes)
             times = {point: solution.times[transition] for point, transition in assembly.at.items()}
+            yield len(times) // 4
             rounds = _rounds(assembly, solution.times)
-            arranged, conflicts = arrange(self.chains, present, classes, arrangement, times, rounds, self.barred)
+            yield len(times) // 4
+            arranged, conflicts = yield from arrange(
+                self.chains, present, classes, arrangement, times, rounds, self.barred
+            )
             conflicts = [each for each in conflicts if each.hand or each.turn not in self.overlaps]
             turns = [each.turn for each in conflicts if each.turn and not each.hand]
-            if losses := clashes(turns, self.chains, self.relations.required, classes):
+            if losses := (yield from clashes(turns, self.chains, self.relations.required, classes)):
                 raise Losses(losses)
-            for conflict in conflicts:
-                self._resolve(conflict)
+            for part in portions(conflicts):
+                for conflict in part:
+                    self._resolve(conflict)
+                yield 2 * len(part)
             if conflicts:
                 arrangement = Arrangement(natural=natural, turns=self.turns)
             elif arranged == arrangement:
@@ -201,7 +227,7 @@ class _Planner:
             problems=tuple(self.problems),
         )
 
-    def _present(self) -> tuple[Relations, Classes]:
+    def _present(self) -> Steps[tuple[Relations, Classes]]:
         """What is said about the points of those that are performed, and which of them are one instant."""
 
         def there(term: Term) -> bool:
@@ -213,8 +239,10 @@ class _Planner:
             for equal in self.relations.equals
             if (kept := tuple(filter(there, equal.terms))) and (len(kept) > 1 or len(equal.terms) == 1)
         ]
-        classes = self._classes(equals)
+        yield len(equals)
+        classes = yield from self._classes(equals)
         equals += [equal for equal in self._left_over() if classes.tie_if_possible(equal)]
+        yield len(equals)
         orders = [each for each in self.relations.orders if there(each.earlier) and there(each.later)]
         present = Relations(
             tuple(equals),
@@ -265,13 +293,16 @@ class _Planner:
         share = (term.stroke - 1) / movement.behavior.repetition
         return replace(term, offset=term.offset + share * strokes, stroke=0)
 
-    def _classes(self, equals: Iterable[Equal]) -> Classes:
+    def _classes(self, equals: Collection[Equal]) -> Steps[Classes]:
         classes = Classes()
-        for each in self.chains.values():
-            for syncs in one_instant(each.type):
-                classes.tie(Equal(tuple([Term(Point(each.behavior.id, sync), 0.0, sync) for sync in syncs])), "")
+        for portion in portions(self.chains.values()):
+            for each in portion:
+                for syncs in one_instant(each.type):
+                    classes.tie(Equal(tuple([Term(Point(each.behavior.id, sync), 0.0, sync) for sync in syncs])), "")
+            yield 2 * len(portion)
         for equal in equals:
             classes.tie(equal, self.block.id)
+            yield 2 * len(equal.terms)
         return classes
 
     def _unawaited_events(self, present: Relations) -> frozenset[str]:
@@ -282,21 +313,27 @@ class _Planner:
 
     def _solved(
         self, assembler: Assembler, arrangement: Arrangement, classes: Classes
-    ) -> tuple[Assembler, Assembly, Solution]:
+    ) -> Steps[tuple[Assembler, Assembly, Solution]]:
         """What waits for each other without delay is made one instant. Raises Losses, or BlockRefused: a deadlock."""
-        while not (assembly := assembler.assemble(arrangement)).is_ordered and (circles := assembler.circles()):
+        while True:
+            assembly = yield from assembler.assemble(arrangement)
+            if assembly.is_ordered or not (circles := (yield from assembler.circles())):
+                break
             for points in circles:
                 terms = tuple([Term(point, 0.0, str(point)) for point in points])
                 classes.tie(Equal(terms), self.block.id)
-            assembler = Assembler(self.chains, assembler.relations, classes, assembler.waited_for)
+            assembler = yield from assembling(self.chains, assembler.relations, classes, assembler.waited_for)
         try:
-            return assembler, assembly, predict(assembly.net, lambda ties: bool(assembly.waits(ties)))
+            solution = yield from predict(assembly.net, lambda ties: bool(assembly.waits(ties)))
+            return assembler, assembly, solution
         except Impossible as impossible:
             if waits := assembly.waits(tie for circle in impossible.circles for tie, _ in circle):
                 assembler.waive(waits)
-                return self._solved(assembler, arrangement, classes)
+                return (yield from self._solved(assembler, arrangement, classes))
             required = self.relations.required
-            raise judge(impossible, assembly, self.chains, required, classes, self.block.id, self.turns) from None
+            raise (
+                yield from judge(impossible, assembly, self.chains, required, classes, self.block.id, self.turns)
+            ) from None
 
     def _may_speak_at_once(self, id: str, present: Relations) -> bool:
         """Of an utterance that only begins the block nobody has said that it must be over by then: the voice will."""

@@ -6,6 +6,7 @@ from math import inf
 from schemas.units import Seconds
 from services.realizer.net import Bound, PetriNet, Place
 from services.realizer.schedule import EPSILON, Lag, PositiveCycle, Solution, solve
+from services.realizer.steps import PORTION, Steps
 
 Circle = tuple[tuple[Place | Bound, Seconds], ...]
 """Ties that lead back to their start, in order, each with the seconds it asks for: more than none in all."""
@@ -24,22 +25,28 @@ class Impossible(Exception):
 
 def predict(
     net: PetriNet, is_dispensable: Callable[[Iterable[Place | Bound]], bool] = lambda ties: False
-) -> Solution:
+) -> Steps[Solution]:
     """The earliest schedule; `reason` of a cause is the number of the place or, after them, of the bound.
 
     What a cycle takes too long is shared by its phases, each according to the room it has. Raises Impossible; also
     for a cycle with a tie that nobody insists on: no phase is hurried for its sake.
     """
     ties: tuple[Place | Bound, ...] = (*net.places, *net.bounds)
-    lags = [Lag(tie.source, tie.target, tie.lag, number) for number, tie in enumerate(ties) if tie.kind != "idle"]
+    lags = []
+    for number, tie in enumerate(ties):
+        if tie.kind != "idle":
+            lags.append(Lag(tie.source, tie.target, tie.lag, number))
+        if not number % PORTION:
+            yield PORTION // 4
     index: dict[int, int] = {}
     while True:
         try:
-            return solve(len(net.transitions), lags)
+            return (yield from solve(len(net.transitions), lags))
         except PositiveCycle as found:
             index = index or {lag.reason: number for number, lag in enumerate(lags)}
             hopeless = []
             for cycle in found.cycles:
+                yield 3 * len(cycle)
                 circle = tuple([(ties[lag.reason], lag.seconds) for lag in cycle])
                 room = [seconds - _least(tie) for tie, seconds in circle]
                 excess = sum(lag.seconds for lag in cycle)

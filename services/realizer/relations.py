@@ -4,11 +4,12 @@ Constraints and inline timing mean the same thing and become the same relations;
 """
 
 from collections.abc import Mapping
+from functools import cached_property
 
 from msgspec import Struct
 from msgspec.structs import replace
 
-from schemas.behaviors import After, Before, Behavior, Head, Speech, Synchronize, Unknown, Wait
+from schemas.behaviors import After, Before, Behavior, BlockBehavior, Head, Speech, Synchronize, Unknown, Wait
 from schemas.blocks import Block
 from schemas.faults import Fault, InputRefused
 from schemas.feedback import WarningKind
@@ -16,6 +17,7 @@ from schemas.references import type_name
 from schemas.syncref import BLOCK_ITSELF, SyncRef, canonical_sync, dialect_sync
 from schemas.units import Seconds
 from services.realizer.points import ORIGIN, Point, sync_points
+from services.realizer.steps import PORTION, Steps, finished, portions
 
 
 class BlockRefused(InputRefused):
@@ -70,7 +72,7 @@ def at_line(line: int, reason: str) -> str:
     return f"line {line}: {reason}" if line else reason
 
 
-class Relations(Struct, frozen=True):
+class Relations(Struct, frozen=True, dict=True):
     """unusable: behaviors that cannot be performed as written. required: those whose loss fails the block."""
 
     equals: tuple[Equal, ...]
@@ -79,17 +81,17 @@ class Relations(Struct, frozen=True):
     problems: tuple[Problem, ...] = ()
     unusable: frozenset[str] = frozenset()
 
-    @property
+    @cached_property
     def named(self) -> frozenset[Point]:
         """Every point that is written anywhere."""
         return self.constrained | {term.point for equal in self.equals for term in equal.terms}
 
-    @property
+    @cached_property
     def constrained(self) -> frozenset[Point]:
         """Every point that has to do with another."""
         return self.held | {order.earlier.point for order in self.orders}
 
-    @property
+    @cached_property
     def held(self) -> frozenset[Point]:
         """Every point that must share an instant or wait for one: it cannot come at any earlier time."""
         instants = ({term.point for term in equal.terms} for equal in self.equals)
@@ -101,6 +103,8 @@ class _Reader:
     def __init__(self, block: Block, elsewhere: Elsewhere) -> None:
         self.block = block
         self.elsewhere = elsewhere
+        self.theirs: dict[str, Mapping[str, Behavior]] = {}
+        """Behaviors of other blocks that are named, by id."""
         self.behaviors: Mapping[str, Behavior] = {behavior.id: behavior for behavior in block.behaviors}
         self.points = {id: frozenset(sync_points(behavior)) for id, behavior in self.behaviors.items()}
         self.equals: list[Equal] = []
@@ -146,7 +150,9 @@ class _Reader:
     def _elsewhere(self, ref: SyncRef, text: str, where: str, line: int) -> Term:
         """A point of another block, spelled as in this one."""
         other = self.elsewhere.get(ref.block)
-        known = {each.id: each for each in other.behaviors} if other else {}
+        if other is not None and ref.block not in self.theirs:
+            self.theirs[ref.block] = {each.id: each for each in other.behaviors}
+        known = self.theirs.get(ref.block, {})
         if isinstance(behavior := known.get(ref.behavior), Speech):
             ref = SyncRef.parse(text, [mark.id for mark in behavior.marks])
         sync = canonical_sync(ref.sync, type_name(behavior) if behavior else "", self.block.dialect)
@@ -165,7 +171,8 @@ class _Reader:
     def _advice(self) -> str:
         return f"the block has {', '.join(sorted(self.behaviors)) or 'no behaviors'}"
 
-    def read_constraints(self) -> None:
+    def read_constraints(self) -> Steps[None]:
+        done = 0
         for number, constraint in enumerate(self.block.constraints, 1):
             where = constraint.id or f"constraint {number}"
             for operator in constraint.operators:
@@ -175,6 +182,10 @@ class _Reader:
                 self._relate(operator, terms)
                 if constraint.required:
                     self.required |= {term.point.behavior for term in terms.values()} & self.behaviors.keys()
+                if (done := done + 4 * len(texts)) >= PORTION:
+                    yield done
+                    done = 0
+        yield done
 
     def _terms(self, texts: tuple[str, ...], where: str, line: int, *, required: bool) -> dict[str, Term]:
         terms = {}
@@ -199,29 +210,33 @@ class _Reader:
             if ref is not None and (sync := terms.get(text)) is not None:
                 self.orders.append(Order(ref, sync) if isinstance(operator, After) else Order(sync, ref))
 
-    def read_timing(self) -> None:
-        for behavior in self.block.behaviors:
-            relations: list[Equal] = []
-            for timing in behavior.timing:
-                sync = canonical_sync(timing.sync, type_name(behavior), self.block.dialect)
-                own = f"{behavior.id}:{timing.sync}"
-                problem: Problem | None = None
-                if not self._has(behavior, sync):
-                    problem = Problem("PARSING_FAILURE", f"{type_name(behavior)} has no sync point {timing.sync!r}")
-                else:
-                    other = self.term(timing.ref, behavior.id, behavior.line)
-                    if isinstance(other, Problem):
-                        problem = other
-                    else:
-                        term = Term(Point(behavior.id, sync), 0.0, own, behavior.line)
-                        relations.append(Equal((term, other), behavior.id))
-                if problem is not None:
-                    self.unusable.add(behavior.id)
-                    message = at_line(behavior.line, f"{problem.message}; the behavior is dropped")
-                    self.problems.append(Problem("PARSING_FAILURE", message, behavior.id))
-                    break
+    def read_timing(self) -> Steps[None]:
+        for portion in portions(self.block.behaviors):
+            for behavior in portion:
+                self._read_timing_of(behavior)
+            yield 4 * len(portion)
+
+    def _read_timing_of(self, behavior: BlockBehavior) -> None:
+        relations: list[Equal] = []
+        for timing in behavior.timing:
+            sync = canonical_sync(timing.sync, type_name(behavior), self.block.dialect)
+            own = f"{behavior.id}:{timing.sync}"
+            problem: Problem | None = None
+            if not self._has(behavior, sync):
+                problem = Problem("PARSING_FAILURE", f"{type_name(behavior)} has no sync point {timing.sync!r}")
             else:
-                self.equals += relations
+                other = self.term(timing.ref, behavior.id, behavior.line)
+                if isinstance(other, Problem):
+                    problem = other
+                else:
+                    term = Term(Point(behavior.id, sync), 0.0, own, behavior.line)
+                    relations.append(Equal((term, other), behavior.id))
+            if problem is not None:
+                self.unusable.add(behavior.id)
+                message = at_line(behavior.line, f"{problem.message}; the behavior is dropped")
+                self.problems.append(Problem("PARSING_FAILURE", message, behavior.id))
+                return
+        self.equals += relations
 
     def result(self) -> Relations:
         found = Relations(
@@ -250,9 +265,14 @@ def relations(block: Block, elsewhere: Elsewhere | None = None) -> Relations:
 
     elsewhere: other live blocks, by id. Their points become `Point("block:behavior", sync)`.
     """
+    return finished(relation_steps(block, elsewhere))
+
+
+def relation_steps(block: Block, elsewhere: Elsewhere | None = None) -> Steps[Relations]:
+    """See `relations`."""
     reader = _Reader(block, elsewhere or {})
-    reader.read_constraints()
-    reader.read_timing()
+    yield from reader.read_constraints()
+    yield from reader.read_timing()
     return reader.result()
 
 

@@ -4,9 +4,13 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import NamedTuple
 
 from schemas.units import Seconds
+from services.realizer.steps import Steps
 
 EPSILON: Seconds = 1e-6
 """Times closer than this are the same instant."""
+
+LAGS_AN_ELEMENT = 32
+"""How many are looked at in the time that others take for an element of a block: see `steps`."""
 
 
 class Lag(NamedTuple):
@@ -37,7 +41,7 @@ class Solution(NamedTuple):
     causes: dict[int, Lag]
 
 
-def solve(size: int, lags: Sequence[Lag]) -> Solution:
+def solve(size: int, lags: Sequence[Lag]) -> Steps[Solution]:
     """Least instants, none before 0, that satisfy `lags`. Raises PositiveCycle.
 
     Sweeps go to and fro over the lags. Where these are in an order in which they can be met, forward lags need one
@@ -51,6 +55,7 @@ def solve(size: int, lags: Sequence[Lag]) -> Solution:
     sweeps = (inner, inner[::-1])
     for number in range(2 * size + 4):
         moved = None
+        yield 1 + len(lags) // LAGS_AN_ELEMENT
         for lag in sweeps[number % 2]:
             source, target, seconds, _ = lag
             at = times[source] + seconds

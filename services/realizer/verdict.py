@@ -13,6 +13,7 @@ from services.realizer.points import Point
 from services.realizer.prediction import Circle, Impossible
 from services.realizer.relations import BlockRefused
 from services.realizer.schedule import EPSILON
+from services.realizer.steps import Steps
 
 Turn = tuple[str, Point]
 """Who waits for which point of another before it takes its part."""
@@ -36,13 +37,14 @@ class Losses(Exception):
 
 def clashes(
     turns: Iterable[Turn], chains: Mapping[str, Chain], required: Collection[str], classes: Classes
-) -> list[Loss]:
+) -> Steps[list[Loss]]:
     """Turns that cannot be waited for, whatever the rest of the block: what ties the two leaves no time for both."""
     rank = {id: number for number, id in enumerate(chains)}
     losses: dict[str, Loss] = {}
     stays: dict[str, str] = {}
     """Who has the part instead of who is lost."""
     for later, (earlier, sync) in sorted(turns, key=lambda turn: (rank[turn[0]], rank[turn[1].behavior])):
+        yield 16
         earlier = stays.get(earlier, earlier)
         free = [id for id in (earlier, later) if id not in required]
         if free and later not in losses and _clash(chains[earlier], sync, chains[later], classes):
@@ -73,7 +75,7 @@ def judge(
     classes: Classes,
     block: str,
     turns: Collection[Turn],
-) -> Losses | BlockRefused:
+) -> Steps[Losses | BlockRefused]:
     """A time that cannot be met costs a behavior, the later in the document; waiting for each other costs the block.
 
     Each circle costs a behavior, unless one that is lost already was part of it.
@@ -81,9 +83,13 @@ def judge(
     net = assembly.net
     rank = {id: number for number, id in enumerate(chains) if id not in required}
     ends = {(assembly.at[turn[1]], assembly.at[Point(turn[0], "start")]): turn for turn in sorted(turns)}
-    found = [(_loss(circle, net, rank, chains, ends), circle) for circle in impossible.circles]
+    found = []
+    for circle in impossible.circles:
+        found.append((_loss(circle, net, rank, chains, ends), circle))
+        yield 1 + len(circle)
     losses: dict[str, Loss] = {}
     for loss, circle in sorted(found, key=lambda each: rank[each[0].behavior] if each[0] else -1):
+        yield len(circle)
         if loss is not None and not _touched(circle, net) & losses.keys():
             losses[loss.behavior] = loss
     return Losses(tuple(losses.values())) if losses else _deadlock(impossible.circles[0], net, classes, block)
