@@ -27,6 +27,7 @@ SHELLS = {
     "services/realizer/recognition_link.py",  # asks recognition
     "services/realizer/reporting.py",  # publishes feedback
     "services/realizer/surroundings.py",  # what the executor is given
+    "services/realizer/unhurried.py",  # lets the loop go on between slices of planning
     "services/generation/body_link.py",  # asks the body
     "services/generation/conductor.py",  # awaits the blocks of fragments
     "services/control/body.py",  # the interface of bodies: coroutines

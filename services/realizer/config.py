@@ -22,7 +22,7 @@ class RealizerConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
     of 100 cases on two cores (benchmarks/live_blocks.py).
     event_grace: an event ends as failed this much after its limit if recognition is not there to decide it.
     event_patience: and this much if it is there, but says nothing.
-    most: behaviors, marks and sync references in a block; more is refused, as planning takes the loop 0.1 ms each.
+    most: behaviors, marks and sync references in a block; more is refused. Planning takes 0.1 ms each.
     *_limit: of an event that names no limit: recognition's own (its design page), the longer for a pair.
     """
 

@@ -29,11 +29,12 @@ from services.bus import Bus, Received
 from services.realizer.config import RealizerConfig
 from services.realizer.executor import Performance
 from services.realizer.ledger import Ledger
-from services.realizer.planner import Plan, plan_block
+from services.realizer.planner import Plan, plan_steps
 from services.realizer.points import Point, performer
 from services.realizer.poses import poses_before, poses_left
-from services.realizer.relations import BlockRefused, extent, relations
+from services.realizer.relations import BlockRefused, extent, relation_steps
 from services.realizer.surroundings import Ending, Live, Presence, Surroundings
+from services.realizer.unhurried import unhurried
 from services.requests import Patience, RequestDesk, Requester
 from services.runtime import Ready
 
@@ -180,13 +181,13 @@ class _Realizer:
         if (held := extent(block)) > self.config.most:
             reason = f"{held} behaviors, marks and sync references; at most {self.config.most} can be planned in time"
             raise BlockRefused(Fault(reason=reason, where=block.id, advice="send several, each with APPEND"))
-        relations(block, elsewhere)  # A bad reference is seen without asking the body.
+        await unhurried(relation_steps(block, elsewhere))  # A bad reference is seen without asking the body.
         block = sound(block)
         barred: set[tuple[str, Hand]] = set()
         chosen, estimates = block, await self._estimates(block, {})
         first, is_asked_again = estimates, False
         while True:
-            plan = plan_block(chosen, estimates, elsewhere=elsewhere, barred=barred)
+            plan = await unhurried(plan_steps(chosen, estimates, elsewhere=elsewhere, barred=barred))
             before = poses_before(plan, self._left_for(plan))
             if plan.block is chosen and (is_asked_again or not before):
                 return plan
@@ -252,7 +253,7 @@ class _Realizer:
         try:
             # The body is elsewhere by now.
             estimates = await self._estimates(plan.block, poses_before(plan))
-            return plan_block(plan.block, estimates, elsewhere=elsewhere)
+            return await unhurried(plan_steps(plan.block, estimates, elsewhere=elsewhere))
         except EngageError as error:
             self._warn(live, error)
             live.stop(Ending("failed", error.fault))

@@ -148,6 +148,8 @@ class FakeBody:
         self.homes: list[tuple[str, ...]] = []
         self.aborted: list[str] = []
         self.acts: dict[str, Act] = {}
+        self.asked = 0
+        """How often for estimates."""
 
     async def serve(self, bus: Bus, ready: Ready) -> None:
         self.bus = bus
@@ -214,6 +216,7 @@ class FakeBody:
 
     def _estimate(self, question: Message) -> Message:
         assert isinstance(question, EstimateBehaviors)
+        self.asked += 1
         return Estimates(items=tuple(self.estimate(item.behavior) for item in question.items))
 
     def _perform(self, perform: PerformBehavior) -> None:
