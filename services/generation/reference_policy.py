@@ -294,6 +294,7 @@ def _continued(
             seconds = way.cost + cost(pair, target, way.posture, motions, config)
             rank = (round(seconds, ROUNDING), (*way.rank[1], preference))
             reached = way.posture.after(pair.gesture, target, motions)
+            # No two ways have the same rank: a pair's preference names its gesture and its phrase.
             if reached not in best or rank < best[reached].rank:
                 best[reached] = _Way(seconds, rank, (*way.pairs, pair), (*way.postures, reached))
     return list(best.values())

@@ -166,6 +166,7 @@ class LongestPaths:
     def _set_seconds(self, number: int, seconds: Seconds) -> None:
         arc = self._arcs[number]
         before, arc.seconds = arc.seconds, seconds
+        # What is the same as before changes nothing: to find it out anew would only take time.
         if seconds < before:
             self._loosen(number)
         elif seconds > before:

@@ -77,8 +77,10 @@ class Patience:
     def overdue(self, now: Seconds) -> list[Late | Stalled]:
         """Who is late, once each, and who has been for too long."""
         found: list[Late | Stalled] = []
+        due = []
         while (deadline := self.deadline) is not None and deadline <= now + EPSILON:
-            _, behavior = heapq.heappop(self._alarms)
+            due.append(heapq.heappop(self._alarms)[1])
+        for behavior in dict.fromkeys(due):
             awaited = self._awaited[behavior]
             if now >= awaited.stalled - EPSILON:
                 found.append(Stalled(behavior, awaited.sync, now - awaited.expected))

@@ -1,9 +1,13 @@
 """Each claim on the head alone: when it is acquired and released, to the millisecond."""
 
+import math
+
 import pytest
 
 from schemas.actions import ActorFound, ActorLost
+from schemas.body import Ray
 from schemas.world import Entity, World
+from services.generation.response_policy import viewing_order
 from tests.generation.heads import AT, Stage, act, event, looking_at, on_the_face, statistics, world
 
 # -- each claim, alone against the face -------------------------------------------------------------------------
@@ -198,6 +202,20 @@ def test_objects_far_apart_are_looked_at_one_by_one_the_nearest_first() -> None:
     stage.until(12.0)
 
     assert stage.owners[-2:] == [(10.0, "response", "other"), (10.8, "response", "piece")]
+
+
+@pytest.mark.parametrize(("apart", "order"), [(0.98, ("left",)), (1.02, ("right", "left"))])
+def test_one_gaze_is_a_cone_of_the_half_angle_around_the_middle_of_the_objects(
+    apart: float, order: tuple[str, ...]
+) -> None:
+    """apart: the angle from the middle to each, in half-angles. The present gaze is to the right of both."""
+    half_angle = 0.2
+    aside = math.tan(apart * half_angle)
+    left = Entity(id="left", kind="object", position=(1.0, aside, 0.0))
+    right = Entity(id="right", kind="object", position=(1.0, -aside, 0.0))
+    gaze = Ray(origin=(0.0, 0.0, 0.0), axis=(0.0, -1.0, 0.0))
+
+    assert viewing_order(("left", "right"), World(entities=(left, right)), gaze, half_angle) == order
 
 
 def test_objects_within_one_gaze_are_met_by_one_look() -> None:

@@ -70,13 +70,22 @@ def test_the_cylinder_begins_at_the_hand_and_grows_by_the_object() -> None:
     forearm = Ray(origin=(0.0, 0.0, 0.0), axis=(1.0, 0.0, 0.0), tip=(0.3, 0.0, 0.0))
     objects = [
         thing("behind the hand", 0.2, 0.0),
+        thing("just behind the hand", 0.299, 0.0),
+        thing("at the hand", 0.3, 0.04),
+        thing("just ahead of the hand", 0.301, 0.0),
         thing("ahead", 0.5, 0.04),
         thing("beside", 0.5, 0.08),
         thing("large", 0.5, -0.08, radius=0.03),
         thing("far ahead", 3.0, 0.0),
     ]
 
-    assert in_pointing_cylinder(forearm, 0.05, laid_out(objects)) == {"ahead", "large", "far ahead"}
+    assert in_pointing_cylinder(forearm, 0.05, laid_out(objects)) == {
+        "at the hand",
+        "just ahead of the hand",
+        "ahead",
+        "large",
+        "far ahead",
+    }
 
 
 def test_without_a_radius_the_footprint_tells_how_large_an_object_is() -> None:

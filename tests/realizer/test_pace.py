@@ -4,6 +4,11 @@ import pytest
 
 from schemas.behaviors import Gaze, GazeShift, Gesture, Mark, Pointing, Speech
 from schemas.feedback import PredictionFeedback
+from services.realizer.authority import Authority
+from services.realizer.config import RealizerConfig
+from services.realizer.effects import Extend
+from services.realizer.planner import plan_block
+from services.realizer.points import Point
 from tests.realizer.fake_body import FakeBody, Script
 from tests.realizer.stage import after, block, stage, together
 
@@ -150,3 +155,28 @@ async def test_who_is_too_late_for_what_came_before_it_says_so() -> None:
     assert [(each.kind, each.behavior, each.message) for each in seen.warnings()] == [
         ("LATE", "p", "stroke came 0.75 s later than it should")
     ]
+
+
+def test_nobody_is_told_to_be_slower_than_its_body_can() -> None:
+    """The words stop coming: the shift that ends with them is slowed down, but to no more than its longest time."""
+    words = Speech(id="s", text="one two three four", marks=(Mark("a", 3), Mark("b", 7), Mark("c", 13)))
+    body = FakeBody(elastic=(0.5, 1.5), estimates={"shift": (3.0,)})
+    made = block((words, SHIFT), together("shift:end", "s:end"))
+    authority = Authority(plan_block(made, [body.estimate(each) for each in made.behaviors]), 0.0, RealizerConfig())
+    told = []
+    for now, point in (
+        (0.0, "s:start"),
+        (1.0, "s:a"),
+        (1.0, "shift:start"),
+        (2.2, ""),
+        (2.6, ""),
+        (3.2, ""),
+        (3.5, ""),
+    ):
+        told += authority.advance(now)
+        if point:
+            authority.reach(Point(*point.split(":")), now)
+
+    paces = [dict(each.pace)["end"] for each in told if isinstance(each, Extend) and each.behavior == "shift"]
+    assert 4.0 < paces[0] < 5.5
+    assert max(paces) == pytest.approx(1.0 + 1.5 * 3.0)

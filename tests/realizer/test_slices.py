@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from schemas import keys
-from schemas.behaviors import Constraint, Speech
+from schemas.behaviors import Constraint, Gaze, Speech
 from schemas.blocks import Block, BlockOutcome
 from schemas.body import SyncPointReached
 from schemas.feedback import BlockProgress
@@ -188,3 +188,24 @@ async def test_a_block_that_is_cancelled_while_it_is_planned_ends_at_once() -> N
         assert waited < 20
         assert not is_planned(seen)
     assert body.commands == []
+
+
+def test_what_comes_with_the_successor_is_not_cut_short_by_it() -> None:
+    """Planning settles at once: the way home, which begins in that very instant, is all that is given up."""
+    behaviors = (Gaze(id="g", target="a"), Gaze(id="h", target="b"))
+    made = block(behaviors, together("g:relax", "h:start"), together("g:start", "0"), together("h:start", "2"))
+    calls = 0
+
+    def limited() -> Steps[Plan]:
+        nonlocal calls
+        steps = plan_steps(made, [FakeBody().estimate(each) for each in behaviors])
+        while calls < 1000:
+            calls += 1
+            try:
+                yield next(steps)
+            except StopIteration as end:
+                return end.value
+        raise AssertionError("it does not settle")
+
+    plan = finished(limited())
+    assert [plan.predicted(point) for point in plan.chains["g"].points] == [0.0, 0.0, 0.0, 0.5, 2.0, 2.0, 2.0]

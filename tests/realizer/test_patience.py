@@ -1,0 +1,54 @@
+"""Who is late, once, and who is given up, once: each at its instant."""
+
+from schemas.behaviors import Gesture
+from services.realizer.authority import Authority
+from services.realizer.config import RealizerConfig
+from services.realizer.effects import Extend
+from services.realizer.patience import Late, Patience, Stalled
+from services.realizer.planner import plan_block
+from services.realizer.points import Point
+from tests.realizer.fake_body import FakeBody
+from tests.realizer.stage import block
+
+CONFIG = RealizerConfig(late=0.5, late_factor=1.0, stall=3.0, stall_factor=5.0)
+
+
+def test_what_does_not_come_is_late_once_and_given_up_once() -> None:
+    patience = Patience(CONFIG)
+    patience.expect("b", "stroke", 1.0, 1.0)
+
+    assert patience.deadline == 2.5
+    assert patience.overdue(2.4) == []
+    assert patience.overdue(2.5) == [Late("b", "stroke", 1.5)]
+    assert patience.deadline == 9.0
+    assert patience.overdue(8.9) == []
+    assert patience.overdue(9.0) == [Stalled("b", "stroke", 8.0)]
+    assert patience.deadline is None
+
+
+def test_who_comes_to_look_long_after_gives_up_at_once() -> None:
+    patience = Patience(CONFIG)
+    patience.expect("b", "stroke", 1.0, 1.0)
+
+    assert patience.overdue(20.0) == [Stalled("b", "stroke", 19.0)]
+    assert patience.overdue(20.0) == []
+
+
+def test_who_holds_where_it_may_pass_is_late_from_when_it_was_told_that() -> None:
+    """Not from when something else about it was looked at again."""
+    body = FakeBody()
+    beat = Gesture(id="g", lexeme="BEAT", mode="RIGHT_HAND")
+    authority = Authority(plan_block(block((beat,)), [body.estimate(beat)]), 0.0, CONFIG)
+    authority.follow([Point("g", "end")])
+    authority.advance(0.0)
+    authority.reach(Point("g", "start"), 0.0)
+    authority.reach(Point("g", "ready"), 0.5)
+    assert authority.advance(0.5) == [Extend("g", "stroke")]
+    assert authority.advance(1.2) == [Extend("g", "end")]
+    assert authority.advance(1.5) == [Late("g", "stroke_start", 0.75)]  # it was to begin its stroke at 0.75
+    assert authority.advance(2.0) == []
+    authority.arrive(Point("g", "stroke_start"), 2.1)
+
+    stalled = 1.2 + CONFIG.stall + CONFIG.stall_factor * 0.25
+    assert authority.advance(stalled - 0.01) == []
+    assert [type(each) for each in authority.advance(stalled)] == [Stalled]

@@ -1,0 +1,17 @@
+"""What has been said of the speeches of a block."""
+
+from schemas.behaviors import Mark, Speech
+from schemas.blocks import SpokenText
+from services.realizer.points import Point
+from services.realizer.spoken import Spoken
+
+STORY = Speech(id="s", text="one two three", marks=(Mark("m", 4),))
+
+
+def test_words_that_were_said_are_not_taken_back_by_what_is_told_late() -> None:
+    spoken = Spoken((STORY,))
+    spoken.hear("s", 8)
+    spoken.hear("s", 4)
+    spoken.reach(Point("s", "m"))
+
+    assert spoken.of("s") == SpokenText(behavior="s", text="one two ", complete=False)
