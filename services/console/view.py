@@ -3,6 +3,8 @@
 `feed(scene, message, at)` gives the next scene; `services.console.render` draws one. Nothing here knows the bus.
 """
 
+from collections.abc import Mapping
+
 import msgspec
 from msgspec import Struct
 
@@ -69,9 +71,12 @@ class Point(Struct, frozen=True, kw_only=True):
 
 
 class BlockInView(Struct, frozen=True, kw_only=True):
+    """places: of points, where in `points` each is, by behavior and name: looked up for each sync point."""
+
     id: str
     began: Seconds
     points: tuple[Point, ...] = ()
+    places: Mapping[tuple[str, str], int] = {}
     status: str = ""
     """Empty while it runs."""
 
@@ -216,26 +221,24 @@ def _block(scene: Scene, message: BlockProgress, at: Seconds) -> Scene:
 
 
 def _points(scene: Scene, id: str, news: tuple[Point, ...]) -> Scene:
+    blocks = tuple(_merged(block, news) if block.id == id else block for block in scene.blocks)
+    return msgspec.structs.replace(scene, blocks=blocks)
+
+
+def _merged(block: BlockInView, news: tuple[Point, ...]) -> BlockInView:
     """A plan never unsays what was realised, and a realised point keeps the newest plan made before it."""
-    return msgspec.structs.replace(
-        scene,
-        blocks=tuple(
-            msgspec.structs.replace(block, points=_merged(block.points, news)) if block.id == id else block
-            for block in scene.blocks
-        ),
-    )
-
-
-def _merged(known: tuple[Point, ...], news: tuple[Point, ...]) -> tuple[Point, ...]:
-    points = {(point.behavior, point.sync): point for point in known}
+    points, places = list(block.points), block.places
+    if any((new.behavior, new.sync) not in places for new in news):
+        known = ((point.behavior, point.sync) for point in (*points, *news))
+        places = {key: place for place, key in enumerate(dict.fromkeys(known))}
     for new in news:
-        old = points.get((new.behavior, new.sync))
-        if old is not None:
-            if old.realised is not None:
-                continue
-            new = msgspec.structs.replace(new, planned=old.planned if new.planned is None else new.planned)
-        points[new.behavior, new.sync] = new
-    return tuple(points.values())
+        place = places[new.behavior, new.sync]
+        if place == len(points):
+            points.append(new)
+        elif (old := points[place]).realised is None:
+            planned = old.planned if new.planned is None else new.planned
+            points[place] = msgspec.structs.replace(new, planned=planned)
+    return msgspec.structs.replace(block, points=tuple(points), places=places)
 
 
 def _event(scene: Scene, event: ConnectionEvent, at: Seconds) -> Scene:

@@ -61,9 +61,10 @@ class Outlook(Facts):
     @property
     def ahead(self) -> Mapping[Point, Seconds]:
         """When the points that other blocks are tied to are expected, of those that are still to come."""
-        forecast = self.forecast
-        coming = (self._followed & self.plan.at.keys()) - self.reached.keys() if forecast is not None else ()
-        return {point: forecast.times[self.plan.at[point]] for point in coming}  # type: ignore[union-attr]
+        if not self._followed or self.forecast is None:
+            return {}
+        at, times = self.plan.at, self.forecast.times
+        return {point: times[at[point]] for point in self._followed if point in at and point not in self.reached}
 
     @property
     def _overdue_at(self) -> Seconds | None:

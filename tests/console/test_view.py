@@ -1,4 +1,7 @@
+import sys
+from collections.abc import Callable
 from io import StringIO
+from types import FrameType
 
 import msgspec
 import pytest
@@ -159,3 +162,32 @@ def test_people_look_at_things_away_or_around(scene: view.Scene) -> None:
         looks.append(next(line for line in drawn(scene).splitlines() if "human" in line)[:40])
 
     assert [("looks at table" in looks[0]), ("looks away" in looks[1]), ("looks around" in looks[2])] == [True] * 3
+
+
+def test_a_sync_point_costs_the_view_no_look_at_all_other_points_of_its_block() -> None:
+    def work(size: int) -> int:
+        """Python's own instructions."""
+        points = tuple(PlannedPoint(behavior=f"b{number}", sync="end", time=1.0) for number in range(size))
+        scene = view.feed(view.empty("robot", 0.0), BlockProgress(block="long", progress="start", at=at(0.0)), 0.0)
+        scene = view.feed(scene, PredictionFeedback(block="long", points=points), 0.0)
+        reached = SyncPointProgress(block="long", behavior="b7", sync="end", at=at(0.0), time=1.5)
+        count = 0
+
+        def counted(frame: FrameType, event: str, argument: object) -> Callable[..., object]:
+            nonlocal count
+            frame.f_trace_opcodes = True
+            count += event == "opcode"
+            return counted
+
+        before = sys.gettrace()
+        sys.settrace(counted)
+        try:
+            scene = view.feed(scene, reached, 1.5)
+        finally:
+            sys.settrace(before)
+        assert scene.block is not None
+        assert scene.block.points[7].realised == 1.5
+        assert [point.behavior for point in scene.block.points] == [each.behavior for each in points]
+        return count
+
+    assert work(1000) == work(10)
