@@ -11,8 +11,8 @@ from schemas.units import Probability, Stamp, Vector
 class HeadPose(Struct, frozen=True, kw_only=True, tag="head_pose", omit_defaults=True):
     """stream: perception. Where a person's head is, and which way it faces.
 
-    position: between the eyes, in the robot's frame, metres. direction: any length but 0; of the eyes, if the tracker
-    sees those, else of the nose.
+    position: between the eyes, in the robot's frame, metres. direction: any length but 0, its parts at most 1e6; of
+    the eyes, if the tracker sees those, else of the nose.
     """
 
     actor: str

@@ -10,8 +10,17 @@ Degrees = Annotated[float, Meta(description="degrees")]
 Meters = Annotated[float, Meta(description="metres")]
 Probability = Annotated[float, Meta(ge=0, le=1, description="0..1")]
 
-Vector = tuple[float, float, float]
-"""Metres: x ahead of the robot, y to its left, z up; origin on the floor below the robot."""
+FARTHEST = 1e6
+"""No place is farther off: with larger numbers, and with what is no number, no geometry can be done."""
+Coordinate = Annotated[float, Meta(ge=-FARTHEST, le=FARTHEST)]
+Extent = Annotated[float, Meta(ge=0, le=FARTHEST, description="metres")]
+Heading = Annotated[float, Meta(ge=-FARTHEST, le=FARTHEST, description="radians")]
+Named = Annotated[str, Meta(min_length=1)]
+Vector = tuple[Coordinate, Coordinate, Coordinate]
+"""Metres: x ahead of the robot, y to its left, z up; origin on the floor below the robot.
+
+A message whose vector has a part beyond `FARTHEST`, or one that is no number, is refused where it is decoded.
+"""
 
 
 class Stamp(Struct, frozen=True, array_like=True):

@@ -4,7 +4,7 @@ from typing import Literal
 
 from msgspec import Struct
 
-from schemas.units import Meters, Probability, Radians, Stamp, Vector
+from schemas.units import Coordinate, Extent, Heading, Named, Probability, Stamp, Vector
 
 EntityKind = Literal["object", "person", "hand", "surface"]
 
@@ -17,12 +17,12 @@ class Entity(Struct, frozen=True, kw_only=True, omit_defaults=True):
     category, size, color, shape, name, features: what phrases for it are made of; empty: unknown.
     """
 
-    id: str
+    id: Named
     kind: EntityKind
     position: Vector
-    yaw: Radians = 0.0
-    footprint: tuple[tuple[float, float], ...] = ()
-    radius: Meters = 0.0
+    yaw: Heading = 0.0
+    footprint: tuple[tuple[Coordinate, Coordinate], ...] = ()
+    radius: Extent = 0.0
     category: str = ""
     """What it is, a noun: `cup`. Without one its shape is the noun: `square`."""
     color: str = ""

@@ -8,7 +8,7 @@ import math
 from functools import cached_property, lru_cache
 from typing import NamedTuple
 
-from schemas.units import Meters, Probability, Radians, Seconds, Vector
+from schemas.units import FARTHEST, Meters, Probability, Radians, Seconds, Vector
 from schemas.world import Entity, World
 from services.recognition.config import RecognitionConfig
 
@@ -16,8 +16,6 @@ Targets = tuple[str, ...]
 AWAY: Targets = ()
 SURFACE = "table"
 """What a thing lies on when no surface is seen under it."""
-FARTHEST: Meters = 1e6
-"""No place is farther off; nor is it one that is no number."""
 SAME_ANGLE: Radians = 1e-6
 """Closer angles are the same; then the nearer thing is in front."""
 ROUNDING: Meters = 1e-9
@@ -251,4 +249,4 @@ def is_direction(vector: Vector) -> bool:
 
 
 def is_place(vector: Vector) -> bool:
-    return all(abs(part) < FARTHEST for part in vector)
+    return all(abs(part) <= FARTHEST for part in vector)

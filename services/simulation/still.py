@@ -10,7 +10,7 @@ from msgspec import Struct
 from schemas import keys
 from schemas.actions import ActorFound
 from schemas.faults import Fault, InputRefused
-from schemas.units import Stamp
+from schemas.units import FARTHEST, Stamp
 from schemas.world import Entity, World
 from services.bus import Bus
 from services.runtime import Ready
@@ -19,6 +19,7 @@ from services.simulation.table import Table
 from services.tangram_table import tangram_table
 
 EXAMPLE = '{"entities": [{"id": "cup", "kind": "object", "position": [0.5, 0.1, 0.8]}]}'
+ADVICE = f"for example {EXAMPLE}; places are in metres, at most {FARTHEST:.0e}"
 
 
 class _File(Struct, frozen=True, forbid_unknown_fields=True):
@@ -52,13 +53,14 @@ def load_world(path: Path) -> World:
         entities = msgspec.json.decode(path.read_bytes(), type=_File).entities
     except OSError as error:
         raise InputRefused(Fault(reason=error.strerror or str(error), where=str(path))) from error
-    except (msgspec.DecodeError, RecursionError) as error:
-        raise InputRefused(Fault(reason=str(error), where=str(path), advice=EXAMPLE)) from error
+    except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
+        raise InputRefused(Fault(reason=str(error), where=str(path), advice=ADVICE)) from error
     seen: dict[str, int] = {}
     for index, entity in enumerate(entities):
         where = f"{path}: $.entities[{index}].id"
-        if not entity.id:
-            raise InputRefused(Fault(reason="an entity without an id", where=where))
+        if entity.kind == "person" and (not keys.is_chunk(entity.id) or entity.id == "all"):
+            advice = f"a person's id has {keys.CHUNK}, and is not 'all'"
+            raise InputRefused(Fault(reason=f"{entity.id!r} can't be a person's id", where=where, advice=advice))
         if entity.id in seen:
             reason = f"duplicate id {entity.id!r}, of $.entities[{seen[entity.id]}] already"
             raise InputRefused(Fault(reason=reason, where=where, advice="give each entity its own id"))

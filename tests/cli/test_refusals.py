@@ -121,7 +121,8 @@ def test_malformed_xml_warns_about_no_block(engage: Engage, tmp_path: Path) -> N
         ('{"things": []}', "things"),
         ('{"entities": [{"id": "cup", "kind": "mug", "position": [0, 0, 0]}]}', "mug"),
         ('{"entities": [{"id": "cup", "kind": "object", "position": [0, 0]}]}', "position"),
-        ('{"entities": [{"id": "", "kind": "object", "position": [1, 0, 0]}]}', "without an id"),
+        ('{"entities": [{"id": "", "kind": "object", "position": [1, 0, 0]}]}', "$.entities[0].id"),
+        ('{"entities": [{"id": "cup", "kind": "object", "position": [1e308, 0, 0]}]}', "$.entities[0].position[0]"),
     ],
 )  # fmt: skip
 def test_a_bad_world_is_refused(engage: Engage, tmp_path: Path, world: str, reason: str) -> None:

@@ -3,11 +3,14 @@
 import asyncio
 
 import pytest
+from msgspec.structs import replace
 
+from schemas import keys
 from schemas.behaviors import Event, Gaze, Pointing, Reference, Speech, SpeechOption, TurnSignal
 from schemas.blocks import SpokenText
 from schemas.faults import Fault
 from schemas.fragments import FragmentOutcome, TurnFragment
+from schemas.messages import encode
 from schemas.world import World
 from services.generation.config import GenerationConfig
 from services.memory_bus import MemoryHub
@@ -365,3 +368,17 @@ async def test_a_covered_piece_is_still_spoken_of_and_one_that_has_gone_is_not(h
 
         with pytest.raises(RequestRefused, match="does not know the object 'middle'"):
             await partners.send(refers("gone")).outcome
+
+
+@pytest.mark.parametrize("part", [float("nan"), float("inf"), 1e308])
+async def test_a_world_with_what_is_no_place_is_refused_and_the_last_good_one_used(
+    hub: MemoryHub, part: float
+) -> None:
+    async with stage(hub) as partners:
+        with partners.bus.subscribe(keys.fault("generation")) as faults:
+            nowhere = World(entities=(replace(TABLE.entities[0], position=(part, 0.0, 0.0)),))
+            hub.inject(keys.WORLD, encode(nowhere), "application/msgpack")
+            partners.send(refers())
+            await partners.fragment_block("show")  # refers to what the last good world holds
+
+            assert "at `$.entities[0].position[0]`" in str(faults._queue[0].message)

@@ -10,6 +10,7 @@ from schemas import keys
 from schemas.actions import ActionBegan
 from schemas.behaviors import TurnSignal
 from schemas.body import BodyPose, Ray, RobotState
+from schemas.messages import encode
 from schemas.perception import HeadPose
 from schemas.recognition import EventOutcome, SignalTurn
 from schemas.units import Vector
@@ -203,9 +204,25 @@ async def test_nobody_speaks_for_the_robots_head_or_under_anothers_key(hub: Memo
                 about_robot = pose("blue", at, actor=ROBOT)
                 bus.publish(keys.head_pose(ROBOT), about_robot)
                 bus.publish(keys.head_pose("ann"), pose("blue", at, actor="bob"))
-                bad = HeadPose(actor="eve", position=(0.0, 0.0, float("nan")), direction=(0, 0, 0), at=bus.stamp(at))
-                bus.publish(keys.head_pose("eve"), bad)
+                nowhere = HeadPose(actor="eve", position=(0.0, 0.0, 1.2), direction=(0, 0, 0), at=bus.stamp(at))
+                bus.publish(keys.head_pose("eve"), nowhere)
                 await asyncio.sleep(0.1)
             await asyncio.sleep(1.0)
 
         assert len(inbox) == 0
+
+
+@pytest.mark.parametrize("part", [float("nan"), float("inf"), 1e308])
+async def test_what_is_no_place_is_refused_with_a_fault_and_computed_with_by_nobody(hub: MemoryHub, part: float):
+    bus = hub.join("perception")
+    head = HeadPose(actor="eve", position=(part, 0.0, 1.2), direction=(1.0, 0.0, 0.0), at=bus.stamp())
+    with bus.subscribe(keys.ANY_ACTION) as actions, bus.subscribe(keys.fault("recognition")) as faults:
+        async with running(hub, recognition()):
+            for key, message in ((keys.WORLD, table(red=(part, 0.0, 0.7))), (keys.head_pose("eve"), head)):
+                hub.inject(key, encode(message), "application/msgpack")
+            await asyncio.sleep(1.0)
+
+        assert len(actions) == 0
+        reasons = [str(queued.message) for queued in faults._queue]
+    assert "at `$.entities[2].position[0]`" in reasons[0]
+    assert "at `$.position[0]`" in reasons[1]

@@ -1,5 +1,6 @@
 """Worlds from files, and a world that stands still."""
 
+import json
 from functools import partial
 from pathlib import Path
 
@@ -46,17 +47,55 @@ def test_a_world_of_the_bus_can_be_kept_in_a_file(tmp_path: Path) -> None:
         ('{"entities": [{"id": "cup", "kind": "object", "position": [0, 0]}]}', r"position"),
         ('{"entities": [{"id": "cup", "kind": "object"}]}', r"position"),
         (f'{{"entities": [{CUP}, {CUP}]}}', r"\$\.entities\[1\]\.id: duplicate id 'cup'"),
-        ('{"entities": [{"id": "", "kind": "object", "position": [0, 0, 0]}]}', r"without an id"),
+        (
+            '{"entities": [{"id": "", "kind": "object", "position": [0, 0, 0]}]}',
+            r"length >= 1 - at `\$\.entities\[0\]\.id`",
+        ),
+        ('{"entities": [{"id": "caf\xe9", "kind": "object", "position": [0, 0, 0]}]}', r"utf-8"),
     ],
 )
 def test_a_bad_world_is_refused_with_file_and_place(tmp_path: Path, text: str, reason: str) -> None:
     file = tmp_path / "world.json"
-    file.write_text(text)
+    file.write_text(text, encoding="latin-1")
 
     with pytest.raises(InputRefused, match=reason) as refusal:
         load_world(file)
 
     assert refusal.value.fault.where.startswith(str(file))
+
+
+@pytest.mark.parametrize(
+    ("about", "place"),
+    [
+        ({"position": [1e308, 0, 0]}, "position[0]"),
+        ({"position": [0, 0, -2e6]}, "position[2]"),
+        ({"yaw": 1e300}, "yaw"),
+        ({"radius": -0.1}, "radius"),
+        ({"footprint": [[0, 0], [1, 1e9]]}, "footprint[1][1]"),
+        ({"velocity": [0, 1e308, 0]}, "velocity[1]"),
+    ],
+)
+def test_what_is_no_place_is_refused_with_its_json_path(tmp_path: Path, about: dict[str, object], place: str) -> None:
+    file = tmp_path / "world.json"
+    cup = {"id": "cup", "kind": "object", "position": [0.5, 0.1, 0.8], **about}
+    file.write_text(json.dumps({"entities": [cup]}))
+
+    with pytest.raises(InputRefused) as refusal:
+        load_world(file)
+
+    fault = refusal.value.fault
+    assert f"at `$.entities[0].{place}`" in fault.reason
+    assert fault.where == str(file)
+    assert "in metres" in fault.advice
+
+
+@pytest.mark.parametrize("id", ["a/b", "@anna", "who?", "all"])
+def test_a_person_whose_id_cannot_be_in_a_key_is_refused(tmp_path: Path, id: str) -> None:
+    file = tmp_path / "world.json"
+    file.write_text(json.dumps({"entities": [{"id": id, "kind": "person", "position": [1, 0, 1]}]}))
+
+    with pytest.raises(InputRefused, match=r"\$\.entities\[0\]\.id: .* can't be a person's id"):
+        load_world(file)
 
 
 def test_a_world_that_is_not_there_is_refused(tmp_path: Path) -> None:
