@@ -65,7 +65,7 @@ class Recognition:
 
     def _tell(self, effects: list[Effect], now: Seconds) -> None:
         events = [effect for effect in effects if isinstance(effect, ConnectionEvent)]
-        busy = {person.id for person in self.session.persons.values() if person.acts_since is not None}
+        busy = self.session.busy
         self.standings.feed(events, busy, now)
         if self.log is not None:
             self.log += events

@@ -6,6 +6,7 @@ that comes while the turn still goes on is known at once, but decided only when 
 
 from schemas.behaviors import Action
 from schemas.units import Probability, Seconds
+from services.recognition.limits import in_time
 from services.recognition.machine import IDLE, Ledger, Machine, Row, UnderWay, table
 
 ROBOT_WAITING, HUMAN_WAITING = "robot_waiting", "human_waiting"
@@ -120,7 +121,7 @@ class AdjacencyPair(Machine):
 
     def is_third_turn(self, person: str, at: Seconds) -> bool:
         """Does this speech of the initiator follow the answer so closely that it closes that pair?"""
-        return self.state == IDLE and person == self._third_turn_of and at <= self._third_turn_until
+        return self.state == IDLE and person == self._third_turn_of and in_time(at, self._third_turn_until)
 
     def third_turn(self, at: Seconds) -> None:
         self._third_turn_of = ""
@@ -154,13 +155,29 @@ class AdjacencyPair(Machine):
 
     # -- second turn --------------------------------------------------------------------------------------------
 
+    def may_be_answered_with(self, action: Action) -> bool:
+        """Does the robot wait for an answer of the person, and would `action` be one?"""
+        return self.event is not None and self.state == ROBOT_WAITING and action in self.event.accept
+
     def human_begins(self, action: Action, at: Seconds, confidence: Probability = 1.0) -> bool:
         """A person's action as the answer to the robot's turn; False if it is none."""
-        if self.event is None or self.state != ROBOT_WAITING or action not in self.event.accept:
+        if self.event is None:
             return False
-        self.event.rests_on(confidence)
-        self._answer("human_answers", action, at)
-        return True
+        if self._is_earlier_answer(action, at):
+            self.event.rests_on(confidence)
+            self.event.response, self._response_since, self._response_until = action, at, None
+            return True
+        if self.may_be_answered_with(action):
+            self.event.rests_on(confidence)
+            self._answer("human_answers", action, at)
+            return True
+        return False
+
+    def _is_earlier_answer(self, action: Action, at: Seconds) -> bool:
+        """Did it begin before what has been taken for the answer, and only becomes known now, while that is open?"""
+        assert self.event is not None
+        undecided = self.state == INTERRUPTED and self._by_robot
+        return undecided and at < self._response_since and action in self.event.accept
 
     def human_goes_on(self, action: Action, at: Seconds) -> bool:
         """The asking person speaks or manipulates again: the turn is not over yet. False if nobody waits."""

@@ -91,6 +91,15 @@ class RecognitionConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields
     """For raw perception."""
     lost_face_grace: Seconds = 0.5
     """A face lost for less has not gone."""
+    forgotten_after: Seconds = 600.0
+    """Who has been gone for this long, or not been told of by anybody, is forgotten: with the same id comes somebody
+    new. What they have done stays in the statistics of all together."""
+    longest_speech: Seconds = 60.0
+    """Speech whose end nobody has told of by then is over. The next beginning ends it, too."""
+    longest_gesture: Seconds = 10.0
+    """The same of a nod, a shake or a point."""
+    longest_manipulation: Seconds = 120.0
+    """The same of a manipulation."""
     window: Seconds = 30.0
     """Of the recent statistics."""
     reference_mtbce: Seconds = 5.7
@@ -108,6 +117,7 @@ class RecognitionConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields
         positive = (
             "directed_gaze_limit", "mutual_facial_gaze_limit", "adjacency_pair_limit", "manipulation_limit",
             "turn_patience", "backchannel_limit", "direct_by_look", "window", "reference_mtbce",
+            "longest_speech", "longest_gesture", "longest_manipulation",
         )  # fmt: skip
         for name in positive:
             if not getattr(self, name) > 0:
@@ -117,6 +127,10 @@ class RecognitionConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields
                 raise ValueError(f"{name} must not be negative, but is {getattr(self, name)}")
         if not 0 <= self.disengaged_below + self.hysteresis <= self.engaged_from - self.hysteresis <= 1:
             raise ValueError("thresholds overlap: disengaged_below + hysteresis <= engaged_from - hysteresis")
+        if not self.forgotten_after > max(self.lost_face_grace, self.after_robot_directed, self.direct_by_look):
+            raise ValueError(
+                "forgotten_after must be greater than lost_face_grace, after_robot_directed and direct_by_look"
+            )
         if self.enough_events < 2:
             raise ValueError("enough_events must be at least 2: one event has no time between events")
         if not self.accept:

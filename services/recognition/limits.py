@@ -7,8 +7,15 @@ from schemas.syncref import BLOCK_ITSELF, SyncRef, canonical_sync
 from schemas.units import Seconds
 from services.recognition.latest import Latest
 
+ROUNDING: Seconds = 1e-6
+"""Sums of times are off by less than this, on clocks that have run for decades, too."""
 BLOCKS_KEPT = 64
 """Blocks whose realised points are remembered, for a request that arrives after them."""
+
+
+def in_time(at: Seconds, limit: Seconds) -> bool:
+    """Is `at` no later than `limit`? What happens at the very limit still counts, whatever the rounding."""
+    return at <= limit + ROUNDING
 
 
 def anchor(reference: str) -> tuple[str, Seconds] | None:

@@ -10,13 +10,33 @@ from typing import ClassVar, NamedTuple
 from msgspec import Struct
 
 from schemas.behaviors import Action, Cause, EventKind
-from schemas.recognition import ConnectionEvent, EventOutcome, EventState, TurnOutcome
+from schemas.recognition import ENDINGS, ConnectionEvent, EventOutcome, EventState, TurnOutcome
 from schemas.requests import Accepted, Refused
 from schemas.units import Probability, Seconds, Stamp
 
-Effect = ConnectionEvent | EventOutcome | TurnOutcome | Accepted | Refused
+
+class Forgotten(NamedTuple):
+    """A person who has been gone for long. Who comes with this id from now on is somebody new."""
+
+    actor: str
+
+
+class Mishap(NamedTuple):
+    """A bug has shown while something happened; `actor` is whom it concerned, empty: nobody in particular.
+
+    The person's open events have ended as lost; nothing else has.
+    """
+
+    actor: str
+    at: Seconds
+    error: Exception
+
+
+Effect = ConnectionEvent | EventOutcome | TurnOutcome | Accepted | Refused | Forgotten | Mishap
 IDLE = "idle"
 DECISIONS: frozenset[EventState] = frozenset({"succeeded", "failed", "preempted", "withdrawn", "superseded"})
+DECIDED: frozenset[EventState] = DECISIONS | {"lost"}
+"""What answers a request."""
 PREFIX: Mapping[EventKind, str] = {
     "directed_gaze": "dg", "mutual_facial_gaze": "mfg", "adjacency_pair": "ap", "backchannel": "bc",
 }  # fmt: skip
@@ -94,6 +114,8 @@ class Ledger:
         self._clock = clock
         self._session = session
         self._count: dict[EventKind, int] = dict.fromkeys(PREFIX, 0)
+        self._open: dict[str, UnderWay] = {}
+        """What has been told of and not ended, by id."""
 
     def take(self) -> list[Effect]:
         """What happened since the last call."""
@@ -122,7 +144,11 @@ class Ledger:
                 block=event.block, behavior=event.behavior, turn=event.turn,
             )
         )  # fmt: skip
-        if state in DECISIONS and event.request:
+        if state in ENDINGS:
+            self._open.pop(event.id, None)
+        else:
+            self._open[event.id] = event
+        if state in DECIDED and event.request:
             self.effects.append(
                 EventOutcome(
                     id=event.request, event=event.id, state=state, at=self.stamp(at), delay=event.delay,
@@ -130,6 +156,11 @@ class Ledger:
                 )
             )  # fmt: skip
             event.request = ""
+
+    def lose(self, person: str, at: Seconds) -> None:
+        """Nobody will know what became of the open events with `person`."""
+        for event in [event for event in self._open.values() if person in (event.initiator, event.responder)]:
+            self.publish(event, "lost", at)
 
     def answer(self, request: str, event: str, at: Seconds) -> None:
         """Answer a request with an event that has been published already."""

@@ -16,16 +16,18 @@ class OpenBook:
 
     def feed(self, changes: Iterable[ConnectionEvent], at: Stamp) -> list[OpenEvents]:
         """Enter what happened; the messages of the persons it happened with. at: now."""
-        touched = set()
+        touched: dict[str, tuple[ConnectionEvent, ...]] = {}
         for change in changes:
             person = change.person(self._robot)
-            touched.add(person)
             events = self._open.setdefault(person, {})
             if change.state in ENDINGS:
                 events.pop(change.id, None)
             else:
                 events[change.id] = change
+            touched[person] = tuple(events.values())
+            if not events:
+                del self._open[person]
         return [
-            OpenEvents(actor=person, session=self._session, at=at, events=tuple(self._open[person].values()))
-            for person in sorted(touched)
+            OpenEvents(actor=person, session=self._session, at=at, events=events)
+            for person, events in sorted(touched.items())
         ]

@@ -4,18 +4,22 @@ from collections.abc import Callable, Iterator
 from functools import partial
 from typing import NamedTuple
 
-from schemas.behaviors import Action, Cause, EventKind
+from schemas.actions import ActionBegan, ActionEnded
+from schemas.behaviors import Action, EventKind
 from schemas.units import Probability, Seconds
-from services.recognition.adjacency_pair import AdjacencyPair
-from services.recognition.backchannel import BRIEF, UNDECIDED, Backchannel
 from services.recognition.config import RecognitionConfig
+from services.recognition.conversation import Conversation
 from services.recognition.directed_gaze import HUMAN_DIRECTING, DirectedGaze
 from services.recognition.limits import LimitClock
 from services.recognition.machine import IDLE, Ledger, UnderWay
 from services.recognition.mutual_facial_gaze import HUMAN_WAITING, MutualFacialGaze
+from services.recognition.news import News
 from services.recognition.presence import Presence
 from services.recognition.scene import Gaze, Scene
 from services.recognition.shared_gaze import SharedGaze
+
+ACTIONS_KEPT = 64
+"""Of each person; of those it is known when they last began and ended."""
 
 
 class Due(NamedTuple):
@@ -32,24 +36,29 @@ class _Directed(NamedTuple):
     at: Seconds
 
 
-class Person:
-    """The recognizers of one actor. strict: undefined transitions raise."""
+class _Doing(NamedTuple):
+    """What a person does, and since when. targets: with what."""
 
-    def __init__(self, id: str, scene: Scene, config: RecognitionConfig, ledger: Ledger, *, strict: bool) -> None:
+    targets: tuple[str, ...]
+    since: Seconds
+
+
+class Person:
+    """The recognizers of one actor. number: in the order of acquaintance. strict: undefined transitions raise."""
+
+    def __init__(
+        self, id: str, number: int, scene: Scene, config: RecognitionConfig, ledger: Ledger, *, strict: bool
+    ) -> None:
         self.id = id
+        self.number = number
         self.presence = Presence(config.lost_face_grace)
         self.gaze = Gaze()
-        self.speaks_since: Seconds | None = None
-        self.silent_since: Seconds | None = None
-        self.acts_since: Seconds | None = None
-        self._speech_confidence: Probability = 1.0
         self.directed: list[DirectedGaze] = []
         self.facial = MutualFacialGaze(ledger, strict=strict)
-        self.pair = AdjacencyPair(
-            ledger, limit=config.adjacency_pair_limit, patience=config.turn_patience, strict=strict
-        )
-        self.own_backchannel = Backchannel(ledger, limit=config.backchannel_limit, strict=strict)
-        self.robot_backchannel = Backchannel(ledger, limit=config.backchannel_limit, strict=strict)
+        self.conversation = Conversation(id, scene, config, ledger, strict=strict)
+        self.news = News(ACTIONS_KEPT)
+        self._doing: dict[Action, _Doing] = {}
+        """Other than looking."""
         self._scene = scene
         self._config = config
         self._ledger = ledger
@@ -63,43 +72,104 @@ class Person:
         first: Due | None = None
         candidates: tuple[tuple[Seconds | None, Callable[[Seconds], None]], ...] = (
             (self.gaze.deadline, self._gaze_expires),
-            (self.presence.deadline, self._gone),
+            (self.presence.deadline, self.leave),
             *((one.deadline, partial(self._expire_directed, one)) for one in self.directed),
             (self.facial.deadline, self.facial.expire),
-            (self.own_backchannel.deadline, self._takes_floor),
-            (self.robot_backchannel.deadline, self._robot_takes_floor),
-            (self.pair.deadline, self.pair.expire),
+            *self.conversation.dues,
             (self._look_directs_at, self._look_directs),
+            *((one.since + self._longest(action), self._goes_on_too_long) for action, one in self._doing.items()),
         )
         for at, happen in candidates:
             if at is not None and (first is None or at < first.at):
                 first = Due(at, happen)
         return first
 
+    def pass_time(self, at: Seconds) -> None:
+        """What is due first happens, at its own time `at`."""
+        due = self.first_due()
+        assert due is not None
+        due.happen(at)
+
     @property
     def _look_directs_at(self) -> Seconds | None:
         """When this look will have lasted long enough to direct the robot's, if nothing changes."""
-        if self.gaze.spent or self.gaze.ended is not None or self.acts_since is not None:
+        if self.gaze.spent or self.gaze.ended is not None or self.conversation.acts_since is not None:
             return None
         if not any(map(self._scene.is_object, self.gaze.targets)):
             return None
         silent_since = self._scene.others_silent_since(self.id)
         return None if silent_since is None else max(self.gaze.since, silent_since) + self._config.direct_by_look
 
-    def _gone(self, at: Seconds) -> None:
-        """Close whatever is open with this person."""
+    def leave(self, at: Seconds) -> None:
+        """The person has gone: close whatever is open."""
         until = self.presence.leave()
         for one in self.directed:
             one.person_gone(at, until)
         self.forget_idle(at)
         self.facial.person_gone(at, until)
-        self.pair.person_gone(at, until)
-        self.own_backchannel.person_gone(at, until)
-        self.robot_backchannel.person_gone(at, until)
+        self.conversation.person_gone(at, until)
         self.gaze = Gaze(since=until)
-        self.speaks_since = self.acts_since = None
-        self.silent_since = until
-        self._scene.falls_silent(self.id, until)
+        self._doing.clear()
+        self._scene.stops(self.id, until)
+
+    # -- what the person does -----------------------------------------------------------------------------------
+
+    def begins(self, began: ActionBegan, at: Seconds) -> None:
+        if not self.news.is_news(began, at) or not self.presence.seen(at):
+            return
+        action, targets, confidence = began.action, began.targets, began.confidence
+        if action == "look":
+            self.looks(targets, at, confidence)
+            return
+        if action in self._doing:
+            if at < self._doing[action].since:
+                return
+            self._stops(action, at)  # its end has been lost
+        self._doing[action] = _Doing(targets, at)
+        match action:
+            case "point":
+                self.points(targets, at, confidence)
+            case "speak":
+                self.conversation.speaks(at, confidence)
+            case "nod" | "shake":
+                self.conversation.gestures(action, at, confidence)
+            case "act":
+                self._scene.acting.add(self.id)
+                self.conversation.manipulates(at, confidence)
+
+    def ends(self, ended: ActionEnded, at: Seconds) -> None:
+        if not self.news.is_news(ended, at):
+            return
+        if ended.action == "look":
+            self.gaze.end(ended.targets, at)
+            return
+        doing = self._doing.get(ended.action)
+        if doing is not None and at >= doing.since and (not ended.targets or ended.targets == doing.targets):
+            self._stops(ended.action, at)
+
+    def _stops(self, action: Action, at: Seconds) -> None:
+        del self._doing[action]
+        match action:
+            case "point":
+                self.conversation.pair.ends("point", at, by_robot=False)
+            case "speak":
+                self.conversation.falls_silent(at)
+            case "nod" | "shake":
+                self.conversation.gesture_ends(action, at)
+            case "act":
+                self.gaze.spent = True
+                self._scene.acting.discard(self.id)
+                self.conversation.manipulation_ends(at)
+
+    def _longest(self, action: Action) -> Seconds:
+        if action == "speak":
+            return self._config.longest_speech
+        return self._config.longest_manipulation if action == "act" else self._config.longest_gesture
+
+    def _goes_on_too_long(self, at: Seconds) -> None:
+        """An end has been lost, and no other beginning has followed."""
+        for action in [action for action, one in self._doing.items() if one.since + self._longest(action) <= at]:
+            self._stops(action, at)
 
     # -- gaze ---------------------------------------------------------------------------------------------------
 
@@ -114,9 +184,6 @@ class Person:
         self.gaze_changed(at)
         if self.on_robots_face and not was_on_face and self.facial.state == IDLE:
             self._human_looks_at_face(at)
-
-    def looks_away(self, targets: tuple[str, ...], at: Seconds) -> None:
-        self.gaze.end(targets, at)
 
     def _gaze_expires(self, at: Seconds) -> None:
         self.gaze_changed(self.gaze.expire())
@@ -175,7 +242,7 @@ class Person:
         objects = tuple(filter(self._scene.is_object, targets))
         if objects:
             self._human_directs(objects, at, at, confidence)
-        self.pair.human_begins("point", at, confidence)
+        self.conversation.points(at, confidence)
 
     def _look_directs(self, at: Seconds) -> None:
         self.gaze.spent = True
@@ -228,132 +295,15 @@ class Person:
                 self._robot_directed.append(_Directed(one.objects, at))
         self.directed = [one for one in self.directed if one.state != IDLE]
 
-    # -- mutual facial gaze -------------------------------------------------------------------------------------
-
-    def robot_looks_at_face(self, event: UnderWay, clock: LimitClock) -> None:
-        self.facial.supersede(event.started)
-        robot_on = self._scene.robot_looks_at((self.id,))
-        self.facial.robot_begins(event, clock, robot_on=robot_on, look=self.gaze if self.on_robots_face else None)
-
-    # -- speech and gestures ------------------------------------------------------------------------------------
-
-    @property
-    def robot_holds_floor(self) -> bool:
-        return self._scene.robot_speaks_since is not None or self.pair.robot_holds_turn
-
-    @property
-    def holds_floor(self) -> bool:
-        return self.speaks_since is not None
-
-    def speaks(self, at: Seconds, confidence: Probability = 1.0) -> None:
-        if self.speaks_since is not None:
-            return
-        self.speaks_since, self.silent_since = at, None
-        self._scene.speaks(self.id)
-        self._speech_confidence = confidence
-        if self.robot_holds_floor:
-            self.own_backchannel.speaks(self._backchannel(self._scene.robot, self.id, at, confidence))
-        else:
-            self._human_turn(at, "speak", confidence)
-
-    def falls_silent(self, at: Seconds) -> None:
-        if self.speaks_since is None:
-            return
-        self.speaks_since, self.silent_since = None, at
-        self._scene.falls_silent(self.id, at)
-        self._backchannel_speech_ends(self.own_backchannel, at)
-        self._floor_is_free(at)
-        self.pair.ends("speak", at, by_robot=False)
-
-    def gestures(self, action: Action, at: Seconds, confidence: Probability = 1.0) -> None:
-        """A nod or a shake."""
-        if self.robot_holds_floor and self.own_backchannel.state != UNDECIDED:
-            self.own_backchannel.gestures(self._backchannel(self._scene.robot, self.id, at, confidence))
-        else:
-            self.pair.human_begins(action, at, confidence)
-
-    def gesture_ends(self, action: Action, at: Seconds) -> None:
-        if self.own_backchannel.state == BRIEF:
-            self.own_backchannel.ends(at)
-        self.pair.ends(action, at, by_robot=False)
-
-    def manipulates(self, at: Seconds, confidence: Probability = 1.0) -> None:
-        if self.acts_since is None:
-            self.acts_since = at
-            self._human_turn(at, "act", confidence)
-
-    def manipulation_ends(self, at: Seconds) -> None:
-        self.acts_since = None
-        self.gaze.spent = True
-        self.pair.ends("act", at, by_robot=False)
-
-    def _human_turn(self, at: Seconds, action: Action, confidence: Probability) -> None:
-        """Speech that is no backchannel, or a manipulation: an answer, more of the same turn, or a first turn."""
-        pair = self.pair
-        if pair.human_begins(action, at, confidence) or pair.human_goes_on(action, at):
-            pass
-        elif action == "speak" and pair.is_third_turn(self.id, at):
-            pair.third_turn(at)
-        elif pair.state == IDLE:
-            event = self._by_human("adjacency_pair", at, self._config.adjacency_pair_limit, confidence)
-            pair.human_asks(event, action)
-        if action == "speak" and self.speaks_since is None and self.silent_since is not None:
-            pair.ends("speak", self.silent_since, by_robot=False)
-
-    def robot_speaks(self, at: Seconds) -> None:
-        self.pair.robot_heard(None)
-        if self.holds_floor:
-            if self.robot_backchannel.state != BRIEF:
-                self.robot_backchannel.speaks(self._backchannel(self.id, self._scene.robot, at))
-        else:
-            self.pair.robot_begins("speak", at)
-
-    def robot_falls_silent(self, at: Seconds) -> None:
-        self.pair.robot_heard(at)
-        self._backchannel_speech_ends(self.robot_backchannel, at)
-        self.pair.ends("speak", at, by_robot=True)
-        self._floor_is_free(at)
-
-    def robot_gestures(self, action: Action, at: Seconds) -> None:
-        """A nod, a shake, or pointing: the robot's."""
-        if not self.holds_floor or action == "point":
-            self.pair.robot_begins(action, at)
-        elif self.robot_backchannel.state == IDLE:
-            self.robot_backchannel.gestures(self._backchannel(self.id, self._scene.robot, at))
-
-    def robot_gesture_ends(self, action: Action, at: Seconds) -> None:
-        if self.robot_backchannel.state == BRIEF and action != "point":
-            self.robot_backchannel.ends(at)
-        self.pair.ends(action, at, by_robot=True)
-
-    def turn_ends(self, at: Seconds) -> None:
-        self.pair.turn_ends(at)
-        self._floor_is_free(at)
-
-    def _backchannel_speech_ends(self, backchannel: Backchannel, at: Seconds) -> None:
-        since = backchannel.undecided_since
-        if backchannel.state == BRIEF or (since is not None and at - since <= self._config.backchannel_limit):
-            backchannel.ends(at)
-
-    def _floor_is_free(self, at: Seconds) -> None:
-        """Speech that outlasts the turn in which it began is a turn of its own."""
-        if self.own_backchannel.state == UNDECIDED and not self.robot_holds_floor:
-            self._takes_floor(at, "outlasts_turn")
-        if self.robot_backchannel.state == UNDECIDED and not self.holds_floor:
-            self._robot_takes_floor(at, "outlasts_turn")
-
-    def _robot_takes_floor(self, at: Seconds, given: str = "limit") -> None:
-        self.pair.robot_begins("speak", self.robot_backchannel.takes_floor(given, at))
-
-    def _takes_floor(self, at: Seconds, given: str = "limit") -> None:
-        """The person's speech is no backchannel after all, but a turn since it began."""
-        self._human_turn(self.own_backchannel.takes_floor(given, at), "speak", self._speech_confidence)
+    def point_realised(self, block: str, name: str, at: Seconds) -> None:
+        """A point of a block of the robot has come: time limits may run from there."""
+        for machine in self.gaze_machines():
+            if machine.clock is not None and machine.event is not None and machine.event.block == block:
+                machine.clock.realised(name, at)
 
     def abort(self, at: Seconds, *, turn: str) -> None:
         """The robot's turn was cut off: what it asked for is taken back."""
-        if self.pair.is_turn(turn):
-            self.pair.abort(at)
-            self._floor_is_free(at)
+        self.conversation.abort(at, turn=turn)
         for machine in self.gaze_machines():
             if machine.event is not None and turn and machine.event.turn == turn:
                 machine.block_ended(at, aborted=True)
@@ -364,18 +314,24 @@ class Person:
             if machine.event is not None and machine.event.block == block:
                 machine.block_ended(at, aborted=aborted)
         self.forget_idle(at)
-        self.pair.block_ended(block, at, aborted=aborted)
-        announced = self.robot_backchannel.event
-        if announced is not None and announced.block == block:
-            self.robot_backchannel.ends(at)
-        self._floor_is_free(at)
+        self.conversation.block_ended(block, at, aborted=aborted)
 
-    def robot_asks(self, event: UnderWay) -> None:
-        if self.robot_backchannel.state == UNDECIDED:
-            self.robot_backchannel.takes_floor("outlasts_turn", event.started)
-        self.pair.robot_asks(event)
-        if self._scene.robot_speaks_since is not None:
-            self.pair.robot_heard(None)
+    def withdraw(self, event: UnderWay, at: Seconds) -> None:
+        """The robot takes back what it has asked for."""
+        if self.conversation.pair.event is event:
+            self.conversation.pair.abort(at)
+            return
+        for machine in self.gaze_machines():
+            if machine.event is event:
+                machine.step("withdraw", at)
+        self.forget_idle(at)
+
+    # -- mutual facial gaze -------------------------------------------------------------------------------------
+
+    def robot_looks_at_face(self, event: UnderWay, clock: LimitClock) -> None:
+        self.facial.supersede(event.started)
+        robot_on = self._scene.robot_looks_at((self.id,))
+        self.facial.robot_begins(event, clock, robot_on=robot_on, look=self.gaze if self.on_robots_face else None)
 
     # -- new events ---------------------------------------------------------------------------------------------
 
@@ -386,9 +342,3 @@ class Person:
             kind=kind, initiator=self.id, responder=self._scene.robot, started=at, limit=limit, objects=objects,
             confidence=confidence,
         )  # fmt: skip
-
-    def _backchannel(self, speaker: str, listener: str, at: Seconds, confidence: Probability = 1.0) -> UnderWay:
-        cause: Cause = "human" if listener == self.id else "turn"
-        return UnderWay(
-            kind="backchannel", initiator=speaker, responder=listener, started=at, cause=cause, confidence=confidence
-        )

@@ -10,9 +10,11 @@ class Presence:
 
     def __init__(self, grace: Seconds) -> None:
         self.here = True
+        self.told = False
+        """Perception has said that the person is there, and will say when that is over."""
         self._grace = grace
         self._lost_at: Seconds | None = None
-        self._found_last = self._lost_last = self._left_at = NEVER
+        self._found_last = self._lost_last = self.left_at = NEVER
 
     @property
     def deadline(self) -> Seconds | None:
@@ -21,7 +23,7 @@ class Presence:
 
     def seen(self, at: Seconds) -> bool:
         """There is an observation of the person, so it is there; False if that is from before it left."""
-        if at < self._left_at:
+        if at < self.left_at:
             return False
         if self._lost_at is None or at >= self._lost_at:
             self.here, self._lost_at = True, None
@@ -30,7 +32,7 @@ class Presence:
     def found(self, at: Seconds) -> None:
         if at > self._found_last:
             self._found_last = at
-            self.seen(at)
+            self.told = self.seen(at) or self.told
 
     def lost(self, at: Seconds) -> None:
         """The face is lost. Nothing new if that was known, or if it has been found since."""
@@ -40,5 +42,9 @@ class Presence:
     def leave(self) -> Seconds:
         """The person has gone; when it was last there."""
         assert self._lost_at is not None
-        self.here, self._left_at, self._lost_at = False, self._lost_at, None
-        return self._left_at
+        self.here, self.told, self.left_at, self._lost_at = False, False, self._lost_at, None
+        return self.left_at
+
+    def vanish(self, at: Seconds) -> None:
+        """Nobody has told of the person since `at`: it has gone then, and is to `leave`."""
+        self._lost_at = at

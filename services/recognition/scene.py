@@ -76,41 +76,66 @@ class Scene:
         self.head_owner = Claim(kind="none", priority=0)
         self.people_in_world: frozenset[str] = frozenset()
         self.covered = Covered(frozenset())
+        self.acting: set[str] = set()
+        """People with a manipulation in hand."""
         self._objects: set[str] = set()
         self._surfaces: set[str] = {"table"}
-        self._others: set[str] = set()
+        self._others: dict[str, Seconds] = {}
+        """People and hands that have been seen, and when last; the longest ago first."""
         self._speakers: set[str] = set()
-        self._fell_silent: dict[str, Seconds] = {}
+        self.speech = 0
+        """Counts how often somebody has begun or ended to speak."""
+        self._fell_silent: list[tuple[Seconds, str]] = []
+        """The two people who fell silent last, for whoever asks is one of them at most."""
 
-    def see(self, world: World) -> None:
+    def see(self, world: World, at: Seconds) -> None:
         """Objects once seen stay known: a covered piece has not gone (thesis 5.4.2)."""
         self._objects.update(entity.id for entity in world.objects)
         self._surfaces.update(entity.id for entity in world.entities if entity.kind == "surface")
-        self._others.update(entity.id for entity in world.entities if entity.kind in ("person", "hand"))
+        for entity in world.entities:
+            if entity.kind in ("person", "hand"):
+                self._others.pop(entity.id, None)
+                self._others[entity.id] = at
         self.people_in_world = frozenset(person.id for person in world.people) - {self.robot}
+
+    def forget_others(self, before: Seconds) -> None:
+        """Forget the people and hands that nobody has seen since."""
+        while self._others and (oldest := next(iter(self._others))) and self._others[oldest] < before:
+            del self._others[oldest]
 
     def speaks(self, actor: str) -> None:
         self._speakers.add(actor)
+        self.speech += 1
 
     def falls_silent(self, actor: str, at: Seconds) -> None:
         if actor in self._speakers:
             self._speakers.discard(actor)
-            self._fell_silent[actor] = at
+            others = [one for one in self._fell_silent if one[1] != actor]
+            self._fell_silent = sorted((*others, (at, actor)))[-2:]
+            self.speech += 1
+
+    def stops(self, actor: str, at: Seconds) -> None:
+        """A person has gone, or is not followed any longer."""
+        self.acting.discard(actor)
+        self.falls_silent(actor, at)
 
     def others_silent_since(self, actor: str) -> Seconds | None:
         """Since when nobody but `actor` speaks; None while somebody does."""
         if self._speakers - {actor}:
             return None
-        return max((at for other, at in self._fell_silent.items() if other != actor), default=float("-inf"))
+        return max((at for at, other in self._fell_silent if other != actor), default=float("-inf"))
 
     def knows(self, entity: str) -> bool:
         """Has it ever been seen? Without any world nobody can tell, so yes."""
-        return not self._objects or entity in self._objects | self._surfaces | self._others
+        return not self._objects or entity in self._objects or self._is_no_object(entity)
+
+    def _is_no_object(self, entity: str) -> bool:
+        return entity in self._surfaces or entity in self._others
 
     def is_object(self, entity: str) -> bool:
         if entity in self._objects:
             return True
-        return not self._objects and entity not in self._surfaces | self._others | {self.robot}
+        return not self._objects and entity != self.robot and not self._is_no_object(entity)
 
     def person_looks_at(self, gaze: Gaze, objects: tuple[str, ...]) -> bool:
         """Does a person's look count as one at `objects`? At resolution `table` anything on the table will do."""

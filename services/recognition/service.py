@@ -14,6 +14,7 @@ from schemas.units import Seconds, Stamp
 from schemas.world import World
 from services.bus import Bus, Received
 from services.recognition.config import RecognitionConfig
+from services.recognition.machine import Forgotten
 from services.recognition.open_events import OpenBook
 from services.recognition.recognizer import Perceived, Recognizer, Result
 from services.recognition.standings import Standings
@@ -130,11 +131,11 @@ class _Recognition:
         return arrived if stamp is None else min(self._bus.local(stamp), self._bus.now())
 
     def _tell(self, effects: Iterable[Result]) -> None:
-        events = []
+        changes: list[ConnectionEvent | Forgotten] = []
         for effect in effects:
             match effect:
                 case ConnectionEvent():
-                    events.append(effect)
+                    changes.append(effect)
                     self._bus.publish(keys.connection_event(effect.person(self._bus.robot), effect.kind), effect)
                 case ActionBegan() | ActionEnded() | ActorFound() | ActorLost():
                     self._bus.publish(keys.RECOGNIZED_ACTION, effect)
@@ -144,9 +145,12 @@ class _Recognition:
                     self.desk.refuse(id, fault)
                 case EventOutcome() | TurnOutcome():
                     self.desk.end(effect)
+                case Forgotten(actor=actor):
+                    changes.append(effect)
+                    self._witnesses.forget(actor)
+        events = [change for change in changes if isinstance(change, ConnectionEvent)]
         for book in self._open.feed(events, self._bus.stamp()):
             self._bus.publish(keys.open_events(book.actor), book)
-        busy = {person.id for person in self._recognizer.session.persons.values() if person.acts_since is not None}
-        for statistics in self._standings.feed(events, busy, self._bus.now()):
+        for statistics in self._standings.feed(changes, self._recognizer.session.busy, self._bus.now()):
             if statistics.actor != "all":  # a person of that name would pass for everybody
                 self._bus.publish(keys.statistics(statistics.actor or "all"), statistics)

@@ -4,8 +4,10 @@ from collections.abc import Iterable, Set
 
 from schemas.recognition import ConnectionEvent, Statistics
 from schemas.units import Seconds, Stamp
+from services.recognition.agenda import Agenda
 from services.recognition.config import RecognitionConfig
 from services.recognition.engagement import Engagement
+from services.recognition.machine import Forgotten
 from services.recognition.statistics import Tally
 
 EVERYBODY = ""
@@ -15,7 +17,6 @@ class _Standing:
     def __init__(self, config: RecognitionConfig, clock: str) -> None:
         self.tally = Tally(config.window, clock)
         self.engagement = Engagement(config, self.tally)
-        self.due: Seconds | None = None
 
 
 class Standings:
@@ -26,19 +27,25 @@ class Standings:
         self._config = config
         self._clock = clock
         self._standings: dict[str, _Standing] = {EVERYBODY: _Standing(config, clock)}
+        self._agenda: Agenda[str] = Agenda()
         self._busy: frozenset[str] = frozenset()
 
     @property
     def deadline(self) -> Seconds | None:
         """When somebody's statistics change by the passing of time."""
-        return min((one.due for one in self._standings.values() if one.due is not None), default=None)
+        return self._agenda.deadline
 
-    def feed(self, events: Iterable[ConnectionEvent], busy: Set[str], now: Seconds) -> list[Statistics]:
-        """Count what happened; the statistics that are new. busy: persons with a task in hand."""
-        touched = {actor for actor, one in self._standings.items() if one.due is not None and one.due <= now}
-        for event in events:
-            for name in (event.person(self._robot), EVERYBODY):
-                self._standing(name).tally.feed(event)
+    def feed(self, changes: Iterable[ConnectionEvent | Forgotten], busy: Set[str], now: Seconds) -> list[Statistics]:
+        """Count what happened, in its order; the statistics that are new. busy: persons with a task in hand."""
+        touched = set(self._agenda.take_due(now))
+        for change in changes:
+            if isinstance(change, Forgotten):
+                self._standings.pop(change.actor, None)
+                self._agenda.set(change.actor, None)
+                touched.discard(change.actor)
+                continue
+            for name in (change.person(self._robot), EVERYBODY):
+                self._standing(name).tally.feed(change)
                 touched.add(name)
         if busy != self._busy:
             touched |= {EVERYBODY, *(busy ^ self._busy)}
@@ -63,5 +70,5 @@ class Standings:
             engagement=estimate.value, level=estimate.level, reasons=estimate.reasons, busy=busy,
         )  # fmt: skip
         changes = (one.tally.next_change, one.engagement.next_change(now))
-        one.due = min((at for at in changes if at is not None), default=None)
+        self._agenda.set(actor, min((at for at in changes if at is not None), default=None))
         return statistics

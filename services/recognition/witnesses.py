@@ -19,8 +19,10 @@ class Witnesses:
             case ActionBegan(actor=actor) | ActorFound(actor=actor):
                 self._reported.setdefault(source, set()).add(actor)
             case ActorLost(actor=actor):
-                self._reported.get(source, set()).discard(actor)
+                self._discard(actor, source)
             case PeerGone(participant=name):
+                if name not in self._reported:
+                    self._runs.pop(name, None)
                 return [ActorLost(actor=actor, at=at) for actor in sorted(self._reported.get(name, ()))]
             case PeerAlive(participant=name, run=run):
                 before = self._runs.get(name, run)
@@ -29,3 +31,14 @@ class Witnesses:
                     self._reported.pop(name, None)
                 return [ActorFound(actor=actor, at=at) for actor in sorted(self._reported.get(name, ()))]
         return []
+
+    def forget(self, actor: str) -> None:
+        """The person has been gone for long: nobody will be asked for it again."""
+        for source in list(self._reported):
+            self._discard(actor, source)
+
+    def _discard(self, actor: str, source: str) -> None:
+        reported = self._reported.get(source, set())
+        reported.discard(actor)
+        if not reported:
+            self._reported.pop(source, None)

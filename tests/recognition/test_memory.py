@@ -47,7 +47,7 @@ def test_a_long_session_keeps_no_more_than_a_short_one():
     for number, (at, observation) in enumerate(islice(Untidy(2), LATE + 1)):
         now = max(now, at)
         effects = session.feed(observation, at)
-        busy = {person.id for person in session.persons.values() if person.acts_since is not None}
+        busy = session.busy
         standings.feed([effect for effect in effects if isinstance(effect, ConnectionEvent)], busy, now)
         if number in (EARLY, LATE):
             sizes.append(kinds(session, standings))

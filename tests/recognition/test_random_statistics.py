@@ -53,7 +53,7 @@ class Replay:
     def _tell(self, effects: list[Effect]) -> list[Statistics]:
         events = [effect for effect in effects if isinstance(effect, ConnectionEvent)]
         self.log += events
-        self.busy = {person.id for person in self._session.persons.values() if person.acts_since is not None}
+        self.busy = set(self._session.busy)
         told = self._standings.feed(events, self.busy, self._now)
         self.told.update((statistics.actor, statistics) for statistics in told)
         return told
