@@ -91,6 +91,8 @@ class RecognitionConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields
     """For raw perception."""
     lost_face_grace: Seconds = 0.5
     """A face lost for less has not gone."""
+    look_break: Seconds = 0.15
+    """A look that is said to end and follows again within this has gone on. What happens meanwhile waits for it."""
     forgotten_after: Seconds = 600.0
     """Who has been gone for this long, or not been told of by anybody, is forgotten: with the same id comes somebody
     new. What they have done stays in the statistics of all together."""
@@ -127,6 +129,8 @@ class RecognitionConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields
                 raise ValueError(f"{name} must not be negative, but is {getattr(self, name)}")
         if not 0 <= self.disengaged_below + self.hysteresis <= self.engaged_from - self.hysteresis <= 1:
             raise ValueError("thresholds overlap: disengaged_below + hysteresis <= engaged_from - hysteresis")
+        if not 0 <= self.look_break <= self.sensing.settling:
+            raise ValueError("look_break must not be negative, nor longer than sensing.settling")
         if not self.forgotten_after > max(self.lost_face_grace, self.after_robot_directed, self.direct_by_look):
             raise ValueError(
                 "forgotten_after must be greater than lost_face_grace, after_robot_directed and direct_by_look"

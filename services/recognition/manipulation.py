@@ -22,6 +22,9 @@ ALONG = 0.5
 FOLLOW = 0.1
 """How quickly the place of a resting piece follows what is seen of it: share of the difference at each sight."""
 
+HANDS_KEPT = 16
+"""So many hands may have taken what they hid: the last ones."""
+
 
 class _Piece(Struct):
     place: Vector
@@ -118,6 +121,10 @@ class Manipulation:
                 found += self._end(id, piece)
         return found
 
+    def acting(self, actor: str) -> tuple[str, ...]:
+        """The piece with which the person's manipulation began; empty if there is none."""
+        return (self._acts[actor].first,) if actor in self._acts else ()
+
     def lose(self, actor: str) -> None:
         """The person has gone, and whatever they did is over."""
         act = self._acts.pop(actor, None)
@@ -161,6 +168,8 @@ class Manipulation:
                 here_before = piece.touched.get(hand, self._before) == self._before
                 if here_before and self._reaches(entity, piece.place):
                     piece.touched[hand] = at
+            if len(piece.touched) > HANDS_KEPT:
+                del piece.touched[min(piece.touched, key=lambda hand: piece.touched[hand])]
         elif piece.holder in self._hands:
             palm = self._hands[piece.holder].position
             self._pause(piece, _plus(palm, piece.grip), at)

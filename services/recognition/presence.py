@@ -14,7 +14,7 @@ class Presence:
         """Perception has said that the person is there, and will say when that is over."""
         self._grace = grace
         self._lost_at: Seconds | None = None
-        self._found_last = self._lost_last = self.left_at = NEVER
+        self._found_last = self._seen_last = self._lost_last = self.left_at = NEVER
 
     @property
     def deadline(self) -> Seconds | None:
@@ -25,6 +25,7 @@ class Presence:
         """There is an observation of the person, so it is there; False if that is from before it left."""
         if at < self.left_at:
             return False
+        self._seen_last = max(self._seen_last, at)
         if self._lost_at is None or at >= self._lost_at:
             self.here, self._lost_at = True, None
         return True
@@ -35,9 +36,12 @@ class Presence:
             self.told = self.seen(at) or self.told
 
     def lost(self, at: Seconds) -> None:
-        """The face is lost. Nothing new if that was known, or if it has been found since."""
-        if self.here and self._lost_at is None and at >= self._found_last and at > self._lost_last:
-            self._lost_at = self._lost_last = at
+        """The face is lost. Nothing new if that was known, or if the person has been seen since."""
+        if at < self._seen_last or at <= self._lost_last:
+            return
+        self._lost_last = at
+        if self.here and self._lost_at is None:
+            self._lost_at = at
 
     def leave(self) -> Seconds:
         """The person has gone; when it was last there."""

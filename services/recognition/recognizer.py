@@ -1,11 +1,13 @@
 """All of recognition as one pure machine: symbolic and raw observations in; effects and derived actions out.
 
 Raw perception makes up its mind late about what has happened, so observations wait in the order of their times until
-nothing that came before them can still become known. With symbolic perception alone nothing ever waits.
+nothing that came before them can still become known. With symbolic perception alone only the end of a look that no
+other look follows is waited for: it may be none.
 """
 
 import heapq
 import math
+from collections.abc import Callable
 from itertools import count
 
 from schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost
@@ -14,8 +16,9 @@ from schemas.perception import HeadPose, VoiceActivity
 from schemas.units import Seconds
 from schemas.world import World
 from services.recognition.attention import Attention, Symbolic
+from services.recognition.breaks import Breaks
 from services.recognition.config import RecognitionConfig
-from services.recognition.machine import Effect
+from services.recognition.machine import Effect, Forgotten, Mishap
 from services.recognition.scene import Covered
 from services.recognition.session import Observation, Session
 
@@ -25,15 +28,22 @@ Result = Effect | Symbolic
 
 
 class Recognizer:
-    """robot, clock, name: as of `Session` and `Attention`."""
+    """robot, clock, name: as of `Session` and `Attention`. strict: as of `Session`; if not, nothing here raises."""
 
-    def __init__(self, robot: str, config: RecognitionConfig, *, clock: str = "loop", name: str = "") -> None:
-        self.session = Session(robot, config, clock=clock, name=name)
+    def __init__(
+        self, robot: str, config: RecognitionConfig, *, clock: str = "loop", name: str = "", strict: bool = True
+    ) -> None:
+        self.session = Session(robot, config, clock=clock, name=name, strict=strict)
+        self._strict = strict
         self._robot = robot
+        self._clock = clock
         self._config = config
         self._attention = Attention(robot, config, clock)
+        self._breaks = Breaks(config.look_break)
         self._waiting: list[tuple[Seconds, int, Observation | Covered]] = []
         self._numbers = count()
+        self._mishaps: list[Mishap] = []
+        """That have not been told of."""
         self._covered = Covered(frozenset())
         self._now: Seconds = -math.inf
 
@@ -42,7 +52,7 @@ class Recognizer:
         """When `advance` has something to do, unless an observation comes first."""
         settled, due = self._settled, self.session.deadline
         more = settled + self._config.sensing.settling  # is settled then, at the latest
-        times = [self._attention.deadline]
+        times = [self._attention.deadline, self._breaks.deadline]
         if self._waiting:
             times.append(more)
         if due is not None:
@@ -56,21 +66,21 @@ class Recognizer:
         match observation:
             case HeadPose() | VoiceActivity():
                 if now - at <= self._config.sensing.oldest:
-                    derived = self._attention.feed(observation, at)
+                    derived = self._attend(lambda attention: attention.feed(observation, at), at)
             case RobotState():
-                derived = self._attention.feed(observation, at)
+                derived = self._attend(lambda attention: attention.feed(observation, at), at)
             case World():
-                derived = self._attention.feed(observation, at)
+                derived = self._attend(lambda attention: attention.feed(observation, at), at)
                 self._wait(observation, at)
                 if (covered := self._attention.covered) != self._covered:
                     self._covered = covered
                     self._wait(covered, at)
             case ActionBegan(confidence=confidence) if confidence < self._config.least_confidence:
                 pass
-            case ActionBegan() | ActionEnded() | ActorFound() | ActorLost():
-                if observation.actor != self._robot:
-                    self._attention.believe(observation, at)
-                self._wait(observation, at)
+            case ActionBegan() | ActionEnded() | ActorFound() | ActorLost() if observation.actor != self._robot:
+                derived = self._attend(lambda attention: attention.believe(observation, at), at)
+                for when, told in self._breaks.feed(observation, at):
+                    self._wait(told, when)
             case _:
                 self._wait(observation, at)
         return self._take(derived)
@@ -78,10 +88,29 @@ class Recognizer:
     def advance(self, now: Seconds) -> list[Result]:
         """What happens by itself up to and including `now`."""
         self._now = now
-        results = self._take(self._attention.advance(now))
+        for when, ended in self._breaks.advance(now):
+            self._wait(ended, when)
+        results = self._take(self._attend(lambda attention: attention.advance(now), now))
         settled = self._settled
         # What is due at the very moment from which on things are undecided has to wait, too.
-        return [*results, *self.session.advance(now if settled > now else math.nextafter(settled, -math.inf))]
+        until = now if settled > now else math.nextafter(settled, -math.inf)
+        return self._told([*results, *self.session.advance(until)])
+
+    def lose_track(self, person: str, at: Seconds) -> list[Result]:
+        """After a failure with this person: see `Session.lose_track`."""
+        return self._told([*self.session.lose_track(person, at)])
+
+    def _attend(self, happen: Callable[[Attention], list[Symbolic]], at: Seconds) -> list[Symbolic]:
+        """What raw perception means. A bug there costs what it had found out; it begins anew."""
+        try:
+            return happen(self._attention)
+        except Exception as error:
+            if self._strict:
+                raise
+            self._mishaps.append(Mishap("", at, error))
+            ends = self._attention.give_up(at)
+            self._attention = Attention(self._robot, self._config, self._clock)
+            return ends
 
     def _take(self, derived: list[Symbolic]) -> list[Result]:
         for action in derived:
@@ -90,8 +119,20 @@ class Recognizer:
         results: list[Result] = [*derived]
         while self._waiting and self._waiting[0][0] <= settled:
             at, _, observation = heapq.heappop(self._waiting)
-            results += self.session.feed(observation, at)
-        return results
+            try:
+                results += self.session.feed(observation, at)
+            except Exception as error:
+                if self._strict:
+                    raise
+                self._mishaps.append(Mishap("", at, error))
+        return self._told(results)
+
+    def _told(self, results: list[Result]) -> list[Result]:
+        for result in results:
+            if isinstance(result, Forgotten):
+                self._breaks.forget(result.actor)
+        mishaps, self._mishaps = self._mishaps, []
+        return [*results, *mishaps]
 
     def _wait(self, observation: Observation | Covered, at: Seconds) -> None:
         heapq.heappush(self._waiting, (at, next(self._numbers), observation))
@@ -100,4 +141,5 @@ class Recognizer:
     def _settled(self) -> Seconds:
         """Nothing from before this can still become known, but for what has taken longer than the time to settle."""
         longest = self._config.sensing.settling
-        return min((since for since in self._attention.undecided if self._now < since + longest), default=math.inf)
+        undecided = (*self._attention.undecided, *self._breaks.undecided)
+        return min((since for since in undecided if self._now < since + longest), default=math.inf)

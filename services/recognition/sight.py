@@ -125,6 +125,7 @@ class Sight:
     def see(self, world: World, at: Seconds) -> None:
         """What is missing, or there with too little confidence, is covered."""
         self._spheres = None
+        self._forget_faded(at)
         seen = {one.id: one for one in world.entities if one.kind != "hand" and one.confidence >= self._least}
         for id, thing in self._known.items():
             if id not in seen and thing.hidden_since is None and id != self._robot:
@@ -138,6 +139,8 @@ class Sight:
 
     def see_face(self, actor: str, position: Vector, at: Seconds | None = None) -> None:
         """at: when; the place is the less certain the longer ago. None: it stays certain."""
+        if actor not in self._known and at is not None:
+            self._forget_faded(at)
         thing = self._thing(Entity(id=actor, kind="person", position=position))
         thing.hidden_since = at
         self._known[actor] = thing
@@ -145,6 +148,22 @@ class Sight:
             self._spheres[actor] = (*position, thing.bound, thing)
         else:
             self._spheres = None
+
+    def forget_face(self, actor: str) -> None:
+        if self._known.pop(actor, None) is not None:
+            self._spheres = None
+
+    def _forget_faded(self, at: Seconds) -> None:
+        """What has been covered for so long that no gaze can be on it. Things may still lie on a covered surface."""
+        faded = [
+            id
+            for id, thing in self._known.items()
+            if thing.hidden_since is not None
+            and thing.entity.kind != "surface"
+            and self._confidence(thing, at) < self._least
+        ]
+        for id in faded:
+            del self._known[id]
 
     def _thing(self, entity: Entity) -> _Thing:
         return _Thing(entity, self._sensing.face_radius)

@@ -18,7 +18,10 @@ from tests.recognition.test_random_streams import Chance, Stream, streams
 PEOPLE = ("ann", "bob")
 CELL = 0.04
 """Within this from each full second things happen, and come in whatever order."""
-CONFIG = RecognitionConfig(manipulation_limit=8.3, turn_patience=12.3, after_robot_directed=2.3)
+CONFIG = RecognitionConfig(
+    manipulation_limit=8.3, turn_patience=12.3, after_robot_directed=2.3, forgotten_after=600.3,
+    longest_speech=60.3, longest_gesture=10.3, longest_manipulation=120.3,
+)  # fmt: skip
 """No limit is a number of full seconds, so none passes between two observations of a cell."""
 
 
@@ -65,6 +68,7 @@ def independent(draw):
     other: Stream = []
     for second in range(draw(st.integers(1, 60))):
         cell = [(second + number * CELL / 8, chance.observation(second + number * CELL / 8)) for number in range(8)]
+        cell = [(at, _own(it)) for at, it in cell]
         whose = {person: [it for it in cell if concerns(it[1]) == person] for person in PEOPLE}
         common = [it for it in cell if concerns(it[1]) == ""]
         if common and chance.pick((True, False)):
@@ -78,6 +82,13 @@ def independent(draw):
                     stream.append(queues[person].pop(0))
                     queues = {name: left for name, left in queues.items() if left}
     return one, other
+
+
+def _own(observation: Observation) -> Observation:
+    """No two persons' requests have the same id: the later of two such is taken for a repetition."""
+    if isinstance(observation, RequestEvent):
+        return replace(observation, id=f"{observation.id} {observation.event.responder}")
+    return observation
 
 
 def concerns(observation: Observation) -> str:
