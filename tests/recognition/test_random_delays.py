@@ -188,20 +188,30 @@ class Act(Struct):
 
 
 class Round(Struct):
-    """A first turn in words, and what the listener does meanwhile and afterwards."""
+    """A first turn in words, and what the listener does meanwhile and after it. further: the robot's words then."""
 
     by_robot: bool
     lasts: Seconds
     acts: list[Act]
+    further: list[Act]
+
+    def floor_until(self, at: Seconds) -> Seconds | None:
+        """When the floor that the speaker holds will be free; None if it is."""
+        if at < self.lasts:
+            return self.lasts
+        held = (
+            self.lasts + word.at + word.lasts for word in self.further if 0 <= at - self.lasts - word.at < word.lasts
+        )
+        return next(held, None) if self.by_robot else None
 
     @property
     def answer(self) -> Act | None:
-        """The first that is no backchannel: no gesture, nor short speech that is over, while the turn goes on."""
+        """The first that is no backchannel: no gesture, nor short speech that is over, while the floor is held."""
         for act in self.acts:
-            brief = act.lasts <= CONFIG.backchannel_limit and act.at + act.lasts <= self.lasts
-            meanwhile = act.at < self.lasts
-            backchannel = meanwhile and (act.action in ("nod", "shake") or (act.action == "speak" and brief))
-            if not backchannel:
+            free = self.floor_until(act.at)
+            brief = act.lasts <= CONFIG.backchannel_limit and free is not None and act.at + act.lasts <= free
+            gesture = act.action in ("nod", "shake") and free is not None
+            if not gesture and not (act.action == "speak" and brief):
                 return act if act.at <= self.lasts + CONFIG.adjacency_pair_limit else None
         return None
 
@@ -214,6 +224,11 @@ class Round(Struct):
             seen.append((start, ask))
         seen.append((end, ActionEnded(actor=speaker, action="speak", at=stamp(end), behavior=turn)))
         if self.by_robot:
+            for number, word in enumerate(self.further):
+                for kind, at in ((ActionBegan, end + word.at), (ActionEnded, end + word.at + word.lasts)):
+                    seen.append(
+                        (at, kind(actor=ROBOT, action="speak", at=stamp(at), behavior=f"{turn}/more-{number}"))
+                    )
             signal = TurnSignal(id="end", turn=turn, signal="ended", actor="ann")
             seen.append((end, SignalTurn(id=f"{turn}/end", requester="realizer", signal=signal, at=stamp(end))))
         for number, act in enumerate(self.acts):
@@ -223,11 +238,11 @@ class Round(Struct):
         return sorted(seen, key=lambda observed: observed[0])
 
 
-def _one_after_the_other(drawn: list[tuple[Action, int, int]]) -> list[Act]:
+def _one_after_the_other(drawn: list[tuple[Action, int, int]], odd: Seconds = 0.013) -> list[Act]:
     """Pauses and lengths in tenths of a second; at odd thousandths, so that no two things happen at once."""
     acts, at = [], 0.0
     for number, (action, pause, lasts) in enumerate(drawn):
-        at += 0.1 * pause + 0.013
+        at += 0.1 * pause + odd
         acts.append(Act(action, at, 0.1 * lasts + 0.0007 * (number + 1)))
         at += acts[-1].lasts
     return acts
@@ -235,7 +250,9 @@ def _one_after_the_other(drawn: list[tuple[Action, int, int]]) -> list[Act]:
 
 actions = st.sampled_from(("speak", "speak", "speak", "nod", "shake", "point"))
 acts = st.lists(st.tuples(actions, st.integers(0, 25), st.integers(1, 15)), max_size=4).map(_one_after_the_other)
-rounds = st.builds(Round, st.booleans(), st.integers(5, 40).map(lambda tenths: 0.1 * tenths), acts)
+words = st.lists(st.tuples(st.just("speak"), st.integers(1, 12), st.integers(2, 20)), max_size=2)
+further = words.map(lambda drawn: _one_after_the_other(drawn, odd=0.0191))
+rounds = st.builds(Round, st.booleans(), st.integers(5, 40).map(lambda tenths: 0.1 * tenths), acts, further)
 
 
 @settings(max_examples=150, deadline=None)
