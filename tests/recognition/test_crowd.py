@@ -1,0 +1,304 @@
+"""Many people who pass by: they are forgotten, cost nothing when they have gone, and change no event of others."""
+
+import random
+from collections import Counter
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from msgspec.structs import replace
+
+from schemas.actions import ActionBegan, ActorFound, ActorLost
+from schemas.recognition import ConnectionEvent, EventOutcome, Statistics
+from schemas.requests import Accepted, Refused
+from services.recognition.agenda import SLACK, Agenda
+from services.recognition.config import RecognitionConfig
+from services.recognition.machine import Forgotten
+from services.recognition.open_events import OpenBook
+from services.recognition.person import Person
+from services.recognition.session import Session
+from services.recognition.standings import Standings
+from tests.recognition.kept import kinds
+from tests.recognition.observations import HUMAN, ROBOT, Log, stamp, world
+from tests.recognition.passers import Lobby, visit
+from tests.recognition.test_random_streams import Chance, Stream
+
+NEVER = 1e9
+
+
+def forgotten(log: Log) -> list[str]:
+    return [effect.actor for effect in log.effects if isinstance(effect, Forgotten)]
+
+
+# -- who is forgotten ---------------------------------------------------------------------------------------------
+
+
+def met_and_lost(**config: object) -> Log:
+    log = Log("host", **config)
+    log.found("ann", 1.0)
+    log.looks("ann", ROBOT, 1.0)
+    log.lost("ann", 2.0)
+    return log
+
+
+def test_who_has_been_gone_for_long_is_forgotten():
+    log = met_and_lost(forgotten_after=60.0)
+    log.until(61.9)
+    assert "ann" in log.session.persons
+    log.until(62.0)
+
+    assert forgotten(log) == ["ann"]
+    assert "ann" not in log.session.persons
+    log.requests_event("mutual_facial_gaze", 63.0, responder="ann")
+    assert [effect.fault.reason for effect in log.effects if isinstance(effect, Refused)] == ["unknown actor 'ann'"]
+
+
+def test_nothing_waits_for_forgetting():
+    log = met_and_lost()
+    log.until(5.0)
+
+    assert log.session.deadline is None
+
+
+def test_who_comes_back_in_time_is_not_forgotten():
+    log = met_and_lost(forgotten_after=60.0)
+    log.found("ann", 50.0)
+    log.until(1000.0)
+
+    assert forgotten(log) == []
+
+
+def test_who_is_in_the_world_is_not_forgotten_though_the_face_is_lost():
+    log = Log("ann", forgotten_after=60.0)
+    log.lost("ann", 2.0)
+    log.until(1000.0)
+    assert forgotten(log) == []
+    log.feed(world("host"), 1001.0)
+    log.until(1061.0)
+
+    assert forgotten(log) == ["ann"]
+
+
+def test_who_is_missing_in_the_world_and_told_of_by_nobody_has_gone():
+    log = Log("ann", forgotten_after=60.0)
+    log.looks("ann", ROBOT, 1.0)
+    log.looks(ROBOT, "ann", 1.5)
+    log.feed(world("host"), 10.0)
+    log.until(69.9)
+    assert log.states("mfg-1") == ["started", "succeeded"]
+    log.until(70.0)
+
+    assert forgotten(log) == ["ann"]
+    assert log.told()[-1] == ("mfg-1", "completed", 70.0)
+    assert log.last("mfg-1").duration == pytest.approx(8.5)
+
+
+def test_whom_only_their_actions_tell_of_are_forgotten_after_the_last():
+    log = Log("host", forgotten_after=60.0)
+    log.begins("voice-1", "speak", 1.0)
+    log.ends("voice-1", "speak", 30.0)
+    log.until(89.9)
+    assert forgotten(log) == []
+    log.until(90.0)
+
+    assert forgotten(log) == ["voice-1"]
+
+
+def test_who_has_been_found_is_there_however_quiet():
+    log = Log("host", forgotten_after=60.0)
+    log.found("ann", 1.0)
+    log.until(5000.0)
+
+    assert forgotten(log) == []
+
+
+def test_who_comes_back_later_is_somebody_new_and_the_totals_stay():
+    log, standings = met_and_lost(forgotten_after=60.0), Standings(ROBOT, RecognitionConfig())
+    log.until(100.0)
+    log.found("ann", 100.0)
+    log.looks("ann", ROBOT, 100.0)
+    changes = [effect for effect in log.effects if isinstance(effect, ConnectionEvent | Forgotten)]
+    (first, everybody) = sorted(standings.feed(changes, set(), 100.0), key=lambda one: one.session.events)
+
+    assert (first.actor, first.session.events) == ("ann", 1)
+    assert (everybody.actor, everybody.session.events) == ("", 2)
+    assert everybody.session.max_gap == 99.0
+
+
+def test_the_book_of_open_events_keeps_nobody_without_one():
+    book = OpenBook(ROBOT, "s")
+    log = met_and_lost()
+    log.until(10.0)
+    told = book.feed(log.events, stamp(10.0))
+
+    assert [(one.actor, one.events) for one in told] == [("ann", ())]
+    assert kinds(book)["OpenEvents"] == 0
+    assert book._open == {}
+
+
+@pytest.mark.parametrize("seconds", [0.0, 0.5, 2.0])
+def test_nobody_is_forgotten_who_may_still_count(seconds):
+    with pytest.raises(ValueError, match="forgotten_after must be greater than"):
+        RecognitionConfig(forgotten_after=seconds)
+
+
+# -- what they cost -----------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("raw", [False, True], ids=["symbolic", "raw"])
+def test_what_is_kept_does_not_grow_with_those_who_have_passed(raw: bool):
+    lobby = Lobby(RecognitionConfig(forgotten_after=40.0))
+    sizes = []
+    for number in range(600):
+        for at, observation in visit(number, raw=raw):
+            lobby.feed(observation, at)
+        if number in (299, 599):  # later than what is remembered of the robot's looks
+            sizes.append(kinds(*lobby.kept()))
+    early, late = sizes
+
+    assert len(lobby.recognizer.session.persons) < 10
+    for kind, count in late.items():
+        assert count <= 1.1 * early[kind] + 40, kind
+
+
+def test_a_step_asks_nobody_who_has_gone(monkeypatch: pytest.MonkeyPatch):
+    asked: list[str] = []
+    first_due = Person.first_due
+    monkeypatch.setattr(Person, "first_due", lambda self: asked.append(self.id) or first_due(self))
+    lobby = Lobby(RecognitionConfig())
+    for number in range(60):
+        asked.clear()
+        for at, observation in visit(number, raw=False):
+            lobby.feed(observation, at)
+        if number > 0:
+            assert set(asked) <= {"host", f"track-{number - 1}", f"track-{number}"}
+            assert len(asked) < 60
+
+    assert len(lobby.recognizer.session.persons) == 61
+
+
+def test_a_step_asks_no_more_than_one_of_many_who_are_here(monkeypatch: pytest.MonkeyPatch):
+    log = Log(*(f"person-{number}" for number in range(50)))
+    asked: list[str] = []
+    first_due = Person.first_due
+    monkeypatch.setattr(Person, "first_due", lambda self: asked.append(self.id) or first_due(self))
+    log.looks("person-7", ROBOT, 1.0)
+    log.until(2.0)
+
+    assert asked == ["person-7"]
+
+
+def test_an_agenda_keeps_one_time_for_each_key_and_gives_them_in_order():
+    agenda: Agenda[str] = Agenda()
+    for at in range(1000):
+        agenda.set("a", 5000.0 - at)
+        agenda.set("b", 5000.0)
+    agenda.set("c", 4001.0)
+    agenda.set("b", None)
+
+    assert len(agenda._heap) <= 2 * 3 + SLACK
+    assert agenda.take_due(4000.0) == []
+    assert agenda.take_due(9000.0) == ["a", "c"]
+    assert agenda.deadline is None
+
+
+# -- what they change ---------------------------------------------------------------------------------------------
+
+
+class Crowd(Stream):
+    """Two who are in the world, and passers-by, some of whom come again; told by its seed."""
+
+    def __init__(self, seed: int) -> None:
+        self._seed = seed
+        chance = Chance(random.Random(seed).choice)
+        pick, at = chance.pick, 0.0
+        super().__init__()
+        here: dict[str, float] = {}
+        names = [f"track-{number}" for number in range(12)]
+        gone = dict.fromkeys(names, -NEVER)
+        while len(self) < 250:
+            at += pick((0.0, 0.1, 0.1, 0.2, 0.3, 0.4, 0.7, 2.0))
+            for name in [name for name, until in here.items() if until <= at]:
+                self.append((at, ActorLost(actor=name, at=stamp(at))))
+                del here[name]
+                gone[name] = at
+            if len(here) < 3 and pick((True, False, False)):
+                name = pick([name for name in names if name not in here])
+                if at - gone[name] > 8.0:
+                    here[name] = at + pick((0.5, 2.0, 5.0))
+                    self.append((at, ActorFound(actor=name, at=stamp(at))))
+            observation = chance.observation(at)
+            if here and pick((True, False)):
+                observation = _of(pick(tuple(here)), observation)
+            self.append((at, observation))
+
+    def __repr__(self) -> str:
+        return f"Crowd({self._seed})"
+
+
+def _of(name: str, observation: object) -> object:
+    """The same, with somebody else instead of ann."""
+    if getattr(observation, "actor", "") == "ann":
+        return replace(observation, actor=name)
+    if getattr(getattr(observation, "event", None), "responder", "") == "ann":
+        return replace(observation, event=replace(observation.event, responder=name))
+    if isinstance(observation, ActionBegan) and observation.targets == ("ann",):
+        return replace(observation, targets=(name,))
+    return observation
+
+
+def told(stream: Stream, forgotten_after: float) -> tuple[Counter[object], Statistics, int]:
+    """The effects, but for their numbers: at one instant it is whoever was met first; the totals; who is known."""
+    config = RecognitionConfig(forgotten_after=forgotten_after)
+    session, standings = Session(ROBOT, config), Standings(ROBOT, config)
+    session.feed(world("ann", "bob"), 0.0)
+    effects = []
+    for at, observation in stream:
+        new = session.feed(observation, at)
+        standings.feed((one for one in new if isinstance(one, ConnectionEvent | Forgotten)), session.busy, at)
+        effects += new
+    end = stream[-1][0]
+    known = len(session.persons)
+    effects += session.advance(end + 5.0)
+    kept: Counter[object] = Counter()
+    for effect in effects:
+        match effect:
+            case ConnectionEvent():
+                kept[replace(effect, id="")] += 1
+            case EventOutcome():
+                kept[replace(effect, event="")] += 1
+            case Accepted(id=id) | Refused(id=id):
+                kept[type(effect), id] += 1
+    return kept, standings.overall(end), known
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.integers(0, 10**6).map(Crowd))
+def test_events_and_totals_are_the_same_as_if_nobody_were_forgotten(stream):
+    events, totals, known = told(stream, 6.3)
+    expected, expected_totals, all_known = told(stream, NEVER)
+
+    assert events == expected
+    for one, other in ((totals.session, expected_totals.session), (totals.recent, expected_totals.recent)):
+        assert (one.mtbce, one.max_gap, one.events) == (other.mtbce, other.max_gap, other.events)
+        for kind, other_kind in zip(one.kinds, other.kinds, strict=True):
+            means = (kind.delay_mean, kind.failed_delay_mean)
+            assert means == pytest.approx((other_kind.delay_mean, other_kind.failed_delay_mean))
+            assert replace(kind, delay_mean=None, failed_delay_mean=None) == replace(
+                other_kind, delay_mean=None, failed_delay_mean=None
+            )
+    assert known <= all_known
+
+
+def test_in_such_streams_people_are_forgotten():
+    fewer = [told(Crowd(seed), 6.3)[2] < told(Crowd(seed), NEVER)[2] for seed in range(10)]
+
+    assert all(fewer)
+
+
+def test_a_human_of_the_world_is_met_once():
+    log = Log(HUMAN)
+    for second in range(1, 5):
+        log.feed(world(HUMAN), float(second))
+
+    assert len(log.session.persons) == 1
