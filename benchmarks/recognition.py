@@ -1,4 +1,4 @@
-"""Recognition: observations a second for 1, 3 and 10 people, an hour replayed, what is kept over a day.
+"""Recognition: observations a second for 1, 3 and 10 people, an hour replayed, what is kept over a day, passers-by.
 
     python benchmarks/recognition.py [--laps 5] [--observations 10000] [--hours 24] [--only speed] [--json]
 
@@ -10,6 +10,8 @@ Seconds are those of the processor, so that others on the machine matter little.
 - speed: microseconds per observation, and as a multiple of one person's; beside the statistics alone, kept up
   with each change and made anew from the log;
 - hour: how long an hour takes;
+- passers: thousands of people who come, look, speak and go, one after the other, told of and filmed: milliseconds a
+  visit, and what is kept;
 - day: at each hour the objects and bytes that can be reached from session and statistics, and the process's memory.
 """
 
@@ -37,10 +39,12 @@ from tests.recognition import recomputed
 from tests.recognition.kept import reachable
 from tests.recognition.meeting import meeting
 from tests.recognition.observations import ROBOT
+from tests.recognition.passers import Lobby, visit
 
 Rows = list[dict[str, Any]]
 PEOPLE = (1, 3, 10)
 HOUR: Seconds = 3600.0
+VISITS = (100, 1000, 2000, 10_000)
 
 
 class Recognition:
@@ -148,6 +152,26 @@ def day(hours: int, people: int) -> Rows:
     return rows
 
 
+def passers() -> Rows:
+    """Time of the last hundred visits; `known`: people who have not been forgotten."""
+    rows: Rows = []
+    for raw in (False, True):
+        lobby, visits, taken = Lobby(RecognitionConfig()), 0, 0.0
+        for number in VISITS:
+            while visits < number:
+                since = process_time()
+                for at, observation in visit(visits, raw=raw):
+                    lobby.feed(observation, at)
+                taken = process_time() - since if visits % 100 == 0 else taken + process_time() - since
+                visits += 1
+            gc.collect()
+            kept = list(reachable(*lobby.kept()))
+            rows.append({"perception": "raw" if raw else "symbolic", "visits": number,
+                         "ms_a_visit": round(10 * taken, 2), "known": len(lobby.recognizer.session.persons),
+                         "objects": len(kept), "kB": round(sum(map(sys.getsizeof, kept)) / 1000)})  # fmt: skip
+    return rows
+
+
 def resident() -> int:
     """Bytes of this process in memory."""
     pages = int(Path("/proc/self/statm").read_text().split()[1])
@@ -168,7 +192,7 @@ def main() -> None:
     parser.add_argument("--observations", type=int, default=10_000)
     parser.add_argument("--hours", type=int, default=24)
     parser.add_argument("--people", type=int, default=1, help="in the day")
-    parser.add_argument("--only", choices=("speed", "hour", "day"))
+    parser.add_argument("--only", choices=("speed", "hour", "passers", "day"))
     parser.add_argument("--json", action="store_true")
     options = parser.parse_args()
     measured: dict[str, Rows] = {}
@@ -177,6 +201,8 @@ def main() -> None:
         measured["statistics of each change"] = statistics(options.observations)
     if options.only in (None, "hour"):
         measured["an hour replayed"] = hour()
+    if options.only in (None, "passers"):
+        measured["passers-by"] = passers()
     if options.only in (None, "day"):
         measured["kept"] = rows = day(options.hours, options.people)
         last, first = rows[-1], rows[0]

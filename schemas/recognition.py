@@ -9,7 +9,8 @@ from schemas.requests import Outcome, Request
 from schemas.units import Probability, Seconds, Stamp
 
 EventState = Literal["started", "succeeded", "failed", "preempted", "withdrawn", "superseded", "completed", "lost"]
-"""`lost`: recognition has died with the event open. Never sent: made for its readers, as `PeerGone` is."""
+"""`lost`: nobody knows what became of the event. Readers end so what was open when recognition died, as they are told of
+that by `PeerGone`; recognition itself, when it has lost track of the person by a mistake of its own."""
 ENDINGS: frozenset[EventState] = frozenset({"failed", "preempted", "withdrawn", "superseded", "completed", "lost"})
 """The last state of an event: nothing follows it."""
 

@@ -47,8 +47,8 @@ class AdjacencyPair(Machine):
 
     TABLE = TABLE
 
-    def __init__(self, ledger: Ledger, *, limit: Seconds, patience: Seconds, strict: bool = True) -> None:
-        super().__init__(ledger, strict=strict)
+    def __init__(self, ledger: Ledger, *, limit: Seconds, patience: Seconds) -> None:
+        super().__init__(ledger)
         self._limit = limit
         self._patience = patience
         self._by_robot = False

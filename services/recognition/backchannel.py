@@ -28,8 +28,8 @@ class Backchannel(Machine):
 
     TABLE = TABLE
 
-    def __init__(self, ledger: Ledger, *, limit: Seconds, strict: bool = True) -> None:
-        super().__init__(ledger, strict=strict)
+    def __init__(self, ledger: Ledger, *, limit: Seconds) -> None:
+        super().__init__(ledger)
         self._limit = limit
         self.last: tuple[Seconds, str] | None = None
         """Start and id of the last one that was published."""

@@ -40,7 +40,7 @@ class Company:
         """An acquaintance, old or new."""
         if id not in self.persons:
             self._met += 1
-            person = Person(id, self._met, self._scene, self._config, self._ledger, strict=self._strict)
+            person = Person(id, self._met, self._scene, self._config, self._ledger)
             self.persons[id] = self._here[id] = person
         return self.persons[id]
 
@@ -80,7 +80,7 @@ class Company:
 
     def lose_track(self, person: Person, at: Seconds) -> None:
         """Begin anew with somebody: open events end as lost, and what the person does has to be seen again."""
-        fresh = Person(person.id, person.number, self._scene, self._config, self._ledger, strict=self._strict)
+        fresh = Person(person.id, person.number, self._scene, self._config, self._ledger)
         fresh.presence, fresh.news = person.presence, person.news
         self.persons[person.id] = fresh
         if person.id in self._here:

@@ -16,18 +16,16 @@ from services.recognition.scene import Scene
 
 
 class Conversation:
-    """Of one person with the robot. strict: undefined transitions raise."""
+    """Of one person with the robot."""
 
-    def __init__(self, id: str, scene: Scene, config: RecognitionConfig, ledger: Ledger, *, strict: bool) -> None:
+    def __init__(self, id: str, scene: Scene, config: RecognitionConfig, ledger: Ledger) -> None:
         self.id = id
         self.speaks_since: Seconds | None = None
         self.silent_since: Seconds | None = None
         self.acts_since: Seconds | None = None
-        self.pair = AdjacencyPair(
-            ledger, limit=config.adjacency_pair_limit, patience=config.turn_patience, strict=strict
-        )
-        self.own_backchannel = Backchannel(ledger, limit=config.backchannel_limit, strict=strict)
-        self.robot_backchannel = Backchannel(ledger, limit=config.backchannel_limit, strict=strict)
+        self.pair = AdjacencyPair(ledger, limit=config.adjacency_pair_limit, patience=config.turn_patience)
+        self.own_backchannel = Backchannel(ledger, limit=config.backchannel_limit)
+        self.robot_backchannel = Backchannel(ledger, limit=config.backchannel_limit)
         self._speech_confidence: Probability = 1.0
         self._scene = scene
         self._config = config

@@ -42,6 +42,6 @@ class DirectedGaze(SharedGaze):
     ROBOT_BEGINS, HUMAN_BEGINS = "robot_directs", "human_directs"
     ROBOT_JOINS, HUMAN_JOINS = "robot_follows", "human_follows"
 
-    def __init__(self, ledger: Ledger, objects: tuple[str, ...], *, strict: bool = True) -> None:
-        super().__init__(ledger, strict=strict)
+    def __init__(self, ledger: Ledger, objects: tuple[str, ...]) -> None:
+        super().__init__(ledger)
         self.objects = objects

@@ -172,11 +172,10 @@ class Machine:
 
     TABLE: ClassVar[Table]
 
-    def __init__(self, ledger: Ledger, *, strict: bool = True) -> None:
+    def __init__(self, ledger: Ledger) -> None:
         self.state = IDLE
         self.event: UnderWay | None = None
         self._ledger = ledger
-        self._strict = strict
 
     @property
     def deadline(self) -> Seconds | None:
@@ -186,20 +185,17 @@ class Machine:
     def expire(self, at: Seconds) -> None:
         """`deadline` has passed; at: that instant."""
 
-    def step(self, given: str, at: Seconds) -> bool:
+    def step(self, given: str, at: Seconds) -> None:
         """Take one transition and publish what its row says.
 
-        An undefined one changes nothing; it raises UndefinedTransition, or returns False if not strict.
+        An undefined one changes nothing and raises UndefinedTransition.
         """
         row = self.TABLE.get((self.state, given))
         if row is None:
-            if self._strict:
-                raise UndefinedTransition(f"{type(self).__name__}: no {given!r} in state {self.state!r}")
-            return False
+            raise UndefinedTransition(f"{type(self).__name__}: no {given!r} in state {self.state!r}")
         self.state = row.next
         for state in row.publishes:
             assert self.event is not None, f"{type(self).__name__}: {given!r} publishes, but no event is under way"
             self._ledger.publish(self.event, state, at)
         if self.state == IDLE:
             self.event = None
-        return True

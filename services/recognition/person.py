@@ -44,25 +44,22 @@ class _Doing(NamedTuple):
 
 
 class Person:
-    """The recognizers of one actor. number: in the order of acquaintance. strict: undefined transitions raise."""
+    """The recognizers of one actor. number: in the order of acquaintance."""
 
-    def __init__(
-        self, id: str, number: int, scene: Scene, config: RecognitionConfig, ledger: Ledger, *, strict: bool
-    ) -> None:
+    def __init__(self, id: str, number: int, scene: Scene, config: RecognitionConfig, ledger: Ledger) -> None:
         self.id = id
         self.number = number
         self.presence = Presence(config.lost_face_grace)
         self.gaze = Gaze()
         self.directed: list[DirectedGaze] = []
-        self.facial = MutualFacialGaze(ledger, strict=strict)
-        self.conversation = Conversation(id, scene, config, ledger, strict=strict)
+        self.facial = MutualFacialGaze(ledger)
+        self.conversation = Conversation(id, scene, config, ledger)
         self.news = News(ACTIONS_KEPT)
         self._doing: dict[Action, _Doing] = {}
         """Other than looking."""
         self._scene = scene
         self._config = config
         self._ledger = ledger
-        self._strict = strict
         self._robot_directed: list[_Directed] = []
 
     # -- time ---------------------------------------------------------------------------------------------------
@@ -260,7 +257,7 @@ class Person:
         if robot_since is not None or not in_vain:
             self.facial.directed_gaze_begins(at, by_robot=False)
         human_on = self._scene.person_looks_at(self.gaze, objects)
-        one = DirectedGaze(self._ledger, objects, strict=self._strict)
+        one = DirectedGaze(self._ledger, objects)
         self.directed.append(one)
         clock = LimitClock(since, limit)
         one.human_begins(event, clock, robot_since=robot_since, human_on=human_on, in_vain=in_vain, at=at)
@@ -273,7 +270,7 @@ class Person:
                 one.supersede(event.started)
         self.forget_idle(event.started)
         self.facial.directed_gaze_begins(event.started, by_robot=True)
-        one = DirectedGaze(self._ledger, event.objects, strict=self._strict)
+        one = DirectedGaze(self._ledger, event.objects)
         self.directed.append(one)
         there = self._scene.person_looks_at(self.gaze, event.objects)
         self.gaze.spent = self.gaze.spent or there

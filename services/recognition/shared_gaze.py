@@ -26,8 +26,8 @@ class SharedGaze(Machine):
     ROBOT_JOINS: ClassVar[str]
     HUMAN_JOINS: ClassVar[str]
 
-    def __init__(self, ledger: Ledger, *, strict: bool = True) -> None:
-        super().__init__(ledger, strict=strict)
+    def __init__(self, ledger: Ledger) -> None:
+        super().__init__(ledger)
         self.by_robot = False
         self.clock: LimitClock | None = None
         self._robot_on = self._human_on = self._robot_came = False

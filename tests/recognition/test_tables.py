@@ -98,25 +98,18 @@ def test_every_name_that_a_shared_gaze_gives_stands_in_its_table(gaze: type[Shar
     assert {state for state, _ in ways} == {IDLE, robot, human, together}
 
 
-def gaze(strict: bool) -> mutual_facial_gaze.MutualFacialGaze:
-    machine = mutual_facial_gaze.MutualFacialGaze(Ledger("loop"), strict=strict)
+def gaze() -> mutual_facial_gaze.MutualFacialGaze:
+    machine = mutual_facial_gaze.MutualFacialGaze(Ledger("loop"))
     machine.event = UnderWay(kind="mutual_facial_gaze", initiator="robot", responder="human", started=1.0)
     machine.step("robot_looks", 1.0)
     return machine
 
 
 def test_an_undefined_transition_raises_and_changes_nothing():
-    machine = gaze(strict=True)
+    machine = gaze()
 
     with pytest.raises(UndefinedTransition, match="MutualFacialGaze: no 'robot_answers' in state 'robot_waiting'"):
         machine.step("robot_answers", 2.0)
-    assert (machine.state, len(machine._ledger.effects)) == ("robot_waiting", 1)
-
-
-def test_an_undefined_transition_is_ignored_when_not_strict():
-    machine = gaze(strict=False)
-
-    assert machine.step("robot_answers", 2.0) is False
     assert (machine.state, len(machine._ledger.effects)) == ("robot_waiting", 1)
 
 
