@@ -9,8 +9,8 @@ from schemas.requests import Outcome, Request
 from schemas.units import Probability, Seconds, Stamp
 
 EventState = Literal["started", "succeeded", "failed", "preempted", "withdrawn", "superseded", "completed", "lost"]
-"""`lost`: nobody knows what became of the event. Readers end so what was open when recognition died, as they are told of
-that by `PeerGone`; recognition itself, when it has lost track of the person by a mistake of its own."""
+"""`lost`: nobody knows what became of the event. Readers end so what was open when recognition died, of which
+`PeerGone` tells them; recognition itself does when it has lost track of the person by a mistake of its own."""
 ENDINGS: frozenset[EventState] = frozenset({"failed", "preempted", "withdrawn", "superseded", "completed", "lost"})
 """The last state of an event: nothing follows it."""
 

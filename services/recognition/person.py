@@ -10,7 +10,7 @@ from schemas.units import Probability, Seconds
 from services.recognition.config import RecognitionConfig
 from services.recognition.conversation import Conversation
 from services.recognition.directed_gaze import HUMAN_DIRECTING, DirectedGaze
-from services.recognition.limits import LimitClock
+from services.recognition.limits import LimitClock, in_time
 from services.recognition.machine import IDLE, Ledger, UnderWay
 from services.recognition.mutual_facial_gaze import HUMAN_WAITING, MutualFacialGaze
 from services.recognition.news import News
@@ -198,7 +198,7 @@ class Person:
             one.gazes(robot_on=robot_on, human_on=human_on, at=at, confidence=confidence)
         self.forget_idle(at)
         if any(
-            self._scene.person_looks_at(self.gaze, past.objects) and at - past.at <= self._config.after_robot_directed
+            self._scene.person_looks_at(self.gaze, past.objects) and self._is_recent(past, at)
             for past in self._robot_directed
         ):
             self.gaze.spent = True
@@ -285,8 +285,7 @@ class Person:
 
     def forget_idle(self, at: Seconds) -> None:
         """Drop finished directed gazes; the robot's are remembered for a while."""
-        recent = self._config.after_robot_directed
-        self._robot_directed = [past for past in self._robot_directed if at - past.at <= recent]
+        self._robot_directed = [past for past in self._robot_directed if self._is_recent(past, at)]
         for one in self.directed:
             if one.state == IDLE and one.by_robot:
                 self._robot_directed.append(_Directed(one.objects, at))
@@ -322,6 +321,9 @@ class Person:
             if machine.event is event:
                 machine.step("withdraw", at)
         self.forget_idle(at)
+
+    def _is_recent(self, past: _Directed, at: Seconds) -> bool:
+        return in_time(at, past.at + self._config.after_robot_directed)
 
     # -- mutual facial gaze -------------------------------------------------------------------------------------
 
