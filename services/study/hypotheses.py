@@ -15,8 +15,9 @@ CAVEAT = (
     "The person is a model. The sessions show what the robot's behavior does to an interaction with somebody who "
     "reacts in just this way, not how people would react. That a look that is not returned makes the next one rarer "
     "is built into the stochastic person (`simulation.stochastic.reciprocity`): 11 shows how strong the effect of "
-    "that would be, not that there is one. With enough sessions any difference, however small, gets a small p: read "
-    "the difference and its interval first."
+    "that would be, not that there is one. All is counted through the perception of the condition: in degraded "
+    "recognition a part of 6 and 7, and most of 11, is what is not seen. With enough sessions any difference, "
+    "however small, gets a small p: read the difference and its interval first."
 )
 
 
@@ -49,7 +50,7 @@ HYPOTHESES = (
     ),
     Hypothesis(
         name="7", claim="the mean adjacency pair delay is less in operational", sign=1, unit="s",
-        measure="mean delay of succeeded adjacency pairs", value=_pair_delay,
+        measure="mean delay of the adjacency pairs that were answered", value=_pair_delay,
     ),
     Hypothesis(
         name="8", claim="the puzzle is completed sooner in operational", sign=1, unit="s",
@@ -57,7 +58,7 @@ HYPOTHESES = (
     ),
     Hypothesis(
         name="11a", claim="people make progressively less eye contact when degraded", sign=-1, unit="of the time",
-        measure="person's look at the robot's face, last third - first third", value=_change, baseline=False,
+        measure="look at the robot's face, as seen, last third - first third", value=_change, baseline=False,
     ),
     Hypothesis(
         name="11b", claim="and their eye contact falls more than in operational", sign=-1, unit="of the time",

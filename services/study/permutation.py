@@ -1,8 +1,9 @@
 """The paired test of a study: how often would chance alone give a difference so large?
 
-Each session has a twin with the same seed in the other condition. If the conditions did the same, each difference
-could as well have the other sign; the test counts how many choices of signs give a sum as far from zero. Nothing is
-assumed about the distribution, and small samples get the large p they deserve. Pure; chance has a fixed seed.
+Each session is compared with the one of the same seed in the other condition. If the conditions did the same, each
+difference could as well have the other sign; the test counts how many choices of signs give a sum as far from zero.
+Nothing is assumed about the distribution, and small samples get the large p they deserve. Pure; chance has a fixed
+seed.
 """
 
 from collections.abc import Sequence

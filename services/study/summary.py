@@ -135,9 +135,10 @@ def hypotheses(found: Sequence[Finding]) -> Table:
         rows=tuple(rows),
         notes=(
             *(f"{one.name}: {one.claim} ({one.measure}, {one.unit})." for one in HYPOTHESES),
-            "Sessions of the same seed are pairs. p: two-sided permutation test of their differences (signs "
-            "flipped), corrected for the number of questions (Holm). 95 %: the differences that the test does not "
-            "reject, uncorrected. d: mean / standard deviation of the differences.",
+            "Sessions of the same seed are compared as pairs, though they are hardly more alike than others. p: "
+            "two-sided permutation test of their differences (signs flipped), corrected for the number of questions "
+            "(Holm). 95 %: the differences that the test does not reject, uncorrected. d: mean / standard deviation "
+            "of the differences.",
             CAVEAT,
         ),
     )
