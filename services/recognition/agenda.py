@@ -36,13 +36,15 @@ class Agenda(Generic[Key]):
     @property
     def first(self) -> tuple[Seconds, Key] | None:
         """What is due first, and when."""
-        while self._heap and self._at.get(self._heap[0][1]) != self._heap[0][0]:
-            heapq.heappop(self._heap)
-        return self._heap[0] if self._heap else None
+        heap = self._heap
+        while heap and self._at.get(heap[0][1]) != heap[0][0]:
+            heapq.heappop(heap)
+        return heap[0] if heap else None
 
     @property
     def deadline(self) -> Seconds | None:
-        return None if self.first is None else self.first[0]
+        first = self.first
+        return None if first is None else first[0]
 
     def take_due(self, now: Seconds) -> list[Key]:
         """Whatever is due at `now`; it is due no longer."""

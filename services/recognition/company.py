@@ -142,8 +142,7 @@ class Company:
 
     def _arrange(self, person: Person) -> None:
         """Know when the person is due, and whether it is here."""
-        due = person.first_due()
-        self._agenda.set((person.number, person.id), None if due is None else due.at)
+        self._agenda.set((person.number, person.id), person.deadline)
         here, was_here = person.presence.here, person.id in self._here
         if was_here and not here:
             del self._here[person.id]

@@ -31,6 +31,11 @@ class Conversation:
         self._config = config
 
     @property
+    def deadlines(self) -> tuple[Seconds | None, ...]:
+        """The times of the `dues`."""
+        return self.own_backchannel.deadline, self.robot_backchannel.deadline, self._pair_deadline
+
+    @property
     def dues(self) -> Iterator[tuple[Seconds | None, Callable[[Seconds], None]]]:
         """What will happen by itself, and when."""
         yield self.own_backchannel.deadline, self._takes_floor

@@ -22,13 +22,6 @@ ACTIONS_KEPT = 64
 """Of each person; of those it is known when they last began and ended."""
 
 
-class Due(NamedTuple):
-    """Something that happens by itself at `at`."""
-
-    at: Seconds
-    happen: Callable[[Seconds], None]
-
-
 class _Directed(NamedTuple):
     """A directed gaze of the robot that is over."""
 
@@ -64,28 +57,31 @@ class Person:
 
     # -- time ---------------------------------------------------------------------------------------------------
 
-    def first_due(self) -> Due | None:
-        """What will happen by itself first, unless something comes in between."""
-        first: Due | None = None
-        candidates: tuple[tuple[Seconds | None, Callable[[Seconds], None]], ...] = (
-            (self.gaze.deadline, self._gaze_expires),
-            (self.presence.deadline, self.leave),
-            *((one.deadline, partial(self._expire_directed, one)) for one in self.directed),
-            (self.facial.deadline, self.facial.expire),
-            *self.conversation.dues,
-            (self._look_directs_at, self._look_directs),
-            *((one.since + self._longest(action), self._goes_on_too_long) for action, one in self._doing.items()),
+    @property
+    def deadline(self) -> Seconds | None:
+        """When something happens by itself, unless something comes in between; then `pass_time`."""
+        times = [self.gaze.deadline, self.presence.deadline, self.facial.deadline, self._look_directs_at]
+        times += self.conversation.deadlines
+        times += [one.deadline for one in self.directed]
+        times += [one.since + self._longest(action) for action, one in self._doing.items()]
+        return min([at for at in times if at is not None], default=None)
+
+    @property
+    def _dues(self) -> Iterator[tuple[Seconds | None, Callable[[Seconds], None]]]:
+        """All that has a time, in the order in which it happens if the times are equal."""
+        yield self.gaze.deadline, self._gaze_expires
+        yield self.presence.deadline, self.leave
+        yield from ((one.deadline, partial(self._expire_directed, one)) for one in self.directed)
+        yield self.facial.deadline, self.facial.expire
+        yield from self.conversation.dues
+        yield self._look_directs_at, self._look_directs
+        yield from (
+            (one.since + self._longest(action), self._goes_on_too_long) for action, one in self._doing.items()
         )
-        for at, happen in candidates:
-            if at is not None and (first is None or at < first.at):
-                first = Due(at, happen)
-        return first
 
     def pass_time(self, at: Seconds) -> None:
-        """What is due first happens, at its own time `at`."""
-        due = self.first_due()
-        assert due is not None
-        due.happen(at)
+        """What is due at `at`, the deadline, happens: the first of it."""
+        next(happen for due, happen in self._dues if due == at)(at)
 
     @property
     def _look_directs_at(self) -> Seconds | None:

@@ -60,8 +60,9 @@ class Recognizer:
         return min((at for at in times if at is not None), default=None)
 
     def feed(self, observation: Perceived, at: Seconds, now: Seconds) -> list[Result]:
-        """Take what happened at `at`, before or at `now`."""
+        """Take what happened at `at`, before or at `now`. A time that is no number is taken for now."""
         self._now = now
+        at = at if math.isfinite(at) else now
         derived: list[Symbolic] = []
         match observation:
             case HeadPose() | VoiceActivity():

@@ -80,8 +80,8 @@ class Session:
     @property
     def deadline(self) -> Seconds | None:
         """When `advance` has something to do, unless an observation comes first."""
-        times = (self.scene.gaze.deadline, self._company.deadline)
-        return min((at for at in times if at is not None), default=None)
+        gaze, company = self.scene.gaze.deadline, self._company.deadline
+        return company if gaze is None or (company is not None and company < gaze) else gaze
 
     def advance(self, now: Seconds) -> list[Effect]:
         """What happens by itself up to and including `now`."""

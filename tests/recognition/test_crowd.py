@@ -163,8 +163,8 @@ def test_what_is_kept_does_not_grow_with_those_who_have_passed(raw: bool):
 
 def test_a_step_asks_nobody_who_has_gone(monkeypatch: pytest.MonkeyPatch):
     asked: list[str] = []
-    first_due = Person.first_due
-    monkeypatch.setattr(Person, "first_due", lambda self: asked.append(self.id) or first_due(self))
+    deadline = Person.deadline.fget  # type: ignore[attr-defined]
+    monkeypatch.setattr(Person, "deadline", property(lambda self: asked.append(self.id) or deadline(self)))
     lobby = Lobby(RecognitionConfig())
     for number in range(60):
         asked.clear()
@@ -180,8 +180,8 @@ def test_a_step_asks_nobody_who_has_gone(monkeypatch: pytest.MonkeyPatch):
 def test_a_step_asks_no_more_than_one_of_many_who_are_here(monkeypatch: pytest.MonkeyPatch):
     log = Log(*(f"person-{number}" for number in range(50)))
     asked: list[str] = []
-    first_due = Person.first_due
-    monkeypatch.setattr(Person, "first_due", lambda self: asked.append(self.id) or first_due(self))
+    deadline = Person.deadline.fget  # type: ignore[attr-defined]
+    monkeypatch.setattr(Person, "deadline", property(lambda self: asked.append(self.id) or deadline(self)))
     log.looks("person-7", ROBOT, 1.0)
     log.until(2.0)
 

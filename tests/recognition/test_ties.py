@@ -1,13 +1,18 @@
 """Two things at the very same instant, and numbers at the very edge: which of them counts."""
 
+import math
+
 import pytest
 
+from schemas.actions import ActionBegan
+from schemas.recognition import ConnectionEvent
 from services.recognition.attention import Attention
 from services.recognition.config import RecognitionConfig
 from services.recognition.limits import in_time
 from services.recognition.presence import Presence
+from services.recognition.recognizer import Recognizer
 from services.recognition.statistics import Starts
-from tests.recognition.observations import HUMAN, ROBOT, Log, asked, stamp
+from tests.recognition.observations import HUMAN, ROBOT, Log, asked, stamp, world
 from tests.recognition.raw import pose, table
 
 BLUE = "blue-square"
@@ -110,3 +115,15 @@ def test_two_points_at_one_instant_direct_both():
     log.begins(HUMAN, "point", 1.0, "rectangle")
 
     assert [event.objects for event in log.events] == [(BLUE,), ("rectangle",)]
+
+
+@pytest.mark.parametrize("no_time", [math.nan, math.inf, -math.inf])
+def test_a_time_that_is_no_number_is_taken_for_now(no_time: float):
+    recognizer = Recognizer(ROBOT, RecognitionConfig())
+    recognizer.feed(world(), no_time, 0.0)
+    (started,) = recognizer.feed(
+        ActionBegan(actor=HUMAN, action="look", at=stamp(0.0), targets=(ROBOT,)), no_time, 1.0
+    )
+
+    assert isinstance(started, ConnectionEvent)
+    assert (started.at, recognizer.deadline) == (stamp(1.0), 2.9)
