@@ -22,7 +22,6 @@ from services.bus import Bus
 from services.client import Robot, connect
 from services.feeds import EventFeed
 from services.zenoh_bus import open_hub
-from tests.bus.cable import Cable
 from tests.bus.places import free_endpoint
 from tests.cli.command import engage, start
 from tests.cli.test_processes import PATIENCE, line, stopped
@@ -34,12 +33,13 @@ MUTUAL = "mutual_facial_gaze"
 
 
 class Scene(NamedTuple):
-    """A recognition that runs by itself, our place on its bus, and where that is."""
+    """A recognition that runs by itself, our place on its bus, where that is, and how recognition is set."""
 
     recognition: list[Process]
     robot: Robot
     body: Bus
     where: tuple[str, ...]
+    settings: tuple[str, ...] = ()
 
     def look(self, actor: str, target: str) -> None:
         key = keys.ROBOT_ACTION if actor == self.body.robot else keys.PERCEIVED_ACTION
@@ -52,14 +52,15 @@ class Scene(NamedTuple):
 
     async def recognize(self) -> None:
         """Start another one."""
-        self.recognition.append(await start("run", "recognition", *self.where))
+        self.recognition.append(await start("run", "recognition", *self.where, *self.settings))
         await line(self.recognition[-1], "recognition is ready")
 
 
 @asynccontextmanager
-async def scene(robot: str, endpoint: str) -> AsyncIterator[Scene]:
+async def scene(robot: str, endpoint: str, *settings: str) -> AsyncIterator[Scene]:
     async with await open_hub(robot, listen=[endpoint]) as hub, connect(hub=hub) as client:
-        made = Scene([], client, hub.join("control"), ("--robot", robot, "--connect", endpoint))
+        where = ("--robot", robot, "--connect", endpoint)
+        made = Scene([], client, hub.join("control"), where, settings)
         try:
             await made.recognize()
             yield made
@@ -126,33 +127,6 @@ async def test_late_joiners_of_all_kinds_and_the_death_of_recognition(endpoint: 
     assert [one["id"] for one in watched] == [lost.id, again.id]
     assert [text.split(":")[0] for text in plain_watched] == [lost.id, again.id]
     assert codes == [0, 0]
-
-
-async def test_the_plain_example_goes_on_after_a_cut(endpoint: str) -> None:
-    cable = Cable(endpoint)
-    await cable.join()
-    async with scene("seen", endpoint) as our:
-        with our.robot.connection_events("ann") as events:
-            our.look("seen", "ann")
-            our.look("ann", "seen")
-            shared = await heard(events, "succeeded")
-            plain = await asyncio.create_subprocess_exec(
-                sys.executable, EXAMPLE, "--robot", "seen", "--actor", "ann", cable.endpoint, stdout=PIPE, stderr=PIPE
-            )
-            try:
-                before = await line(plain, ": succeeded", log=False)
-                await cable.cut()
-                await line(plain, ": lost", log=False)
-                await cable.join()
-                after = await line(plain, ": succeeded", log=False)
-                our.look_away("ann")
-                ended = await line(plain, ": completed", log=False)
-            finally:
-                await stopped(plain)
-                await cable.cut()
-
-    assert before == after
-    assert [text.split(":")[0] for text in (after, ended)] == [shared.id] * 2
 
 
 async def test_a_reader_who_has_had_enough_ends_watch_without_a_word(endpoint: str) -> None:
