@@ -122,7 +122,7 @@ HEAD = f"""\
 
 Everything that services say to one another, and what any other program needs to take part. The structs are in
 `schemas/`; as JSON Schemas in `schemas/exported/`, one file per message. This page is made from the code:
-`python docs/protocol.py`.
+`.venv/bin/python docs/protocol.py`.
 
 ## Keys
 
@@ -237,9 +237,15 @@ query, as it was published: same encoding, attachment and timestamp.
   services how they are.
 
 ```python
-for reply in session.get("robot/{keys.of_class("state")}?format=json"):
-    if reply.ok:
-        print(reply.ok.key_expr, json.loads(reply.ok.payload.to_bytes()))
+import json, zenoh
+
+config = zenoh.Config()
+config.insert_json5("mode", '"client"')
+config.insert_json5("connect/endpoints", '["tcp/127.0.0.1:7447"]')
+with zenoh.open(config) as session:
+    for reply in session.get("robot/{keys.of_class("state")}?format=json"):
+        if reply.ok:
+            print(reply.ok.key_expr, json.loads(reply.ok.payload.to_bytes()))
 ```
 
 ## Blocks and fragments in files

@@ -6,7 +6,6 @@ import re
 import sys
 from contextlib import suppress
 from pathlib import Path
-from textwrap import indent
 from types import ModuleType
 from typing import get_args
 
@@ -17,8 +16,6 @@ from schemas import keys, lines
 from schemas.fragments import PerformFragment
 from schemas.messages import Message
 from schemas.requests import Accepted
-from schemas.units import Stamp
-from schemas.world import World
 from services.zenoh_bus import open_hub
 from tests.bus.places import free_endpoint
 
@@ -100,24 +97,3 @@ async def test_the_example_in_plain_zenoh_reaches_every_process() -> None:
     assert received.message.fragment.behaviors[0].id == "speech-1"
     assert b"engage.Accepted/1" in answer
     assert b"greeting-1" in answer
-
-
-@pytest.mark.real_time
-async def test_the_example_of_a_query_brings_the_last_states_as_json() -> None:
-    endpoint = free_endpoint()
-    opening, query = re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL)
-    head = opening.replace("tcp/127.0.0.1:7447", endpoint).partition("    states = ")[0]
-    program = head + indent(query, "    ")
-    assert endpoint in program
-
-    async with await open_hub("robot", listen=[endpoint]) as hub:
-        hub.join("perception").publish(keys.WORLD, World(at=Stamp("clock", 1.0), entities=()))
-        async with asyncio.timeout(20):
-            guest = await asyncio.create_subprocess_exec(
-                sys.executable, "-c", program, stdout=asyncio.subprocess.PIPE, stderr=asyncio.subprocess.STDOUT
-            )
-            out, _ = await guest.communicate()
-
-    key, _, content = out.decode().partition(" ")
-    assert key == f"robot/{keys.WORLD}"
-    assert "'type': 'world'" in content
