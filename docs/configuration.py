@@ -33,7 +33,7 @@ seed = 3
 noise = 0.05
 ```
 
-This page is made from the code: `python docs/configuration.py`.
+This page is made from the code: `.venv/bin/python docs/configuration.py`.
 """
 
 

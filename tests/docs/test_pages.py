@@ -1,0 +1,208 @@
+"""Every command and every snippet of README.md and docs/*.md, run against a robot in processes of its own.
+
+All pages run at once, each in a folder of its own and in its order, while somebody talks with the robot. How a block
+is run: `pages.py`. A block that nothing runs fails; what can't be run here is in `EXCUSED`, with the reason.
+"""
+
+import asyncio
+import re
+import shlex
+import signal
+from collections.abc import Mapping
+from pathlib import Path
+
+import msgspec
+import pytest
+
+from schemas.feedback_xml import decode_feedback
+from schemas.summary import Summary
+from tests.bus.places import free_endpoint
+from tests.cli.command import GOOD_BLOCK
+from tests.docs.clone import PATIENCE, ROOT, Clone, Ended, run, run_until_it_prints, start, tell
+from tests.docs.pages import (
+    Block,
+    Shown,
+    Span,
+    blocks,
+    commands,
+    is_complete,
+    is_endless,
+    is_printed,
+    left_to_the_reader,
+    spans,
+)
+
+pytestmark = pytest.mark.real_time
+
+EXCUSED = {
+    "make demo": "takes two and a half minutes; it runs with ARGS=--virtual-time",
+    "make test": "is what runs this",
+    ".venv/bin/engage up": "is what all pages are run against",
+    ".venv/bin/python -m pip install": "would change the environment of the tests; its extras are checked",
+}
+"""Commands, by how they begin, that do not run here, and why."""
+ELSEWHERE = {
+    ("docs/control.md", "python"): "tests/control/test_docs.py",
+    ("docs/recognition.md", "mermaid"): "tests/recognition/test_tables.py",
+}
+"""Blocks that the tests of their part hold to what they say."""
+IN_LESS_TIME = {
+    "--sessions 20 ": "--sessions 1 --condition operational ",
+    "--sessions 200 ": "--sessions 2 ",
+    "--embedded": "--embedded --virtual-time",
+}
+"""What is left out of a command, so that nobody waits for it here."""
+ENDLESS = ("up", "run", "watch")
+"""Commands that go on until Ctrl-C (docs/commands.md)."""
+TALK = """\
+from contextlib import suppress
+from schemas.faults import InputRefused
+from services.client import connect
+
+async with connect() as robot:
+    await robot.person()
+    while True:
+        with suppress(InputRefused):  # generation may see the person a moment after us
+            await robot.perform({"turn_status": "full", "parts": [{"say": "This is"}, {"refer": "blue-square"}]})
+            print("said", flush=True)
+"""
+PAGES = {
+    str(path.relative_to(ROOT)): path.read_text(encoding="utf-8")
+    for path in (ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md")))
+}
+SPANS = [span for page, text in PAGES.items() for span in spans(page, text)]
+ITEMS: list[Block | Span] = sorted(
+    [block for page, text in PAGES.items() for block in blocks(page, text)]
+    + [span for span in SPANS if is_complete(span.text)],
+    key=lambda item: (item.page, item.line),
+)
+
+
+class Page:
+    """Runs what one page shows, in its order. What is wrong with an item: its complaint, else empty."""
+
+    def __init__(self, name: str, clone: Clone, free: asyncio.Semaphore) -> None:
+        self.items = [item for item in ITEMS if item.page == name]
+        self._clone = clone
+        self._folder = clone.folder(name.replace("/", "-"))
+        self._free = free
+        (self._folder / "hello.xml").write_text(GOOD_BLOCK)
+
+    async def complaints(self) -> dict[Block | Span, str]:
+        found = {}
+        for item in self.items:
+            try:
+                found[item] = await (self._span(item) if isinstance(item, Span) else self._block(item))
+            except Exception as error:
+                found[item] = f"{type(error).__name__}: {error}"
+        return found
+
+    async def _span(self, span: Span) -> str:
+        """In a sentence `engage` may stand for a command as such; with a file of the page it is a call."""
+        call = span.text.startswith((".venv/", "make ")) or self._names_a_file(span.text)
+        return await self._run(Shown(span.text)) if call else ""
+
+    def _names_a_file(self, command: str) -> bool:
+        return any((self._folder / word).is_file() for word in shlex.split(command) if word != "hello.xml")
+
+    async def _block(self, block: Block) -> str:
+        if (block.page, block.language) in ELSEWHERE:
+            return ""
+        match block.language:
+            case "text":  # a drawing, or what no program prints as it stands
+                shown = [
+                    line for line in block.text.splitlines() if re.match(r"\$ |(\.venv|engage|make|pip)\b", line)
+                ]
+                return f"{shown[0]!r} stands in a block of text" if shown else ""
+            case "sh" | "console":
+                told = [await self._run(shown) for shown in commands(block)]
+                return next(filter(None, told), "")
+            case "python":
+                return await self._python(block)
+            case "xml" | "json" | "toml":
+                return await self._file(block)
+        return f"nothing runs a block of {block.language or 'no language'}"
+
+    async def _run(self, shown: Shown) -> str:
+        command = shown.command
+        if any(command.startswith(excused) and not command.startswith("make demo ARGS") for excused in EXCUSED):
+            return ""
+        for long, short in IN_LESS_TIME.items():
+            command = command.replace(long, short)
+        if re.search(rf"\bengage ({'|'.join(ENDLESS)})\b", command):
+            ended = await run_until_it_prints(command, self._folder)
+            return _complaint(command, ended, "" if ended.out else "it printed nothing")
+        async with self._free:
+            ended = await run(command, self._folder)
+        if shown.output is None:
+            return _complaint(command, ended)
+        seen = ended.out + ended.err  # a refusal is shown like anything else
+        return "" if is_printed(shown.output, seen) else f"{command}: it printed\n{seen}"
+
+    async def _python(self, block: Block) -> str:
+        """Each by itself: whoever copies one block has no other."""
+        path = self._folder / f"line-{block.line}.py"
+        path.write_text(self._clone.placed(block.text))
+        names = " ".join(sorted(left_to_the_reader(block.text)))
+        command = f".venv/bin/python {Path(__file__).with_name('snippet.py')} {path.name} {names}"
+        if is_endless(block.text):
+            ended = await run_until_it_prints(command, self._folder)
+        else:
+            ended = await run(command, self._folder)
+        return _complaint("the snippet", ended, "" if ended.out else "it printed nothing")
+
+    async def _file(self, block: Block) -> str:
+        """A file of the page's commands; else it is read as what it is."""
+        path = self._folder / (block.name or f"line-{block.line}.{block.language}")
+        path.write_text(block.text)
+        if block.name and any(block.name in item.text for item in self.items if item.line > block.line):
+            return ""
+        if "<ebml:feedback" in block.text:
+            return "" if decode_feedback(block.text) else "no feedback"
+        if '"status"' in block.text:
+            msgspec.json.decode(block.text, type=Summary, strict=True)
+            return ""
+        option = "hello.xml --config" if block.language == "toml" else ""
+        if '"entities"' in block.text:
+            option = "hello.xml --world"
+        return await self._run(Shown(f".venv/bin/engage plan {option} {path.name}"))
+
+
+def _complaint(what: str, ended: Ended, wrong: str = "") -> str:
+    if ended.code or wrong:
+        return f"{what}: exit code {ended.code}, {wrong}\n{ended.err}"
+    return ""
+
+
+@pytest.fixture(scope="module")
+def told(tmp_path_factory: pytest.TempPathFactory) -> Mapping[Block | Span, str]:
+    return asyncio.run(_run_all(Clone(tmp_path_factory.mktemp("clone"), free_endpoint())))
+
+
+async def _run_all(clone: Clone) -> dict[Block | Span, str]:
+    robot = clone.folder("robot")
+    (robot / "talk.py").write_text(TALK)
+    up = await start(".venv/bin/engage up", robot)
+    talk = await start(f".venv/bin/python {Path(__file__).with_name('snippet.py')} talk.py", robot)
+    try:
+        for process in (up, talk):
+            assert process.stdout is not None
+            assert process.stderr is not None
+            async with asyncio.timeout(PATIENCE):
+                assert await process.stdout.readline(), (await process.stderr.read()).decode()
+        free = asyncio.Semaphore(2)
+        pages = [Page(name, clone, free) for name in PAGES]
+        return {
+            item: complaint
+            for complaints in await asyncio.gather(*(page.complaints() for page in pages))
+            for item, complaint in complaints.items()
+        }
+    finally:
+        for process in (talk, up):
+            tell(process, signal.SIGINT)
+            await process.communicate()
+
+
+@pytest.mark.parametrize("item", ITEMS, ids=str)
+def test_what_a_page_shows_works_as_it_stands(item: Block | Span, told: Mapping[Block | Span, str]) -> None:
+    assert not told[item], told[item]
