@@ -32,14 +32,13 @@ def one(text: str) -> Block:
     return thing
 
 
-def test_the_documented_fragment_becomes_the_documented_bml(engage: Engage, tmp_path: Path) -> None:
-    fragment, block = shown("generation.md")
+def test_the_documented_fragment_becomes_bml_of_the_standard(engage: Engage, tmp_path: Path) -> None:
+    [fragment] = shown("generation.md")  # tests/docs compares what comes of it with the page
 
     result = engage("bml", written(tmp_path, fragment), "--core")
 
     assert (result.code, result.err) == (0, "")
-    assert result.out == block
-    assert violations(block) == []
+    assert violations(result.out) == []
 
 
 def test_a_fragment_keeps_its_events_unless_told_otherwise(engage: Engage, tmp_path: Path) -> None:

@@ -91,13 +91,16 @@ def _joined(lines: Sequence[str]) -> Iterator[str]:
     for line in lines:
         command += line
         try:
-            ended = not command.endswith("\\") and shlex.split(command, comments=True)
+            words = shlex.split(command, comments=True)
         except ValueError:
-            ended = []
-        if ended:
+            words = None
+        if words is None or command.endswith("\\"):
+            command += "\n"
+            continue
+        if words:
             yield command
-        command = "" if ended or not command.strip() else f"{command}\n"
-    assert not command.strip(), f"no end of {command!r}"
+        command = ""
+    assert not command, f"no end of {command!r}"
 
 
 def is_printed(shown: str, printed: str) -> bool:
