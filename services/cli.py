@@ -340,6 +340,10 @@ def main(arguments: list[str] | None = None) -> NoReturn:
         code = _ended(_leaves(expected))
     except KeyboardInterrupt:
         code = INTERRUPTED
+    except SystemExit as exit:
+        if not isinstance(exit.__context__, BrokenPipeError):
+            raise
+        code = _ended([exit.__context__])  # Typer has taken it for an error
     sys.exit(code or 0)
 
 
