@@ -8,7 +8,8 @@ import ast
 import builtins
 import re
 import shlex
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
+from contextlib import suppress
 from itertools import pairwise
 from textwrap import dedent
 from typing import NamedTuple
@@ -79,28 +80,26 @@ def is_complete(command: str) -> bool:
 def commands(block: Block) -> list[Shown]:
     """Of a `sh` block each command, of a `console` block each with its output."""
     if block.language == "sh":
-        return [Shown(command) for command in _joined(block.text.splitlines())]
+        lines, found = block.text.splitlines(), []
+        while lines:
+            command, lines = _first(lines)
+            if shlex.split(command, comments=True):
+                found.append(Shown(command))
+        return found
     starts = [match.start() for match in re.finditer(r"^\$ ", block.text, re.MULTILINE)]
-    parts = [block.text[start:end] for start, end in pairwise([*starts, len(block.text)])]
-    return [Shown(command[2:], output) for command, _, output in (part.partition("\n") for part in parts)]
+    parts = [_first(block.text[start + 2 : end].splitlines()) for start, end in pairwise([*starts, len(block.text)])]
+    return [Shown(command, "".join(f"{line}\n" for line in output)) for command, output in parts]
 
 
-def _joined(lines: Sequence[str]) -> Iterator[str]:
-    """A command goes on after a backslash, and until its quotes are closed."""
-    command = ""
-    for line in lines:
-        command += line
-        try:
-            words = shlex.split(command, comments=True)
-        except ValueError:
-            words = None
-        if words is None or command.endswith("\\"):
-            command += "\n"
-            continue
-        if words:
-            yield command
-        command = ""
-    assert not command, f"no end of {command!r}"
+def _first(lines: Sequence[str]) -> tuple[str, list[str]]:
+    """The first command, and what follows. It goes on after a backslash, and until its quotes are closed."""
+    for end in range(1, len(lines) + 1):
+        command = "\n".join(lines[:end])
+        with suppress(ValueError):
+            shlex.split(command, comments=True)
+            if not command.endswith("\\"):
+                return command, list(lines[end:])
+    raise ValueError(f"no end of {lines[0]!r}")
 
 
 def is_printed(shown: str, printed: str) -> bool:
