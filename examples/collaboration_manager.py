@@ -1,6 +1,6 @@
-"""A collaboration manager of one's own: `python examples/collaboration_manager.py [ENDPOINT]`.
+"""A collaboration manager of one's own: `.venv/bin/python examples/collaboration_manager.py [ENDPOINT]`.
 
-Run it beside `engage up` (before or after), or on another machine with the endpoint of one of its services.
+Run it beside `.venv/bin/engage up` (before or after), or on another machine with the endpoint of one of its services.
 It waits for the robot and for a person, says one thing, and tells how it went.
 """
 

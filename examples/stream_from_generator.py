@@ -1,8 +1,8 @@
 """A language model speaks through the robot, and is told what became of it. A generator stands in for the model.
 
-    engage up --human listening                                   # then, beside it or with its ENDPOINT anywhere:
-    python examples/stream_from_generator.py [ENDPOINT]
-    python examples/stream_from_generator.py --embedded [--virtual-time]      # or everything in this process
+    .venv/bin/engage up --human listening                         # then, beside it or with its ENDPOINT anywhere:
+    .venv/bin/python examples/stream_from_generator.py [ENDPOINT]
+    .venv/bin/python examples/stream_from_generator.py --embedded [--virtual-time]  # or everything in this process
 
 The words are spoken while the rest is still being written. `[red-square]` refers to an object; how it is called, and
 whether the robot looks or points at it, is not the model's business. The simulated person does not notice a mere

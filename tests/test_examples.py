@@ -1,10 +1,6 @@
 """The examples do what they show."""
 
-import ast
-import asyncio
 import re
-import sys
-from asyncio.subprocess import PIPE
 from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 from types import ModuleType
@@ -48,18 +44,6 @@ async def test_a_streaming_model_learns_that_nobody_looked_and_makes_itself_clea
     assert all(len(line) < 500 for line in printed.splitlines())
 
 
-@pytest.mark.real_time
-async def test_the_streaming_example_runs_by_itself() -> None:
-    running = await asyncio.create_subprocess_exec(
-        *(sys.executable, str(EXAMPLES / "stream_from_generator.py"), "--embedded", "--virtual-time"),
-        stdout=PIPE, stderr=PIPE,
-    )  # fmt: skip
-    out, err = await running.communicate()
-
-    assert (running.returncode, err) == (0, b"")
-    assert b'"answer":"act"' in out
-
-
 def test_what_the_page_on_language_models_shows_is_so() -> None:
     page = (ROOT / "docs" / "language-models.md").read_text()
     call, result = re.findall("```json\n(.*?)```", page, re.DOTALL)
@@ -70,12 +54,3 @@ def test_what_the_page_on_language_models_shows_is_so() -> None:
     assert [each.id for each in fragment.behaviors] == ["say-1", "refer-2", "say-3", "refer-4"]
     assert msgspec.json.decode(told.json) == msgspec.json.decode(result)
     assert set(fields) == {*ToolInput.__struct_fields__, *Summary.__struct_fields__} - {"cut_short", "answer_delay"}
-
-
-@pytest.mark.parametrize("page", ["language-models.md", "connection-events.md"])
-def test_the_python_of_a_page_is_python(page: str) -> None:
-    snippets = re.findall("```python\n(.*?)```", (ROOT / "docs" / page).read_text(), re.DOTALL)
-
-    assert snippets
-    for snippet in snippets:
-        compile(snippet, page, "exec", flags=ast.PyCF_ALLOW_TOP_LEVEL_AWAIT)

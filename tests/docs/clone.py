@@ -14,7 +14,7 @@ ROOT = Path(__file__).parents[2]
 RENDEZVOUS = "tcp/127.0.0.1:7447"
 """Where all that runs on this machine would meet, other runs of these tests too."""
 HOLDS = ("schemas", "services", "examples", "docs", "Makefile", "pyproject.toml", "constraints.txt")
-PATIENCE = 60.0
+PATIENCE = 120.0
 """Seconds. A limit of failure, never waited for."""
 
 

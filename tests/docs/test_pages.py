@@ -35,13 +35,14 @@ from tests.docs.pages import (
 pytestmark = pytest.mark.real_time
 
 EXCUSED = {
-    "make demo  ": "takes two and a half minutes; it runs with ARGS=--virtual-time",
+    "make demo": "takes two and a half minutes; it runs with ARGS=--virtual-time",
     "make test": "is what runs this",
     ".venv/bin/engage up": "is what all pages are run against",
-    ".venv/bin/engage simulate --sessions 20": "takes minutes; tests/cli/test_simulate.py plays smaller ones",
-    ".venv/bin/python -m pip install": "would change the environment of the tests; its extras are checked",
+    ".venv/bin/engage simulate --sessions 20 --seed 1 --out study": "takes minutes; tests/cli/test_simulate.py",
+    ".venv/bin/python -m pip install -e '.[study]'": "changes the tests' environment; the extra is checked",
+    ".venv/bin/python -m pip install -e '.[speed]'": "the same",
 }
-"""Commands, by how they begin, that do not run here, and why."""
+"""Commands that do not run here, and why."""
 ELSEWHERE = {
     ("docs/control.md", "python"): "tests/control/test_docs.py",
     ("docs/recognition.md", "mermaid"): "tests/recognition/test_tables.py",
@@ -52,8 +53,9 @@ IN_LESS_TIME = {
     "--embedded": "--embedded --virtual-time",
 }
 """What is left out of a command, so that nobody waits for it here."""
-ENDLESS = ("up", "run", "watch")
-"""Commands that go on until Ctrl-C (docs/commands.md)."""
+ENDLESS = {"up": 0, "run": 0, "watch": 0, "demo": 130}
+"""Commands that go on until Ctrl-C (docs/commands.md), and their exit code then. Of a demo whose output no page shows
+the beginning is enough."""
 TALK = """\
 from contextlib import suppress
 from schemas.faults import InputRefused
@@ -125,13 +127,15 @@ class Page:
 
     async def _run(self, shown: Shown) -> str:
         command = shown.command
-        if any(command.startswith(excused) for excused in EXCUSED):
+        if shlex.join(shlex.split(command, comments=True)) in EXCUSED:
             return ""
         for long, short in IN_LESS_TIME.items():
             command = command.replace(long, short)
-        if re.search(rf"\bengage ({'|'.join(ENDLESS)})\b", command):
+        endless = re.search(rf"\bengage ({'|'.join(ENDLESS)})\b", command)
+        if endless and shown.output is None:
             ended = await run_until_it_prints(command, self._folder)
-            return _complaint(command, ended, "" if ended.out else "it printed nothing")
+            code = ended.code - ENDLESS[endless[1]]
+            return _complaint(command, ended._replace(code=code), "" if ended.out else "it printed nothing")
         async with self._free:
             ended = await run(command, self._folder)
         if shown.output is None:
