@@ -65,7 +65,11 @@ class Clone:
 
 async def start(command: str, folder: Path) -> Process:
     """A line of a shell, in a session of its own."""
-    settings = {"PATH": f"{folder / '.venv' / 'bin'}{os.pathsep}{os.environ['PATH']}", "PYTHONUNBUFFERED": "1"}
+    settings = {
+        "PATH": f"{folder / '.venv' / 'bin'}{os.pathsep}{os.environ['PATH']}",
+        "PYTHONUNBUFFERED": "1",
+        "PYTHONDONTWRITEBYTECODE": "",  # every process would compile the copy anew
+    }
     return await asyncio.create_subprocess_exec(
         *("bash", "-euo", "pipefail", "-c", command), cwd=folder, env={**os.environ, **settings},
         stdin=DEVNULL, stdout=PIPE, stderr=PIPE, start_new_session=True, limit=2**20,
