@@ -11,6 +11,7 @@ from schemas.blocks import SpokenText
 from schemas.faults import Fault
 from schemas.fragments import FragmentOutcome, GestureChoice, ReferenceChoice
 from schemas.recognition import ConnectionEvent
+from schemas.speakable import joined
 from schemas.units import Seconds
 
 LONGEST_PROBLEM = 160
@@ -103,7 +104,7 @@ def refusal(fault: Fault) -> Summary:
 
 
 def _said(spoken: Sequence[SpokenText]) -> str:
-    return " ".join(" ".join(each.text for each in spoken).split())
+    return joined(each.text for each in spoken)
 
 
 def _was_made(outcome: FragmentOutcome, choice: ReferenceChoice) -> bool:

@@ -13,6 +13,7 @@ from msgspec.structs import replace
 from schemas.behaviors import Action, After, Constraint, FragmentBehavior, Gaze, Head, Reference, Speech, SpeechOption
 from schemas.faults import Fault, InputRefused
 from schemas.fragments import TurnFragment
+from schemas.speakable import word_count
 from schemas.tool import PARTS, Certainty, Expects, Gesture, Look, Part, Refer, Say, ToolInput
 from schemas.units import Probability
 
@@ -100,7 +101,7 @@ def _behavior(part: Part, number: int) -> tuple[FragmentBehavior, str]:
 def _option(phrase: str) -> SpeechOption:
     words = phrase.split()
     deictic = bool(words) and words[0].lower() in DEMONSTRATIVES
-    return SpeechOption(text=" ".join(words), cost=float(len(words)), deictic=deictic)
+    return SpeechOption(text=" ".join(words), cost=word_count(phrase), deictic=deictic)
 
 
 def _part(raw: dict[str, Any], source: str, path: str) -> Part:

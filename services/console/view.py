@@ -18,6 +18,7 @@ from schemas.fragments import PerformFragment
 from schemas.messages import Message
 from schemas.presence import PeerAlive, PeerGone
 from schemas.recognition import ConnectionEvent, Statistics, WindowStatistics
+from schemas.speakable import joined
 from schemas.units import Seconds
 
 UTTERANCES_KEPT = 8
@@ -198,7 +199,7 @@ def _speak(scene: Scene, word: WordSpoken, at: Seconds) -> Scene:
     said = list(scene.said)
     for index in reversed(range(len(said))):
         if said[index].behavior == behavior and said[index].open:
-            text = f"{said[index].text} {word.word}".strip()
+            text = joined((said[index].text, word.word))
             said[index] = msgspec.structs.replace(said[index], text=text)
             break
     else:

@@ -73,12 +73,13 @@ async def wait(behavior: Wait, authority: Authority) -> AsyncGenerator[Progress,
 
 
 def _score(behavior: Speech, utterance: Utterance) -> list[Reached | Spoke]:
-    """Everything the voice is going to report, in time order, seconds from its start; at one instant the word before
-    the mark after it."""
-    score: list[Reached | Spoke] = [Reached("start", 0.0, 0.0)]
-    score += [Spoke(word.text, word.position, word.end) for word in utterance.words]
+    """Everything the voice is going to report, in time order, seconds from its start; at one instant in the order of
+    the text, a word before the mark after it."""
+    last = len(behavior.text)
+    score: list[tuple[Seconds, int, Reached | Spoke]] = [(0.0, -1, Reached("start", 0.0, 0.0))]
+    score += [(word.end, word.position, Spoke(word.text, word.position, word.end)) for word in utterance.words]
     for mark in sorted(behavior.marks, key=lambda mark: mark.position):
         at = utterance.said_by(mark.position)
-        score.append(Reached(mark.id, at, at))
-    score.append(Reached("end", utterance.seconds, utterance.seconds))
-    return sorted(score, key=lambda progress: progress.at)
+        score.append((at, mark.position, Reached(mark.id, at, at)))
+    score.append((utterance.seconds, last, Reached("end", utterance.seconds, utterance.seconds)))
+    return [progress for _, _, progress in sorted(score, key=lambda each: each[:2])]

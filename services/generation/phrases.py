@@ -15,6 +15,7 @@ from msgspec import Struct
 from msgspec.structs import replace
 
 from schemas.behaviors import Reference, SpeechOption
+from schemas.speakable import word_count
 from schemas.world import Entity, World
 from services.generation.config import GenerationConfig, PhraseAttribute
 from services.generation.discourse import SILENCE, Discourse
@@ -76,7 +77,7 @@ def phrases(
     if not objects.describes(target):
         demonstrative += " one"
     # What a deictic phrase leaves is what pointing leaves: the policy knows.
-    options.append(SpeechOption(text=demonstrative, cost=_words(demonstrative), deictic=True))
+    options.append(SpeechOption(text=demonstrative, cost=word_count(demonstrative), deictic=True))
     return (*options, *_descriptions(target, objects, config))
 
 
@@ -104,11 +105,7 @@ def _phrase(noun: Property, modifiers: Sequence[Property]) -> str:
 
 
 def _option(text: str, distractors: frozenset[str]) -> SpeechOption:
-    return SpeechOption(text=text, cost=_words(text), distractors=tuple(sorted(distractors)))
-
-
-def _words(text: str) -> float:
-    return float(len(text.split()))
+    return SpeechOption(text=text, cost=word_count(text), distractors=tuple(sorted(distractors)))
 
 
 class _Objects:

@@ -55,3 +55,69 @@ def test_time_never_runs_backwards(text: str):
     assert times == sorted(times)
     assert all(0.0 <= time <= utterance.seconds for time in times)
     assert all(text[: word.position].endswith(word.text) for word in utterance.words)
+
+
+@pytest.mark.parametrize(
+    ("text", "slowest", "quickest"),
+    [
+        ("你好请把蓝色的方块放在桌子的左边然后再把红色的方块给我谢谢你的帮助", 33 / 4, 33 / 5),
+        ("今日はとても良い天気ですから一緒に公園まで歩いて行きましょうか", 36 / 6, 36 / 8),  # of its moras
+        ("วันนี้อากาศดีมากเราไปเดินเล่นที่สวนสาธารณะกันเถอะ", 18 / 4, 18 / 5),  # of its syllables
+    ],
+)
+def test_a_script_without_spaces_takes_as_long_as_with_people_and_can_be_cut_everywhere(
+    text: str, slowest: float, quickest: float
+):
+    utterance = utter(text)
+
+    assert quickest <= utterance.seconds <= slowest
+    assert max(word.end - word.start for word in utterance.words) < 0.25
+    assert sum(map(utterance.is_gap, range(len(text)))) == len(utterance.words)
+
+
+def test_wide_punctuation_gives_pauses():
+    one, two, three = utter("好，来！吧。").words
+
+    assert two.start == pytest.approx(one.end + 0.2)
+    assert three.start == pytest.approx(two.end + 0.35)
+    assert utter("好，来！吧。").seconds == three.end
+
+
+def test_a_mark_between_two_characters_is_reached_as_the_second_begins():
+    utterance = utter("好，来吧")
+
+    assert utterance.said_by(2) == utterance.words[1].start
+    assert utterance.said_by(3) == utterance.words[1].end == utterance.words[2].start
+
+
+def test_an_emoji_is_among_what_was_said_and_takes_no_time():
+    plain, smiling = utter("Hello there. Bye"), utter("Hello there. 😊 Bye 😊")
+
+    assert [word.text for word in smiling.words] == ["Hello", "there.", "😊", "Bye", "😊"]
+    assert smiling.seconds == plain.seconds
+    assert smiling.words[-1].position == len("Hello there. 😊 Bye 😊")
+
+
+SPOKEN = st.text(st.sampled_from(list("ab ,.—'世界。，！「」かきゃー한ขไม้😊3")), max_size=40)
+
+
+@settings(max_examples=200)
+@given(text=SPOKEN)
+def test_what_has_been_said_is_always_a_beginning_of_the_text(text: str):
+    words = utter(text).words
+
+    said = ""
+    for word in words:
+        said += word.text
+        assert said == "".join(text[: word.position].split())
+    assert not words or said == "".join(text.split())
+
+
+@settings(max_examples=200)
+@given(text=SPOKEN, more=SPOKEN)
+def test_more_text_never_takes_less_time(text: str, more: str):
+    assert utter(text + more).seconds >= utter(text).seconds - 1e-9
+    utterance = utter(text + more)
+    times = [utterance.said_by(position) for position in range(len(text + more) + 1)]
+
+    assert times == sorted(times)
