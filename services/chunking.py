@@ -5,13 +5,15 @@
         for chunk in chunks.feed(piece): ...  # parts for a turn fragment
     chunks.rest()
 
-In the text `[blue-square]` refers to the object of that id, and `[blue-square!]` does so with high certainty.
-Pure.
+In the text `[blue-square]` refers to the object of that id, and `[blue-square!]` does so with high certainty. The
+words of a `Say` part are cut as text is, but brackets are words there. Where a part begins or ends a word ends. Pure.
 """
 
 import re
+import unicodedata
 from collections.abc import Iterator
 
+from schemas.speakable import UNSPACED, joined, word_count
 from schemas.tool import Part, Refer, Say
 
 Chunk = tuple[Part, ...]
@@ -19,14 +21,26 @@ Chunk = tuple[Part, ...]
 
 CLAUSE_WORDS = 4
 """A chunk of fewer words does not end at a comma: so short a fragment would be over before the next one comes."""
+WORDS_OF_REFERENCE = 2
+"""Which words are going to be chosen nobody knows yet: "the square"."""
 _REFERENCE = r"\[(?P<id>[^\[\]\s!]+)(?P<certain>!?)\]"
-_CLOSING = "[\"'”’)\\]]*"
 _ABBREVIATED = "".join(rf"(?<!\b{word})" for word in ("Mr", "Mrs", "Ms", "Dr", "Prof", "St", "vs", "[A-Z]"))
-_SENTENCE = rf"{_ABBREVIATED}[.!?…]+{_CLOSING}(?=\s)"
-_CLAUSE = rf"[,;:–—]{_CLOSING}(?=\s)"
-_CUT = re.compile(rf"{_REFERENCE}|(?P<sentence>{_SENTENCE}|\n\s*\n)|(?P<clause>{_CLAUSE})")
-_WORD = re.compile(r"\w")
-_SPOKEN = re.compile(r"\S*\w\S*")
+_CLOSING = "\"'”’)\\]"
+_CLOSING_WIDE = f"{_CLOSING}」』）】》〉］｝〕"
+_STOPS_WIDE = "。！？｡။។"
+_WIDE = f"(?<=[{UNSPACED}])"
+"""Behind a character of a script without spaces a stop needs no space after it, either."""
+_SENTENCE = rf"{_ABBREVIATED}[.!?…।؟۔]+[{_CLOSING}]*(?=\s)"
+_SENTENCE_WIDE = (
+    rf"(?:[{_STOPS_WIDE}]|{_WIDE}[.!?])[{_STOPS_WIDE}.!?…]*[{_CLOSING_WIDE}]*(?=[^{_STOPS_WIDE}.!?…{_CLOSING_WIDE}])"
+)
+_CLAUSE = rf"[,;:–—،؛][{_CLOSING}]*(?=\s)"
+_CLAUSE_WIDE = rf"(?:[，、；：､]|{_WIDE}[,;:])[{_CLOSING_WIDE}]*(?=[^\d{_CLOSING_WIDE}])"
+_CLAUSE_THAI = "(?<=[\u0e01-\u0ecd])(?=\\s+[\u0e01-\u0ecd])"
+"""Thai and Lao have spaces where others have commas and full stops."""
+_END = rf"(?P<sentence>{_SENTENCE}|{_SENTENCE_WIDE}|\n\s*\n)|(?P<clause>{_CLAUSE}|{_CLAUSE_WIDE}|{_CLAUSE_THAI})"
+_CUT = re.compile(rf"{_REFERENCE}|{_END}")
+_CUT_OF_WORDS = re.compile(_END)
 
 
 class Chunker:
@@ -36,23 +50,22 @@ class Chunker:
         self._clause_words = clause_words
         self._text = ""
         """Of which it is not known yet whether it is words or a reference, or where it ends."""
+        self._is_between_words = True
+        """Does what comes next begin with a word, whether or not there is a space before it?"""
         self._parts: list[Part] = []
 
     def feed(self, piece: str | Part) -> Iterator[Chunk]:
         """The chunks that are complete now. A part stands where it stands: the words before it are complete."""
-        if not isinstance(piece, str):
-            self._say(self._text)
-            self._text = ""
-            self._parts.append(piece)
+        if isinstance(piece, str):
+            self._text += piece
+            yield from self._cut(_CUT)
             return
-        self._text += piece
-        while cut := _CUT.search(self._text):
-            self._say(self._text[: cut.start() if cut["id"] else cut.end()])
-            self._text = self._text[cut.end() :]
-            if cut["id"]:
-                self._parts.append(Refer(refer=cut["id"], certainty="high" if cut["certain"] else "normal"))
-            elif self._parts and (cut["sentence"] or self._words >= self._clause_words):
-                yield self._taken()
+        yield from self._complete(_CUT)
+        if isinstance(piece, Say):
+            self._text = piece.say
+            yield from self._complete(_CUT_OF_WORDS)
+        else:
+            self._parts.append(piece)
 
     def rest(self) -> Chunk:
         """What is left when nothing more comes; may be empty."""
@@ -60,18 +73,45 @@ class Chunker:
         self._text = ""
         return self._taken()
 
+    def _cut(self, pattern: re.Pattern[str]) -> Iterator[Chunk]:
+        while cut := pattern.search(self._text):
+            found = cut.groupdict()
+            id = found.get("id")
+            self._say(self._text[: cut.start() if id else cut.end()])
+            self._text = self._text[cut.end() :]
+            if id:
+                self._parts.append(Refer(refer=id, certainty="high" if found["certain"] else "normal"))
+            elif self._parts and (found["sentence"] or self._words >= self._clause_words):
+                yield self._taken()
+
+    def _complete(self, pattern: re.Pattern[str]) -> Iterator[Chunk]:
+        """The text ends here, and so does its last word."""
+        self._text += " "
+        yield from self._cut(pattern)
+        self._say(self._text)
+        self._text = ""
+        self._is_between_words = True
+
     @property
-    def _words(self) -> int:
-        """A reference counts as two: "the square"."""
-        return sum(len(_SPOKEN.findall(part.say)) if isinstance(part, Say) else 2 for part in self._parts)
+    def _words(self) -> float:
+        return sum(word_count(part.say) if isinstance(part, Say) else WORDS_OF_REFERENCE for part in self._parts)
 
     def _say(self, text: str) -> None:
-        said = " ".join(text.split())
-        if self._parts and isinstance(last := self._parts[-1], Say):
-            self._parts[-1] = Say(say=f"{last.say} {said}".rstrip())
-        elif _WORD.search(said) or (said and self._parts and isinstance(self._parts[-1], Refer)):
+        if not (said := " ".join(text.split())):
+            return
+        before = self._parts[-1] if self._parts else None
+        if isinstance(before, Say):
+            together = joined((before.say, text)) if self._is_between_words else f"{before.say}{text}"
+            self._parts[-1] = Say(say=" ".join(together.split()))
+        elif _means_something(said) or isinstance(before, Refer):
             self._parts.append(Say(say=said))
+        self._is_between_words = False
 
     def _taken(self) -> Chunk:
         taken, self._parts = tuple(self._parts), []
         return taken
+
+
+def _means_something(text: str) -> bool:
+    """Is there more than punctuation? An emoji is not spoken, but belongs to what has been said."""
+    return any(unicodedata.category(character)[0] in "LNS" for character in text)

@@ -38,6 +38,15 @@ def words(*pieces: str | Part, **settings: int) -> list[str]:
         ("Take [a]. And [b], please, now", ["Take <a> .", "And <b> , please,", "now"]),
         ("[a] [b] [c]", ["<a> <b> <c>"]),
         ("an [open bracket. And [] more", ["an [open bracket.", "And [] more"]),
+        ("你好。请把方块给我！谢谢", ["你好。", "请把方块给我！", "谢谢"]),
+        ("他说“好。”然后走了", ["他说“好。”", "然后走了"]),
+        ("好的，我们现在开始吧，请看这里", ["好的，我们现在开始吧，", "请看这里"]),
+        ("好的,我们现在开始吧,好吗?好", ["好的,我们现在开始吧,", "好吗?", "好"]),
+        ("今日は、いい天気ですね。「そう？」と", ["今日は、いい天気ですね。", "「そう？」", "と"]),
+        ("現在12：30、です", ["現在12：30、です"]),
+        ("ขอบคุณมากครับ สวัสดี", ["ขอบคุณมากครับ", "สวัสดี"]),
+        ("把[a]给我。好", ["把 <a> 给我。", "好"]),
+        ("Well 😊 done. 😊", ["Well 😊 done.", "😊"]),
         ("   ", []),
         ("... !", []),
     ],
@@ -68,12 +77,44 @@ def test_what_stands_behind_a_reference_is_said_though_it_is_no_word() -> None:
     assert chunks("Is it [a]?") == [(Say(say="Is it"), Refer(refer="a"), Say(say="?"))]
 
 
+def test_a_part_of_words_leaves_as_soon_as_its_sentence_is_complete() -> None:
+    chunker = Chunker()
+
+    assert list(chunker.feed("A whole sentence. Now ")) == [(Say(say="A whole sentence."),)]
+    assert list(chunker.feed(Say(say="another one."))) == [(Say(say="Now another one."),)]
+    assert list(chunker.feed(Say(say="Could you hand me"))) == []
+    assert list(chunker.feed(Refer(refer="cup"))) == []
+    assert list(chunker.feed(Say(say="? Thanks. And"))) == [
+        (Say(say="Could you hand me"), Refer(refer="cup"), Say(say="?")),
+        (Say(say="Thanks."),),
+    ]
+    assert chunker.rest() == (Say(say="And"),)
+
+
+def test_a_part_shows_that_the_sentence_before_it_is_complete() -> None:
+    nod = Gesture(gesture="nod")
+
+    assert chunks("Yes.", nod, "it is") == [(Say(say="Yes."),), (nod, Say(say="it is"))]
+
+
+def test_brackets_in_a_part_of_words_are_words() -> None:
+    assert chunks(Say(say="see [a] there")) == [(Say(say="see [a] there"),)]
+
+
+def test_words_of_different_parts_are_different_words() -> None:
+    assert words("one", Say(say="two"), "three", Say(say="four")) == ["one two three four"]
+    assert words("把方块", Say(say="给我"), "吧") == ["把方块给我吧"]
+
+
 def test_how_long_a_clause_must_be_can_be_set() -> None:
     assert words("one, two, three", clause_words=1) == ["one,", "two,", "three"]
 
 
-texts = st.text(st.sampled_from(list("ab .,!?[]\n\"'DrM")), max_size=60) | st.lists(
-    st.sampled_from(["[a]", "[b!]", "Dr. ", "word ", "end. ", "so, ", "\n\n", "3.5 ", "e.g. "]), max_size=15
+texts = st.text(st.sampled_from(list("ab .,!?[]\n\"'DrM好。，」ขั")), max_size=60) | st.lists(
+    st.sampled_from(
+        ["[a]", "[b!]", "Dr. ", "word ", "end. ", "so, ", "\n\n", "3.5 ", "e.g. ", "我们，", "好。", "吧"]
+    ),
+    max_size=15,
 ).map("".join)
 
 
@@ -90,6 +131,14 @@ def test_it_does_not_matter_in_what_bits_the_text_comes(text: str, data: st.Data
 @given(texts)
 def test_no_word_is_lost(text: str) -> None:
     spoken = " ".join(words(text))
-    plain = re.sub(r"\[([^\[\]\s!]+)!?\]", r" <\1> ", text)
+    plain = re.sub(r"\[([^\[\]\s!]+)!?\]", r"<\1>", text)
 
-    assert re.findall(r"\w+", spoken) == re.findall(r"\w+", plain)
+    assert "".join(re.findall(r"\w+", spoken)) == "".join(re.findall(r"\w+", plain))
+
+
+@settings(max_examples=200)
+@given(texts)
+def test_no_word_is_torn(text: str) -> None:
+    inside = set(re.findall(r"[a-zM]+", text))
+
+    assert {word for chunk in words(text) for word in re.findall(r"[a-zM]+", chunk)} == inside

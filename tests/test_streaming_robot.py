@@ -8,7 +8,8 @@ from typing import NamedTuple
 from schemas import keys
 from schemas.actions import ActionBegan, ActionEnded
 from schemas.summary import Summary, summary
-from schemas.tool import ToolInput
+from schemas.tool import Say, ToolInput
+from schemas.units import Seconds
 from services.bus import Bus
 from services.client import Robot, connect
 from services.commandline import roster
@@ -17,7 +18,7 @@ from services.config import load
 from services.memory_bus import MemoryHub
 from services.runtime import running
 from services.simulation.still import tangram_world
-from services.streaming import perform_call, stream
+from services.streaming import Piece, perform_call, stream
 
 
 class Stage(NamedTuple):
@@ -120,3 +121,37 @@ async def test_a_call_that_the_world_does_not_bear_out_is_a_result() -> None:
     assert "does not know the person 'ann' (people: human)" in nobody.problems[0]
     assert "begin a turn with 'beginning' or 'full'" in at_once.problems[0]
     assert "does not know the object 'human'" in person.problems[0]
+
+
+SENTENCES = (
+    "Hello there, nice to meet you.", "I could use your help with a puzzle today.",
+    "We are going to use the pieces on this table to make a picture.", "First please have a look at all of them.",
+    "Then tell me which one you would like to begin with.",
+)  # fmt: skip
+TOKEN: Seconds = 0.04
+"""Of four characters: a model that writes 25 a second."""
+
+
+async def parts_as_written() -> AsyncIterator[Piece]:
+    for sentence in SENTENCES:
+        await asyncio.sleep(len(f'{{"say": "{sentence}"}}, ') / 4 * TOKEN)
+        yield Say(say=sentence)
+
+
+async def first_word(pieces: AsyncIterator[Piece]) -> Seconds:
+    """How long after the first token the robot began to speak."""
+    async with stage() as here:
+        await here.robot.person()
+        began = here.robot.now()
+        with here.robot.actions() as actions:
+            speaking = asyncio.create_task(stream(here.robot, pieces, id="t"))
+            async for action in actions:
+                if isinstance(action, ActionBegan) and (action.actor, action.action) == (here.robot.id, "speak"):
+                    break
+            outcomes = await speaking
+    assert summary(*outcomes).said == " ".join(SENTENCES)
+    return action.at.seconds - began
+
+
+async def test_a_part_of_words_is_spoken_while_the_next_one_is_written() -> None:
+    assert await first_word(parts_as_written()) < len('{"say": "Hello there, nice to meet you."}, ') / 4 * TOKEN + 0.1
