@@ -28,7 +28,10 @@ Format = Literal["anthropic", "openai", "openai-chat"]
 Expects = Literal["reply", "action"]
 Certainty = Literal["normal", "high"]
 
-ObjectId = Annotated[str, Meta(description="Id of an object, exactly as the world calls it. Ids are never spoken.")]
+ObjectId = Annotated[
+    str,
+    Meta(description="Id of an object, exactly as the world calls it. Never write ids into words to be spoken."),
+]
 
 
 class Say(Struct, frozen=True, kw_only=True, omit_defaults=True, forbid_unknown_fields=True):

@@ -14,7 +14,8 @@ class Entity(Struct, frozen=True, kw_only=True, omit_defaults=True):
 
     footprint: corners in the entity's own frame, metres (x, y), before turning by `yaw` about z.
     Only `object` entities can be distractors.
-    category, size, color, shape, name, features: what phrases for it are made of; empty: unknown.
+    category, size, color, shape, name, features: what phrases for it are made of; empty: unknown. Without a category,
+    its shape, its name or what its id says is the noun.
     """
 
     id: Named

@@ -7,6 +7,7 @@ other one of as few words beats, from "the square" to "the big red square". As w
 the order of preference decides between equals, and what is not known of an object does not rule it out.
 """
 
+import re
 from collections.abc import Iterator, Sequence
 from itertools import combinations, pairwise
 from typing import get_args
@@ -27,6 +28,12 @@ MOST_MODIFIERS = 3
 """In one phrase. Nobody listens to more, and there would be ever more of them to weigh."""
 SIZES_APART = 1.25
 """Objects of a kind are big and small if the greatest step between two successive sizes is at least this ratio."""
+
+SHORTEST_NOUN = 3
+"""Letters of a word in an id: what is shorter numbers things, as in `block-a`."""
+NO_NOUNS = {"entity", "item", "marker", "node", "obj", "object", "piece", "tag", "thing", "track", "unknown"}
+"""What trackers call things that they know nothing of."""
+_ID_SEPARATORS = re.compile(r"[\W_]+|(?<=[a-z])(?=[A-Z])")
 
 
 class Property(Struct, frozen=True):
@@ -58,7 +65,11 @@ def proposed(
             is_the_topic = discourse.topic == reference.target
             options = phrases(reference.target, objects, config, is_the_topic=is_the_topic)
             if not objects.describes(reference.target):
-                warnings.append(f"{reference.id}: the world does not say what {reference.target} looks like")
+                called = _phrase(objects.noun(reference.target), ())
+                warnings.append(
+                    f"{reference.id}: the world does not say what {reference.target} is, so it is {called!r}: "
+                    "give the entity a category or a name"
+                )
             reference = replace(reference, options=options)
         made.append(reference)
         discourse = discourse.naming("", [reference.target])
@@ -74,7 +85,7 @@ def phrases(
     """
     options = [_option("it", frozenset())] if is_the_topic else []
     demonstrative = "this" if objects.distance(target) <= config.this_within else "that"
-    if not objects.describes(target):
+    if not objects.describes(target) and not objects.noun(target).word:
         demonstrative += " one"
     # What a deictic phrase leaves is what pointing leaves: the policy knows.
     options.append(SpeechOption(text=demonstrative, cost=word_count(demonstrative), deictic=True))
@@ -126,8 +137,8 @@ class _Objects:
         return Property(None, _noun(self._objects[id]))
 
     def describes(self, id: str) -> bool:
-        """Is there anything to say of it but that it is an object?"""
-        return bool(_noun(self._objects[id])) or any(self._said(self._objects[id], each) for each in SPOKEN)
+        """Does the world say anything of it but its id?"""
+        return bool(_names(self._objects[id])) or any(self._said(self._objects[id], each) for each in SPOKEN)
 
     def properties(self, id: str, attribute: PhraseAttribute) -> tuple[Property, ...]:
         entity = self._objects[id]
@@ -142,7 +153,7 @@ class _Objects:
 
     def _may(self, entity: Entity, known: Property) -> bool:
         if known.attribute is None:
-            names = {entity.category, entity.shape, entity.name} - {""}
+            names = _names(entity) or {_noun_in(entity.id)} - {""}
             return not known.word or not names or known.word in names
         said = self._said(entity, known.attribute)
         return known.word in said or (not said and known.attribute != "feature")
@@ -161,7 +172,18 @@ class _Objects:
 
 
 def _noun(entity: Entity) -> str:
-    return entity.category or entity.shape or entity.name
+    return entity.category or entity.shape or entity.name or _noun_in(entity.id)
+
+
+def _names(entity: Entity) -> set[str]:
+    return {entity.category, entity.shape, entity.name} - {""}
+
+
+def _noun_in(id: str) -> str:
+    """What an id says if a person chose it: `cup` of `cup-2`, `coffee cup` of `coffeeCup`; nothing of `obj-17`."""
+    words = [word.lower() for part in _ID_SEPARATORS.split(id) if (word := part.rstrip("0123456789"))]
+    telling = [word for word in words if word.isalpha() and (len(word) >= SHORTEST_NOUN or not word.isascii())]
+    return "" if NO_NOUNS.intersection(telling) else " ".join(telling)
 
 
 def _sizes(objects: Sequence[Entity]) -> dict[str, str]:

@@ -18,7 +18,7 @@ from services.simulation.config import SimulationConfig
 from services.simulation.table import Table
 from services.tangram_table import tangram_table
 
-EXAMPLE = '{"entities": [{"id": "cup", "kind": "object", "position": [0.5, 0.1, 0.8]}]}'
+EXAMPLE = '{"entities": [{"id": "cup", "kind": "object", "position": [0.5, 0.1, 0.8], "category": "cup"}]}'
 ADVICE = f"for example {EXAMPLE}; places are in metres, at most {FARTHEST:.0e}"
 
 

@@ -170,7 +170,9 @@ def test_near_things_are_this_and_far_ones_that_as_in_appendix_b() -> None:
 def test_what_the_world_does_not_describe_is_this_one_with_a_warning() -> None:
     made = offered(world(thing("obj-17"), thing("b", color="red")), "obj-17")
 
-    assert made.warnings == ("ref-1: the world does not say what obj-17 looks like",)
+    assert made.warnings == (
+        "ref-1: the world does not say what obj-17 is, so it is 'the object': give the entity a category or a name",
+    )
     assert [(o.text, o.cost, o.deictic, o.distractors) for o in made.references[0].options or ()] == [
         ("this one", 2.0, True, ()), ("the object", 2.0, False, ("b",)),
     ]  # fmt: skip
@@ -185,6 +187,35 @@ def test_a_name_is_the_last_resort_for_a_noun() -> None:
         "this": set(),
         "the teapot": set(),
     }
+
+
+@pytest.mark.parametrize(
+    ("id", "noun"),
+    [
+        ("cup", "cup"), ("cup-2", "cup"), ("cup2", "cup"), ("red_cup", "red cup"), ("coffeeCup", "coffee cup"),
+        ("block-a", "block"), ("杯子", "杯子"), ("obj-17", "object"), ("tracked.object.cup", "object"),
+        ("3f2a-9c", "object"), ("x", "object"),
+    ],
+)  # fmt: skip
+def test_what_the_world_does_not_describe_is_called_by_what_its_id_says(id: str, noun: str) -> None:
+    assert f"the {noun}" in table(world(thing(id)), id)
+
+
+def test_a_noun_found_in_an_id_tells_things_apart_and_the_warning_names_the_remedy() -> None:
+    around = world(thing("cup"), thing("plate"), thing("cup-2"), thing("obj-1"), thing("c", category="cup"))
+
+    assert table(around, "cup") == {"this": set(), "the cup": {"cup-2", "obj-1", "c"}}
+    (warning,) = offered(around, "cup").warnings
+    assert "so it is 'the cup': give the entity a category or a name" in warning
+
+
+def test_a_category_counts_more_than_an_id_and_needs_no_warning() -> None:
+    around = world(thing("cup", category="mug"), thing("bowl", name="cup"), thing("red-cup", color="red"))
+
+    assert offered(around, "cup").warnings == offered(around, "bowl").warnings == ()
+    assert set(table(around, "cup")) == {"this", "the mug"}
+    assert table(around, "bowl") == {"this": set(), "the cup": set()}
+    assert "the red cup" in table(around, "red-cup")
 
 
 words = st.sampled_from(["", "x", "y", "z"])

@@ -1,6 +1,7 @@
 """Worlds from files, and a world that stands still."""
 
 import json
+import re
 from functools import partial
 from pathlib import Path
 
@@ -14,8 +15,9 @@ from schemas.world import World
 from services.client import connect
 from services.memory_bus import MemoryHub
 from services.runtime import running
-from services.simulation.still import load_world, show_world, tangram_world
+from services.simulation.still import EXAMPLE, load_world, show_world, tangram_world
 
+COMMANDS = (Path(__file__).parents[2] / "docs/commands.md").read_text()
 CUP = '{"id": "cup", "kind": "object", "position": [0.5, 0.1, 0.8]}'
 
 
@@ -120,3 +122,11 @@ async def test_a_still_world_is_there_for_whoever_comes_later(hub: MemoryHub) ->
 
     assert isinstance(world, World)
     assert world.entities == tangram_world().entities
+
+
+@pytest.mark.parametrize("source", [EXAMPLE, re.search(r"\{\"entities\".*?\]\}\n", COMMANDS, re.DOTALL)])
+def test_an_example_of_a_world_says_what_its_objects_are(source: str | re.Match[str], tmp_path: Path) -> None:
+    file = tmp_path / "world.json"
+    file.write_text(source if isinstance(source, str) else source.group())
+
+    assert all(thing.category for thing in load_world(file).objects)
