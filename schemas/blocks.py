@@ -91,6 +91,8 @@ class BlockOutcome(Outcome, frozen=True, kw_only=True, tag="block_outcome", omit
     spoken: tuple[SpokenText, ...] = ()
     dropped: tuple[str, ...] = ()
     """Ids of behaviors that were dropped, each with its warning on the feedback stream."""
+    reasons: tuple[str, ...] = ()
+    """Of each of them in turn, why, as the warning has it."""
     interrupted: tuple[str, ...] = ()
     """Ids of behaviors that somebody asked to end (`InterruptBehavior`), each with a warning as well."""
     replaced_by: str = ""

@@ -1,5 +1,8 @@
 """One fragment from its acceptance to its outcome: what runs, what it started, and when nothing of it is open."""
 
+from collections.abc import Mapping
+from itertools import zip_longest
+
 from msgspec import Struct
 
 from schemas.behaviors import (
@@ -10,12 +13,14 @@ from schemas.behaviors import (
     GazeShift,
     HeadDirectionShift,
     Pointing,
+    Speech,
     TurnSignal,
 )
 from schemas.blocks import BlockOutcome, SpokenText
 from schemas.faults import EngageError, Fault
 from schemas.feedback import SyncPointProgress
 from schemas.fragments import FragmentOutcome, PerformFragment, ReferenceChoice, TurnFragment
+from schemas.speakable import has_words
 from schemas.units import Seconds
 from services.generation.permits import Permits
 from services.generation.planning import Plan
@@ -163,9 +168,24 @@ class Performance:
         self.end(at, "failed", fault=fault)
 
     def end_with(self, outcome: BlockOutcome, at: Seconds) -> None:
-        self._warnings += [f"{behavior} was dropped" for behavior in outcome.dropped]
+        """What its realizer says. Where words were lost and not one was spoken the fragment was not performed."""
+        given = zip_longest(outcome.dropped, outcome.reasons[: len(outcome.dropped)], fillvalue="")
+        why = {id: reason.removeprefix(f"{id}: ") for id, reason in given}
+        self._warnings += [f"{id} was dropped" + (f": {reason}" if reason else "") for id, reason in why.items()]
         self._started -= set(outcome.dropped)
-        self.end(at, outcome.status, spoken=outcome.spoken, replaced_by=outcome.replaced_by, fault=outcome.fault)
+        status, fault = outcome.status, outcome.fault
+        if status == "done" and (silence := self._silence(outcome, why)) is not None:
+            status, fault = "failed", silence
+        self.end(at, status, spoken=outcome.spoken, replaced_by=outcome.replaced_by, fault=fault)
+
+    def _silence(self, outcome: BlockOutcome, why: Mapping[str, str]) -> Fault | None:
+        """Why nothing was said of a fragment with words; None if something was, or nobody wanted it any more."""
+        unspoken = [id for id in why if isinstance(it := self._behaviors.get(id), Speech) and has_words(it.text)]
+        if not unspoken or any(has_words(spoken.text) for spoken in outcome.spoken):
+            return None
+        reasons = "; ".join(dict.fromkeys(why[id] for id in unspoken if why[id])) or "see the block's warnings"
+        lost = f"{', '.join(unspoken)} {'was' if len(unspoken) == 1 else 'were'} dropped"
+        return Fault(reason=f"none of its words was spoken: {lost}: {reasons}", where=self.fragment.id)
 
     @property
     def is_over(self) -> bool:

@@ -24,6 +24,7 @@ from services.realizer.patience import Late, Stalled
 from services.realizer.planner import Plan, plan_block
 from services.realizer.points import Point, performer, sync_points
 from services.realizer.recognition_link import RecognitionLink
+from services.realizer.relations import DROPPED
 from services.realizer.reporting import Reporter
 from services.realizer.spoken import Spoken
 from services.realizer.surroundings import Ending, Live, Surroundings
@@ -50,7 +51,9 @@ class Performance:
         """Of each behavior, what it was last told."""
         self._pending: dict[str, Pending] = {}
         self._running: dict[str, asyncio.Task[None]] = {}
-        self._dropped: list[str] = list(plan.dropped)
+        why = {each.behavior: each.message.removesuffix(DROPPED) for each in reversed(plan.problems)}
+        self._dropped = {id: why.get(id, "") for id in plan.dropped}
+        """And why."""
         self._unwanted: set[str] = set()
         """Whose end somebody has asked for."""
         self._elsewhere = elsewhere
@@ -110,6 +113,7 @@ class Performance:
             self._live.outcome,
             spoken=self.spoken.texts,
             dropped=tuple(id for id in self._dropped if id not in self._unwanted),
+            reasons=tuple(why for id, why in self._dropped.items() if id not in self._unwanted),
             interrupted=tuple(id for id in self._dropped if id in self._unwanted),
         )
 
@@ -258,7 +262,7 @@ class Performance:
         """It cannot be finished: the block fails if it is required, else goes on without. at_rest: its parts are."""
         if id in self._dropped or self._ending.done():
             return
-        self._dropped.append(id)
+        self._dropped[id] = str(fault)
         if id in self._unwanted:
             # Its parts go home by themselves: the body does not need to be told, nor to forget what it looked at.
             self._report.interrupted(id, self.spoken.of(id))

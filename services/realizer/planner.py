@@ -25,6 +25,7 @@ from services.realizer.net import Bound, PetriNet
 from services.realizer.points import ORIGIN, Point, one_instant
 from services.realizer.prediction import Impossible, predict
 from services.realizer.relations import (
+    DROPPED,
     BlockRefused,
     Elsewhere,
     Equal,
@@ -161,7 +162,7 @@ class _Planner:
         self._refuse_if_required(id, reason, kind)
         self.chains.pop(id, None)
         self.dropped[id] = None
-        self.problems.append(Problem(kind, at_line(self.lines[id], f"{reason}; the behavior is dropped"), id))
+        self.problems.append(Problem(kind, at_line(self.lines[id], f"{reason}{DROPPED}"), id))
 
     def plan(self) -> Steps[Plan]:
         """What cannot be on time is dropped, until the rest can be."""

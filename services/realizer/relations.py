@@ -59,6 +59,10 @@ class Order(Struct, frozen=True, gc=False):
     later: Term
 
 
+DROPPED = "; the behavior is dropped"
+"""What the message of a problem that costs a behavior ends with."""
+
+
 class Problem(Struct, frozen=True):
     """A warning about a behavior (empty: about the block)."""
 
@@ -233,7 +237,7 @@ class _Reader:
                     relations.append(Equal((term, other), behavior.id))
             if problem is not None:
                 self.unusable.add(behavior.id)
-                message = at_line(behavior.line, f"{problem.message}; the behavior is dropped")
+                message = at_line(behavior.line, f"{problem.message}{DROPPED}")
                 self.problems.append(Problem("PARSING_FAILURE", message, behavior.id))
                 return
         self.equals += relations

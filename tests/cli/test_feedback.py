@@ -99,3 +99,14 @@ def test_a_refusal_is_told_as_xml(engage: Engage, block: Path) -> None:
     assert isinstance(warning, WarningFeedback)
     assert warning.block is None
     assert result.code == 2
+
+
+def test_a_fragment_of_which_no_word_is_spoken_has_failed(engage: Engage, tmp_path: Path) -> None:
+    fragment = tmp_path / "ask.json"
+    fragment.write_text('{"turn_status": "full", "parts": [{"say": "Hello there"}, {"look": "human"}]}')
+
+    result = engage(*PLAY, "--set", "control.variability.mute=refuse", "--outcomes", "-", fragment)
+
+    assert result.code == 3
+    assert f"{fragment}: ask: none of its words was spoken: say-1 was dropped: the voice is mute\n" in result.err
+    assert lines(result.out)[0]["status"] == "failed"

@@ -343,7 +343,7 @@ async def test_words_that_fail_are_followed_by_the_next_ones(stage: Robot) -> No
     await stage.until("b:end")
 
     assert stage.reached["b:s:start"] == stage.reached["a:end"] < 1.2
-    assert stage.outcomes["a"][1].warnings == ("s was dropped",)
+    assert stage.outcomes["a"][1].warnings == ("s was dropped: the body aborted it",)
 
 
 # -- thinking -----------------------------------------------------------------------------------------------------
