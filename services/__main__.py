@@ -10,7 +10,7 @@ def main(arguments: list[str] | None = None) -> None:
     # Loading takes half a second. A KeyboardInterrupt in it is a traceback, or lost in somebody's callback; nothing
     # has begun yet, so leaving at once is orderly. `services.commandline.process` takes over when something runs.
     for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, lambda number, frame: os._exit(130))
+        signal.signal(number, lambda number, frame: os._exit(128 + number))
     from services import cli
 
     cli.main(arguments)

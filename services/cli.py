@@ -1,15 +1,12 @@
 """The command line. Options are declared here; what they do is in `services.commandline`, loaded only when called."""
 
 import sys
-from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated, Any, Literal, NoReturn
+from typing import Annotated, Literal, NoReturn
 
 import typer
 
-from schemas.faults import EngageError, InputRefused
-from services.commandline.errors import readable
-from services.commandline.process import FAILED, INTERRUPTED, REFUSED, silence
+from services.commandline.ends import exit_code
 from services.commandline.roster import ServiceName
 
 app = typer.Typer(
@@ -321,53 +318,6 @@ def watch(
     raise typer.Exit(watch.main(where, json, watch.Wanted(tuple(only or ()), actor, tuple(kind or ()))))
 
 
-UsageError: type[Exception] = next(kind for kind in typer.BadParameter.__mro__ if kind.__name__ == "UsageError")
-"""Typer carries its own copy of click and does not show this class."""
-
-
 def main(arguments: list[str] | None = None) -> NoReturn:
     """Run a command. Bad input is one line on standard error, never a traceback; a bug of ours is a traceback."""
-    try:
-        code = app(arguments, standalone_mode=False)
-    except UsageError as error:
-        code = _misused(error)
-    except (EngageError, BrokenPipeError) as error:
-        code = _ended([error])
-    except BaseExceptionGroup as group:
-        expected, bugs = group.split((EngageError, BrokenPipeError))
-        if expected is None or bugs is not None:
-            raise
-        code = _ended(_leaves(expected))
-    except KeyboardInterrupt:
-        code = INTERRUPTED
-    except SystemExit as exit:
-        if not isinstance(exit.__context__, BrokenPipeError):
-            raise
-        code = _ended([exit.__context__])  # Typer has taken it for an error
-    sys.exit(code or 0)
-
-
-def _misused(error: Any) -> int:
-    """One line instead of Typer's box. Without any argument the help has been printed and there is nothing to add."""
-    if message := error.format_message().replace("\n", " ").replace("Value error, ", ""):
-        command = error.ctx.command_path if error.ctx else "engage"
-        print(f"{command}: {message} (see {command} --help)", file=sys.stderr)
-    return REFUSED
-
-
-def _leaves(group: BaseExceptionGroup[Any]) -> list[BaseException]:
-    found: list[BaseException] = []
-    for error in group.exceptions:
-        found += _leaves(error) if isinstance(error, BaseExceptionGroup) else [error]
-    return found
-
-
-def _ended(errors: Sequence[BaseException]) -> int:
-    """The exit code for what somebody else is to blame for, told if there is anything to tell."""
-    told = [error for error in errors if isinstance(error, EngageError)]
-    for error in told:
-        print(readable(error.fault), file=sys.stderr)
-    if told:
-        return FAILED if any(not isinstance(error, InputRefused) for error in told) else REFUSED
-    silence()  # whoever read our output (`| head`) has had enough
-    return INTERRUPTED
+    sys.exit(exit_code(app, arguments))

@@ -11,8 +11,10 @@ from typing import Any, TypeVar
 from services.virtual_time import VirtualTimeLoop
 
 T = TypeVar("T")
-DONE, REFUSED, FAILED, INTERRUPTED = 0, 2, 3, 130
-"""Exit codes: all done; input refused, nothing moved; failed while running; stopped by Ctrl-C or SIGTERM."""
+DONE, REFUSED, FAILED, UNREAD = 0, 2, 3, 128 + signal.SIGPIPE
+"""Exit codes: all done; input refused, nothing moved; failed while running; nobody reads the output any more."""
+_stopping = [signal.SIGINT]
+"""The signal that stops us, if one does, is the last of these."""
 
 
 def run(main: Coroutine[Any, Any, T], *, virtual_time: bool = False) -> T:
@@ -23,7 +25,7 @@ def run(main: Coroutine[Any, Any, T], *, virtual_time: bool = False) -> T:
     # asyncio.Runner cancels `main` only if it finds this handler. A shell that starts us in the background has had
     # Ctrl-C ignored.
     signal.signal(signal.SIGINT, signal.default_int_handler)
-    signal.signal(signal.SIGTERM, lambda number, frame: signal.raise_signal(signal.SIGINT))
+    signal.signal(signal.SIGTERM, _terminate)
     with asyncio.Runner(loop_factory=VirtualTimeLoop if virtual_time else _fastest_loop()) as runner:
         return runner.run(main)
 
@@ -38,9 +40,27 @@ def run_until_signal(main: Coroutine[Any, Any, None]) -> None:
         silence()
 
 
+def _terminate(number: int, frame: object) -> None:
+    _stopping.append(signal.SIGTERM)
+    signal.raise_signal(signal.SIGINT)
+
+
+def interrupted() -> int:
+    """The exit code after a KeyboardInterrupt: 130 after Ctrl-C, 143 after SIGTERM, as shells count."""
+    return 128 + _stopping[-1]
+
+
 def silence() -> None:
-    """Nobody reads on: Python's own flush of standard output at the end must not complain of it."""
-    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    """Nothing can be written any more: Python's own flush at its end must not complain of it."""
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    for stream in (sys.stdout, sys.stderr):
+        try:
+            if stream is not None:
+                stream.flush()
+        except OSError:
+            os.dup2(nowhere, stream.fileno())
+    if sys.stdout is not None:
+        os.dup2(nowhere, sys.stdout.fileno())
 
 
 def _fastest_loop() -> Any:

@@ -20,7 +20,7 @@ from schemas.units import Seconds
 from services.commandline import demo
 from services.commandline.folder import Folder
 from services.commandline.outputs import Terminal
-from services.commandline.process import DONE, FAILED, INTERRUPTED, run
+from services.commandline.process import DONE, FAILED, interrupted, run
 from services.commandline.progress import Following
 from services.commandline.run import Where
 from services.commandline.session import Order, Played
@@ -77,7 +77,7 @@ def main(options: Options) -> int:
     folder = Folder(options.out, FILES, overwrite=options.overwrite)
     console = Terminal(quiet=options.quiet)
     played: list[Played] = []
-    interrupted = False
+    is_broken_off = False
     with Following(console, len(orders)) as following:
 
         def tell(one: Played) -> None:
@@ -87,7 +87,7 @@ def main(options: Options) -> int:
         try:
             run(play_all(orders, options.jobs or os.cpu_count() or 1, tell))
         except KeyboardInterrupt:
-            interrupted = True
+            is_broken_off = True
     if played:
         place = {(order.condition, order.session): number for number, order in enumerate(orders)}
         played.sort(key=lambda one: place[one.record.condition, one.record.session])
@@ -98,8 +98,8 @@ def main(options: Options) -> int:
         for table in tables:
             console.print("", shown(table), sep="\n")
         console.print(f"\nresults in {options.out}", markup=False, highlight=False, soft_wrap=True)
-    if interrupted:
-        return INTERRUPTED
+    if is_broken_off:
+        return interrupted()
     return DONE if all(one.record.finished for one in played) else FAILED
 
 

@@ -7,8 +7,9 @@ we die without a word, so that nothing outlives its supervisor.
 import asyncio
 import sys
 from asyncio.subprocess import PIPE, STDOUT, Process
-from collections.abc import AsyncIterator, Callable, Iterator, Mapping, Sequence
+from collections.abc import AsyncIterator, Awaitable, Callable, Coroutine, Iterator, Mapping, Sequence
 from contextlib import asynccontextmanager, contextmanager, suppress
+from typing import Any
 
 from schemas.faults import Fault, RunFailed
 from schemas.units import Seconds
@@ -47,6 +48,58 @@ def without_threads() -> Iterator[None]:
         policy.set_child_watcher(before)
 
 
+@asynccontextmanager
+async def spawned(
+    end: Callable[[Process], Awaitable[None]], *arguments: str, limit: int = 2**16, stderr: int | None = None
+) -> AsyncIterator[Process]:
+    """A child process while the body of `async with` runs, with pipes to standard input and output. At the end `end`
+    must see to it that it has ended; no cancellation cuts that short, however often it comes.
+
+    The child has its own process group: a terminal's Ctrl-C reaches us alone, and we end the children in order.
+    """
+    creating = asyncio.ensure_future(
+        asyncio.create_subprocess_exec(
+            *arguments, stdin=PIPE, stdout=PIPE, stderr=stderr, limit=limit, start_new_session=True
+        )
+    )
+    try:
+        yield await asyncio.shield(creating)
+    finally:
+        await _to_its_end(_ended(creating, end))
+
+
+async def _ended(creating: "asyncio.Future[Process]", end: Callable[[Process], Awaitable[None]]) -> None:
+    process = await creating
+    await end(process)
+    # Only with the last of its pipes is asyncio's own part of it closed; if the loop was sooner it would complain.
+    assert process.stdin is not None
+    assert process.stdout is not None
+    process.stdin.close()
+    while await process.stdout.read(2**16):
+        pass
+
+
+async def _to_its_end(work: Coroutine[Any, Any, None]) -> None:
+    """As `await work`, but a cancellation is raised only when that is done."""
+    task = asyncio.ensure_future(work)
+    cancellation: asyncio.CancelledError | None = None
+    while not task.done():
+        try:
+            await asyncio.shield(task)
+        except asyncio.CancelledError as error:
+            cancellation = error
+    task.result()
+    if cancellation is not None:
+        raise cancellation
+
+
+async def killed(process: Process) -> None:
+    """End it at once: it holds nothing that needs an orderly end."""
+    with suppress(ProcessLookupError):
+        process.kill()
+    await process.wait()
+
+
 class Child:
     """One supervised process. once: it may end by itself, with exit code 0, and is then not started again."""
 
@@ -76,17 +129,13 @@ class Child:
             await asyncio.sleep(pause)
 
     async def _life(self) -> int:
-        # Its own process group: a terminal's Ctrl-C reaches us alone, and we stop the children in order.
-        process = await asyncio.create_subprocess_exec(
-            *self._arguments, stdin=PIPE, stdout=PIPE, stderr=STDOUT, start_new_session=True
-        )
-        self.starts += 1
-        self.pid = process.pid
         try:
-            await self._pass_on(process)
-            return await process.wait()
+            async with spawned(self._end, *self._arguments, stderr=STDOUT) as process:
+                self.starts += 1
+                self.pid = process.pid
+                await self._pass_on(process)
+                return await process.wait()
         finally:
-            await self._end(process)
             self.pid = None
 
     async def _pass_on(self, process: Process) -> None:
@@ -105,9 +154,7 @@ class Child:
                 await process.wait()
         except TimeoutError:
             self._tell(self.name, f"did not end within {PATIENCE:g} s; killed")
-            with suppress(ProcessLookupError):
-                process.kill()
-            await process.wait()
+            await killed(process)
 
 
 class ChildRefused(RunFailed):

@@ -2,16 +2,16 @@
 
 import asyncio
 import sys
-from asyncio.subprocess import PIPE, Process
+from asyncio.subprocess import Process
 from collections import deque
-from collections.abc import AsyncIterator, Callable, Iterable
-from contextlib import asynccontextmanager, suppress
+from collections.abc import Callable, Iterable
+from contextlib import suppress
 
 import msgspec
 
 from schemas.units import Seconds
 from services.commandline.session import Order, Played
-from services.commandline.supervisor import ending, without_threads
+from services.commandline.supervisor import ending, killed, spawned, without_threads
 from services.study.records import SessionRecord
 
 WORKER = (sys.executable, "-P", "-m", "services", "play-sessions")
@@ -37,7 +37,7 @@ async def play_all(orders: Iterable[Order], jobs: int, tell: Tell, worker: tuple
 
 async def _play_some(waiting: deque[Order], tell: Tell, worker: tuple[str, ...]) -> None:
     while waiting:
-        async with _child(worker) as child:
+        async with spawned(killed, *worker, limit=LONGEST_ANSWER) as child:
             lost = ""
             while waiting and not lost:
                 order = waiting.popleft()
@@ -69,17 +69,3 @@ async def _ask(child: Process, order: Order) -> Played:
             raise _Lost(f"the process that played it ended with {ending(await child.wait())}")
     except TimeoutError:
         raise _Lost(f"no answer within {PATIENCE:g} s") from None
-
-
-@asynccontextmanager
-async def _child(worker: tuple[str, ...]) -> AsyncIterator[Process]:
-    # Its own process group: a terminal's Ctrl-C reaches us alone.
-    child = await asyncio.create_subprocess_exec(
-        *worker, stdin=PIPE, stdout=PIPE, limit=LONGEST_ANSWER, start_new_session=True
-    )
-    try:
-        yield child
-    finally:
-        with suppress(ProcessLookupError):
-            child.kill()  # it holds nothing that needs an orderly end
-        await child.wait()

@@ -106,7 +106,7 @@ async def test_a_signal_while_it_still_loads_ends_it_without_a_word(how: signal.
     finally:
         await stopped(demo, signal.SIGKILL)
 
-    assert (demo.returncode, err) == (130, b"")
+    assert (demo.returncode, err) == (128 + how, b"")
 
 
 @pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGTERM])
@@ -121,7 +121,7 @@ async def test_a_signal_ends_what_was_started_with_ctrl_c_ignored(how: signal.Si
     async with asyncio.timeout(PATIENCE):
         _, err = await demo.communicate()
 
-    assert (demo.returncode, err) == (130, b"")
+    assert (demo.returncode, err) == (128 + how, b"")
 
 
 @pytest.mark.parametrize(
@@ -136,7 +136,46 @@ async def test_a_reader_who_has_had_enough_ends_it_without_a_word(arguments: tup
     async with asyncio.timeout(PATIENCE):
         _, err = await demo.communicate()
 
-    assert (demo.returncode, err) == (130, b"")
+    assert (demo.returncode, err) == (141, b"")
+
+
+COMMANDS_THAT_PRINT = {
+    "plan": ("plan", "ask.xml"),
+    "bml": ("bml", "ask.xml"),
+    "explain": ("explain", "ask.xml"),
+    "explain as json": ("explain", "ask.xml", "--format", "json"),
+    "tool": ("tool",),
+    "play": ("play", "ask.xml", "--embedded", "--virtual-time"),
+    "simulate": ("simulate", "--human", "table-2-1", "--sessions", "8", "--jobs", "2", "--out", "study"),
+    "help": ("--help",),
+    "version": ("--version",),
+}
+
+
+@pytest.mark.parametrize("arguments", COMMANDS_THAT_PRINT.values(), ids=COMMANDS_THAT_PRINT)
+async def test_with_no_reader_at_all_every_command_ends_as_the_shell_expects(
+    arguments: tuple[str, ...], tmp_path: Path
+) -> None:
+    (tmp_path / "ask.xml").write_text(FRAGMENT)
+    ours, theirs = os.pipe()
+    os.close(ours)
+    places = {"ask.xml": tmp_path / "ask.xml", "study": tmp_path / "study"}
+    process = await start(*(places.get(each, each) for each in arguments), stdout=theirs)
+    os.close(theirs)
+    async with asyncio.timeout(PATIENCE):
+        _, err = await process.communicate()
+
+    assert (process.returncode, err) == (128 + signal.SIGPIPE, b"")
+
+
+async def test_output_that_finds_no_room_is_a_failure_in_one_line() -> None:
+    full = os.open("/dev/full", os.O_WRONLY)
+    process = await start("tool", stdout=full)
+    os.close(full)
+    async with asyncio.timeout(PATIENCE):
+        _, err = await process.communicate()
+
+    assert (process.returncode, err) == (3, b"cannot write the output: No space left on device\n")
 
 
 @pytest.mark.parametrize("command", ["plan", "tool"])

@@ -4,6 +4,7 @@ import asyncio
 import os
 import signal
 import sys
+from asyncio.subprocess import Process
 
 import pytest
 
@@ -13,7 +14,9 @@ from services.commandline.supervisor import (
     STABLE,
     Child,
     ChildRefused,
+    killed,
     pause_after,
+    spawned,
     supervised,
 )
 
@@ -100,3 +103,33 @@ async def test_a_refused_child_ends_everything() -> None:
             await child.ended.wait()
 
     assert caught.group_contains(ChildRefused)
+
+
+@pytest.mark.real_time
+async def test_a_child_is_seen_to_its_end_however_often_its_keeper_is_cancelled() -> None:
+    ending, may_end = asyncio.Event(), asyncio.Event()
+    ended: list[int | None] = []
+
+    async def end(process: Process) -> None:
+        ending.set()
+        await may_end.wait()
+        await killed(process)
+        ended.append(process.returncode)
+
+    async def keep() -> None:
+        async with spawned(end, *python("import sys; sys.stdin.read()")) as process:
+            await process.wait()
+
+    keeper = asyncio.create_task(keep())
+    await asyncio.sleep(0)
+    keeper.cancel()  # while it is being created
+    async with asyncio.timeout(20):
+        await ending.wait()
+        keeper.cancel()
+        await asyncio.sleep(0)
+        assert not keeper.done()
+        may_end.set()
+        await asyncio.gather(keeper, return_exceptions=True)
+
+    assert keeper.cancelled()
+    assert ended == [-signal.SIGKILL]
