@@ -16,6 +16,7 @@ from schemas.check import sound
 from schemas.faults import Fault, InputRefused
 from schemas.fragments import TurnFragment
 from schemas.tool_call import from_tool, is_tool_input
+from schemas.utf8 import BYTE_ORDER_MARK, is_utf8, utf8
 from schemas.xml_codec import decode_xml
 from schemas.xml_names import snake
 from schemas.xml_source import LARGEST
@@ -45,7 +46,7 @@ def read(data: bytes, source: str = "", unnamed: str = UNNAMED) -> tuple[Block |
 
     unnamed: the id of a language model's fragment, which has none; of several `<unnamed>-1`, `<unnamed>-2`...
     """
-    start = data[:64].removeprefix(b"\xef\xbb\xbf").lstrip()
+    start = data[:64].removeprefix(BYTE_ORDER_MARK).lstrip()
     if start.startswith((b"<", b"\0<", *_UTF_16)):
         return (decode_xml(data, source),)
     if not start.startswith((b"{", b"[")):
@@ -61,10 +62,12 @@ def _parsed(data: bytes | str, source: str) -> Any:
     if len(data) > LARGEST:
         reason = f"{len(data)} bytes; at most {LARGEST} are read"
         raise InputRefused(Fault(reason=reason, where=source, advice="split it into several blocks"))
-    raw = data.encode() if isinstance(data, str) else data
-    raw = raw.removeprefix(b"\xef\xbb\xbf")
+    # msgspec, too, refuses what is not UTF-8, but as another error, and it does not say where.
+    text = utf8(data, source) if isinstance(data, bytes) else data.removeprefix("\ufeff")
+    if not is_utf8(text):
+        raise InputRefused(Fault(reason="half a character (a surrogate without its other half)", where=source))
+    raw = text.encode()
     try:
-        raw.decode()  # msgspec, too, refuses what is not UTF-8, but counts from the start of the string it is in
         parsed = msgspec.json.decode(raw)
         # Of a key that stands twice msgspec silently keeps the last: half of what was meant would be performed.
         json.loads(raw, object_pairs_hook=_each_once, parse_int=str, parse_float=str)
@@ -73,7 +76,7 @@ def _parsed(data: bytes | str, source: str) -> Any:
         raise InputRefused(Fault(reason="nested too deep", where=source)) from error
     except _Doubled as error:
         raise InputRefused(Fault(reason=str(error), where=source, advice="an object has each key once")) from error
-    except (msgspec.DecodeError, UnicodeDecodeError) as error:
+    except msgspec.DecodeError as error:
         line = _line(raw, error)
         raise InputRefused(Fault(reason=str(error), where=source, line=line, advice="a JSON object")) from error
 
@@ -88,11 +91,9 @@ def _each_once(pairs: list[tuple[str, Any]]) -> None:
             raise _Doubled(f"key {key!r} stands {times} times in one object")
 
 
-def _line(raw: bytes, error: msgspec.DecodeError | UnicodeDecodeError) -> int:
+def _line(raw: bytes, error: msgspec.DecodeError) -> int:
     """Where it is: by its byte, or at the end where the document just stops; 0 where msgspec doesn't say."""
-    if isinstance(error, UnicodeDecodeError):
-        end = error.start
-    elif "truncated" in str(error):
+    if "truncated" in str(error):
         end = len(raw)
     else:
         byte = str(error).rpartition("(byte ")[2].rstrip(")")

@@ -109,6 +109,7 @@ def decode(payload: bytes, encoding: str = "application/msgpack") -> Message:
             return _json_decoder.decode(payload)  # type: ignore[no-any-return]
         if form == "application/msgpack":
             return _msgpack_decoder.decode(payload)  # type: ignore[no-any-return]
-    except (msgspec.DecodeError, RecursionError) as error:
-        raise InputRefused(Fault(reason=str(error), where=schema or form)) from error
+    except (msgspec.DecodeError, RecursionError, UnicodeDecodeError) as error:
+        reason = f"a text that is not UTF-8 ({error.reason})" if isinstance(error, UnicodeDecodeError) else str(error)
+        raise InputRefused(Fault(reason=reason, where=schema or form)) from error
     raise InputRefused(Fault(reason=f"encoding {form!r}", advice="application/msgpack or application/json"))

@@ -20,6 +20,7 @@ from typing import Literal, Self
 from msgspec import Struct
 
 from schemas.units import Seconds
+from schemas.utf8 import is_utf8
 
 BLOCK_ITSELF = "bml"
 SYNC_POINTS = ("start", "ready", "stroke_start", "stroke", "stroke_end", "relax", "end")
@@ -99,7 +100,7 @@ class SyncRef(Struct, frozen=True, omit_defaults=True):
 
 def is_id(text: str) -> bool:
     """May this be the id of a block or behavior?"""
-    return len(text) <= LONGEST_ID and _NAME.fullmatch(text) is not None
+    return len(text) <= LONGEST_ID and _NAME.fullmatch(text) is not None and is_utf8(text)
 
 
 def is_sync_point(text: str) -> bool:

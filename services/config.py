@@ -14,6 +14,7 @@ import msgspec
 from msgspec import Struct
 
 from schemas.faults import Fault, InputRefused
+from schemas.utf8 import is_utf8, utf8
 from services.collaboration.config import CollaborationConfig
 from services.control.config import ControlConfig
 from services.generation.config import GenerationConfig
@@ -97,16 +98,18 @@ def _not_a_number(table: dict[str, Any], place: str = "") -> str:
 
 def _file(path: Path) -> dict[str, Any]:
     try:
-        return tomllib.loads(path.read_text(encoding="utf-8"))
+        return tomllib.loads(utf8(path.read_bytes(), str(path)))
     except OSError as error:
         raise InputRefused(Fault(reason=error.strerror or str(error), where=str(path))) from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+    except tomllib.TOMLDecodeError as error:
         raise InputRefused(Fault(reason=f"not TOML: {error}", where=str(path), advice=_ADVICE)) from error
 
 
 def _setting(text: str) -> dict[str, Any]:
     """`recognition.gaze_resolution=table`; the value is TOML, or else a plain word."""
     key, equals, value = text.partition("=")
+    if not is_utf8(text):
+        raise InputRefused(Fault(reason=f"setting {text!r} is not UTF-8", advice="section.key=value"))
     if not equals:
         raise InputRefused(Fault(reason=f"no value in setting {text!r}", advice="section.key=value"))
     for form in (f"{key} = {value}", f"{key} = {msgspec.json.encode(value).decode()}"):

@@ -11,7 +11,7 @@ def readable(fault: Fault, source: Path | str = "") -> str:
     place = f"{file}:{fault.line}" if fault.line else file
     text = ": ".join(part for part in (place, rest, fault.reason) if part)
     text = f"{text} ({fault.advice})" if fault.advice else text
-    return " ".join(text.split())
+    return " ".join(text.split()).encode(errors="backslashreplace").decode()  # a file name need not be UTF-8
 
 
 def _split(where: str, source: str) -> tuple[str, str]:

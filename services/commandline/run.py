@@ -9,6 +9,8 @@ from typing import NamedTuple
 
 from msgspec import json
 
+from schemas.faults import Fault, InputRefused
+from schemas.utf8 import is_utf8
 from services.bus import Hub
 from services.commandline import roster
 from services.commandline.process import DONE, run_until_signal
@@ -31,6 +33,8 @@ class Where(NamedTuple):
 
     def load(self, *, defaults: Iterable[str] = ()) -> Config:
         """The file's configuration with the command line's settings before it. Raises InputRefused."""
+        if self.robot is not None and not is_utf8(self.robot):
+            raise InputRefused(Fault(reason=f"robot {self.robot!r} is not UTF-8"))
         named = () if self.robot is None else (f"robot={json.encode(self.robot).decode()}",)
         return load(self.config, settings=(*self.settings, *named), defaults=defaults)
 

@@ -11,6 +11,7 @@ from schemas import keys
 from schemas.actions import ActorFound
 from schemas.faults import Fault, InputRefused
 from schemas.units import FARTHEST, Stamp
+from schemas.utf8 import utf8
 from schemas.world import Entity, World
 from services.bus import Bus
 from services.runtime import Ready
@@ -50,10 +51,10 @@ def tangram_world() -> World:
 def load_world(path: Path) -> World:
     """The world in a JSON file. Raises InputRefused with the file, the JSON path and the reason."""
     try:
-        entities = msgspec.json.decode(path.read_bytes(), type=_File).entities
+        entities = msgspec.json.decode(utf8(path.read_bytes(), str(path)), type=_File).entities
     except OSError as error:
         raise InputRefused(Fault(reason=error.strerror or str(error), where=str(path))) from error
-    except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
+    except (msgspec.DecodeError, RecursionError) as error:
         raise InputRefused(Fault(reason=str(error), where=str(path), advice=ADVICE)) from error
     seen: dict[str, int] = {}
     for index, entity in enumerate(entities):

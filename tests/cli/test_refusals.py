@@ -204,3 +204,49 @@ def test_the_version_is_told(engage: Engage) -> None:
     result = engage("--version")
 
     assert (result.code, result.out) == (0, f"engage {metadata.version('engage-hri')}\n")
+
+
+NOT_UTF_8 = {
+    "world.json": b'{"entities":\n [{"id":"caf\xe9","kind":"object","position":[0.5,0,0.7]}]}',
+    "turn.json": b'{"turn_status": "full",\n "parts": [{"say": "caf\xe9"}]}',
+    "block.xml": b'<bml id="b">\n<speech id="s">caf\xe9</speech></bml>',
+    "engage.toml": b'# one\nrobot = "caf\xe9"',
+}
+
+
+@pytest.mark.parametrize("name", NOT_UTF_8)
+def test_a_file_that_is_not_utf_8_is_refused_with_its_line(engage: Engage, tmp_path: Path, name: str) -> None:
+    bad, block = tmp_path / name, tmp_path / "good.xml"
+    bad.write_bytes(NOT_UTF_8[name])
+    block.write_text(GOOD_BLOCK)
+    arguments = {"world.json": (block, "--world", bad), "engage.toml": (block, "--config", bad)}.get(name, (bad,))
+
+    for command in (("plan",), ("play", "--embedded", "--virtual-time")):
+        result = engage(*command, *arguments)
+
+        assert (result.code, result.out) == (2, "")
+        assert result.err.startswith(f"{bad}:2: ")
+        assert "UTF-8" in result.err
+        assert result.err.count("\n") == 1
+
+
+@pytest.mark.parametrize("option", [("--robot", "caf\udce9"), ("--set", "robot=caf\udce9")])
+def test_an_option_that_is_not_utf_8_is_refused(engage: Engage, tmp_path: Path, option: tuple[str, str]) -> None:
+    (tmp_path / "block.xml").write_text(GOOD_BLOCK)
+
+    result = engage("play", "--embedded", "--virtual-time", tmp_path / "block.xml", *option)
+
+    assert result.code == 2
+    assert "not UTF-8" in result.err
+
+
+def test_the_name_of_a_file_need_not_be_utf_8(engage: Engage, tmp_path: Path) -> None:
+    good, bad = tmp_path / "caf\udce9.json", tmp_path / "\udce9.json"
+    good.write_text('{"turn_status": "full", "parts": [{"say": "Hello"}]}')
+    bad.write_text("{")
+
+    assert engage("play", "--embedded", "--virtual-time", good).code == 0
+    result = engage("play", "--embedded", "--virtual-time", "--feedback", tmp_path / "feedback", bad)
+
+    assert result.code == 2
+    assert "\\udce9.json:1: " in result.err
