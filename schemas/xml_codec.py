@@ -22,6 +22,15 @@ from schemas.check import check
 from schemas.feedback import WarningKind
 from schemas.fragments import TurnFragment
 from schemas.references import disambiguated, in_draft_spelling
+from schemas.xml_elements import (
+    CHILDREN,
+    CORE_BEHAVIORS,
+    EXTENSIONS,
+    OPERATORS,
+    behaviors_inside,
+    misplaced,
+    take_out,
+)
 from schemas.xml_encode import encode_xml
 from schemas.xml_names import (
     SYNC_ATTRIBUTES,
@@ -37,34 +46,9 @@ from schemas.xml_names import (
     unknown_attributes,
 )
 from schemas.xml_source import BML_1_0, CORE, EBML, Source, split
-from schemas.xml_speech import spoken
+from schemas.xml_speech import MARKS, spoken
 
 __all__ = ["decode_xml", "encode_xml"]
-
-CORE_BEHAVIORS: dict[str, type[of.Behavior]] = {
-    str(kind.__struct_config__.tag): kind
-    for kind in (
-        of.Gaze, of.GazeShift, of.Pointing, of.Gesture, of.Head, of.HeadDirectionShift, of.Face, of.FaceLexeme,
-        of.FaceFacs, of.FaceShift, of.Posture, of.PostureShift, of.Pose, of.Locomotion, of.Speech, of.Wait, of.Emit,
-    )
-}  # fmt: skip
-EXTENSIONS: dict[str, type[of.Behavior]] = {
-    "reference": of.Reference,
-    "event": of.Event,
-    "turn": of.TurnSignal,
-    "unknown": of.Unknown,
-}
-OPERATORS: dict[str, type[of.Synchronize | of.Before | of.After]] = {
-    "synchronize": of.Synchronize,
-    "before": of.Before,
-    "after": of.After,
-}
-CHILDREN = {
-    "face": {"lexeme", "facs"}, "faceShift": {"lexeme", "facs"}, "posture": {"stance", "pose"},
-    "postureShift": {"stance", "pose"}, "emit": {"event"}, "reference": {"speechOption"},
-    "event": {"object", "anchor"}, "speechOption": {"distractor"}, "synchronize": {"sync"}, "before": {"sync"},
-    "after": {"sync"},
-}  # fmt: skip
 
 
 def decode_xml(data: bytes | str, source: str = "") -> Block | TurnFragment:
@@ -216,7 +200,7 @@ class _Document:
             raw["required"] = True
         timing = [of.Timing(name, value) for name, value in plain.items() if name in SYNC_ATTRIBUTES]
         if local != "speech":
-            self._only(element, local, raw["id"])
+            self._only(element, raw["id"])
             timing += [
                 of.Timing(child.get("sync", ""), child.get("ref", ""))
                 for child, namespace, name in ours(element)
@@ -266,6 +250,7 @@ class _Document:
         return timing
 
     def _speech(self, element: etree._Element, raw: dict[str, Any]) -> list[of.Timing]:
+        self._leave_out_strays(element, raw["id"])
         said = spoken(self._source, element, raw["id"])
         raw["text"], raw["marks"] = said.text, said.marks
         raw["markup"] = said.markup or raw.get("markup", "")
@@ -282,6 +267,17 @@ class _Document:
             if split(str(child.tag)) == (EBML, "timing")
         ]
         return [*ties, *said.timing]
+
+    def _leave_out_strays(self, speech: etree._Element, id: str) -> None:
+        """Behaviors are neither words nor markup for the voice, and marks are empty."""
+        for stray in list(behaviors_inside(speech, is_strict=self._is_strict)):
+            local = split(str(stray.tag))[1]
+            advice = f'put it beside the speech; a mark says when: start="{id}:m1"'
+            self._leave_out(f"unknown element <{local}> in <speech>", stray, id, advice=advice)
+            take_out(stray)
+        for each in speech.iter():
+            if split(str(each.tag))[1] in MARKS:
+                self._only(each, id)
 
     def _face(
         self, element: etree._Element, plain: dict[str, str], raw: dict[str, Any], kind: type[of.Behavior]
@@ -323,7 +319,6 @@ class _Document:
         return None
 
     def _option(self, element: etree._Element) -> of.SpeechOption:
-        self._only(element, "speechOption")
         raw = self._own_fields(element, of.SpeechOption)
         raw["line"] = self._source.line(element)
         raw["distractors"] = [child.get("object", "") for child, _, _ in ours(element)]
@@ -341,7 +336,7 @@ class _Document:
                 reason = f"unknown element <{local}> in a constraint"
                 self._leave_out(reason, child, required=required, advice=advice)
                 continue
-            self._only(child, local)
+            self._only(child)
             self._note_attributes(child, local)
             raw: dict[str, Any] = {"syncs": [self._ref(sync) for sync, _, name in ours(child) if name == "sync"]}
             if (ref := child.get("ref")) is not None:
@@ -371,12 +366,12 @@ class _Document:
         self._note_attributes(sync, "sync")
         return ref
 
-    def _only(self, element: etree._Element, local: str, behavior: str = "") -> None:
-        """Note children that the element can't have. Raises InputRefused in a fragment."""
-        known = CHILDREN.get(local, set())
-        for child, _, name in ours(element):
-            if name not in known and name not in ("description", "timing"):
-                self._leave_out(f"unknown element <{name}> in <{local}>", child, behavior)
+    def _only(self, element: etree._Element, behavior: str = "") -> None:
+        """Note what the element, or one in it, can't hold. Raises InputRefused in a fragment."""
+        for child, name, holder in misplaced(element):
+            known = ", ".join(sorted(CHILDREN.get(holder, ()))) or "nothing"
+            advice = f"<{holder}> holds {known}: put <{name}> beside it"
+            self._leave_out(f"unknown element <{name}> in <{holder}>", child, behavior, advice=advice)
 
 
 def _is_true(raw: dict[str, Any]) -> bool:

@@ -17,7 +17,7 @@ from schemas.xml_source import BML_1_0, CORE, EBML, Source, split
 
 SSML = "http://www.w3.org/2001/10/synthesis"
 XML = "http://www.w3.org/XML/1998/namespace"
-_MARKS = ("sync", "tm", "mark")
+MARKS = ("sync", "tm", "mark")
 _WHITE = re.compile("[ \t\r\n]+")
 
 
@@ -83,7 +83,7 @@ class _Reading:
         for child in element:
             namespace, local = split(str(child.tag))
             known = namespace in CORE or namespace == SSML
-            if known and local in _MARKS:
+            if known and local in MARKS:
                 self._mark(child)
             elif known and local != "description":
                 self._prosodic = element if self._prosodic is None and not nested else self._prosodic
@@ -127,7 +127,7 @@ def serialized(element: etree._Element) -> str:
     parts = [escape(element.text or "")]
     for child in element:
         local = split(str(child.tag))[1]
-        if local in _MARKS:
+        if local in MARKS:
             parts.append(f"<mark name={quoteattr(child.get('id') or child.get('name') or child.get('ref') or '')}/>")
         elif local != "description":
             inner = serialized(child)

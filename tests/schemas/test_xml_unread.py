@@ -136,3 +136,54 @@ def test_a_bad_id_of_the_whole_names_its_line(id: str) -> None:
         decode_xml(f'<!-- -->\n<bml id="{id}"/>')
 
     assert refusal.value.fault.line == 2
+
+
+SWALLOWED = {
+    "constraint": (
+        '<gaze id="a" target="t"/><constraint><synchronize ref="a:end">'
+        '\n<sync ref="a:end"><gaze id="x" target="t"/></sync></synchronize></constraint>',
+        "<gaze> in <sync>", "",
+    ),
+    "face": ('<face id="a"><lexeme lexeme="SMILE">\n<gaze id="x" /></lexeme></face>', "<gaze> in <lexeme>", "a"),
+    "posture": (
+        '<posture id="a"><pose part="ARMS" lexeme="X">\n<wait id="x" duration="1"/></pose></posture>',
+        "<wait> in <pose>", "a",
+    ),
+    "words": ('<speech id="a">Well, \n<gaze id="x" target="t"/> hello</speech>', "<gaze> in <speech>", "a"),
+    "text": ('<speech id="a"><text>Oh, <b>\n<head id="x"/></b>hi</text></speech>', "<head> in <speech>", "a"),
+    "mark": ('<speech id="a">Hi <sync id="m">\n<gaze id="x"/></sync>you</speech>', "<gaze> in <speech>", "a"),
+    "empty mark": ('<speech id="a">Hi <sync id="m">\n<um/></sync>you</speech>', "<um> in <sync>", "a"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", SWALLOWED)
+def test_no_element_swallows_what_stands_in_it(name: str) -> None:
+    content, reason, behavior = SWALLOWED[name]
+
+    decoded = block(content)
+
+    message = f"line 2: unknown element {reason}; it is ignored"
+    assert decoded.unread == (Unread(message=message, behavior=behavior),)
+    assert [each.id for each in decoded.behaviors] == ["a"]
+    with pytest.raises(InputRefused, match=f"unknown element {reason}") as refused:
+        decode_xml(f'<ebml:ebml id="f" xmlns="{DRAFT}" xmlns:ebml="edu.wpi.ebml">{content}</ebml:ebml>')
+    assert refused.value.fault.line == 2
+    assert "beside" in refused.value.fault.advice
+
+
+def test_a_reference_among_the_words_of_a_fragment_is_refused() -> None:
+    with pytest.raises(InputRefused, match="unknown element <reference> in <speech>") as refused:
+        decode_xml(
+            '<ebml:ebml id="f" xmlns="org.mindmakers.bml" xmlns:ebml="edu.wpi.ebml"><speech id="s">Take '
+            '<ebml:reference id="r" target="cup"/> please</speech></ebml:ebml>'
+        )
+
+    assert "put it beside the speech" in refused.value.fault.advice
+
+
+def test_what_is_left_out_of_words_is_no_markup_and_the_words_around_it_stay() -> None:
+    speech = behavior('<speech id="s"><b>Well</b>, <gaze id="x" target="t"/> hello<sync id="m"/> you</speech>')
+
+    assert speech == Speech(
+        id="s", text="Well, hello you", marks=(Mark("m", 11),), markup='<b>Well</b>,  hello<mark name="m"/> you'
+    )
