@@ -10,7 +10,7 @@ from schemas.actions import ActionBegan, ActionEnded
 from schemas.behaviors import GazeShift, TurnSignal
 from schemas.blocks import BlockOutcome, PerformBlock
 from schemas.body import AbortBehavior
-from schemas.faults import EngageError, Fault, RunFailed
+from schemas.faults import EngageError, Fault, InputRefused, RunFailed
 from schemas.feedback import SyncPointProgress, WarningFeedback
 from schemas.fragments import PerformFragment
 from schemas.recognition import ConnectionEvent, SignalTurn
@@ -73,8 +73,12 @@ class Conductor:
     # -- what arrives ---------------------------------------------------------------------------------------------
 
     def admit(self, request: PerformFragment, world: World) -> None:
-        """Raises InputRefused, and changes nothing, where the fragment is illegal."""
-        fragment = checked(request.fragment, world, self._bus.robot)
+        """Raises InputRefused, and changes nothing, where the fragment is illegal, or one too many."""
+        if len(self._live) >= self._config.fragments:
+            reason = f"{len(self._live)} fragments are waiting or performed, which is the limit"
+            advice = "wait until one has ended; `generation.fragments` is the limit"
+            raise InputRefused(Fault(reason=reason, where=request.fragment.id, advice=advice))
+        fragment = checked(request.fragment, world, self._bus.robot, self._config.utterance)
         turn = self._turns.accept(fragment, fragment.addressee)
         performance = Performance(request, fragment, turn, self._config.decision_patience)
         if (displaced := self._outcomes.expect(fragment.id, turn)) is not None:

@@ -70,7 +70,11 @@ class GenerationConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=
     decision_patience: Seconds = 8.0
     """After a block's end: how long its undecided connection events may delay the fragment's outcome. Ours."""
     world_patience: Seconds = 5.0
-    """How long a fragment waits for a first report of the world. Ours."""
+    """How long a fragment waits for a first report of the world, or of a person to speak to. Ours."""
+    fragments: int = 200
+    """How many fragments may be waiting or performed at once; one more is refused. Ours."""
+    utterance: int = 5000
+    """Characters of one speech, some five minutes; a longer one is refused. Ours."""
     covered_for: Seconds = 10.0
     """How long an object that the world no longer reports is taken to be covered, and spoken of and looked at where
     it was. Ours."""
@@ -156,7 +160,7 @@ class GenerationConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=
 
 _POSITIVE = (
     "turn_silence", "barge_in", "decision_patience", "world_patience", "glance_factor", "mtbce_prior", "mtbce_low",
-    "glance_duration", "response_hold", "retry",
+    "glance_duration", "response_hold", "retry", "fragments", "utterance",
 )  # fmt: skip
 _NOT_NEGATIVE = (
     "seconds_per_head_degree", "seconds_per_arm_degree", "seconds_per_word", "wait_weight", "expected_delay",

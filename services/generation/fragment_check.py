@@ -1,11 +1,12 @@
 """Is a fragment sound, and does it speak of what the world knows? Refused whole, with its place, before all else."""
 
+import sys
 from collections.abc import Iterator, Mapping
 from difflib import get_close_matches
 
 from msgspec.structs import replace
 
-from schemas.behaviors import Gaze, GazeShift, HeadDirectionShift, Pointing, Reference
+from schemas.behaviors import Gaze, GazeShift, HeadDirectionShift, Pointing, Reference, Speech
 from schemas.check import sound
 from schemas.faults import Fault, InputRefused
 from schemas.fragments import TurnFragment
@@ -14,21 +15,26 @@ from schemas.tool_call import in_call
 from schemas.world import Entity, World
 
 
-def checked(fragment: TurnFragment, world: World, robot: str) -> TurnFragment:
+def checked(fragment: TurnFragment, world: World, robot: str, longest: int = sys.maxsize) -> TurnFragment:
     """The fragment with addressee and delay target filled in, and marks that look like offsets made explicit.
 
-    robot: its actor id, which may be a target too. Raises InputRefused with JSON path and XML line of the first
-    thing that is wrong, by itself or with regard to the world.
+    robot: its actor id, which may be a target too. longest: characters of one speech. Raises InputRefused with JSON
+    path and XML line of the first thing that is wrong, by itself or with regard to the world.
     """
     try:
-        return _checked(fragment, world, robot)
+        return _checked(fragment, world, robot, longest)
     except InputRefused as error:
         fault = replace(error.fault, where=in_call(error.fault.where, fragment))
         raise InputRefused(fault, error.block) from error
 
 
-def _checked(fragment: TurnFragment, world: World, robot: str) -> TurnFragment:
+def _checked(fragment: TurnFragment, world: World, robot: str, longest: int) -> TurnFragment:
     fragment = sound(fragment)
+    for index, behavior in enumerate(fragment.behaviors):
+        if isinstance(behavior, Speech) and len(behavior.text) > longest:
+            reason = f"{len(behavior.text)} characters of speech, at most {longest} can be said in one go"
+            advice = "say it in several fragments; `generation.utterance` is the limit"
+            raise _refused(fragment, f"$.behaviors[{index}].text", reason, behavior.line, advice)
     known = {entity.id: entity for entity in world.entities}
     for path, target, line in _targets(fragment):
         if target not in known and target != robot:
@@ -38,6 +44,11 @@ def _checked(fragment: TurnFragment, world: World, robot: str) -> TurnFragment:
             _check_objects(fragment, index, behavior, known)
             _check_timing(fragment, index, behavior)
     return replace(fragment, addressee=addressee(fragment, world), delay_target=_away(fragment, world))
+
+
+def lacks_people(fragment: TurnFragment, world: World) -> bool:
+    """Is it for whoever is there, and is nobody there?"""
+    return not (fragment.addressee or world.people) and fragment.turn_status not in ("middle", "end")
 
 
 def addressee(fragment: TurnFragment, world: World) -> str:

@@ -20,6 +20,7 @@ from services.covered import CoveredObjects
 from services.generation.arbiter import Arbiter, Shift
 from services.generation.conductor import Conductor
 from services.generation.config import GenerationConfig
+from services.generation.fragment_check import lacks_people
 from services.generation.leases import Leases
 from services.requests import RequestDesk, Requester
 from services.runtime import Ready
@@ -85,9 +86,9 @@ class _Generation:
                 self._conductor.feed(world, now)
                 self._arbiter.feed(world, now)
                 early, self._early = self._early, {}
-                for request, _ in early.values():
+                for request, until in early.values():
                     with self._desk.serving(request):
-                        self._admit(request, now)
+                        self._admit(request, now, until)
             case ConnectionEvent():
                 self._conductor.feed(message, now)
                 self._arbiter.feed(message, now)
@@ -116,16 +117,17 @@ class _Generation:
     def _serve(self, request: Request, now: Seconds) -> None:
         match request:
             case PerformFragment():
-                self._admit(request, now)
+                self._admit(request, now, now + self._config.world_patience)
             case Inhibit():
                 self._grant(request, now)
             case Cancel():
                 self._cancel(request)
 
-    def _admit(self, request: PerformFragment, now: Seconds) -> None:
+    def _admit(self, request: PerformFragment, now: Seconds, until: Seconds) -> None:
+        """until: what it needs of the world is waited for."""
         world = self._objects.at(now)
-        if world is None:
-            self._early[request.id] = (request, now + self._config.world_patience)
+        if world is None or (now < until and lacks_people(request.fragment, world)):
+            self._early[request.id] = (request, until)
             return
         try:
             self._conductor.admit(request, world)
@@ -189,9 +191,12 @@ class _Generation:
 
     def _after(self, now: Seconds) -> None:
         """Whatever happened: what follows from it by now."""
-        for id, (_, until) in list(self._early.items()):
+        for id, (request, until) in list(self._early.items()):
             if now >= until:
                 del self._early[id]
+                if self._objects.at(now) is not None:
+                    self._admit(request, now, until)  # which says whom it lacks
+                    continue
                 fault = Fault(reason="the world is unknown", where=id, advice="is perception running?")
                 self._refuse(id, fault)
         for id, fault in self._conductor.settle(now):

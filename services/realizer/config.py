@@ -18,6 +18,7 @@ class RealizerConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
     abort: how long the body may take to end what was aborted before the block ends without it.
     pulse: between two renewals of what the body, and recognition, are asked for. lease: how long movement authority
     lasts that is not renewed, so that a body stops by itself when the realizer is gone. At least three pulses.
+    utterance: characters of one speech, some five minutes; a block with a longer one is refused.
     blocks: live blocks; one more is refused. The default is where a command follows its sync point within 50 ms in 99
     of 100 cases on two cores (benchmarks/live_blocks.py).
     event_grace: an event ends as failed this much after its limit if recognition is not there to decide it.
@@ -37,6 +38,7 @@ class RealizerConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
     abort: Seconds = 5.0
     pulse: Seconds = 1.0
     lease: Seconds = 5.0
+    utterance: int = 5000
     blocks: int = 300
     event_grace: Seconds = 0.5
     event_patience: Seconds = 10.0

@@ -7,7 +7,7 @@ from typing import Any, TypeVar
 from msgspec.structs import replace
 
 from schemas import keys
-from schemas.behaviors import Gesture, Hand, Pointing
+from schemas.behaviors import Gesture, Hand, Pointing, Speech
 from schemas.blocks import BehaviorInterrupted, Block, BlockOutcome, InterruptBehavior, PerformBlock
 from schemas.body import (
     BodyPose,
@@ -178,6 +178,13 @@ class _Realizer:
 
     async def _plan(self, block: Block, elsewhere: Mapping[str, Block]) -> Plan:
         """The body is asked again from where it will be by then, and about the hands that the plan has chosen."""
+        for each in block.behaviors:
+            if isinstance(each, Speech) and len(each.text) > self.config.utterance:
+                reason = f"{len(each.text)} characters of speech, at most {self.config.utterance} are said in one go"
+                advice = "say it in several; `realizer.utterance` is the limit"
+                raise BlockRefused(
+                    Fault(reason=reason, where=f"{block.id}: {each.id}", line=each.line, advice=advice)
+                )
         if (held := extent(block)) > self.config.most:
             reason = f"{held} behaviors, marks and sync references; at most {self.config.most} can be planned in time"
             raise BlockRefused(Fault(reason=reason, where=block.id, advice="send several, each with APPEND"))

@@ -14,7 +14,7 @@ from schemas.units import Seconds, Stamp
 from schemas.world import World
 from services.bus import Bus, Received
 from services.recognition.config import RecognitionConfig
-from services.recognition.machine import Forgotten
+from services.recognition.machine import Forgotten, Mishap
 from services.recognition.open_events import OpenBook
 from services.recognition.recognizer import Perceived, Recognizer, Result
 from services.recognition.standings import Standings
@@ -57,7 +57,7 @@ class _Recognition:
         self._nameless: set[str] = set()
         self._witnesses = Witnesses()
         session = session_of(bus.run)
-        self._recognizer = Recognizer(bus.robot, config, clock=bus.clock, name=f"{session}-")
+        self._recognizer = Recognizer(bus.robot, config, clock=bus.clock, name=f"{session}-", strict=False)
         self._open = OpenBook(bus.robot, session)
         self._standings = Standings(bus.robot, config, bus.clock)
 
@@ -81,7 +81,9 @@ class _Recognition:
         if not self._is_credible(received):
             return
         if isinstance(observation, Perceived):
-            self._feed(observation, self._when(observation, received.at))
+            fault = self._feed(observation, self._when(observation, received.at))
+            if fault is not None and request is not None and self.desk.is_live(request.id):
+                self.desk.refuse(request.id, fault)
         if received.key == keys.PERCEIVED_ACTION or isinstance(received.message, PeerGone | PeerAlive):
             for change in self._witnesses.feed(received.message, received.source, self._bus.stamp()):
                 self._feed(change, self._bus.now())
@@ -89,8 +91,8 @@ class _Recognition:
     def _cancel(self, cancel: Cancel) -> None:
         self._feed(cancel, self._bus.now())
 
-    def _feed(self, observation: Perceived, at: Seconds) -> None:
-        self._tell(self._recognizer.feed(observation, at, self._bus.now()))
+    def _feed(self, observation: Perceived, at: Seconds) -> Fault | None:
+        return self._tell(self._recognizer.feed(observation, at, self._bus.now()))
 
     def _is_credible(self, received: Received) -> bool:
         """Only the robot's body says what the robot does, and only perception what others do."""
@@ -130,8 +132,10 @@ class _Recognition:
                 stamp = observation.at
         return arrived if stamp is None else min(self._bus.local(stamp), self._bus.now())
 
-    def _tell(self, effects: Iterable[Result]) -> None:
+    def _tell(self, effects: Iterable[Result]) -> Fault | None:
+        """Publish what follows; the fault, if a bug has shown."""
         changes: list[ConnectionEvent | Forgotten] = []
+        fault: Fault | None = None
         for effect in effects:
             match effect:
                 case ConnectionEvent():
@@ -148,9 +152,12 @@ class _Recognition:
                 case Forgotten(actor=actor):
                     changes.append(effect)
                     self._witnesses.forget(actor)
+                case Mishap(actor=actor, error=error):
+                    fault = self._bus.failed(error, f"what {actor or 'somebody'} does")
         events = [change for change in changes if isinstance(change, ConnectionEvent)]
         for book in self._open.feed(events, self._bus.stamp()):
             self._bus.publish(keys.open_events(book.actor), book)
         for statistics in self._standings.feed(changes, self._recognizer.session.busy, self._bus.now()):
             if statistics.actor != "all":  # a person of that name would pass for everybody
                 self._bus.publish(keys.statistics(statistics.actor or "all"), statistics)
+        return fault

@@ -2,6 +2,7 @@
 
 import random
 from itertools import product
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -16,6 +17,7 @@ from services.asking import Asking, Patience
 from services.serving import Serving
 from tests.bus.request_world import World
 
+ROOT = Path(__file__).parents[2]
 RUNS = 400
 
 
@@ -115,3 +117,16 @@ def test_a_lease_that_a_late_message_renews_is_not_shortened() -> None:
     serving.keep_alive(late, 2.0, 11.0)
 
     assert serving.deadline == 15.0
+
+
+@pytest.mark.parametrize("table", [asking_table, serving_table])
+def test_the_page_draws_the_tables(table: Any) -> None:
+    lines = ["stateDiagram-v2"]
+    for state, rows in table.TABLE.items():
+        ways: dict[Any, list[str]] = {}
+        for event, (after, _) in rows.items():
+            if after is not state:
+                ways.setdefault(after, []).append(event.name.lower())
+        lines += [f"    {state.name} --> {after.name}: {', '.join(events)}" for after, events in ways.items()]
+
+    assert "```mermaid\n" + "\n".join(lines) + "\n```" in (ROOT / "docs" / "bus.md").read_text()
