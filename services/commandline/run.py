@@ -50,6 +50,11 @@ def unique(name: str) -> str:
     return f"{name}-{uuid.uuid4().hex[:8]}"
 
 
+def is_ready(name: str) -> str:
+    """What a service says on standard error when it serves. `engage up` waits for it."""
+    return f"{name} is ready"
+
+
 async def forever() -> None:
     """Until cancelled."""
     await asyncio.get_running_loop().create_future()
@@ -66,7 +71,7 @@ async def _serve(name: str, where: Where, config: Config, attended: bool) -> Non
     service = roster.service(name, config)
 
     def stands() -> None:
-        print(f"{name} is ready", file=sys.stderr, flush=True)
+        print(is_ready(name), file=sys.stderr, flush=True)
 
     async with await where.open(config.robot) as hub:
         serving = asyncio.create_task(serve(hub, name, service, stands), name=f"service {name}")

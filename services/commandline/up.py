@@ -1,5 +1,6 @@
 """`engage up`: the services as processes of their own on this machine, watched over until Ctrl-C."""
 
+import asyncio
 import sys
 from collections.abc import Iterable
 from pathlib import Path
@@ -8,14 +9,12 @@ from typing import NamedTuple
 from rich.console import Console
 from rich.text import Text
 
-from schemas.messages import Message
-from schemas.presence import PeerAlive
-from schemas.units import Seconds
+from services.commandline.claim import claiming
 from services.commandline.demo import DEFAULTS, Tallying, shown
 from services.commandline.outputs import Outputs
 from services.commandline.process import DONE, run_until_signal
 from services.commandline.roster import ROBOT
-from services.commandline.run import Where, forever, unique
+from services.commandline.run import Where, forever, is_ready
 from services.commandline.supervisor import Child, supervised
 from services.config import Config
 from services.console import tally
@@ -44,20 +43,23 @@ def main(options: Options) -> int:
 
 async def _up(options: Options, config: Config, outputs: Outputs, console: Console) -> None:
     # Our own session comes first and stays: children may crash, the place where all find one another does not.
-    async with await options.where.open(config.robot) as hub:
+    async with await options.where.open(config.robot) as hub, claiming(hub) as claim:
+        await claim.granted()
         await hub.vacant(*_names(options))
-        bus = hub.join(unique("up"))
+        bus = claim.bus
         tallying = Tallying(bus.now())
         live = options.task and console.is_terminal and not options.quiet
-        children = _children(options, config, console)
-        arrivals = Arrivals(children, console)
+        arrivals = Arrivals(_names(options), console)
+        children = _children(options, config, console, arrivals)
         with shown(console, config.robot, bus.now(), live) as show:
-            sinks = (show, tallying, outputs, arrivals) if options.task else (outputs, arrivals)
-            async with following(bus, sinks), supervised(children):
+            sinks = (show, tallying, outputs) if options.task else (outputs,)
+            async with following(bus, sinks), supervised(children), asyncio.TaskGroup() as group:
+                holding = group.create_task(claim.held_until(arrivals.complete), name="claim")
                 if options.task:
                     await children["collaboration"].ended.wait()
                 else:
                     await forever()
+                holding.cancel()
     if options.task:
         console.print(tally.render(tallying.tally, config.robot))
 
@@ -66,13 +68,15 @@ def _names(options: Options) -> tuple[str, ...]:
     return (*ROBOT, "simulation", "collaboration") if options.task else (*ROBOT, "simulation")
 
 
-def _children(options: Options, config: Config, console: Console) -> dict[str, Child]:
+def _children(options: Options, config: Config, console: Console, arrivals: "Arrivals") -> dict[str, Child]:
     names = _names(options)
     width = max(map(len, names))
     styles = dict(zip(names, STYLES, strict=False))
 
     def tell(name: str, line: str) -> None:
         console.print(Text(f"{name:>{width}} │ ", style=styles[name]) + Text(line), soft_wrap=True)
+        if line == is_ready(name):
+            arrivals(name)
 
     return {
         name: Child(name, command(name, options.where, config), tell, once=name == "collaboration") for name in names
@@ -93,14 +97,15 @@ def command(name: str, where: Where, config: Config) -> list[str]:
 
 
 class Arrivals:
-    """A sink that says once that everybody is there."""
+    """Told of each child that is ready; says once that all are. Those of another `up` do not count."""
 
     def __init__(self, names: Iterable[str], console: Console) -> None:
         self._missing = set(names)
         self._console = console
+        self.complete = asyncio.Event()
 
-    def __call__(self, message: Message, at: Seconds) -> None:
-        if isinstance(message, PeerAlive) and message.participant in self._missing:
-            self._missing.remove(message.participant)
-            if not self._missing:
-                self._console.print("all services are up; Ctrl-C stops them", highlight=False)
+    def __call__(self, name: str) -> None:
+        self._missing.discard(name)
+        if not self._missing and not self.complete.is_set():
+            self.complete.set()
+            self._console.print("all services are up; Ctrl-C stops them", highlight=False)

@@ -250,12 +250,48 @@ async def test_a_second_one_of_a_robot_is_refused_and_the_first_goes_on(endpoint
             _, err = await play.communicate()
 
         assert [process.returncode for process in second] == [2, 2]
-        assert told[0].startswith("control, generation, realizer, recognition, simulation: robot 'only' has these")
+        assert told[0].startswith("up: robot 'only' has this on the bus already (stop what runs there")
         assert told[1].startswith("realizer: robot 'only' has this on the bus already (stop what runs there")
         assert [text.count("\n") for text in told] == [1, 1]
         assert (play.returncode, err) == (0, b"")
     finally:
         await stopped(up)
+
+
+def processes_of(robot: str) -> list[int]:
+    """All that were started for it, by us or by one of those."""
+    found = []
+    for place in Path("/proc").glob("[0-9]*"):
+        with suppress(OSError):
+            if f"\0{robot}\0".encode() in (place / "cmdline").read_bytes():
+                found.append(int(place.name))
+    return found
+
+
+@pytest.mark.parametrize("time", range(3))
+async def test_of_two_that_are_started_at_once_exactly_one_goes_on(endpoint: str, time: int) -> None:
+    robot = f"twins-{os.getpid()}-{time}"
+    twins = [await start("up", "--robot", robot, how, endpoint) for how in ("--listen", "--connect")]
+    ends = [asyncio.create_task(twin.wait()) for twin in twins]
+    try:
+        async with asyncio.timeout(PATIENCE):
+            await asyncio.wait(ends, return_when=asyncio.FIRST_COMPLETED)
+        loser, winner = sorted(twins, key=lambda twin: twin.returncode is None)
+        out, err = await loser.communicate()
+        await line(winner, "all services are up", log=False)
+
+        assert loser.returncode == 2
+        assert b"all services are up" not in out
+        assert err.startswith(b"up: robot '%s' has this on the bus already" % robot.encode())
+        assert err.count(b"\n") == 1
+        assert sorted(processes_of(robot)) == sorted([winner.pid, *children(winner.pid)])
+        assert len(children(winner.pid)) == 5
+    finally:
+        for twin in twins:
+            await stopped(twin)
+
+    assert winner.returncode == 0
+    assert processes_of(robot) == []
 
 
 async def test_a_killed_service_may_come_back_at_once(endpoint: str) -> None:
