@@ -11,7 +11,7 @@ Refused input raises InputRefused, failure at run time RunFailed, each with the 
 
 import asyncio
 import uuid
-from collections.abc import AsyncIterator, Awaitable, Collection, Iterable, Sequence
+from collections.abc import AsyncIterator, Awaitable, Callable, Collection, Iterable, Sequence
 from contextlib import asynccontextmanager
 from itertools import count
 from pathlib import Path
@@ -330,11 +330,11 @@ def _fragment(source: FragmentSource, unnamed: str) -> TurnFragment:
             except OSError as error:
                 raise InputRefused(Fault(reason=error.strerror or str(error), where=str(source))) from error
         case str():
-            data, place = source.encode(), ""
+            data, place = _encoded(source.encode), ""
         case bytes():
             data, place = source, ""
         case dict():
-            data, place = msgspec.json.encode(source), ""
+            data, place = _encoded(lambda: msgspec.json.encode(source)), ""
     things = read(data, place, unnamed)
     match things:
         case (TurnFragment() as fragment,):
@@ -342,6 +342,14 @@ def _fragment(source: FragmentSource, unnamed: str) -> TurnFragment:
         case (Block(),):
             raise InputRefused(Fault(reason="a BML block, not a turn fragment", where=place, advice="use `realize`"))
     raise InputRefused(Fault(reason=f"{len(things)} things, not one turn fragment", where=place))
+
+
+def _encoded(encode: Callable[[], bytes]) -> bytes:
+    """Raises InputRefused for half a character, and for values that JSON does not have."""
+    try:
+        return encode()
+    except (UnicodeEncodeError, TypeError, ValueError, RecursionError, msgspec.MsgspecError) as error:
+        raise InputRefused(Fault(reason=str(error), advice="text in Unicode, or what JSON can hold")) from error
 
 
 O = TypeVar("O", FragmentOutcome, BlockOutcome)  # noqa: E741

@@ -2,6 +2,7 @@
 
 import asyncio
 from collections.abc import Callable
+from contextlib import suppress
 from typing import Any
 
 import msgspec
@@ -163,7 +164,8 @@ class Peers:
 
         def reply(got: zenoh.Reply) -> None:
             if got.ok is not None:
-                answer.append(_pasts.decode(got.ok.payload.to_bytes()))
+                with suppress(*BAD):  # then it has not answered
+                    answer.append(_pasts.decode(got.ok.payload.to_bytes()))
 
         self.ask(keys.own(run, "past"), pack(missing), reply, lambda _: then(answer[0] if answer else None), CATCH_UP)
 
@@ -183,7 +185,8 @@ class Peers:
         def reply(got: zenoh.Reply) -> None:
             answered = self._loop.time()
             if got.ok is not None:
-                self.clocks.measured(clock, asked, _instants.decode(got.ok.payload.to_bytes()), answered)
+                with suppress(*BAD):
+                    self.clocks.measured(clock, asked, _instants.decode(got.ok.payload.to_bytes()), answered)
                 if trips > 1:
                     self.measure_clock(run, clock, trips - 1)
 

@@ -53,8 +53,8 @@ async def change_mind(robot: Robot, chance: random.Random, number: int) -> str:
 
     async def interrupt() -> None:
         asking = asyncio.create_task(robot.realize(f"b{number}", behaviors))
-        await asyncio.sleep(0.05)
         try:
+            await asyncio.sleep(0.05)
             await robot.interrupt(f"b{number}", "s")
         finally:
             asking.cancel()

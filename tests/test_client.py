@@ -311,3 +311,12 @@ async def test_an_answer_that_nobody_tells_of_is_not_awaited_for_ever(hub: Memor
 
     assert outcome.status == "done"
     assert asyncio.get_running_loop().time() == ANSWER_PATIENCE
+
+
+@pytest.mark.parametrize(
+    "source", ["\udcff", {"turn_status": "full", "parts": [{"say": "\udcff"}]}, {"parts": object()}]
+)
+async def test_what_cannot_be_written_down_is_refused(hub: MemoryHub, source: object) -> None:
+    async with connect(hub=hub) as robot:
+        with pytest.raises(InputRefused):
+            await robot.perform(source)  # type: ignore[arg-type]

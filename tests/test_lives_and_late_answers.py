@@ -302,7 +302,7 @@ def breaking(attribute: str) -> Callable[..., Any]:
         ("services.generation.conductor.Conductor.admit", "perform"),
         ("services.generation.planning.plan", "perform"),
         ("services.generation.conductor.plan", "perform"),
-        ("services.realizer.service.plan_block", "realize"),
+        ("services.realizer.service.plan_steps", "realize"),
         ("services.realizer.executor.Authority", "realize"),
         ("services.realizer.authority.Authority.advance", "realize"),
         ("services.realizer.authority.Authority.reach", "realize"),

@@ -59,6 +59,7 @@ class SimulatedBody(Body):
         self._attention = Attention()
         self._utterance: Authority | None = None
         self._saying = ""
+        self._hushed = asyncio.Event()
         self._occasions = 0
 
     # -- the contract -------------------------------------------------------------------------------------------
@@ -344,6 +345,9 @@ class SimulatedBody(Body):
     async def _speak(self, behavior: Speech, authority: Authority) -> AsyncGenerator[Progress, None]:
         if self._deviations.mute == "refuse":
             raise BehaviorRefused(_fault(behavior, "the voice is mute"))
+        await self._silence(authority)
+        if authority.revoked is not None:
+            return
         if self._utterance is not None:
             raise BehaviorRefused(_fault(behavior, f"the voice is busy with {self._saying!r}"))
         self._occasions += 1
@@ -358,6 +362,17 @@ class SimulatedBody(Body):
         finally:
             if self._utterance is authority:
                 self._utterance, self._saying = None, ""
+            self._hushed.set()
+
+    async def _silence(self, authority: Authority) -> None:
+        """Aborted words end with the word that is being said: wait for that, as long as these are wanted."""
+        unwatch = authority.watch(self._hushed.set)
+        try:
+            while self._utterance is not None and self._utterance.revoked is not None and authority.revoked is None:
+                self._hushed.clear()
+                await self._hushed.wait()
+        finally:
+            unwatch()
 
 
 def _fault(behavior: BlockBehavior, reason: str) -> Fault:

@@ -178,19 +178,6 @@ async def test_output_that_finds_no_room_is_a_failure_in_one_line() -> None:
     assert (process.returncode, err) == (3, b"cannot write the output: No space left on device\n")
 
 
-@pytest.mark.parametrize("command", ["plan", "tool"])
-async def test_nobody_who_reads_ends_a_short_command_as_a_long_one(command: str, tmp_path: Path) -> None:
-    (tmp_path / "ask.xml").write_text(FRAGMENT)
-    ours, theirs = os.pipe()
-    os.close(ours)
-    process = await start(command, *([] if command == "tool" else [tmp_path / "ask.xml"]), stdout=theirs)
-    os.close(theirs)
-    async with asyncio.timeout(PATIENCE):
-        _, err = await process.communicate()
-
-    assert (process.returncode, err) == (130, b"")
-
-
 async def test_each_service_runs_alone_with_only_zenohs_threads_and_stops_on_a_signal() -> None:
     arguments = ("--robot", "alone", "--listen", "tcp/127.0.0.1:0")
     services = {name: await start("run", name, *arguments) for name in NAMES}

@@ -26,7 +26,7 @@ from schemas.behaviors import (
 )
 from schemas.body import NoPointZone
 from schemas.world import Entity, World
-from services.control.body import Arrived, BehaviorRefused, sync_points
+from services.control.body import Arrived, Authority, BehaviorRefused, sync_points
 from services.control.simulated import SimulatedBody
 from services.control.waiting import Bell
 from services.virtual_time import run_virtual
@@ -350,3 +350,35 @@ async def test_an_instant_that_rounding_puts_behind_its_timer_is_waited_for_once
     assert bell.now() < almost
     assert bell.is_past(almost)
     await bell.heard(almost)
+
+
+async def test_words_wait_for_the_word_that_an_aborted_utterance_ends_with() -> None:
+    body = body_in()
+    long, short = Speech(id="a", text="extraordinarily long words"), Speech(id="b", text="next")
+    first, second = Authority(long, "end"), Authority(short, "end")
+    told: list[str] = []
+
+    async def say(speech: Speech, authority: Authority) -> None:
+        async for progress in body.perform(speech, authority):
+            told.append(f"{speech.id} {type(progress).__name__}")
+
+    async with asyncio.TaskGroup() as tasks:
+        tasks.create_task(say(long, first))
+        await asyncio.sleep(0.1)
+        first.revoke()
+        tasks.create_task(say(short, second))
+    assert told == ["a Reached", "a Spoke", "b Reached", "b Spoke", "b Reached"]
+
+
+async def test_words_that_wait_for_the_voice_are_given_up_when_they_are_aborted() -> None:
+    body = body_in()
+    long, short = Speech(id="a", text="extraordinarily long words"), Speech(id="b", text="next")
+    first, second = Authority(long, "end"), Authority(short, "end")
+    aborted = asyncio.create_task(anext(body.perform(long, first)))
+    await aborted
+    first.revoke()
+    waiting = asyncio.ensure_future(anext(body.perform(short, second), None))
+    await asyncio.sleep(0)
+    second.revoke()
+
+    assert await waiting is None

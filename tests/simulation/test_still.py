@@ -53,7 +53,7 @@ def test_a_world_of_the_bus_can_be_kept_in_a_file(tmp_path: Path) -> None:
             '{"entities": [{"id": "", "kind": "object", "position": [0, 0, 0]}]}',
             r"length >= 1 - at `\$\.entities\[0\]\.id`",
         ),
-        ('{"entities": [{"id": "caf\xe9", "kind": "object", "position": [0, 0, 0]}]}', r"utf-8"),
+        ('{"entities": [{"id": "caf\xe9", "kind": "object", "position": [0, 0, 0]}]}', r"not UTF-8"),
     ],
 )
 def test_a_bad_world_is_refused_with_file_and_place(tmp_path: Path, text: str, reason: str) -> None:

@@ -1,0 +1,90 @@
+"""What is too much is refused at once, with the limit's name; what was admitted goes on as before."""
+
+import asyncio
+from functools import partial
+
+import pytest
+
+from schemas.behaviors import Gaze, Speech, Wait
+from schemas.blocks import Block, BlockOutcome
+from schemas.faults import InputRefused
+from schemas.fragments import FragmentOutcome, TurnFragment
+from schemas.world import Entity, World
+from services.client import connect
+from services.commandline import roster
+from services.config import load
+from services.generation.config import GenerationConfig
+from services.memory_bus import MemoryHub
+from services.realizer.config import RealizerConfig
+from services.requests import RequestRefused
+from services.runtime import running
+from services.simulation.still import show_world
+from tests.realizer.stage import stage
+
+
+async def test_one_live_block_too_many_is_refused_and_the_others_keep_their_time() -> None:
+    alone = stage(config=RealizerConfig(blocks=10))
+    async with alone as seen:
+        asked = [seen.ask(Block(id=f"b{n}", behaviors=(Wait(id="w", duration=5.0),))) for n in range(10)]
+        await asyncio.sleep(0.1)
+        before = asyncio.get_running_loop().time()
+        with pytest.raises(RequestRefused, match=r"10 blocks are live.*`realizer.blocks` is the limit"):
+            await seen.ask(Block(id="more", behaviors=(Wait(id="w"),))).outcome
+        assert asyncio.get_running_loop().time() == before
+        outcomes = [await each.outcome for each in asked]
+        again = await seen.perform(Block(id="again", behaviors=(Wait(id="w"),)))
+
+    assert {each.status for each in outcomes if isinstance(each, BlockOutcome)} == {"done"}
+    assert {seen.times(f"b{n}")["w:end"] for n in range(10)} == {5.0}
+    assert again.status == "done"
+
+
+async def test_a_speech_too_long_is_refused_in_a_block_and_in_a_fragment(hub: MemoryHub) -> None:
+    config = load(settings=["simulation.human=listening"])
+    services = {name: roster.service(name, config) for name in (*roster.ROBOT, "simulation")}
+    words = "word " * 1001
+    speech = Speech(id="s", text=words)
+    async with running(hub, services), connect(hub=hub) as robot:
+        await robot.person()
+        with pytest.raises(InputRefused, match=r"5005 characters of speech, at most 5000.*`realizer.utterance`"):
+            await robot.realize("b", [Gaze(id="g", target="human"), speech])
+        with pytest.raises(InputRefused, match=r"behaviors\[0\].text: 5005 characters.*`generation.utterance`"):
+            await robot.perform(TurnFragment(id="f", turn_status="full", behaviors=(speech,)))
+        assert (await robot.realize("c", [Wait(id="w")])).status == "done"
+
+
+async def test_one_fragment_too_many_is_refused_and_the_others_are_performed(hub: MemoryHub) -> None:
+    config = load(settings=["simulation.human=listening", "generation.fragments=5"])
+    services = {name: roster.service(name, config) for name in (*roster.ROBOT, "simulation")}
+    async with running(hub, services), connect(hub=hub) as robot:
+        await robot.person()
+        asked = [
+            asyncio.create_task(
+                robot.perform(TurnFragment(id=f"f{n}", turn_status="full", behaviors=(Speech(id="s", text="one"),)))
+            )
+            for n in range(8)
+        ]
+        outcomes = await asyncio.gather(*asked, return_exceptions=True)
+
+    assert [each.status for each in outcomes if isinstance(each, FragmentOutcome)] == ["done"] * 5
+    assert all("`generation.fragments` is the limit" in str(each) for each in outcomes[5:])
+
+
+@pytest.mark.parametrize("comes", [True, False])
+async def test_a_fragment_waits_for_the_first_person(hub: MemoryHub, comes: bool) -> None:
+    cup = Entity(id="cup", kind="object", position=(0.5, 0.0, 0.8))
+    ann = Entity(id="ann", kind="person", position=(1.2, 0.0, 1.2))
+    config = load()
+    services = {name: roster.service(name, config) for name in roster.ROBOT}
+    services["perception"] = partial(show_world, world=World(entities=(cup,)))
+    fragment = TurnFragment(id="f", turn_status="full", behaviors=(Speech(id="s", text="hello"),))
+    async with running(hub, services), connect(hub=hub) as robot:
+        asking = asyncio.create_task(robot.perform(fragment))
+        await asyncio.sleep(2.0)
+        if comes:
+            async with running(hub, {"camera": partial(show_world, world=World(entities=(cup, ann)))}):
+                assert (await asking).status == "done"
+        else:
+            with pytest.raises(InputRefused, match="the world knows no people"):
+                await asking
+            assert robot.now() == pytest.approx(GenerationConfig().world_patience, abs=0.1)
