@@ -52,6 +52,12 @@ def check(thing: Input, source: str = "", *, prefix: str = "$", paths: bool = Fa
         raise InputRefused(_fault(thing, problem, source, prefix, paths), thing.id or None)
 
 
+def check_behavior(behavior: Behavior) -> None:
+    """One behavior by itself, without what it refers to. Raises InputRefused for its first problem."""
+    for problem in _behavior(behavior, "$.behavior"):
+        raise InputRefused(Fault(reason=problem.reason, where=problem.path, line=problem.line, advice=problem.advice))
+
+
 def _fault(thing: Input, problem: Problem, source: str, prefix: str, paths: bool) -> Fault:
     by_path = paths or not problem.line
     place = problem.path.replace("$", prefix, 1) if by_path else ": ".join(filter(None, (thing.id, problem.name)))

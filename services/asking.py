@@ -187,11 +187,12 @@ class Asking:
             self._step(asked, Event.CANCELLED, now)
         return self._told()
 
-    def hear(self, answer: Answer, now: Seconds) -> list[Effect]:
-        """What a server says. An answer to somebody else, or to another life, changes nothing."""
+    def hear(self, answer: Answer, now: Seconds, server: str) -> list[Effect]:
+        """What a server says. An answer of another server, to somebody else, or to another life changes nothing."""
         asked = self._asked.get(answer.id)
         ours = (self._requester, self._life)
-        if asked is not None and (answer.requester, answer.life) == ours and answer.kind == kind_of(asked.request):
+        is_ours = asked is not None and (answer.requester, answer.life) == ours
+        if asked is not None and is_ours and (answer.kind, server) == (kind_of(asked.request), asked.server):
             match answer:
                 case Heard():
                     self._step(asked, Event.HEARD, now)

@@ -18,9 +18,10 @@ from msgspec import Struct
 
 from schemas import keys
 from schemas.blocks import Block, PerformBlock
-from schemas.faults import EngageError, Fault
+from schemas.faults import EngageError, Fault, InputRefused
 from schemas.fragments import PerformFragment
 from schemas.messages import Message, decode
+from schemas.presence import PeerAlive, PeerGone
 from schemas.requests import Unreadable
 from schemas.status import BusHealth
 from schemas.units import Seconds, Stamp
@@ -289,13 +290,21 @@ class Hub(ABC):
         await self.close()
 
 
+LOCAL = (PeerAlive, PeerGone, Unreadable)
+"""Messages that no payload may hold: who could send them could end what others have asked for."""
+
+
 def read_payload(payload: bytes, encoding: str, key: str, source: str) -> Message:
     """The message that another program sent, in any encoding. Raises InputRefused.
 
     XML holds a block or a fragment; the request for it goes by its id.
     """
     if encoding.partition(";")[0] not in ("application/xml", "text/xml"):
-        return decode(payload, encoding)
+        message = decode(payload, encoding)
+        if isinstance(message, LOCAL):
+            reason = f"{type(message).__name__} is what each bus makes for its own subscribers; it is never sent"
+            raise InputRefused(Fault(reason=reason))
+        return message
     thing = decode_xml(payload, key)
     requester = keys.requester_of(key) or source
     if isinstance(thing, Block):

@@ -15,7 +15,7 @@ from schemas.messages import Message, decode, encode, published
 from schemas.presence import PeerAlive, PeerGone
 from schemas.status import BusHealth
 from schemas.units import Probability, Seconds, Stamp
-from services.bus import Answer, Bus, Hub, Keep, Received, Subscription, read_payload, unreadable
+from services.bus import LOCAL, Answer, Bus, Hub, Keep, Received, Subscription, read_payload, unreadable
 
 
 class Faults(Struct, frozen=True, kw_only=True):
@@ -83,6 +83,8 @@ class MemoryHub(Hub):
     # -- for MemoryBus ------------------------------------------------------------------------------------------
 
     def send(self, sender: str, key: str, message: Message) -> None:
+        if isinstance(message, LOCAL):
+            raise TypeError(f"{type(message).__name__} is never sent")
         life = self._buses[sender].run
         self._pass_on(sender, Received(key, decode(*published(message)), sender, self._loop.time(), life=life))
 

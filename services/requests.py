@@ -161,7 +161,7 @@ class Requester:
         now = self._bus.now()
         match received.message:
             case Answer() as answer:
-                self._carry_out(self._asking.hear(answer, now))
+                self._carry_out(self._asking.hear(answer, now, keys.server_of(received.key)))
             case PeerGone(participant=server):
                 self._carry_out(self._asking.server_gone(server, now))
             case PeerAlive(participant=server, run=run):

@@ -24,6 +24,7 @@ from schemas.body import (
     SyncPointReached,
     WordSpoken,
 )
+from schemas.check import check_behavior
 from schemas.faults import Fault, InputRefused
 from schemas.messages import Message
 from schemas.requests import Cancel, Request
@@ -111,6 +112,10 @@ class _Control:
         return Estimates(items=tuple(self._estimated(item.behavior, item.pose) for item in question.items))
 
     def _estimated(self, behavior: BlockBehavior, pose: BodyPose | None) -> Estimate:
+        try:
+            check_behavior(behavior)
+        except InputRefused as error:
+            return Estimate(behavior=behavior.id, feasible=False, fault=error.fault, warning="CANNOT_CREATE_BEHAVIOR")
         return self._body.estimate(behavior, pose, self._world)
 
     def describe(self, question: Message) -> Message:
@@ -152,7 +157,11 @@ class _Control:
 
     def _begin(self, request: PerformBehavior) -> None:
         try:
+            check_behavior(request.behavior)  # before a motor sees it
             authority = Authority(request.behavior, request.through, self._pace(request))
+        except InputRefused as error:
+            self.desk.refuse(request.id, error.fault)
+            return
         except ValueError as error:
             self.desk.refuse(request.id, Fault(reason=str(error), where=request.behavior.id, service="control"))
             return

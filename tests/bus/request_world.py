@@ -90,7 +90,7 @@ class World:
 
     def hear(self, client: Client, answer: Answer) -> None:
         if client.is_alive:
-            client.carry_out(client.machine.hear(answer, self.now))
+            client.carry_out(client.machine.hear(answer, self.now, "realizer"))
 
     # -- lives: tokens come and go a moment later than what they tell of -----------------------------------------
 

@@ -106,7 +106,7 @@ def test_any_sequence_of_anything_raises_nothing_at_a_requester() -> None:
                     kind = chance.choice(["perform_block", "inhibit", ""])
                     answer = chance.choice(answers)
                     fields = {name: getattr(answer, name) for name in answer.__struct_fields__}
-                    asking.hear(type(answer)(**{**fields, "id": id, "kind": kind, **whose}), now)
+                    asking.hear(type(answer)(**{**fields, "id": id, "kind": kind, **whose}), now, "realizer")
 
 
 def test_a_lease_that_a_late_message_renews_is_not_shortened() -> None:
