@@ -1,0 +1,134 @@
+"""`engage hostile`: seeded attacks on the whole robot in this process, in virtual time, and what came of them."""
+
+from collections import Counter
+from collections.abc import Callable, Iterator, Mapping
+from functools import partial
+from importlib import import_module
+from typing import NamedTuple
+
+from rich.console import Console
+from rich.table import Table
+
+from schemas.faults import Fault, InputRefused
+from schemas.units import Seconds
+from services.bus import Bus
+from services.commandline import roster
+from services.commandline.process import DONE
+from services.commandline.run import Where
+from services.commandline.sources import still
+from services.config import Config
+from services.control.body import Body
+from services.control.service import embody
+from services.hostile.trial import KINDS, Attack, Client, Kind, Report, run
+from services.runtime import Ready, Service
+from services.simulation.still import tangram_world
+
+WRONG = 1
+"""Exit code: something came of it that should not have."""
+Making = Callable[[], Body]
+
+
+class Options(NamedTuple):
+    """body: `package.module:Class`, somebody's own, made without arguments."""
+
+    where: Where = Where()
+    seed: int = 0
+    runs: int = 20
+    seconds: Seconds = 20.0
+    only: tuple[Kind, ...] = ()
+    body: str = ""
+    quiet: bool = False
+
+
+def main(options: Options) -> int:
+    config = options.where.load()
+    make = body_class(options.body) if options.body else None
+    console = Console(quiet=options.quiet)
+    counts: Counter[str] = Counter()
+    bad: list[Report] = []
+    for report in reports(options, config, make):
+        counts.update(report.counts)
+        if report.wrong:
+            bad.append(report)
+            _tell(console, report, options)
+    console.print(table(counts, options.runs))
+    return WRONG if bad else DONE
+
+
+def reports(options: Options, config: Config, make: Making | None) -> Iterator[Report]:
+    for seed in range(options.seed, options.seed + options.runs):
+        yield attack(seed, config, seconds=options.seconds, kinds=options.only or KINDS, body=make)
+
+
+def attack(
+    seed: int,
+    config: Config | None = None,
+    *,
+    seconds: Seconds = 20.0,
+    kinds: tuple[Kind, ...] = KINDS,
+    body: Making | None = None,
+    client: Client | None = None,
+) -> Report:
+    """One attack on the whole robot: what a test of one's own body or client calls.
+
+    body: makes it, once the loop runs; behind the real control. Without one a lying body takes control's place if
+    `kinds` has "body". client: is given the hub, and is to end by itself, once the attack is over at the latest.
+    """
+    plan = Attack(seed=seed, kinds=kinds, seconds=seconds, own_body=body is not None)
+    return run(plan, whole_robot(config, body), client)
+
+
+def whole_robot(config: Config | None = None, body: Making | None = None) -> Mapping[str, Service]:
+    """All services of a robot, before a still table with a person at it."""
+    config = config or Config()
+    services = {name: roster.service(name, config) for name in roster.ROBOT}
+    if body is not None:
+        services["control"] = partial(_embody, config=config, make=body)
+    return {"simulation": still(tangram_world()), **services}
+
+
+async def _embody(bus: Bus, ready: Ready, config: Config, make: Making) -> None:
+    await embody(bus, ready, config.control, make())
+
+
+def body_class(name: str) -> Making:
+    """Raises InputRefused if there is no such class of a body."""
+    place, _, attribute = name.partition(":")
+    try:
+        found = getattr(import_module(place), attribute)
+    except (ImportError, AttributeError, ValueError) as error:
+        advice = "--body package.module:Class"
+        raise InputRefused(Fault(reason=f"no body {name!r}: {error}", advice=advice)) from error
+    if not (isinstance(found, type) and issubclass(found, Body)):
+        raise InputRefused(Fault(reason=f"{name} is no class of a Body", advice="see docs/control.md"))
+    return found
+
+
+def _tell(console: Console, report: Report, options: Options) -> None:
+    only = f" --only {options.only[0]}" if options.only else ""
+    body = f" --body {options.body}" if options.body else ""
+    again = f"engage hostile --seed {report.attack.seed} --runs 1 --seconds {options.seconds:g}{only}{body}"
+    console.print(f"seed {report.attack.seed}: {again}", style="bold", highlight=False, soft_wrap=True)
+    for line in report.wrong:
+        console.print(f"  {line}", markup=False, highlight=False, soft_wrap=True)
+    for trace in report.failures[:1]:
+        console.print(trace, markup=False, highlight=False, soft_wrap=True)
+
+
+MISTAKES = (
+    "services that ended", "services without status", "requests without outcome", "requests with two outcomes",
+    "pending afterwards", "still spoken of", "tasks left", "contained failures", "clients that failed",
+)  # fmt: skip
+
+
+def table(counts: Mapping[str, int], runs: int) -> Table:
+    """What was sent, and what came of it."""
+    made = Table(title=f"{runs} attacks", title_justify="left")
+    made.add_column("what")
+    made.add_column("how many", justify="right")
+    for what in sorted(set(counts) - set(MISTAKES)):
+        made.add_row(what, str(counts[what]))
+    made.add_section()
+    for what in MISTAKES:
+        made.add_row(what, str(counts[what]), style="bold red" if counts[what] else "green")
+    return made

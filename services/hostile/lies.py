@@ -1,0 +1,162 @@
+"""What a body that lies does with a behavior: pure, from chance alone. services/hostile/service.py carries it out."""
+
+from collections.abc import Sequence
+from typing import Literal
+
+from msgspec import Struct
+
+from schemas.behaviors import (
+    BlockBehavior,
+    Face,
+    FaceFacs,
+    FaceLexeme,
+    Gaze,
+    Gesture,
+    Head,
+    Pointing,
+    Posture,
+    Speech,
+)
+from schemas.body import Estimate, Phase
+from schemas.faults import Fault
+from schemas.syncref import SYNC_POINTS
+from schemas.units import Seconds
+from services.hostile.chance import Chance, happens
+
+Status = Literal["done", "aborted", "failed"]
+FAR = (1e9, -1e9, 1e308, float("nan"), float("inf"), -1.0, 60.0)
+WAITS = {"stroke_start", "stroke_end", "stroke", "relax"}
+"""Points before which an honest body waits for its authority."""
+
+
+class Step(Struct, frozen=True):
+    """After `delay` seconds something is said. off: what is added to the time that it tells.
+
+    twice: the same message comes once more. stranger: it is about a behavior that nobody has asked for.
+    """
+
+    say: Literal["reached", "arrived", "word"]
+    sync: str
+    delay: Seconds
+    off: Seconds = 0.0
+    twice: bool = False
+    stranger: bool = False
+    waits: bool = False
+    """For its authority, as it should."""
+
+
+class Lie(Struct, frozen=True, kw_only=True):
+    """What becomes of one behavior. end: None if it never ends. ends_after: seconds after the last step.
+
+    answer: how long the acceptance takes. deaf: to cancellations. mourning: how late one is answered.
+    afterwards: what it says of the behavior once that has ended.
+    """
+
+    refuse: bool = False
+    answer: Seconds = 0.0
+    steps: tuple[Step, ...] = ()
+    end: Status | None = "done"
+    ends_after: Seconds = 0.0
+    deaf: bool = False
+    mourning: Seconds = 0.0
+    afterwards: tuple[Step, ...] = ()
+
+
+def points_of(behavior: BlockBehavior) -> tuple[str, ...]:
+    match behavior:
+        case Speech(marks=marks):
+            return ("start", *(mark.id for mark in sorted(marks, key=lambda mark: mark.position)), "end")
+        case Gaze() | Pointing() | Gesture() | Head() | Face() | FaceLexeme() | FaceFacs() | Posture():
+            return SYNC_POINTS
+    return ("start", "end")
+
+
+def lie(chance: Chance, behavior: BlockBehavior) -> Lie:
+    """Half of them are honest."""
+    points = points_of(behavior)
+    if happens(chance, 0.5):
+        return Lie(steps=_steps(chance, points, 1.0))
+    match chance.randrange(0, 11):
+        case 0:
+            return Lie(refuse=True, answer=_pause(chance))
+        case 1:  # slow
+            return Lie(steps=_steps(chance, points, chance.uniform(2.0, 10.0)), answer=_pause(chance))
+        case 2:  # stalled, and perhaps deaf
+            reached = _steps(chance, points, 1.0)[: chance.randrange(0, len(points))]
+            return Lie(steps=reached, end=None, deaf=happens(chance, 0.5), mourning=_pause(chance))
+        case 3:  # out of order
+            steps = list(_steps(chance, points, 1.0))
+            chance.shuffle(steps)
+            return Lie(steps=tuple(steps))
+        case 4:  # twice
+            return Lie(steps=tuple(_changed(chance, step) for step in _steps(chance, points, 1.0)))
+        case 5:  # after the end
+            return Lie(steps=_steps(chance, points, 1.0), afterwards=_steps(chance, points, 1.0))
+        case 6:  # done without its points
+            return Lie(steps=_steps(chance, points, 1.0)[: chance.randrange(0, len(points))])
+        case 7:
+            broken = _steps(chance, points, 1.0)[: chance.randrange(0, len(points))]
+            return Lie(steps=broken, end="failed", ends_after=_pause(chance))
+        case 8:  # aborted by itself
+            return Lie(steps=_steps(chance, points, 1.0)[:1], end="aborted", mourning=_pause(chance))
+        case 9:  # late after a cut, or a cancellation
+            return Lie(steps=_steps(chance, points, 3.0), mourning=chance.uniform(4.0, 40.0))
+    return Lie(steps=tuple(_changed(chance, step) for step in _steps(chance, (*points, *points), 0.5)), deaf=True)
+
+
+def _steps(chance: Chance, points: Sequence[str], slow: float) -> tuple[Step, ...]:
+    obeys = happens(chance, 0.8)
+    steps = []
+    for number, sync in enumerate(points):
+        delay = chance.uniform(0.0, 0.6) * slow if number else 0.0
+        steps.append(Step("reached", sync, delay, waits=obeys and sync in WAITS))
+    return tuple(steps)
+
+
+def _changed(chance: Chance, step: Step) -> Step:
+    return Step(
+        chance.choice(("reached", "reached", "arrived", "word")),
+        step.sync if happens(chance, 0.8) else chance.choice(("", "stroke:2", "nothing", "end", "start")),
+        step.delay,
+        off=chance.choice(FAR) if happens(chance, 0.3) else 0.0,
+        twice=happens(chance, 0.5),
+        stranger=happens(chance, 0.2),
+        waits=step.waits,
+    )
+
+
+def _pause(chance: Chance) -> Seconds:
+    return chance.choice((0.0, 0.1, 1.0, chance.uniform(0.0, 12.0)))
+
+
+def estimate(chance: Chance, behavior: BlockBehavior) -> Estimate:
+    """Mostly what it will do."""
+    points = points_of(behavior)
+    natural = [chance.uniform(0.0, 0.6) for _ in points[1:]]
+    what = chance.randrange(0, 40)
+    if what == 0:
+        fault = Fault(reason="no way", where=behavior.id)
+        return Estimate(behavior=behavior.id, feasible=False, warning="CANNOT_CREATE_BEHAVIOR", fault=fault)
+    if what == 1:
+        return Estimate(behavior=behavior.id, feasible=True)
+    if what == 2:
+        natural = [chance.choice(FAR) for _ in natural]
+    if what == 3:
+        points = (*points[1:], *points[:1])
+    phases = [
+        Phase(since=since, to=to, shortest=seconds, natural=seconds, longest=None, hold=to in WAITS)
+        for since, to, seconds in zip(points, points[1:], natural, strict=False)
+    ]
+    named = "stranger" if what == 4 else behavior.id
+    return Estimate(behavior=named, feasible=True, parts=(_part(behavior),), phases=tuple(phases))
+
+
+def _part(behavior: BlockBehavior) -> str:
+    match behavior:
+        case Speech():
+            return "voice"
+        case Pointing() | Gesture():
+            return "left_arm" if behavior.mode == "LEFT_HAND" else "right_arm"
+        case Face() | FaceLexeme() | FaceFacs():
+            return "face"
+    return "head"

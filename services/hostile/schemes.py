@@ -1,0 +1,188 @@
+"""Requests at bad moments: what peers do who know the protocol and keep none of its manners. Pure, from chance."""
+
+from collections import deque
+from collections.abc import Callable, Sequence
+from typing import Literal
+
+from msgspec import Struct
+from msgspec.structs import replace
+
+from schemas import keys
+from schemas.attention import Inhibit
+from schemas.blocks import BlockOutcome, InterruptBehavior, PerformBlock
+from schemas.body import AbortBehavior, BehaviorOutcome, GoHome, PerformBehavior
+from schemas.faults import Fault
+from schemas.fragments import FragmentOutcome, PerformFragment
+from schemas.messages import COMMANDS, Message
+from schemas.requests import Accepted, Answer, Cancel, Heard, KeepAlive, Kept, Outdated, Refused, Request, kind_of
+from schemas.units import Seconds, Stamp
+from services.hostile import plausible
+from services.hostile.chance import Chance, happens
+from services.hostile.payloads import SERVERS
+from services.hostile.typed import NASTY_FLOATS, NASTY_INTS, Typed, Words
+
+IDS = ("1", "2", "3", "same", "1~2")
+"""Which all peers use."""
+KEPT = 32
+
+
+class Deed(Struct, frozen=True):
+    """Peer number `who` publishes `message` after `delay` seconds; None: it leaves, and comes back as another life.
+
+    expression: of the key, for a command that of all requesters.
+    """
+
+    who: int
+    message: Message | None = None
+    expression: str = ""
+    delay: Seconds = 0.0
+
+
+class _Sent(Struct, frozen=True):
+    who: int
+    expression: str
+    request: Request
+
+
+class Schemer:
+    """Thinks of one deed after the other. peers: how many take part."""
+
+    def __init__(self, chance: Chance, typed: Typed, words: Words, entities: tuple[str, ...], peers: int = 2) -> None:
+        self._chance = chance
+        self._typed = typed
+        self._words = words
+        self._entities = entities
+        self._peers = peers
+        self._sent: deque[_Sent] = deque(maxlen=KEPT)
+        self._lives = [""] * peers
+
+    def next(self, now: Seconds) -> Deed:
+        who = self._chance.randrange(0, self._peers)
+        deed = self._chance.choice(DEEDS)(self, who, now)
+        late = self._chance.choice((0.0, 0.0, 0.0, self._chance.uniform(0.0, 3.0)))
+        return replace(deed, delay=late)
+
+    # -- deeds ----------------------------------------------------------------------------------------------------
+
+    def _ask(self, who: int, now: Seconds) -> Deed:
+        expression = self._chance.choice(tuple(COMMANDS))
+        kind = self._chance.choice(COMMANDS[expression])
+        lease = self._chance.choice((0.0, 0.0, 1.0, 5.0, *NASTY_FLOATS[:3]))
+        request = self._request(kind, now)
+        request = replace(request, id=self._id(), life=self._lives[who], requester="", revision=0, lease=lease)
+        self._sent.append(_Sent(who, expression, request))
+        return Deed(who, _message(request), expression)
+
+    def _again(self, who: int, now: Seconds) -> Deed:
+        """The same, perhaps as somebody else, or on another key, with another revision, or after a new life began."""
+        if not self._sent:
+            return self._ask(who, now)
+        sent = self._chance.choice(self._sent)
+        request = sent.request
+        if happens(self._chance, 0.4):
+            request = replace(request, revision=self._chance.choice((*NASTY_INTS, 1, 2, 3)))
+        if happens(self._chance, 0.3):
+            other = self._request(type(request), now)
+            request = replace(other, id=request.id, life=request.life, requester="", revision=request.revision)
+        expression = sent.expression if happens(self._chance, 0.9) else self._chance.choice(tuple(COMMANDS))
+        return Deed(sent.who if happens(self._chance, 0.8) else who, _message(request), expression)
+
+    def _cancel(self, who: int, now: Seconds) -> Deed:
+        """One's own request, somebody else's, or one that was never made."""
+        if self._sent and happens(self._chance, 0.7):
+            sent = self._chance.choice(self._sent)
+            server, id, kind, life = keys.server_of(sent.expression), sent.request.id, kind_of(sent.request), ""
+            life, who = sent.request.life, sent.who
+        else:
+            server, id, kind, life = self._chance.choice(SERVERS), self._id(), "perform_block", self._lives[who]
+        of = self._chance.choice((kind, kind, kind, "", "inhibit", "nothing"))
+        return Deed(who, Cancel(id=id, life=life, of=of, reason="why not"), keys.cancel(server))
+
+    def _keep(self, who: int, now: Seconds) -> Deed:
+        """Alive what is not, with authority that does not exist, in revisions that never were."""
+        requests = [each.request for each in self._sent if happens(self._chance, 0.5)][:4]
+        kept = [
+            Kept(kind_of(request), request.id, request.revision, request.authority, 5.0)
+            if happens(self._chance, 0.5)
+            else Kept(
+                self._chance.choice((kind_of(request), "perform_behavior", "nothing")),
+                self._chance.choice((request.id, self._id())),
+                self._chance.choice(NASTY_INTS),
+                self._chance.choice(("", "end", "stroke", "nothing")),
+                self._chance.choice(NASTY_FLOATS),
+            )
+            for request in requests
+        ]
+        clock = self._chance.choice(("loop", "loop", "sundial"))
+        at = Stamp(clock, now + self._chance.choice((0.0, -5.0, 1e9, 1e308)))
+        life = self._chance.choice((self._lives[who], *[request.life for request in requests]))
+        server = self._chance.choice(SERVERS)
+        return Deed(who, KeepAlive(live=tuple(kept), at=at, life=life), keys.keep_alive(server))
+
+    def _answer(self, who: int, now: Seconds) -> Deed:
+        """For a server that it is not."""
+        at = Stamp("loop", now)
+        fault = Fault(reason="because I say so")
+        id, block = self._word("id"), self._word("block")
+        status: Literal["done", "failed"] = "done" if happens(self._chance, 0.5) else "failed"
+        answer = self._chance.choice((
+            Accepted(id=id), Heard(id=id), Outdated(id=id), Refused(id=id, fault=fault),
+            BlockOutcome(id=id, block=block, status=status), FragmentOutcome(id=id, fragment=block, status=status),
+            BehaviorOutcome(id=id, block=block, behavior=self._word("behavior"), status="done", at=at),
+        ))  # fmt: skip
+        answer = replace(
+            answer,
+            requester=self._word("requester"),
+            life=self._word("life"),
+            kind=self._chance.choice(("perform_block", "perform_behavior", "perform_fragment", "request_event", "")),
+        )
+        return Deed(who, _told(answer), keys.request_state(self._chance.choice((*SERVERS, "nobody"))))
+
+    def _new_life(self, who: int, now: Seconds) -> Deed:
+        self._lives[who] = self._chance.choice(("", "life-1", f"life-{now:.3f}"))
+        return Deed(who)
+
+    # -- what is asked for ----------------------------------------------------------------------------------------
+
+    def _id(self) -> str:
+        return self._chance.choice(IDS) if happens(self._chance, 0.7) else self._word("id")
+
+    def _word(self, field: str) -> str:
+        return self._chance.choice((*self._words.of(field), "1"))
+
+    def _request(self, kind: type[Request], now: Seconds) -> Request:
+        chance, name = self._chance, f"x{self._chance.randrange(0, 6)}"
+        if kind is PerformBlock:
+            return PerformBlock(id="", block=plausible.block(chance, name, self._entities))
+        if kind is PerformFragment:
+            return PerformFragment(id="", fragment=plausible.fragment(chance, name, self._entities))
+        if kind is InterruptBehavior:
+            return InterruptBehavior(id="", block=self._word("block"), behavior=chance.choice(("b1", "b2", "b9")))
+        if kind is PerformBehavior:
+            behavior = plausible.block(chance, name, self._entities).behaviors[0]
+            through = chance.choice(("start", "end", "relax"))
+            return PerformBehavior(id="", block=name, behavior=behavior, through=through)
+        if kind is AbortBehavior:
+            return AbortBehavior(id="", block=self._word("block"), behavior=self._word("behavior"))
+        if kind is GoHome:
+            return GoHome(id="", parts=chance.choice(((), ("head",), ("voice", "nothing"))))
+        if kind is Inhibit:
+            target = chance.choice(("", *self._entities))
+            return Inhibit(id="", mode=chance.choice(("release", "hold", "target")), target=target, ttl=2.0)
+        made = self._typed.message(now, kind.__name__)
+        assert isinstance(made, Request)
+        return made
+
+
+DEEDS: Sequence[Callable[[Schemer, int, Seconds], Deed]] = (
+    *(Schemer._ask,) * 5, *(Schemer._again,) * 4, *(Schemer._cancel,) * 3, Schemer._keep, *(Schemer._answer,) * 2,
+    Schemer._new_life,
+)  # fmt: skip
+
+
+def _message(request: Request) -> Message:
+    return request  # type: ignore[return-value]
+
+
+def _told(answer: Answer) -> Message:
+    return answer  # type: ignore[return-value]

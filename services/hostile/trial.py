@@ -1,0 +1,388 @@
+"""One attack on services in this process, and what came of it. On a memory bus and in virtual time, and nowhere else.
+
+    report = run(Attack(seed=7), services)
+    assert not report.wrong
+
+What the peer does is chance, from the seed alone: the same seed does the same each time.
+"""
+
+import asyncio
+import logging
+import traceback
+from collections import Counter
+from collections.abc import Awaitable, Callable, Mapping
+from functools import partial
+from random import Random
+from typing import Any, Literal, get_args
+
+from msgspec import Struct
+
+from schemas import keys
+from schemas.faults import EngageError, Fault, InputRefused
+from schemas.messages import encode
+from schemas.requests import Cancel
+from schemas.status import AskStatus, Status
+from schemas.units import Seconds
+from schemas.world import World
+from services.bus import LOG, Hub, Received, read_payload
+from services.hostile.audit import Book, Entry
+from services.hostile.payloads import SERVERS, Payload, Payloads
+from services.hostile.schemes import Deed, Schemer
+from services.hostile.service import NAME as BODY
+from services.hostile.service import LyingBody
+from services.hostile.typed import Typed, Words
+from services.hostile.visitor import NAME as VISITOR
+from services.hostile.visitor import Visitor, guest
+from services.memory_bus import MemoryBus, MemoryHub
+from services.requests import Requester
+from services.runtime import Service, serve
+from services.virtual_time import Deadlock, TimeRanOut, VirtualTimeLoop
+
+Kind = Literal["messages", "requests", "body"]
+KINDS: tuple[Kind, ...] = get_args(Kind)
+Client = Callable[[Hub], Awaitable[None]]
+SETTLE: Seconds = 100.0
+"""After the attack: longer than all patience in a row, so that what is still open then is open for ever."""
+QUIET: Seconds = 10.0
+"""At its end nobody may speak of old requests any more."""
+LIMIT: Seconds = 3600.0
+PEERS = 2
+TOLD = 5
+"""How many of each kind of mistake a report names."""
+
+
+class Attack(Struct, frozen=True, kw_only=True):
+    """seconds: how long, in virtual time. rate: random messages per second.
+
+    own_body: the body is somebody's own, behind the real control: it is cut off, but nothing takes its place.
+    """
+
+    seed: int = 0
+    kinds: tuple[Kind, ...] = KINDS
+    seconds: Seconds = 20.0
+    rate: float = 20.0
+    own_body: bool = False
+
+
+class Report(Struct, kw_only=True):
+    """counts: of all that was sent and done. wrong: what should not have come of it, in words."""
+
+    attack: Attack
+    counts: Counter[str]
+    wrong: list[str]
+    failures: list[str]
+    """Tracebacks of exceptions that nobody had foreseen."""
+
+
+def run(attack: Attack, services: Mapping[str, Service], client: Client | None = None) -> Report:
+    """A trial on a virtual loop of its own, for whoever has none."""
+    try:
+        with asyncio.Runner(loop_factory=partial(VirtualTimeLoop, LIMIT)) as runner:
+            return runner.run(trial(attack, services, client))
+    except (Deadlock, TimeRanOut) as hang:
+        return Report(attack=attack, counts=Counter(), wrong=[f"it hangs: {hang}"], failures=[])
+
+
+async def trial(attack: Attack, services: Mapping[str, Service], client: Client | None = None) -> Report:
+    """Run the services under the attack, let them settle, and judge. client: somebody's own, which is to end by then.
+
+    Raises InputRefused if time is real: what is sent here is no good for motors.
+    """
+    if not isinstance(asyncio.get_running_loop(), VirtualTimeLoop):
+        advice = "`run` brings its own loop"
+        raise InputRefused(Fault(reason="the hostile peer runs in virtual time only", advice=advice))
+    return await _Trial(attack, services, client).judged()
+
+
+def insist_on_memory(hub: Hub) -> None:
+    """Raises InputRefused if the hub reaches further than this process."""
+    if not isinstance(hub, MemoryHub):
+        reason = f"the hostile peer runs on a MemoryHub only, not on a {type(hub).__name__}"
+        raise InputRefused(Fault(reason=reason, advice="motors may be behind it"))
+
+
+class _Tapped(MemoryHub):
+    """A memory bus on which each message is written into the book."""
+
+    def __init__(self, services: frozenset[str]) -> None:
+        super().__init__()
+        self.book = Book()
+        self.words = Words()
+        self._services = services
+
+    def _pass_on(self, sender: str, received: Received) -> None:
+        key, message = received.key, received.message
+        self.words.hear(message)
+        server = keys.server_of(key)
+        arrives = server in self.alive and not self._is_cut(sender, server)
+        is_foreign = sender not in self._services
+        now = self._loop.time()
+        self.book.hear(key, message, sender, received.life, now, arrives=arrives, is_foreign=is_foreign)
+        super()._pass_on(sender, received)
+
+
+class _Log(logging.Handler):
+    """What was contained, with its traceback."""
+
+    def __init__(self) -> None:
+        super().__init__(logging.ERROR)
+        self.found: list[str] = []
+
+    def emit(self, record: logging.LogRecord) -> None:
+        self.found.append(logging.Formatter().format(record))
+
+
+class _Trial:
+    def __init__(self, attack: Attack, services: Mapping[str, Service], client: Client | None) -> None:
+        self.attack = attack
+        self.client = client
+        self.services = dict(services)
+        self.hub = _Tapped(frozenset((*services, BODY)))
+        self.counts: Counter[str] = Counter()
+        self.wrong: list[str] = []
+        self.failures: list[str] = []
+        self.running: dict[str, asyncio.Task[None]] = {}
+        self.peers: list[MemoryBus] = []
+        self.entities: tuple[str, ...] = ("nobody",)
+
+    def chance(self, of: str) -> Random:
+        """Each part of the attack has its own, so that one can be left out and the others stay the same."""
+        return Random(f"{self.attack.seed}/{of}")
+
+    # -- from beginning to end ------------------------------------------------------------------------------------
+
+    async def judged(self) -> Report:
+        before, log = asyncio.all_tasks(), _Log()
+        loop = asyncio.get_running_loop()
+        LOG.addHandler(log)
+        propagates, LOG.propagate = LOG.propagate, False
+        loop.set_exception_handler(self._unhandled)
+        try:
+            async with self.hub:
+                await self._play()
+        finally:
+            LOG.removeHandler(log)
+            LOG.propagate = propagates
+            loop.set_exception_handler(None)
+        await asyncio.sleep(0)
+        left = [task.get_name() for task in asyncio.all_tasks() - before if not task.done()]
+        self._note("tasks left", left)
+        self.failures += log.found
+        self._note("contained failures", [_last_line(text) for text in self.failures])
+        return Report(attack=self.attack, counts=self.counts, wrong=self.wrong, failures=self.failures)
+
+    async def _play(self) -> None:
+        if "body" in self.attack.kinds and not self.attack.own_body:
+            self.services[BODY] = LyingBody(self.chance("lies"), self.hub.words).serve
+        for name in self.services:
+            await self._start(name)
+        await self._learn_world()
+        bus = self.hub.join(VISITOR)
+        servers = tuple(self.services)
+        visitor = Visitor(self.chance("visitor"), self.entities, servers)
+        async with Requester(bus) as requests:
+            bus.declare_alive()
+            guests = [] if self.client is None else [self.client(self.hub)]
+            clients = [asyncio.ensure_future(self._client(each)) for each in guests]
+            async with asyncio.TaskGroup() as group:
+                for deeds in self._deeds(visitor, bus, requests):
+                    group.create_task(deeds)
+            await self._end_attack()
+            await asyncio.sleep(SETTLE - QUIET)
+            quiet_since = bus.now()
+            for client in clients:
+                self._note("clients that failed", list(filter(None, [await guest(client, QUIET)])))
+            await asyncio.sleep(QUIET)
+            await self._judge(bus, visitor, quiet_since)
+        await bus.leave()
+        for peer in self.peers:
+            await peer.leave()
+        for name in self.services:
+            await self._stop(name)
+
+    async def _client(self, client: Awaitable[None]) -> None:
+        await client
+
+    def _deeds(self, visitor: Visitor, bus: MemoryBus, requests: Requester) -> list[Any]:
+        attack = self.attack
+        typed = Typed(self.chance("typed"), self.hub.words)
+        deeds: list[Any] = []
+        if "realizer" in self.services:
+            deeds.append(visitor.visit(bus, requests, attack.seconds))
+        if "messages" in attack.kinds:
+            deeds.append(self._send_messages(Payloads(self.chance("payloads"), typed, self.entities)))
+        if "requests" in attack.kinds:
+            deeds.append(self._scheme(Schemer(self.chance("schemes"), typed, self.hub.words, self.entities, PEERS)))
+        if "body" in attack.kinds:
+            deeds.append(self._cut())
+        return deeds
+
+    # -- services -------------------------------------------------------------------------------------------------
+
+    async def _start(self, name: str) -> None:
+        stands = asyncio.Event()
+        serving = serve(self.hub, name, self.services[name], stands.set)
+        self.running[name] = task = asyncio.create_task(serving, name=f"service {name}")
+        standing = asyncio.create_task(stands.wait())
+        await asyncio.wait([task, standing], return_when=asyncio.FIRST_COMPLETED)
+        standing.cancel()
+        if task.done():
+            task.result()
+            raise RuntimeError(f"service {name} ended before it stood")
+
+    async def _stop(self, name: str) -> None:
+        task = self.running[name]
+        task.cancel()
+        await asyncio.gather(task, return_exceptions=True)
+
+    async def _learn_world(self) -> None:
+        bus = self.hub.join("witness")
+        with bus.subscribe(keys.WORLD) as inbox:
+            received = await inbox.next(bus.now() + 1.0)
+        if received is not None and isinstance(received.message, World):
+            self.entities = tuple(entity.id for entity in received.message.entities) or self.entities
+        await bus.leave()
+
+    def _unhandled(self, loop: asyncio.AbstractEventLoop, context: dict[str, Any]) -> None:
+        error = context.get("exception")
+        trace = "".join(traceback.format_exception(error)) if isinstance(error, BaseException) else ""
+        self.failures.append(f"{context.get('message')}\n{trace}".strip())
+
+    # -- the attack -----------------------------------------------------------------------------------------------
+
+    async def _send_messages(self, payloads: Payloads) -> None:
+        chance, loop = self.chance("pauses"), asyncio.get_running_loop()
+        until = loop.time() + self.attack.seconds
+        while loop.time() < until:
+            self.inject(payloads.next(loop.time()))
+            await asyncio.sleep(chance.uniform(0.0, 2.0 / self.attack.rate))
+
+    def inject(self, payload: Payload) -> None:
+        self.counts["messages"] += 1
+        try:
+            read_payload(payload.data, payload.encoding, payload.key, "")
+        except EngageError:
+            self.counts["messages that were none"] += 1
+        except Exception:
+            pass  # told below
+        try:
+            self.hub.inject(payload.key, payload.data, payload.encoding)
+        except Exception as error:
+            self.failures.append(f"{payload.kind} on {payload.key}\n{''.join(traceback.format_exception(error))}")
+
+    async def _scheme(self, schemer: Schemer) -> None:
+        chance, loop = self.chance("scheming"), asyncio.get_running_loop()
+        self.peers = [self._join(number) for number in range(PEERS)]
+        until = loop.time() + self.attack.seconds
+        async with asyncio.TaskGroup() as late:
+            while loop.time() < until:
+                late.create_task(self._do(schemer.next(loop.time())))
+                await asyncio.sleep(chance.choice((0.0, chance.uniform(0.0, 0.2), chance.uniform(0.0, 2.0))))
+
+    def _join(self, number: int) -> MemoryBus:
+        bus = self.hub.join(f"mallory-{number}", role="manager")
+        if self.chance(f"{bus.name}/{bus.run}").random() < 0.7:
+            bus.declare_alive()
+        return bus
+
+    async def _do(self, deed: Deed) -> None:
+        await asyncio.sleep(deed.delay)
+        peer = self.peers[deed.who]
+        if deed.message is None:
+            self.counts["new lives of peers"] += 1
+            await peer.leave()
+            self.peers[deed.who] = self._join(deed.who)
+            return
+        is_command = deed.expression.startswith(f"{keys.PREFIX}/cmd/")
+        self.counts["bad commands" if is_command else "false answers"] += 1
+        key = keys.command(deed.expression, peer.role, peer.name) if is_command else deed.expression
+        try:
+            encode(deed.message)
+        except (OverflowError, ValueError):
+            return
+        peer.publish(key, deed.message)
+
+    async def _cut(self) -> None:
+        """Cuts between anybody and all others, and a body that vanishes and comes back."""
+        chance, loop = self.chance("cuts"), asyncio.get_running_loop()
+        until = loop.time() + self.attack.seconds
+        while True:
+            await asyncio.sleep(chance.uniform(0.5, 8.0))
+            if loop.time() >= until:
+                return
+            if chance.random() < 0.75:
+                self.counts["cuts"] += 1
+                self.hub.partition(chance.choice((*self.services, VISITOR)))
+                await asyncio.sleep(chance.choice((0.5, 1.0, 4.0, chance.uniform(0.5, 20.0))))
+                self.hub.heal()
+            elif BODY in self.services:
+                self.counts["vanished bodies"] += 1
+                self.hub.kill(BODY)
+                await self._stop(BODY)
+                self.hub.book.restarted(BODY)
+                await asyncio.sleep(chance.choice((0.0, 0.5, chance.uniform(0.0, 8.0))))
+                await self._start(BODY)
+
+    async def _end_attack(self) -> None:
+        """All is whole again, and what the peers have asked for they do not want any more."""
+        self.hub.heal()
+        await asyncio.sleep(1.0)
+        for entry in self.hub.book.open:
+            if entry.is_foreign and entry.name.requester != VISITOR:
+                self._cancel(entry)
+
+    def _cancel(self, entry: Entry) -> None:
+        name = entry.name
+        role = entry.role if keys.is_chunk(entry.role) else "manager"
+        requester = name.requester if keys.is_chunk(name.requester) else "mallory"
+        cancel = Cancel(id=name.id, requester=name.requester, life=name.life, of=name.kind, reason="the end")
+        key = keys.command(keys.cancel(name.server), role, requester)
+        self.hub.inject(key, encode(cancel), "application/msgpack")
+
+    # -- the verdict ----------------------------------------------------------------------------------------------
+
+    async def _judge(self, bus: MemoryBus, visitor: Visitor, quiet_since: Seconds) -> None:
+        book = self.hub.book
+        self.counts["commands"] += book.commands
+        self.counts["answers"] += book.answers
+        self.counts["requests"] += len(book.entries)
+        self.counts["honest requests"] += len(visitor.asked)
+        self.counts.update({f"honest: {end}": count for end, count in visitor.ends().items()})
+        lies = "body" in self.attack.kinds and not self.attack.own_body
+        judged = set(SERVERS) & set(self.services) - ({BODY} if lies else set())
+        ended = [f"{name}: {_why(task)}" for name, task in self.running.items() if task.done()]
+        self._note("services that ended", ended)
+        self._note("requests without outcome", visitor.hung)
+        self._note("pending afterwards", [_told(entry) for entry in book.open if entry.name.server in judged])
+        doubled = [_told(entry) for entry in book.doubled if entry.name.server in judged]
+        self._note("requests with two outcomes", doubled)
+        self._note("still spoken of", [_told(entry) for entry in book.lingering(quiet_since)])
+        for name in self.services:
+            await self._ask_status(bus, name)
+
+    async def _ask_status(self, bus: MemoryBus, name: str) -> None:
+        try:
+            status = await bus.query(keys.status(name), AskStatus())
+        except EngageError as error:
+            self._note("services without status", [f"{name}: {error}"])
+        else:
+            assert isinstance(status, Status)
+            self.counts["failures by status"] += status.bus.failures
+
+    def _note(self, what: str, found: list[str]) -> None:
+        self.counts[what] += len(found)
+        self.wrong += [f"{what}: {each}" for each in found[:TOLD]]
+
+
+def _told(entry: Entry) -> str:
+    name = entry.name
+    ends = ", ".join(end.decode(errors="replace")[:60] for end in entry.ends)
+    return f"{name.kind} {name.id!r} of {name.requester!r} ({name.life!r}) at {name.server} {ends}".strip()
+
+
+def _why(task: "asyncio.Task[None]") -> str:
+    return "cancelled" if task.cancelled() else repr(task.exception())
+
+
+def _last_line(text: str) -> str:
+    return text.strip().rpartition("\n")[2]

@@ -1,0 +1,88 @@
+"""An honest client in bad company: it asks for blocks and fragments, changes its mind, and counts how each ends."""
+
+import asyncio
+from random import Random
+
+from schemas import keys
+from schemas.blocks import InterruptBehavior, PerformBlock
+from schemas.faults import EngageError
+from schemas.fragments import PerformFragment
+from schemas.requests import Request
+from schemas.units import Seconds
+from services.bus import Bus
+from services.hostile import plausible
+from services.requests import Pending, Requester
+
+NAME = "visitor"
+MOST = 5
+"""Blocks and fragments at a time."""
+
+
+class Visitor:
+    """entities: ids of what the world holds. servers: who is there to be asked."""
+
+    def __init__(self, chance: Random, entities: tuple[str, ...], servers: tuple[str, ...]) -> None:
+        self._chance = chance
+        self._entities = entities
+        self._servers = servers
+        self.asked: list[Pending] = []
+
+    @property
+    def hung(self) -> list[str]:
+        """Ids of requests that have not ended."""
+        return [pending.request.id for pending in self.asked if not pending.outcome.done()]
+
+    def ends(self) -> dict[str, int]:
+        """How often it heard what."""
+        counts: dict[str, int] = {}
+        for pending in self.asked:
+            if pending.outcome.done() and not pending.outcome.cancelled():
+                error = pending.outcome.exception()
+                end = type(error).__name__ if error is not None else type(pending.outcome.result()).__name__
+                counts[end] = counts.get(end, 0) + 1
+        return counts
+
+    async def visit(self, bus: Bus, requests: Requester, seconds: Seconds) -> None:
+        """Ask for a handful of things, again and again, until so many seconds are over."""
+        chance, until, number = self._chance, bus.now() + seconds, 0
+        while bus.now() < until:
+            for _ in range(chance.randrange(1, MOST + 1)):
+                number += 1
+                self._ask(requests, number)
+            await asyncio.sleep(chance.uniform(0.0, 3.0))
+            self._change_mind(requests, f"{NAME}/{number}i")
+            await asyncio.sleep(chance.uniform(0.0, 6.0))
+
+    def _ask(self, requests: Requester, number: int) -> None:
+        chance, id = self._chance, f"{NAME}/{number}"
+        if "generation" in self._servers and chance.random() < 0.25:
+            asked: Request = PerformFragment(id=id, fragment=plausible.fragment(chance, f"f{number}", self._entities))
+            self.asked.append(requests.send(keys.FRAGMENT, asked))
+        else:
+            # Now and then under the id of another live block.
+            name = f"v{number if chance.random() < 0.9 else number - 1}"
+            asked = PerformBlock(id=id, block=plausible.block(chance, name, self._entities))
+            self.asked.append(requests.send(keys.BLOCK, asked))
+
+    def _change_mind(self, requests: Requester, id: str) -> None:
+        pending = self._chance.choice(self.asked)
+        match self._chance.randrange(0, 4):
+            case 0 | 1:
+                requests.cancel(pending.request.id, "never mind")
+            case 2 if isinstance(pending.request, PerformBlock):
+                behavior = self._chance.choice(("b1", "b2", "b3"))
+                interrupt = InterruptBehavior(id=id, block=pending.request.block.id, behavior=behavior)
+                self.asked.append(requests.send(keys.BLOCK, interrupt))
+
+
+async def guest(client: asyncio.Task[None], patience: Seconds) -> str:
+    """What became of somebody's own client; empty: it has ended well, or with an error made for that."""
+    done, _ = await asyncio.wait([client], timeout=patience)
+    if not done:
+        client.cancel()
+        await asyncio.wait([client])
+        return f"the client has not ended {patience:g} s after the attack"
+    if client.cancelled():
+        return "the client was cancelled"
+    error = client.exception()
+    return "" if error is None or isinstance(error, EngageError) else f"the client ended: {error!r}"
