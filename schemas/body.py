@@ -15,7 +15,7 @@ from msgspec.structs import replace
 from schemas.behaviors import BlockBehavior
 from schemas.faults import Fault
 from schemas.requests import Outcome, Request
-from schemas.units import Degrees, Meters, Radians, Seconds, Stamp, Vector
+from schemas.units import Degrees, Duration, Meters, Radians, Stamp, Vector
 
 
 class PlannedInstant(Struct, frozen=True, kw_only=True, omit_defaults=True):
@@ -138,13 +138,14 @@ class Phase(Struct, frozen=True, kw_only=True, omit_defaults=True):
     """From one sync point of a behavior to its next: how long it takes.
 
     hold: the body can wait at `to` for as long as it must. longest None: no upper limit.
+    An estimate with a phase that is no number, negative, or longer than a day is refused: nothing is planned with it.
     """
 
     since: str
     to: str
-    shortest: Seconds
-    natural: Seconds
-    longest: Seconds | None = None
+    shortest: Duration
+    natural: Duration
+    longest: Duration | None = None
     hold: bool = False
 
 

@@ -1,10 +1,14 @@
 """Quantities with their units in the type, and instants that say whose clock they were read from."""
 
+from math import isfinite
 from typing import Annotated
 
 from msgspec import Meta, Struct
 
 Seconds = Annotated[float, Meta(description="seconds")]
+A_DAY = 86_400.0
+Duration = Annotated[float, Meta(ge=0, le=A_DAY, description="seconds")]
+"""Of what takes its time in the world."""
 Radians = Annotated[float, Meta(description="radians")]
 Degrees = Annotated[float, Meta(description="degrees")]
 Meters = Annotated[float, Meta(description="metres")]
@@ -24,7 +28,15 @@ A message whose vector has a part beyond `FARTHEST`, or one that is no number, i
 
 
 class Stamp(Struct, frozen=True, array_like=True):
-    """An instant, on a named clock. Instants of different clocks compare only through `Bus.local`."""
+    """An instant, on a named clock. Instants of different clocks compare only through `Bus.local`.
+
+    Raises ValueError if it is not finite, and a message that holds such a one is refused: it is neither before nor
+    after any other, so whoever waits for its turn waits for ever.
+    """
 
     clock: str
     seconds: Seconds
+
+    def __post_init__(self) -> None:
+        if not isfinite(self.seconds):
+            raise ValueError(f"an instant is a finite number of seconds, not {self.seconds}")
