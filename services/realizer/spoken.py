@@ -23,8 +23,9 @@ class Spoken:
             self.hear(speech.id, next((mark.position for mark in speech.marks if mark.id == point.sync), 0))
 
     def hear(self, id: str, position: int) -> None:
-        """So much has been said."""
-        self._position[id] = max(position, self._position.get(id, 0))
+        """So much has been said. What is no speech of the block says nothing, whatever its body tells."""
+        if id in self._speeches:
+            self._position[id] = max(position, self._position.get(id, 0))
 
     def end(self, outcome: BehaviorOutcome) -> None:
         """The voice says itself what it has said."""
