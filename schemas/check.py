@@ -18,6 +18,7 @@ from schemas.fragments import TurnFragment
 from schemas.references import AnyInput, Input, disambiguated, marks, sites
 from schemas.syncref import BLOCK_ITSELF, LONGEST_ID, SYNC_POINTS, SyncRef, canonical_sync, is_id, is_sync_point
 
+MOST_NODS = 1000
 _SYNC_ADVICE = "write behavior:sync, behavior:sync+seconds, or seconds from the block's start"
 
 
@@ -134,8 +135,8 @@ def _values(behavior: Behavior) -> Iterator[tuple[str, str, str]]:
         yield f"duration {behavior.duration} is negative", "duration", "seconds, 0 or more"
     if isinstance(behavior, Event) and behavior.limit is not None and behavior.limit <= 0:
         yield f"limit {behavior.limit} is not positive", "limit", "seconds"
-    if isinstance(behavior, Head) and behavior.repetition < 1:
-        yield f"repetition {behavior.repetition}", "repetition", "1 or more"
+    if isinstance(behavior, Head) and not 1 <= behavior.repetition <= MOST_NODS:
+        yield f"repetition {behavior.repetition}", "repetition", f"1 to {MOST_NODS}"
     if isinstance(behavior, Speech):
         yield from _marks(behavior)
 

@@ -318,6 +318,31 @@ def watch(
     raise typer.Exit(watch.main(where, json, watch.Wanted(tuple(only or ()), actor, tuple(kind or ()))))
 
 
+@app.command()
+def hostile(
+    runs: Annotated[int, typer.Option(metavar="N", min=1, help="Attacks, each with the next seed.")] = 20,
+    seed: Annotated[int, typer.Option(metavar="S", help="Of the first.")] = 0,
+    seconds: Annotated[float, typer.Option(min=1, max=3600, help="How long each lasts, in its own time.")] = 20.0,
+    only: Annotated[
+        list[str] | None, typer.Option(metavar="messages|requests|body", help="Repeatable; else all three.")
+    ] = None,
+    body: Annotated[str, typer.Option(metavar="MODULE:CLASS", help="Your own body, in place of the lying one.")] = "",
+    config: ConfigFile = None,
+    settings: Settings = None,
+    quiet: Quiet = False,
+) -> None:
+    """Attack the whole robot, in memory and virtual time only. Exit 1 if anything came of it that should not have."""
+    from services.commandline import hostile as hostile_
+    from services.commandline import run
+
+    where = run.Where(config, settings=tuple(settings or ()))
+    raise typer.Exit(hostile_.main(hostile_.Options(where, seed, runs, seconds, tuple(only or ()), body, quiet)))
+
+
+UsageError: type[Exception] = next(kind for kind in typer.BadParameter.__mro__ if kind.__name__ == "UsageError")
+"""Typer carries its own copy of click and does not show this class."""
+
+
 def main(arguments: list[str] | None = None) -> NoReturn:
     """Run a command. Bad input is one line on standard error, never a traceback; a bug of ours is a traceback."""
     sys.exit(exit_code(app, arguments))

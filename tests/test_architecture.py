@@ -34,6 +34,8 @@ SHELLS = {
     "services/control/simulated.py",  # a body that moves on the loop's clock
     "services/control/waiting.py",  # waits for a moment or a change of authority
     "services/simulation/still.py",  # a world, published once
+    "services/hostile/trial.py",  # runs services in virtual time, and is the hostile peer
+    "services/hostile/visitor.py",  # an honest client
     "services/console/follow.py",  # subscribes
     "services/console/live.py",  # draws
 }

@@ -1,5 +1,6 @@
 """`engage hostile`: seeded attacks on the whole robot in this process, in virtual time, and what came of them."""
 
+import sys
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
 from functools import partial
@@ -35,18 +36,19 @@ class Options(NamedTuple):
     seed: int = 0
     runs: int = 20
     seconds: Seconds = 20.0
-    only: tuple[Kind, ...] = ()
+    only: tuple[str, ...] = ()
     body: str = ""
     quiet: bool = False
 
 
 def main(options: Options) -> int:
+    kinds = _kinds(options.only)
     config = options.where.load()
     make = body_class(options.body) if options.body else None
     console = Console(quiet=options.quiet)
     counts: Counter[str] = Counter()
     bad: list[Report] = []
-    for report in reports(options, config, make):
+    for report in reports(options, config, kinds, make):
         counts.update(report.counts)
         if report.wrong:
             bad.append(report)
@@ -55,9 +57,19 @@ def main(options: Options) -> int:
     return WRONG if bad else DONE
 
 
-def reports(options: Options, config: Config, make: Making | None) -> Iterator[Report]:
+def _kinds(only: tuple[str, ...]) -> tuple[Kind, ...]:
+    """Raises InputRefused for one that there is not."""
+    if unknown := set(only) - set(KINDS):
+        fault = Fault(
+            reason=f"no attack {', '.join(map(repr, sorted(unknown)))}", advice=f"one of {', '.join(KINDS)}"
+        )
+        raise InputRefused(fault)
+    return tuple(kind for kind in KINDS if kind in only) or KINDS
+
+
+def reports(options: Options, config: Config, kinds: tuple[Kind, ...], make: Making | None) -> Iterator[Report]:
     for seed in range(options.seed, options.seed + options.runs):
-        yield attack(seed, config, seconds=options.seconds, kinds=options.only or KINDS, body=make)
+        yield attack(seed, config, seconds=options.seconds, kinds=kinds, body=make)
 
 
 def attack(
@@ -94,6 +106,7 @@ async def _embody(bus: Bus, ready: Ready, config: Config, make: Making) -> None:
 def body_class(name: str) -> Making:
     """Raises InputRefused if there is no such class of a body."""
     place, _, attribute = name.partition(":")
+    sys.path.insert(0, "")  # what lies in the folder of whoever calls, as with `python -m`
     try:
         found = getattr(import_module(place), attribute)
     except (ImportError, AttributeError, ValueError) as error:
@@ -105,9 +118,11 @@ def body_class(name: str) -> Making:
 
 
 def _tell(console: Console, report: Report, options: Options) -> None:
-    only = f" --only {options.only[0]}" if options.only else ""
+    only = "".join(f" --only {kind}" for kind in options.only)
     body = f" --body {options.body}" if options.body else ""
-    again = f"engage hostile --seed {report.attack.seed} --runs 1 --seconds {options.seconds:g}{only}{body}"
+    config = f" --config {options.where.config}" if options.where.config else ""
+    settings = config + "".join(f" --set {setting}" for setting in options.where.settings)
+    again = f"engage hostile --seed {report.attack.seed} --runs 1 --seconds {options.seconds:g}{only}{body}{settings}"
     console.print(f"seed {report.attack.seed}: {again}", style="bold", highlight=False, soft_wrap=True)
     for line in report.wrong:
         console.print(f"  {line}", markup=False, highlight=False, soft_wrap=True)

@@ -4,6 +4,8 @@ It sees each message once, as it is published, and judges servers by the protoco
 reached its server ends, and no request ends twice.
 """
 
+from collections import Counter
+
 from msgspec import Struct, field
 
 from schemas import keys
@@ -107,8 +109,16 @@ class Book:
 
     @property
     def doubled(self) -> list[Entry]:
-        """What has ended in two ways. Nobody can tell for those who name no life: there an id may be new again."""
-        return [entry for entry in self.entries.values() if len(entry.ends) > 1 and entry.name.life]
+        """What has ended in two ways.
+
+        Nobody can tell for those who name no life, or give one id to several kinds of requests: it is new again.
+        """
+        kinds = Counter((name.server, name.requester, name.life, name.id) for name in self.entries)
+        return [
+            entry
+            for name, entry in self.entries.items()
+            if len(entry.ends) > 1 and name.life and kinds[name.server, name.requester, name.life, name.id] == 1
+        ]
 
     def lingering(self, since: Seconds) -> list[Entry]:
         """What a requester that is a service still went on about after `since`, long after its end."""

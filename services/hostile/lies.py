@@ -24,7 +24,7 @@ from schemas.units import Seconds
 from services.hostile.chance import Chance, happens
 
 Status = Literal["done", "aborted", "failed"]
-FAR = (1e9, -1e9, 1e308, float("nan"), float("inf"), -1.0, 60.0)
+FAR = (1e9, -1e9, 1e308, -1e308, -1.0, 60.0)
 WAITS = {"stroke_start", "stroke_end", "stroke", "relax"}
 """Points before which an honest body waits for its authority."""
 
@@ -140,12 +140,15 @@ def estimate(chance: Chance, behavior: BlockBehavior) -> Estimate:
     if what == 1:
         return Estimate(behavior=behavior.id, feasible=True)
     if what == 2:
-        natural = [chance.choice(FAR) for _ in natural]
+        natural = [chance.choice((float("nan"), float("inf"), 1e308, 1e6, -1.0, 0.5)) for _ in natural]
     if what == 3:
         points = (*points[1:], *points[:1])
+    shortest = longest = natural
+    if what == 5:  # in no order
+        shortest, longest = ([chance.uniform(0.0, 2.0) for _ in natural] for _ in range(2))
     phases = [
-        Phase(since=since, to=to, shortest=seconds, natural=seconds, longest=None, hold=to in WAITS)
-        for since, to, seconds in zip(points, points[1:], natural, strict=False)
+        Phase(since=since, to=to, shortest=least, natural=seconds, longest=most, hold=to in WAITS)
+        for since, to, least, seconds, most in zip(points, points[1:], shortest, natural, longest, strict=False)
     ]
     named = "stranger" if what == 4 else behavior.id
     return Estimate(behavior=named, feasible=True, parts=(_part(behavior),), phases=tuple(phases))

@@ -25,7 +25,7 @@ from services.hostile.typed import SURROGATE, Typed, distorted
 SERVERS = ("generation", "realizer", "recognition", "control")
 BROKEN = 0.05
 """Of the payloads have bits flipped, or end early."""
-DISTORTED = 0.1
+DISTORTED = 0.15
 MARKUP = 0.05
 
 HOME: Mapping[type, str] = {

@@ -137,7 +137,7 @@ class _Trial:
         self.attack = attack
         self.client = client
         self.services = dict(services)
-        self.hub = _Tapped(frozenset((*services, BODY)))
+        self.hub = _Tapped(frozenset((*services, BODY, VISITOR)))
         self.counts: Counter[str] = Counter()
         self.wrong: list[str] = []
         self.failures: list[str] = []
@@ -158,6 +158,7 @@ class _Trial:
         propagates, LOG.propagate = LOG.propagate, False
         loop.set_exception_handler(self._unhandled)
         try:
+            insist_on_memory(self.hub)
             async with self.hub:
                 await self._play()
         finally:
@@ -328,7 +329,7 @@ class _Trial:
         self.hub.heal()
         await asyncio.sleep(1.0)
         for entry in self.hub.book.open:
-            if entry.is_foreign and entry.name.requester != VISITOR:
+            if entry.is_foreign:
                 self._cancel(entry)
 
     def _cancel(self, entry: Entry) -> None:
@@ -353,7 +354,8 @@ class _Trial:
         ended = [f"{name}: {_why(task)}" for name, task in self.running.items() if task.done()]
         self._note("services that ended", ended)
         self._note("requests without outcome", visitor.hung)
-        self._note("pending afterwards", [_told(entry) for entry in book.open if entry.name.server in judged])
+        old = [entry for entry in book.open if entry.asked_at < quiet_since and entry.name.server in judged]
+        self._note("pending afterwards", [_told(entry) for entry in old])
         doubled = [_told(entry) for entry in book.doubled if entry.name.server in judged]
         self._note("requests with two outcomes", doubled)
         self._note("still spoken of", [_told(entry) for entry in book.lingering(quiet_since)])

@@ -141,13 +141,11 @@ class Typed:
                 fields[field.name] = self._value(field.type, field.name, depth + 1)
         try:
             made: Struct = kind.cls(**fields)
-        except ValueError:  # a struct that checks itself
-            made = kind.cls(**{name: fields[name] for name in fields if _is_required(kind, name)})
+        except ValueError:  # a struct that checks itself: `distorted` brings the others
+            self._nastiness, before = 0.0, self._nastiness
+            made = self._struct(kind, depth)
+            self._nastiness = before
         return made
-
-
-def _is_required(kind: shapes.StructType, name: str) -> bool:
-    return next(field.required for field in kind.fields if field.name == name)
 
 
 def distorted(chance: Chance, message: Message) -> Any:
@@ -156,13 +154,16 @@ def distorted(chance: Chance, message: Message) -> Any:
     spots: list[tuple[Any, Any]] = []
     _collect(plain, spots)
     holder, place = chance.choice(spots)
-    what = chance.randrange(0, 4)
+    what = chance.randrange(0, 5)
     if what == 0 and isinstance(holder, dict):
         del holder[place]
     elif what == 1 and isinstance(holder, dict):
         holder[chance.choice(("type", "id", "extra", ""))] = chance.choice(("", 0, None, []))
     elif what == 2:
         holder[place] = [holder[place]] * 3
+    elif what == 3 and (floats := [spot for spot in spots if isinstance(spot[0][spot[1]], float)]):
+        holder, place = chance.choice(floats)
+        holder[place] = chance.choice(NASTY_FLOATS)
     else:
         holder[place] = chance.choice(("", "text", 0, -1, 1.5, None, True, [], {}, [[]], {"type": "block"}, 2**70))
     return plain

@@ -1,0 +1,33 @@
+"""The hostile peer runs in memory and in virtual time, and nowhere else."""
+
+import pytest
+
+from schemas.faults import InputRefused
+from services.bus import Bus, Hub
+from services.commandline.hostile import whole_robot
+from services.hostile.trial import Attack, insist_on_memory, trial
+from services.memory_bus import MemoryHub
+
+
+class Wire(Hub):
+    robot = "robot"
+
+    def join(self, name: str, role: str = "manager") -> Bus:
+        raise NotImplementedError
+
+    async def vacant(self, *names: str) -> None: ...
+
+    async def close(self) -> None: ...
+
+
+@pytest.mark.real_time
+async def test_it_refuses_real_time() -> None:
+    with pytest.raises(InputRefused, match="virtual time only"):
+        await trial(Attack(), whole_robot())
+
+
+async def test_it_refuses_a_bus_that_reaches_further_than_this_process(hub: MemoryHub) -> None:
+    insist_on_memory(hub)
+
+    with pytest.raises(InputRefused, match="MemoryHub only, not on a Wire"):
+        insist_on_memory(Wire())
