@@ -106,7 +106,8 @@ async def _embody(bus: Bus, ready: Ready, config: Config, make: Making) -> None:
 def body_class(name: str) -> Making:
     """Raises InputRefused if there is no such class of a body."""
     place, _, attribute = name.partition(":")
-    sys.path.insert(0, "")  # what lies in the folder of whoever calls, as with `python -m`
+    if "" not in sys.path:
+        sys.path.insert(0, "")  # the folder of whoever calls, as with `python -m`
     try:
         found = getattr(import_module(place), attribute)
     except (ImportError, AttributeError, ValueError) as error:

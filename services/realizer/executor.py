@@ -182,19 +182,21 @@ class Performance:
 
     async def _end_what_moves(self, ending: Ending) -> None:
         """Abort what still runs, and wait until all has ended, or for as long as the body is given."""
-        moving, running = set(), self._running
+        moving, running = dict[asyncio.Task[None], str](), self._running
         for behavior in self.plan.block.behaviors:
             pending = self._pending.get(behavior.id)
             if pending is None or running[behavior.id].done():
                 continue
             if performer(behavior) == "body":
-                moving.add(running[behavior.id])
+                moving[running[behavior.id]] = behavior.id
                 if ending.status != "done" and not pending.outcome.done():
                     self._body.abort(behavior.id)
             elif ending.status != "done":
                 self._requests.cancel(self._body.id(behavior.id), f"block {ending.status}")
         if moving:
-            await asyncio.wait(moving, timeout=self._config.abort)
+            _, stuck = await asyncio.wait(moving, timeout=self._config.abort)
+            for task in stuck:  # Nobody is to keep alive what has come to its end, and does not say so.
+                self._requests.cancel(self._body.id(moving[task]), "its block has ended")
         if ending.status == "failed":
             self._go_home(self.parts_used)
 

@@ -1,0 +1,214 @@
+"""The serving side by itself: what it knows a request by, what it hands over, and what it answers."""
+
+from typing import Any
+
+import pytest
+from msgspec.structs import replace
+
+from schemas import keys
+from schemas.behaviors import Wait
+from schemas.blocks import Block, BlockOutcome, InterruptBehavior, PerformBlock
+from schemas.body import PerformBehavior
+from schemas.faults import Fault, InputRefused
+from schemas.messages import encode_json
+from schemas.presence import PeerAlive, PeerGone
+from schemas.requests import Accepted, Cancel, Heard, KeepAlive, Kept, Outdated, Refused, Request
+from schemas.units import Stamp
+from services.asking import Asking, Patience, RequestRefused, TellEnd
+from services.bus import read_payload
+from services.memory_bus import MemoryHub
+from services.serving import LIFELESS_KEPT, Complain, Hand, Names, Publish, Serving
+from tests.commanding import key_of
+
+BLOCK = PerformBlock(id="a", requester="me", life="1", block=Block(id="b"))
+OTHER = replace(BLOCK, block=Block(id="c"))
+INTERRUPT = InterruptBehavior(id="a", requester="me", life="1", block="b", behavior="w")
+BEHAVIOR = PerformBehavior(id="a", requester="me", life="1", block="b", behavior=Wait(id="w"), through="start")
+DONE = BlockOutcome(id="a", block="b", status="done")
+
+
+def handed(effects: list[Any]) -> list[Request]:
+    return [each.request for each in effects if isinstance(each, Hand)]
+
+
+def told(effects: list[Any]) -> list[Any]:
+    return [each.answer for each in effects if isinstance(each, Publish)]
+
+
+def test_an_answer_names_requester_life_kind_and_id() -> None:
+    serving = Serving("realizer")
+    serving.take(BLOCK, 0.0)
+
+    for answer in (Accepted(id="a"), DONE):
+        (said,) = told(serving.answer("a", answer, 0.0))
+        assert (said.requester, said.life, said.kind, said.id) == ("me", "1", "perform_block", "a")
+
+
+def test_what_comes_again_is_heard_then_answered_with_the_last_state() -> None:
+    serving = Serving("realizer")
+    assert handed(serving.take(BLOCK, 0.0)) == [BLOCK]
+    kinds = []
+    for answer in (None, Accepted(id="a"), DONE):
+        if answer is not None:
+            serving.answer("a", answer, 0.0)
+        again = serving.take(replace(BLOCK, revision=3), 0.0)
+        assert handed(again) == []
+        kinds += [type(each) for each in told(again)]
+
+    assert kinds == [Heard, Accepted, BlockOutcome]
+
+
+def test_other_content_under_a_live_id_is_ignored_and_told_unless_its_kind_allows_it() -> None:
+    serving = Serving("realizer")
+    serving.take(BLOCK, 0.0)
+    different = serving.take(OTHER, 0.0)
+    assert handed(different) == []
+    assert [each.fault.reason for each in different if isinstance(each, Complain)] == [
+        "a live perform_block of this id has other content, and goes on"
+    ]
+
+    control = Serving("control")
+    control.take(BEHAVIOR, 0.0)
+    further = replace(BEHAVIOR, revision=1, through="end")
+    assert handed(control.take(further, 0.0)) == [further]
+    assert handed(control.take(BEHAVIOR, 0.0)) == []
+
+
+def test_a_live_id_for_another_kind_is_refused_by_name_and_the_live_one_goes_on() -> None:
+    serving = Serving("realizer")
+    serving.take(BLOCK, 0.0)
+
+    (refusal,) = told(serving.take(INTERRUPT, 0.0))
+
+    assert (refusal.kind, refusal.fault.reason) == ("interrupt_behavior", "'a' is the id of a live perform_block")
+    assert serving.is_live("a")
+    (refusal,) = told(serving.take(Cancel(id="a", requester="me", life="1", of="interrupt_behavior"), 0.0))
+    assert refusal.kind == "interrupt_behavior"
+    assert serving.is_live("a")
+
+
+def test_what_has_ended_is_remembered_though_its_id_is_used_for_another_kind() -> None:
+    serving = Serving("realizer")
+    serving.take(BLOCK, 0.0)
+    serving.answer("a", DONE, 0.0)
+    assert [each.id for each in handed(serving.take(INTERRUPT, 0.0))] == ["a~2"]
+    serving.answer("a~2", Refused(id="a~2", fault=Fault(reason="no")), 0.0)
+    serving.take(Cancel(id="a", requester="me", life="1", of="nothing"), 0.0)
+
+    (again,) = told(serving.take(BLOCK, 1.0))
+
+    assert isinstance(again, BlockOutcome)
+
+
+def test_another_requester_and_another_life_are_other_requests_with_names_of_their_own() -> None:
+    serving = Serving("realizer")
+    names = [
+        handed(serving.take(replace(BLOCK, requester=who, life=life), 0.0))[0].id
+        for who, life in (("me", "1"), ("you", "1"), ("me", "2"))
+    ]
+    assert names == ["a", "a~2", "a~3"]
+    (said,) = told(serving.answer("a~2", Accepted(id="a~2"), 0.0))
+    assert (said.id, said.requester) == ("a", "you")
+
+
+@pytest.mark.parametrize(("wait", "is_new"), [(LIFELESS_KEPT, False), (LIFELESS_KEPT + 0.1, True)])
+def test_without_a_life_an_ended_id_is_new_again_after_a_while(wait: float, is_new: bool) -> None:
+    serving = Serving("realizer")
+    lifeless = replace(BLOCK, life="")
+    serving.take(lifeless, 0.0)
+    serving.answer("a", DONE, 5.0)
+
+    assert bool(handed(serving.take(lifeless, 5.0 + wait))) == is_new
+
+
+def test_without_a_life_other_content_after_the_end_is_a_new_request_and_with_one_it_is_not() -> None:
+    for life, is_new in (("", True), ("1", False)):
+        serving = Serving("realizer")
+        serving.take(replace(BLOCK, life=life), 0.0)
+        serving.answer("a", DONE, 0.0)
+        assert bool(handed(serving.take(replace(OTHER, life=life), 0.0))) == is_new
+
+
+@pytest.mark.parametrize("of", ["perform_block", ""])
+def test_a_request_whose_cancellation_came_first_is_refused_under_its_own_kind(of: str) -> None:
+    serving = Serving("realizer")
+    (refusal,) = told(serving.take(Cancel(id="a", requester="me", life="1", of=of), 0.0))
+    assert isinstance(refusal, Refused)
+
+    late = serving.take(BLOCK, 0.1)
+
+    assert handed(late) == []
+    assert [(type(each), each.kind) for each in told(late)] == [(Refused, "perform_block")]
+
+
+def keep(*live: Kept) -> KeepAlive:
+    return KeepAlive(live=live, at=Stamp("w", 0.0), requester="me", life="1")
+
+
+def test_a_keep_alive_renews_grants_authority_and_finds_lost_content() -> None:
+    serving = Serving("control")
+    serving.take(replace(BEHAVIOR, lease=5.0), 0.0)
+    serving.answer("a", Accepted(id="a"), 0.0)
+    assert serving.deadline == 5.0
+
+    effects = serving.keep_alive(keep(Kept("perform_behavior", "a", 2, "end", 5.0)), 3.0, 3.0)
+
+    assert [each.through for each in handed(effects) if isinstance(each, PerformBehavior)] == ["end"]
+    assert [type(each) for each in told(effects)] == [Outdated]
+    assert serving.deadline == 8.0
+    (cancel,) = handed(serving.tick(8.0))
+    assert isinstance(cancel, Cancel)
+    assert cancel.reason == "nobody has renewed it"
+
+
+@pytest.mark.parametrize("kept", [Kept("perform_behavior", "x", 0, "", 5.0), Kept("go_home", "a", 0, "", 5.0)])
+def test_a_keep_alive_of_what_is_not_known_is_refused(kept: Kept) -> None:
+    serving = Serving("control")
+    serving.take(BEHAVIOR, 0.0)
+
+    (refusal,) = told(serving.keep_alive(keep(kept), 0.0, 0.0))
+
+    assert isinstance(refusal, Refused)
+    assert (refusal.id, refusal.kind) == (kept.id, kept.kind)
+
+
+@pytest.mark.parametrize("lease", [0.0, -1.0, float("inf"), float("nan")])
+def test_a_request_without_a_lease_has_that_of_its_server(lease: float) -> None:
+    serving = Serving("control", 5.0)
+    serving.take(replace(BEHAVIOR, lease=lease), 1.0)
+    assert serving.deadline == 6.0
+
+
+def test_names_are_unique_and_forgotten_in_the_order_of_their_use() -> None:
+    names = Names(kept=3)
+    assert [names.unique(id) for id in ("a", "b", "a", "a~2")] == ["a", "b", "a~2", "a~2~2"]
+    for id in "xyz":
+        names.unique(id)
+    assert names.unique("a") == "a"
+
+
+def test_an_answer_of_another_server_or_to_somebody_else_is_not_believed() -> None:
+    asking = Asking("me", "1", Patience())
+    asking.send(keys.BLOCK, PerformBlock(id="a", block=Block(id="b")), 0.0)
+    true = Refused(id="a", requester="me", life="1", kind="perform_block", fault=Fault(reason="no"))
+    for answer, server in (
+        (true, "mallory"),
+        (replace(true, requester="you"), "realizer"),
+        (replace(true, life="2"), "realizer"),
+        (replace(true, kind="interrupt_behavior"), "realizer"),
+        (replace(true, id="x"), "realizer"),
+    ):
+        assert asking.hear(answer, 0.0, server) == []
+
+    (end,) = asking.hear(true, 0.0, "realizer")
+    assert isinstance(end, TellEnd)
+    assert isinstance(end.end, RequestRefused)
+
+
+@pytest.mark.parametrize("message", [PeerGone(participant="x"), PeerAlive(participant="x", run="1")])
+async def test_presence_is_no_payload(hub: MemoryHub, message: Any) -> None:
+    payload = encode_json(message)
+    with pytest.raises(InputRefused, match="it is never sent"):
+        read_payload(payload, "application/json", key_of(hub.join("me"), keys.BLOCK), "")
+    with pytest.raises(TypeError, match="never sent"):
+        hub.join("you").publish(keys.WORLD, message)

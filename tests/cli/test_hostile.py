@@ -1,0 +1,52 @@
+"""`engage hostile`, in this process."""
+
+import asyncio
+
+import pytest
+
+from services.control.body import BodyState
+from services.control.simulated import SimulatedBody
+from tests.cli.command import Engage
+
+
+class Fainting(SimulatedBody):
+    """After a while it does not know any more how it stands."""
+
+    def state(self) -> BodyState:
+        if asyncio.get_running_loop().time() > 3.0:
+            raise ZeroDivisionError("of mine")
+        return super().state()
+
+
+def test_it_prints_what_was_sent_and_what_came_of_it(engage: Engage) -> None:
+    result = engage("hostile", "--only", "body", "--runs", 1, "--seconds", 5)
+
+    assert result.code == 0
+    assert "requests without outcome" in result.out
+    assert "contained failures" in result.out
+
+
+@pytest.mark.contained
+def test_what_goes_wrong_is_told_with_the_command_that_does_it_again(engage: Engage) -> None:
+    body = f"{__name__}:Fainting"
+
+    result = engage("hostile", "--only", "body", "--runs", 1, "--seed", 4, "--seconds", 5, "--body", body)
+
+    assert result.code == 1
+    assert f"engage hostile --seed 4 --runs 1 --seconds 5 --only body --body {body}" in result.out
+    assert "ZeroDivisionError: of mine" in result.out
+
+
+@pytest.mark.parametrize(
+    ("option", "value", "reason"),
+    [
+        ("--only", "kindness", "no attack 'kindness' (one of messages, requests, body)"),
+        ("--body", "nowhere:Body", "no body 'nowhere:Body'"),
+        ("--body", "services.control.body:sync_points", "is no class of a Body"),
+    ],
+)
+def test_what_is_no_attack_is_refused(engage: Engage, option: str, value: str, reason: str) -> None:
+    result = engage("hostile", option, value)
+
+    assert result.code == 2
+    assert reason in result.err

@@ -1,0 +1,34 @@
+"""What nobody has foreseen in one behavior ends its block, and nothing waits for that block in vain."""
+
+import asyncio
+
+import pytest
+
+from schemas.behaviors import Gesture, Wait
+from schemas.blocks import Block, BlockOutcome
+from schemas.body import BehaviorOutcome
+from services.realizer.spoken import Spoken
+from tests.realizer.stage import stage
+
+
+@pytest.mark.contained
+async def test_a_block_that_breaks_ends_as_failed_and_those_behind_it_are_performed(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def breaks(self: Spoken, outcome: BehaviorOutcome) -> None:
+        raise KeyError(outcome.behavior)
+
+    monkeypatch.setattr(Spoken, "end", breaks)
+    behind = Block(id="behind", behaviors=(Wait(id="w", duration=0.5),), composition="APPEND")
+    async with stage() as scene:
+        broken = scene.ask(
+            Block(id="broken", behaviors=(Gesture(id="beat", lexeme="BEAT"), Wait(id="w", duration=9.0)))
+        )
+        await asyncio.sleep(0.1)
+        outcome = await asyncio.wait_for(scene.ask(behind).outcome, 60.0)
+        first = await asyncio.wait_for(broken.outcome, 1.0)
+
+    assert isinstance(first, BlockOutcome)
+    assert first.status == "failed"
+    assert isinstance(outcome, BlockOutcome)
+    assert outcome.status == "done"
