@@ -78,8 +78,6 @@ class Performance:
             self._requests.cancel(self._body.id(behavior), "its block broke")
         self._go_home(self.parts_used)
 
-    # -- life ------------------------------------------------------------------------------------------------------
-
     async def run(self) -> BlockOutcome:
         """Perform the block to its end, whatever that is. Ends everything it began."""
         began = self._bus.now()
