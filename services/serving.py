@@ -162,10 +162,12 @@ class Serving:
         return self._told()
 
     def refuse(self, request: Request, fault: Fault) -> list[Effect]:
-        """It is none of ours. One of the same id that is live here goes on."""
+        """It came on a wrong key. The same request, if it is live here or has ended, is as it was."""
         record = self._known.get((_key(request), _kind(request)))
         if record is not None and record.state is not State.ENDED:
             return [Complain(fault, False)]
+        if record is not None and record.answer is not None:
+            return [Publish(answering(request, record.answer))]
         return [Publish(answering(request, Refused(id=request.id, fault=fault)))]
 
     def keep_alive(self, message: KeepAlive, sent: Seconds, now: Seconds) -> list[Effect]:

@@ -33,6 +33,8 @@ OPENING: Seconds = 0.5
 """How long `open_hub` waits for the first acquaintance: who leaves before anybody knows him is heard by nobody."""
 
 
+ASK_AGAIN: Seconds = 0.5
+"""How long a question goes unanswered before it is asked once more."""
 VACANCY: Seconds = 4.0
 """How long one who is dead may seem to be there: the lease of a silent link, and as long again."""
 QUIET: Seconds = 0.25
@@ -216,30 +218,47 @@ class ZenohBus(Bus):
     async def query(self, key: str, message: Message, timeout: Seconds = 1.0) -> Message:
         deadline = self._loop.time() + timeout
         payload, encoding = encode(message), encoding_of(message)
-        while (left := deadline - self._loop.time()) > 0:
+        while self._loop.time() < deadline:
             known = self._hub.peers.changes
-            reply = await self._ask(key, payload, encoding, left)
+            reply = await self._ask(key, payload, encoding, deadline)
             if reply is not None and reply.ok is not None:
                 return decode(reply.ok.payload.to_bytes(), str(reply.ok.encoding))
             if reply is not None and reply.err is not None:
-                payload, form = reply.err.payload.to_bytes(), str(reply.err.encoding)
-                if form.startswith("application/"):
-                    raise InputRefused(_fault(payload, form))
-                break  # Zenoh's own error: a timeout on the way, which nobody has answered
+                raise InputRefused(_fault(reply.err.payload.to_bytes(), str(reply.err.encoding)))
             # Nobody serves it, or its server died over it: there is hope only if somebody comes.
             if not await self._hub.peers.change(deadline, since=known):
                 break
         raise NoReply(Fault(reason=f"no reply within {timeout} s", where=key, advice="is its server running?"))
 
-    async def _ask(self, key: str, payload: bytes, encoding: str, timeout: Seconds) -> zenoh.Reply | None:
+    async def _ask(self, key: str, payload: bytes, encoding: str, deadline: Seconds) -> zenoh.Reply | None:
+        """The first answer; None once every try has ended without one.
+
+        It is asked again, as a cut may swallow a question; answers change nothing, so a second one does no harm.
+        """
         answered: asyncio.Future[zenoh.Reply | None] = self._loop.create_future()
+        going = 0
 
         def settle(reply: zenoh.Reply | None) -> None:
             if not answered.done():
                 answered.set_result(reply)
 
-        self._hub.peers.ask(key, payload, settle, settle, timeout, encoding)
-        return await answered
+        def replied(reply: zenoh.Reply) -> None:
+            # Zenoh's own errors, as that the time is up, are no answer of a server.
+            if reply.ok is not None or (reply.err is not None and _is_ours(str(reply.err.encoding))):
+                settle(reply)
+
+        def ended(_: Any) -> None:
+            nonlocal going
+            going -= 1
+            if not going:
+                settle(None)
+
+        while not answered.done():
+            left = deadline - self._loop.time()
+            going += 1
+            self._hub.peers.ask(key, payload, replied, ended, max(left, 0.01), encoding)
+            await asyncio.wait([answered], timeout=min(max(left, 0.0) + 0.1, ASK_AGAIN))
+        return answered.result()
 
     def answer(self, key: str, answer: Answer, *, empty: Message | None = None) -> None:
         def reply(query: zenoh.Query) -> None:
@@ -280,6 +299,10 @@ class ZenohBus(Bus):
             self._token.undeclare()
             self._hub.peers.note(self.name, self._hub.run, False)
         self._hub.forget(self.name)
+
+
+def _is_ours(encoding: str) -> bool:
+    return encoding.startswith("application/")
 
 
 def _fault(payload: bytes, encoding: str) -> Fault:

@@ -95,7 +95,8 @@ class Book:
         entry = self.entries.get(name)
         if entry is None or not isinstance(answer, Refused | Outcome):
             return
-        told = encode(answer)  # type: ignore[arg-type]
+        # Nothing was done, for whatever reason: sent on two wrong keys, it is refused in two ways.
+        told = b"refused" if isinstance(answer, Refused) else encode(answer)  # type: ignore[arg-type]
         if told not in entry.ends:
             entry.ends.append(told)
         entry.ended_at = entry.ended_at if entry.ended_at is not None else now

@@ -3,7 +3,7 @@
 import asyncio
 import random
 from itertools import pairwise
-from math import inf, nan
+from math import inf, isfinite, nan
 
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -116,7 +116,8 @@ class Liar(FakeBody):
 
     def _lie(self, act: Act, sync: str) -> None:
         perform, kind = act.perform, self.chance.choice((SyncPointArrived, SyncPointReached))
-        wrong = (self.bus.now() + self.chance.uniform(-3.0, 3.0), *WRONG_TIMES)
+        finite = (at for at in WRONG_TIMES if isfinite(at))  # a stamp takes no others
+        wrong = (self.bus.now() + self.chance.uniform(-3.0, 3.0), *finite)
         at = self.bus.stamp(self.chance.choice(wrong))
         rest = {"arrived": self.bus.stamp(self.chance.choice(wrong))} if kind is SyncPointReached else {}
         lie = kind(id=perform.id, block=perform.block, behavior=perform.behavior.id, sync=sync, at=at, **rest)
