@@ -84,6 +84,7 @@ def keep_alive(server: str) -> str:
     return f"{PREFIX}/cmd/{server}/*/*/keep_alive"
 
 
+@lru_cache(4096)  # asked for every command
 def command(expression: str, role: str, requester: str) -> str:
     """The key on which one requester sends this command. Raises ValueError for a name that can't be in a key."""
     *before, _, _, subject = expression.split("/")
@@ -93,12 +94,19 @@ def command(expression: str, role: str, requester: str) -> str:
     return "/".join((*before, role, requester, subject))
 
 
+def is_command_of(server: str, key: str) -> bool:
+    """Does `commands(server)` include the key?"""
+    return key.startswith(f"{PREFIX}/cmd/{server}/")
+
+
+@lru_cache(4096)  # asked for every command
 def expression_of(key: str) -> str:
     """Of a command's key, the expression for all requesters; empty for one that has no role and requester in it."""
     chunks = key.split("/")
     return "/".join((*chunks[:4], "*", "*", chunks[6])) if len(chunks) == 7 else ""
 
 
+@lru_cache(4096)  # asked for every command
 def requester_of(key: str) -> str:
     """`cmd/<server>/<role>/<requester>/...` -> requester; empty where there is none."""
     chunks = key.split("/")
@@ -196,8 +204,9 @@ def key_class(key: str) -> KeyClass:
     return name  # type: ignore[return-value]
 
 
+@lru_cache(4096)  # asked for every command and answer
 def server_of(key: str) -> str:
-    """`cmd/<server>/...` -> server."""
+    """`cmd/<server>/...` or `evt/<server>/...` -> server."""
     return key.split("/")[3]
 
 

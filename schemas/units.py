@@ -1,6 +1,5 @@
 """Quantities with their units in the type, and instants that say whose clock they were read from."""
 
-from math import isfinite
 from typing import Annotated
 
 from msgspec import Meta, Struct
@@ -27,16 +26,16 @@ A message whose vector has a part beyond `FARTHEST`, or one that is no number, i
 """
 
 
+LATEST = 1e12
+"""Seconds: no clock tells a later instant, in some 30 000 years."""
+
+
 class Stamp(Struct, frozen=True, array_like=True):
     """An instant, on a named clock. Instants of different clocks compare only through `Bus.local`.
 
-    Raises ValueError if it is not finite, and a message that holds such a one is refused: it is neither before nor
-    after any other, so whoever waits for its turn waits for ever.
+    A message with one that is not finite is refused where it is decoded: it is neither before nor after any other, so
+    whoever waits for its turn waits for ever.
     """
 
     clock: str
-    seconds: Seconds
-
-    def __post_init__(self) -> None:
-        if not isfinite(self.seconds):
-            raise ValueError(f"an instant is a finite number of seconds, not {self.seconds}")
+    seconds: Annotated[float, Meta(ge=-LATEST, le=LATEST, description="seconds")]

@@ -18,7 +18,7 @@ from schemas import keys
 from schemas.faults import EngageError, Fault, RunFailed
 from schemas.requests import Accepted, Answer, Cancel, Heard, Kept, Outcome, Outdated, Refused, Request, kind_of
 from schemas.units import Seconds
-from services.asking_table import TABLE, Do, Event, State
+from services.asking_table import TABLE, TELLING, Do, Event, State
 from services.deadlines import Deadlines
 
 
@@ -252,6 +252,9 @@ class Asking:
                 del self._asked[asked.request.id]
 
     def _act(self, asked: _Asked, action: Do, now: Seconds, answer: Answer | None) -> None:
+        if action in TELLING:
+            self._tell(asked, action, answer)
+            return
         id, wait = asked.request.id, self._patience
         match action:
             case Do.SEND:
@@ -290,8 +293,6 @@ class Asking:
                 self._set(Event.PATIENCE_OVER, id, now + wait.cancel)
             case Do.SWALLOW:
                 self._set(Event.SWALLOW_OVER, id, now + wait.swallow)
-            case _:
-                self._tell(asked, action, answer)
 
     def _tell(self, asked: _Asked, action: Do, answer: Answer | None) -> None:
         id, server = asked.request.id, asked.server

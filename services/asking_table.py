@@ -7,7 +7,13 @@ from collections.abc import Mapping
 from enum import Enum, auto
 
 
-class State(Enum):
+class Name(Enum):
+    """Looked up with each message: by identity, at the speed of an object."""
+
+    __hash__ = object.__hash__
+
+
+class State(Name):
     """Of one request."""
 
     SENT = auto()
@@ -24,7 +30,7 @@ class State(Enum):
     """Or never made. Nothing is known of it any more."""
 
 
-class Event(Enum):
+class Event(Name):
     """What can happen to one request."""
 
     ASKED = auto()
@@ -49,7 +55,7 @@ class Event(Enum):
     SWALLOW_OVER = auto()
 
 
-class Do(Enum):
+class Do(Name):
     """What follows from an event."""
 
     SEND = auto()
@@ -87,6 +93,8 @@ class Do(Enum):
     """The cancellation was in vain, which everybody is to know."""
 
 
+TELLING = frozenset(action for action in Do if action.name.startswith("TELL_"))
+"""What the caller gets to hear."""
 Row = tuple[State, tuple[Do, ...]]
 
 

@@ -9,7 +9,6 @@ import logging
 from abc import ABC, abstractmethod
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager
 from enum import Enum, auto
 from types import TracebackType
 from typing import Generic, Self, TypeVar
@@ -203,23 +202,20 @@ class Bus(ABC):
 
     # -- what goes wrong ------------------------------------------------------------------------------------------
 
-    @contextmanager
-    def containing(self, what: str, then: Callable[[Fault], None] | None = None) -> Iterator[None]:
+    def containing(self, what: object, then: Callable[[Fault], None] | None = None) -> "Containing":
         """An exception in the body of `with` ends nothing else: it is logged, counted and told as a fault.
 
-        what: is being done, for the reader of the fault. then: ends what the exception makes impossible.
+        what: is being done, for the reader of the fault: text, or the message that is being taken. then: ends what
+        the exception makes impossible.
         """
-        try:
-            yield
-        except Exception as error:
-            fault = self.failed(error, what)
-            if then is not None:
-                then(fault)
+        return Containing(self, what, then)
 
-    def failed(self, error: Exception, what: str) -> Fault:
+    def failed(self, error: Exception, what: object) -> Fault:
         """Log, count and tell an exception that nobody has foreseen."""
         reason = error.fault.reason if isinstance(error, EngageError) else f"{type(error).__name__}: {error}"
-        fault = Fault(reason=reason, where=what, advice="this is a bug: the log has its traceback", service=self.name)
+        fault = Fault(
+            reason=reason, where=_told(what), advice="this is a bug: the log has its traceback", service=self.name
+        )
         self.failures += 1
         LOG.error("%s: %s", self.name, fault, exc_info=error)
         self.publish(keys.fault(self.name), fault)
@@ -260,6 +256,32 @@ class Bus(ABC):
     @abstractmethod
     async def leave(self) -> None:
         """Withdraw subscriptions, answers and token. Idempotent."""
+
+
+class Containing:
+    """See `Bus.containing`. A class, for it stands around each message."""
+
+    __slots__ = ("_bus", "_then", "_what")
+
+    def __init__(self, bus: Bus, what: object, then: Callable[[Fault], None] | None) -> None:
+        self._bus = bus
+        self._what = what
+        self._then = then
+
+    def __enter__(self) -> None:
+        pass
+
+    def __exit__(self, kind: object, error: BaseException | None, trace: object) -> bool:
+        if not isinstance(error, Exception):
+            return False
+        fault = self._bus.failed(error, self._what)
+        if self._then is not None:
+            self._then(fault)
+        return True
+
+
+def _told(what: object) -> str:
+    return f"{what.key} from {what.source or 'a stranger'}" if isinstance(what, Received) else str(what)
 
 
 class Hub(ABC):

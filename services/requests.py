@@ -158,16 +158,17 @@ class Requester:
 
     def feed(self, received: Received) -> bool:
         """Take a message of `PATTERNS`; False if it was none of ours."""
-        now = self._bus.now()
-        match received.message:
-            case Answer() as answer:
-                self._carry_out(self._asking.hear(answer, now, keys.server_of(received.key)))
-            case PeerGone(participant=server):
-                self._carry_out(self._asking.server_gone(server, now))
-            case PeerAlive(participant=server, run=run):
-                self._carry_out(self._asking.server_there(server, run, now))
-            case _:
-                return False
+        message = received.message
+        if isinstance(message, Answer):
+            effects = self._asking.hear(message, self._bus.now(), keys.server_of(received.key))
+            if effects:
+                self._carry_out(effects)
+        elif isinstance(message, PeerGone):
+            self._carry_out(self._asking.server_gone(message.participant, self._bus.now()))
+        elif isinstance(message, PeerAlive):
+            self._carry_out(self._asking.server_there(message.participant, message.run, self._bus.now()))
+        else:
+            return False
         return True
 
     def _tick(self) -> None:
@@ -213,7 +214,7 @@ class Requester:
     async def _listen(self) -> None:
         with self._bus.subscribe(*self.PATTERNS) as inbox:
             async for received in inbox:
-                with self._bus.containing(f"{received.key} from {received.source}"):
+                with self._bus.containing(received):
                     self.feed(received)
 
     def _stopped_listening(self, task: "asyncio.Task[None]") -> None:
@@ -273,6 +274,7 @@ class RequestDesk:
         self._on_cancel = on_cancel
         self._on_extend = on_extend
         self._serving = Serving(server, term)
+        self._answers = keys.request_state(server)
         self._alarm = _Alarm(self._tick)
 
     @staticmethod
@@ -296,22 +298,24 @@ class RequestDesk:
 
     def take(self, received: Received) -> Request | None:
         """The request, if it is new, changed or a cancellation of a live one; each of these once."""
-        now, serving_ = self._bus.now(), self._serving
-        match received.message:
-            case Request() | KeepAlive() as message if keys.matches(keys.commands(self._server), received.key):
-                return self._take(message, received, now)
+        message = received.message
+        if isinstance(message, Request | KeepAlive):
+            is_ours = keys.is_command_of(self._server, received.key)
+            return self._take(message, received, self._bus.now()) if is_ours else None
+        match message:
             case Unreadable(id=id, fault=fault) if id:
                 refused = Refused(id=id, requester=keys.requester_of(received.key), fault=fault)
-                self._bus.publish(keys.request_state(self._server), refused)
+                self._bus.publish(self._answers, refused)
             case PeerGone(participant=requester):
-                return self._carry_out(serving_.requester_gone(requester, now))
+                return self._carry_out(self._serving.requester_gone(requester, self._bus.now()))
             case PeerAlive(participant=requester, run=run):
-                return self._carry_out(serving_.requester_there(requester, run, now))
+                return self._carry_out(self._serving.requester_there(requester, run, self._bus.now()))
         return None
 
     def _take(self, message: Request | KeepAlive, received: Received, now: Seconds) -> Request | None:
-        requester = keys.requester_of(received.key)
-        message = replace(message, requester=requester or message.requester, life=message.life or received.life)
+        requester = keys.requester_of(received.key) or message.requester
+        if requester != message.requester or not message.life:
+            message = replace(message, requester=requester, life=message.life or received.life)
         if isinstance(message, KeepAlive):
             sent = min(now, self._bus.local(message.at))
             return None if received.past else self._carry_out(self._serving.keep_alive(message, sent, now))
@@ -344,7 +348,7 @@ class RequestDesk:
         for effect in effects:
             match effect:
                 case serving.Publish(answer=answer):
-                    self._bus.publish(keys.request_state(self._server), answer)  # type: ignore[arg-type]
+                    self._bus.publish(self._answers, answer)  # type: ignore[arg-type]
                 case serving.Hand(request=request, is_asked=True):
                     handed = request
                 case serving.Hand(request=Cancel() as cancel):
@@ -376,13 +380,12 @@ class RequestDesk:
 
 def _misplaced(request: Request, key: str) -> Fault | None:
     """What is wrong with sending this request there."""
-    expression, server = keys.expression_of(key), keys.server_of(key)
-    name = type(request).__name__
-    home = next((known for known, kinds in COMMANDS.items() if isinstance(request, kinds)), "")
-    home = keys.cancel(server) if isinstance(request, Cancel) else home
-    expected = COMMANDS.get(expression, (Cancel,) if expression == keys.cancel(server) else ())
+    expression = keys.expression_of(key)
+    expected = COMMANDS.get(expression, ())
     if isinstance(request, expected) or (expression and isinstance(request, Cancel)):
         return None
+    server, name = keys.server_of(key), type(request).__name__
+    home = next((known for known, kinds in COMMANDS.items() if isinstance(request, kinds)), keys.cancel(server))
     takes = (
         f", which takes {' and '.join(kind.__name__ for kind in expected)}" if expected else ", which is no command"
     )

@@ -150,12 +150,13 @@ class Serving:
 
     def take(self, request: Request, now: Seconds) -> list[Effect]:
         """A command that has come; `requester` as its key names it."""
-        newest, kind = self._newest.get(_key(request)), _kind(request)
+        key, kind = _key(request), _kind(request)
+        newest = self._newest.get(key)
         if newest is not None and newest.state is not State.ENDED and kind not in ("", newest.kind):
             self._refuse(request, f"{request.id!r} is the id of a live {newest.kind}", "give it another id")
         else:
             unnamed = newest if newest is not None and not (kind and newest.kind) else None
-            record = self._known.get((_key(request), kind), unnamed)
+            record = self._known.get((key, kind), unnamed)
             if record is None or self._is_new(record, request, now):
                 record = self._new(request)
             self._step(record, _event(record, request), now, request)
@@ -316,7 +317,8 @@ class Serving:
                     self._forget(next(iter(self._ended.values())))
 
     def _hand(self, record: _Record, request: Request, *, is_asked: bool = False) -> None:
-        self._effects.append(Hand(replace(request, id=record.name), is_asked))
+        named = request if request.id == record.name else replace(request, id=record.name)
+        self._effects.append(Hand(named, is_asked))
 
     def _renew(self, record: _Record, since: Seconds, kept: Kept | None) -> None:
         """A late message never shortens what a newer one has granted."""

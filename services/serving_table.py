@@ -8,7 +8,13 @@ from collections.abc import Mapping
 from enum import Enum, auto
 
 
-class State(Enum):
+class Name(Enum):
+    """Looked up with each message: by identity, at the speed of an object."""
+
+    __hash__ = object.__hash__
+
+
+class State(Name):
     """Of one request."""
 
     UNKNOWN = auto()
@@ -22,7 +28,7 @@ class State(Enum):
     """Its terminal state is kept for whoever asks again."""
 
 
-class Event(Enum):
+class Event(Name):
     """What can happen to one request."""
 
     CAME = auto()
@@ -49,7 +55,7 @@ class Event(Enum):
     LEASE_OVER = auto()
 
 
-class Do(Enum):
+class Do(Name):
     """What follows from an event."""
 
     HAND = auto()

@@ -55,7 +55,7 @@ async def embody(bus: Bus, ready: Ready, config: ControlConfig, body: Body | Non
             try:
                 control.publish_state()
                 async for received in inbox:
-                    with bus.containing(f"{received.key} from {received.source or 'a stranger'}"):
+                    with bus.containing(received):
                         control.take(received)
             finally:
                 control.close()

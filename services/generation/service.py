@@ -43,7 +43,7 @@ async def generate(bus: Bus, ready: Ready, config: GenerationConfig) -> None:
                 tasks.create_task(generation.keep_deadlines(), name="deadlines")
                 ready()
                 async for received in inbox:
-                    with bus.containing(f"{received.key} from {received.source or 'a stranger'}"):
+                    with bus.containing(received):
                         generation.take(received)
         finally:
             generation.close()

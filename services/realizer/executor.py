@@ -5,7 +5,6 @@ Decides nothing: what was measured goes to the `Authority`, and what that says i
 
 import asyncio
 from collections.abc import Callable, Iterable, Mapping
-from contextlib import AbstractContextManager
 from functools import partial
 
 from msgspec.structs import replace
@@ -17,6 +16,7 @@ from schemas.faults import EngageError, Fault, InputRefused
 from schemas.feedback import WarningKind
 from schemas.syncref import BLOCK_ITSELF
 from schemas.units import Seconds
+from services.bus import Containing
 from services.realizer.authority import Authority
 from services.realizer.body_link import BodyLink
 from services.realizer.effects import Begin, Effect, Extend
@@ -67,7 +67,7 @@ class Performance:
         self._timer: asyncio.TimerHandle | None = None
         self._is_stale = False
 
-    def containing(self) -> AbstractContextManager[None]:
+    def containing(self) -> Containing:
         """An exception in the body of `with` ends this block, and no other."""
         where = f"block {self.plan.block.id}"
         return self._bus.containing(where, lambda fault: self._live.stop(Ending("failed", fault)))
@@ -237,7 +237,7 @@ class Performance:
                     return True
                 if behavior is not None and id in self._pending and performer(behavior) == "body":
                     self._send(behavior)
-            case Begin(behavior=id):
+            case Begin(behavior=id) if not self._begun[id].done():  # else its task has been cancelled
                 self._asked[id] = effect
                 self._begun[id].set_result(None)
             case Late(behavior=id, sync=sync, overdue=overdue):

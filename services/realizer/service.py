@@ -340,7 +340,7 @@ async def realize(bus: Bus, ready: Ready, config: RealizerConfig) -> None:
             ready()
             async with asyncio.TaskGroup() as tasks:
                 async for received in inbox:
-                    with bus.containing(f"{received.key} from {received.source or 'a stranger'}"):
+                    with bus.containing(received):
                         realizer.take(received, tasks)
     finally:
         realizer.desk.close()

@@ -40,8 +40,7 @@ async def recognize(bus: Bus, ready: Ready, config: RecognitionConfig) -> None:
         try:
             while True:
                 received = await inbox.next(recognition.deadline)
-                source = "the clock" if received is None else f"{received.key} from {received.source or 'a stranger'}"
-                with bus.containing(source):
+                with bus.containing(received or "what is due by now"):
                     if received is None:
                         recognition.advance()
                     else:
