@@ -21,7 +21,7 @@ from schemas.faults import EngageError, Fault, InputRefused
 from schemas.fragments import PerformFragment
 from schemas.messages import Message, decode
 from schemas.presence import PeerAlive, PeerGone
-from schemas.requests import Unreadable
+from schemas.requests import Request, Unreadable, kind_of
 from schemas.status import BusHealth
 from schemas.units import Seconds, Stamp
 from schemas.xml_codec import decode_xml
@@ -281,7 +281,12 @@ class Containing:
 
 
 def _told(what: object) -> str:
-    return f"{what.key} from {what.source or 'a stranger'}" if isinstance(what, Received) else str(what)
+    match what:
+        case Received(key=key, source=source):
+            return f"{key} from {source or 'a stranger'}"
+        case Request(id=id):
+            return f"{kind_of(what)} {id}"
+    return str(what)
 
 
 class Hub(ABC):

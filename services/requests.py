@@ -12,8 +12,7 @@ A server leaves commands that it gets from history to their requester, which kno
 """
 
 import asyncio
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from functools import partial
 from types import TracebackType
 from typing import Self
@@ -24,12 +23,12 @@ from schemas import keys
 from schemas.faults import EngageError, Fault, RunFailed
 from schemas.messages import COMMANDS, Message
 from schemas.presence import PeerAlive, PeerGone
-from schemas.requests import Accepted, Answer, Cancel, KeepAlive, Outcome, Refused, Request, Unreadable, kind_of
+from schemas.requests import Accepted, Answer, Cancel, KeepAlive, Outcome, Refused, Request, Unreadable
 from schemas.units import Seconds
 from services import asking, serving
 from services.asking import Asking, NeverEnded, Patience, RequestRefused, ServerRestarted
 from services.asking_table import State
-from services.bus import Bus, Received
+from services.bus import Bus, Containing, Received
 from services.serving import Serving
 
 __all__ = ["NeverEnded", "Patience", "Pending", "RequestDesk", "RequestRefused", "Requester", "ServerRestarted"]
@@ -175,19 +174,21 @@ class Requester:
         self._carry_out(self._asking.tick(self._bus.now()))
 
     def _carry_out(self, effects: list[asking.Effect]) -> None:
-        for effect in effects:
-            match effect:
-                case asking.Publish(expression=expression, message=message):
-                    self._publish(expression, _as_message(message))
-                case asking.Renew(server=server, live=live):
-                    still = KeepAlive(live=live, at=self._bus.stamp(), requester=self._bus.name, life=self._life)
-                    self._publish(keys.keep_alive(server), still)
-                case asking.TellAccepted(id=id) if id in self._pending:
-                    self._pending[id].accept()
-                case asking.TellEnd(id=id, end=end) if id in self._pending:
-                    self._pending.pop(id).end(end)
-                case asking.Complain(fault=fault):
-                    self._bus.publish(keys.fault(self._bus.name), fault)
+        for effect in effects:  # by isinstance: with each message, and twice as quick as patterns
+            if isinstance(effect, asking.Publish):
+                self._publish(effect.expression, _as_message(effect.message))
+            elif isinstance(effect, asking.TellAccepted):
+                if (pending := self._pending.get(effect.id)) is not None:
+                    pending.accept()
+            elif isinstance(effect, asking.TellEnd):
+                if (ended := self._pending.pop(effect.id, None)) is not None:
+                    ended.end(effect.end)
+            elif isinstance(effect, asking.Renew):
+                at, name = self._bus.stamp(), self._bus.name
+                still = KeepAlive(live=effect.live, at=at, requester=name, life=self._life)
+                self._publish(keys.keep_alive(effect.server), still)
+            else:
+                self._bus.publish(keys.fault(self._bus.name), effect.fault)
         self._alarm.set(self._asking.deadline)
 
     def _publish(self, expression: str, message: Message) -> None:
@@ -346,29 +347,30 @@ class RequestDesk:
         """The one request to be handed over at once; what more there is goes to the clerks."""
         handed: Request | None = None
         for effect in effects:
-            match effect:
-                case serving.Publish(answer=answer):
-                    self._bus.publish(self._answers, answer)  # type: ignore[arg-type]
-                case serving.Hand(request=request, is_asked=True):
-                    handed = request
-                case serving.Hand(request=Cancel() as cancel):
-                    with self._bus.containing(f"the end of request {cancel.id}"):
-                        self._on_cancel(cancel)
-                case serving.Hand(request=request) if self._on_extend is not None:
-                    with self._bus.containing(f"request {request.id}"):
-                        self._on_extend(request)
-                case serving.Complain(fault=fault, is_ours=True):
-                    self._bus.report(fault)
-                case serving.Complain(fault=fault):
-                    self._bus.publish(keys.fault(self._server), fault)
+            if isinstance(effect, serving.Publish):
+                self._bus.publish(self._answers, effect.answer)  # type: ignore[arg-type]
+            elif isinstance(effect, serving.Hand):
+                if effect.is_asked:
+                    handed = effect.request
+                else:
+                    self._hand_to_clerk(effect.request)
+            elif effect.is_ours:
+                self._bus.report(effect.fault)
+            else:
+                self._bus.publish(keys.fault(self._server), effect.fault)
         self._alarm.set(self._serving.deadline)
         return handed
 
-    @contextmanager
-    def serving(self, request: Request) -> Iterator[None]:
+    def _hand_to_clerk(self, request: Request) -> None:
+        with self._bus.containing(request):
+            if isinstance(request, Cancel):
+                self._on_cancel(request)
+            elif self._on_extend is not None:
+                self._on_extend(request)
+
+    def serving(self, request: Request) -> Containing:
         """An exception in the body of `with` ends this request, and nothing else."""
-        with self._bus.containing(f"{kind_of(request)} {request.id}", partial(self._refuse_if_live, request.id)):
-            yield
+        return self._bus.containing(request, partial(self._refuse_if_live, request.id))
 
     def _refuse_if_live(self, name: str, fault: Fault) -> None:
         if self.is_live(name):

@@ -69,8 +69,7 @@ class Performance:
 
     def containing(self) -> Containing:
         """An exception in the body of `with` ends this block, and no other."""
-        where = f"block {self.plan.block.id}"
-        return self._bus.containing(where, lambda fault: self._live.stop(Ending("failed", fault)))
+        return self._bus.containing(self._live, self._live.fail)
 
     def abandon(self) -> None:
         """Its end has gone wrong, too: stop what it asked for, and take its parts home."""

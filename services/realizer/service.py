@@ -61,8 +61,10 @@ class _Realizer:
         match received.message:
             case SyncPointArrived() | SyncPointReached() as report:
                 self._hear(report)
+                return
             case WordSpoken() as word:
                 self._hear_word(word)
+                return
             case PeerAlive() | PeerGone() as change:
                 self.peers.feed(change)
             case Unreadable(id=id, fault=fault):

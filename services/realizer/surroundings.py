@@ -75,6 +75,12 @@ class Live:
         self.ending.set_result(Ending("interrupted", fault, ending.replaced_by))
         return True
 
+    def __str__(self) -> str:
+        return f"block {self.request.block.id}"
+
+    def fail(self, fault: Fault) -> None:
+        self.stop(Ending("failed", fault))
+
     @property
     def outcome(self) -> BlockOutcome:
         """As it is if nothing of it was performed."""
