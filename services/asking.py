@@ -8,7 +8,7 @@ deadlines, and follows the table.
     effects = asking.tick(now)                         # whenever `asking.deadline` has come
 """
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Mapping
 from math import inf
 
 from msgspec import Struct
@@ -111,6 +111,9 @@ class _Server:
 
 
 _CLOCKS = (Event.RESEND_DUE, Event.GRACE_OVER, Event.PATIENCE_OVER, Event.SWALLOW_OVER)
+
+
+_OVER = (State.GIVEN_UP, State.ENDED)
 
 
 class Asking:
@@ -243,56 +246,60 @@ class Asking:
         before = asked.state
         asked.state, actions = TABLE[before][event]
         for action in actions:
-            self._act(asked, action, now, answer)
-        if asked.state is not before and asked.state in (State.GIVEN_UP, State.ENDED):
+            if action in TELLING:
+                self._tell(asked, action, answer)
+            else:
+                _ACTS[action](self, asked, now)
+        if asked.state is not before and asked.state in _OVER:
             self._let_go(asked)
-            for clock in _CLOCKS if asked.state is State.ENDED else _CLOCKS[:3]:
-                self._deadlines.set((clock, asked.request.id), None)
+            id = asked.request.id
+            for clock in _CLOCKS:
+                if clock is not Event.SWALLOW_OVER or asked.state is State.ENDED:
+                    self._deadlines.clear((clock, id))
             if asked.state is State.ENDED:
-                del self._asked[asked.request.id]
+                del self._asked[id]
 
-    def _act(self, asked: _Asked, action: Do, now: Seconds, answer: Answer | None) -> None:
-        if action in TELLING:
-            self._tell(asked, action, answer)
-            return
-        id, wait = asked.request.id, self._patience
-        match action:
-            case Do.SEND:
-                asked.resend_after = wait.first_resend
-                self._send(asked)
-                self._set(Event.RESEND_DUE, id, now + asked.resend_after)
-            case Do.SEND_AGAIN:
-                asked.resend_after = min(2 * asked.resend_after, wait.longest_resend)
-                self._send(asked)
-                self._set(Event.RESEND_DUE, id, now + asked.resend_after)
-            case Do.SEND_ONCE:
-                self._send(asked)
-            case Do.CANCEL_ONCE:
-                cancel = asked.cancel or self._cancellation(asked, "given up")
-                self._effects.append(Publish(keys.cancel(asked.server), cancel))
-            case Do.KEEP:
-                self._set(Event.RESEND_DUE, id, None)
-                self._set(Event.PATIENCE_OVER, id, None)
-                self._keep(asked, now)
-            case Do.KEEP_SOON:
-                self._renew_soon(asked.server, now, wait.first_resend)
-            case Do.KEEP_NOW:
-                self._renew_soon(asked.server, now, 0.0)
-            case Do.LET_GO:
-                self._let_go(asked)
-            case Do.WAIT_GRACE:
-                self._set(Event.GRACE_OVER, id, now + wait.grace)
-                if asked.cancel is None:
-                    self._set(Event.PATIENCE_OVER, id, None)
-            case Do.STOP_GRACE:
-                self._set(Event.GRACE_OVER, id, None)
-            case Do.HOPE:
-                if asked.server in self._runs:
-                    self._set(Event.PATIENCE_OVER, id, now + wait.silence)
-            case Do.BE_PATIENT:
-                self._set(Event.PATIENCE_OVER, id, now + wait.cancel)
-            case Do.SWALLOW:
-                self._set(Event.SWALLOW_OVER, id, now + wait.swallow)
+    def _send_anew(self, asked: _Asked, now: Seconds) -> None:
+        asked.resend_after = self._patience.first_resend
+        self._send(asked, now)
+        self._deadlines.set((Event.RESEND_DUE, asked.request.id), now + asked.resend_after)
+
+    def _send_again(self, asked: _Asked, now: Seconds) -> None:
+        asked.resend_after = min(2 * asked.resend_after, self._patience.longest_resend)
+        self._send(asked, now)
+        self._deadlines.set((Event.RESEND_DUE, asked.request.id), now + asked.resend_after)
+
+    def _send(self, asked: _Asked, now: Seconds) -> None:
+        expression = asked.expression if asked.cancel is None else keys.cancel(asked.server)
+        self._effects.append(Publish(expression, asked.cancel or asked.request))
+
+    def _cancel_once(self, asked: _Asked, now: Seconds) -> None:
+        cancel = asked.cancel or self._cancellation(asked, "given up")
+        self._effects.append(Publish(keys.cancel(asked.server), cancel))
+
+    def _keep_soon(self, asked: _Asked, now: Seconds) -> None:
+        self._renew_soon(asked.server, now, self._patience.first_resend)
+
+    def _keep_now(self, asked: _Asked, now: Seconds) -> None:
+        self._renew_soon(asked.server, now, 0.0)
+
+    def _wait_grace(self, asked: _Asked, now: Seconds) -> None:
+        self._deadlines.set((Event.GRACE_OVER, asked.request.id), now + self._patience.grace)
+        if asked.cancel is None:
+            self._deadlines.clear((Event.PATIENCE_OVER, asked.request.id))
+
+    def _stop_grace(self, asked: _Asked, now: Seconds) -> None:
+        self._deadlines.clear((Event.GRACE_OVER, asked.request.id))
+
+    def _hope(self, asked: _Asked, now: Seconds) -> None:
+        if asked.server in self._runs:
+            self._deadlines.set((Event.PATIENCE_OVER, asked.request.id), now + self._patience.silence)
+
+    def _be_patient(self, asked: _Asked, now: Seconds) -> None:
+        self._deadlines.set((Event.PATIENCE_OVER, asked.request.id), now + self._patience.cancel)
+
+    def _swallow(self, asked: _Asked, now: Seconds) -> None:
+        self._deadlines.set((Event.SWALLOW_OVER, asked.request.id), now + self._patience.swallow)
 
     def _tell(self, asked: _Asked, action: Do, answer: Answer | None) -> None:
         id, server = asked.request.id, asked.server
@@ -320,13 +327,6 @@ class Asking:
             failed = ServerRestarted if action is Do.TELL_REBORN else RunFailed
             self._effects.append(TellEnd(id, failed(fault)))
 
-    def _set(self, clock: Event, id: str, at: Seconds | None) -> None:
-        self._deadlines.set((clock, id), at)
-
-    def _send(self, asked: _Asked) -> None:
-        expression = asked.expression if asked.cancel is None else keys.cancel(asked.server)
-        self._effects.append(Publish(expression, asked.cancel or asked.request))
-
     def _cancellation(self, asked: _Asked, reason: str) -> Cancel:
         request = asked.request
         return Cancel(id=request.id, requester=self._requester, life=self._life, of=kind_of(request), reason=reason)
@@ -334,6 +334,8 @@ class Asking:
     # -- keeping alive --------------------------------------------------------------------------------------------
 
     def _keep(self, asked: _Asked, now: Seconds) -> None:
+        self._deadlines.clear((Event.RESEND_DUE, asked.request.id))
+        self._deadlines.clear((Event.PATIENCE_OVER, asked.request.id))
         server = self._servers.get(asked.server)
         if server is None:
             server = self._servers[asked.server] = _Server(self._patience.pulse)
@@ -341,11 +343,11 @@ class Asking:
         server.period = min(server.period, asked.request.lease / 3)
         self._renew_soon(asked.server, now, server.period)
 
-    def _let_go(self, asked: _Asked) -> None:
+    def _let_go(self, asked: _Asked, now: Seconds = 0.0) -> None:
         server = self._servers.get(asked.server)
         if server is not None and server.kept.pop(asked.request.id, None) is not None and not server.kept:
             del self._servers[asked.server]
-            self._deadlines.set((None, asked.server), None)
+            self._deadlines.clear((None, asked.server))
 
     def _renew_soon(self, name: str, now: Seconds, after: Seconds) -> None:
         if (server := self._servers.get(name)) is not None:
@@ -361,3 +363,20 @@ class Asking:
         self._effects.append(Renew(name, tuple(kept)))
         self._deadlines.set((None, name), now + server.soon)
         server.soon = min(2 * server.soon, server.period)
+
+
+_ACTS: Mapping[Do, Callable[[Asking, _Asked, Seconds], None]] = {
+    Do.SEND: Asking._send_anew,
+    Do.SEND_AGAIN: Asking._send_again,
+    Do.SEND_ONCE: Asking._send,
+    Do.CANCEL_ONCE: Asking._cancel_once,
+    Do.KEEP: Asking._keep,
+    Do.KEEP_SOON: Asking._keep_soon,
+    Do.KEEP_NOW: Asking._keep_now,
+    Do.LET_GO: Asking._let_go,
+    Do.WAIT_GRACE: Asking._wait_grace,
+    Do.STOP_GRACE: Asking._stop_grace,
+    Do.HOPE: Asking._hope,
+    Do.BE_PATIENT: Asking._be_patient,
+    Do.SWALLOW: Asking._swallow,
+}

@@ -17,11 +17,13 @@ class Deadlines(Generic[K]):
         self._heap: list[tuple[Seconds, int, K]] = []
         self._count = 0
 
-    def set(self, name: K, at: Seconds | None) -> None:
-        """Its instant from now on; None: it has none."""
-        if at is None:
-            self._at.pop(name, None)
-        elif self._at.get(name) != at:
+    def clear(self, name: K) -> None:
+        """It has no instant any more."""
+        self._at.pop(name, None)
+
+    def set(self, name: K, at: Seconds) -> None:
+        """Its instant from now on."""
+        if self._at.get(name) != at:
             self._at[name] = at
             self._count += 1
             heapq.heappush(self._heap, (at, self._count, name))

@@ -46,9 +46,6 @@ class Pending:
         self.request = request
         self.accepted: asyncio.Future[None] = loop.create_future()
         self.outcome: asyncio.Future[Outcome] = loop.create_future()
-        # A caller may care for only one of the two.
-        for future in (self.accepted, self.outcome):
-            future.add_done_callback(_mark_seen)
 
     @property
     def server(self) -> str:
@@ -67,11 +64,7 @@ class Pending:
         for future in (self.accepted, self.outcome):
             if not future.done():
                 future.set_exception(end)
-
-
-def _mark_seen(future: "asyncio.Future[None] | asyncio.Future[Outcome]") -> None:
-    if not future.cancelled():
-        future.exception()
+                future.exception()  # seen: a caller may care for only one of the two
 
 
 class _Alarm:

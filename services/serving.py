@@ -87,23 +87,21 @@ _Key = tuple[str, str, str]
 
 
 class _Record:
-    """One request. run: the requester's life by its token."""
+    """One request. run: the requester's life by its token. kind: of the request, though only its cancellation came."""
+
+    __slots__ = ("answer", "ended_at", "key", "kind", "lease", "name", "request", "run", "state")
 
     def __init__(self, name: str, request: Request, run: str) -> None:
         self.name = name
         self.request = request
         self.run = run
+        self.key = _key(request)
+        self.kind = _kind(request)
+        self.lease = (Event.LEASE_OVER, name)
+        """Its clock among the deadlines."""
         self.state = State.UNKNOWN
         self.answer: Answer | None = None
         self.ended_at: Seconds = inf
-
-    @property
-    def key(self) -> _Key:
-        return _key(self.request)
-
-    @property
-    def kind(self) -> str:
-        return _kind(self.request)
 
 
 class Serving:
@@ -238,9 +236,10 @@ class Serving:
     def _new(self, request: Request) -> _Record:
         run = self._runs.get(request.requester, "")
         record = _Record(self._names.unique(request.id), request, run)
-        if (before := self._known.get((record.key, record.kind))) is not None:
+        known = (record.key, record.kind)
+        if (before := self._known.get(known)) is not None:
             self._forget(before)
-        self._known[record.key, record.kind] = self._named[record.name] = self._newest[record.key] = record
+        self._known[known] = self._named[record.name] = self._newest[record.key] = record
         return record
 
     def _forget(self, record: _Record) -> None:
@@ -265,7 +264,12 @@ class Serving:
         before = record.state
         record.state, actions = TABLE[before][event]
         for action in actions:
-            match action:
+            match action:  # the most frequent first
+                case Do.ANSWER:
+                    assert answer is not None
+                    self._answer(record, answer)
+                case Do.RENEW:
+                    self._renew(record, now if sent is None else sent, kept)
                 case Do.HAND:
                     assert request is not None
                     record.request = request
@@ -281,19 +285,14 @@ class Serving:
                     reason = GONE if action is Do.HAND_GONE else LAPSED
                     asked = record.request
                     self._hand(record, Cancel(id=asked.id, requester=asked.requester, life=asked.life, reason=reason))
-                case Do.RENEW:
-                    self._renew(record, now if sent is None else sent, kept)
                 case Do.WAIT_GRACE:
                     self._deadlines.set((Event.GRACE_OVER, record.name), now + GRACE)
                 case Do.STOP_GRACE:
-                    self._deadlines.set((Event.GRACE_OVER, record.name), None)
+                    self._deadlines.clear((Event.GRACE_OVER, record.name))
                 case Do.SAY_OUTDATED:
                     self._effects.append(Publish(answering(record.request, Outdated(id=record.name))))
                 case Do.REPEAT:
                     self._repeat(record, request or record.request)
-                case Do.ANSWER:
-                    assert answer is not None
-                    self._answer(record, answer)
                 case Do.REFUSE_UNHEARD:
                     fault = self._fault(record.request.id, f"{self._server} has never heard of it")
                     self._answer(record, Refused(id=record.name, fault=fault))
@@ -308,8 +307,8 @@ class Serving:
                     assert answer is not None
                     self._warn_ended(record.name, answer, f"has ended already, with {record.answer}")
         if record.state is not before and record.state in (State.CANCELLED, State.ENDED):
-            for clock in (Event.GRACE_OVER, Event.LEASE_OVER):
-                self._deadlines.set((clock, record.name), None)
+            self._deadlines.clear((Event.GRACE_OVER, record.name))
+            self._deadlines.clear(record.lease)
             if record.state is State.ENDED:
                 record.ended_at = now
                 self._ended[record.name] = record
@@ -327,8 +326,7 @@ class Serving:
             if self._term is None:
                 return
             term = self._term
-        clock = (Event.LEASE_OVER, record.name)
-        self._deadlines.set(clock, max(self._deadlines[clock] or 0.0, since + term))
+        self._deadlines.set(record.lease, max(self._deadlines[record.lease] or 0.0, since + term))
 
     def _answer(self, record: _Record, answer: Answer) -> None:
         record.answer = answering(record.request, answer)
