@@ -110,9 +110,13 @@ class _Server:
         self.soon = period
 
 
-_CLOCKS = (Event.RESEND_DUE, Event.GRACE_OVER, Event.PATIENCE_OVER, Event.SWALLOW_OVER)
+_CLOCKS = (
+    Event.RESEND_DUE, Event.GRACE_OVER, Event.PATIENCE_OVER, Event.CANCELLED, Event.SWALLOW_OVER,
+)  # fmt: skip
 
 
+SHORTEST_PULSE: Seconds = 0.05
+"""Whatever the lease: a shorter one would flood the bus."""
 _OVER = (State.GIVEN_UP, State.ENDED)
 
 
@@ -154,8 +158,11 @@ class Asking:
 
     # -- events ---------------------------------------------------------------------------------------------------
 
-    def send(self, expression: str, request: Request, now: Seconds) -> list[Effect]:
-        """A new request, or other content of a live one. One of another kind, or given up, is refused by name."""
+    def send(self, expression: str, request: Request, now: Seconds, within: Seconds | None = None) -> list[Effect]:
+        """A new request, or other content of a live one. One of another kind, or given up, is refused by name.
+
+        within: seconds after which it is cancelled if it has not ended.
+        """
         asked = self._asked.get(request.id)
         if asked is None:
             request = replace(request, requester=self._requester, life=self._life, lease=self._lease(request))
@@ -167,6 +174,8 @@ class Asking:
             asked.request = replace(
                 request, requester=of.requester, life=of.life, lease=of.lease, revision=of.revision + 1
             )
+        if within is not None:
+            self._deadlines.set((Event.CANCELLED, request.id), now + within)
         self._step(asked, Event.ASKED, now)
         return self._told()
 
@@ -184,11 +193,14 @@ class Asking:
         return Fault(reason=reason, where=request.id, advice=f"give this {ours} another id")
 
     def cancel(self, id: str, reason: str, now: Seconds) -> list[Effect]:
+        self._cancel(id, reason, now)
+        return self._told()
+
+    def _cancel(self, id: str, reason: str, now: Seconds) -> None:
         asked = self._asked.get(id)
         if asked is not None and asked.cancel is None:
             asked.cancel = self._cancellation(asked, reason)
             self._step(asked, Event.CANCELLED, now)
-        return self._told()
 
     def hear(self, answer: Answer, now: Seconds, server: str) -> list[Effect]:
         """What a server says. An answer of another server, to somebody else, or to another life changes nothing."""
@@ -229,6 +241,8 @@ class Asking:
             event, name = due
             if event is None:
                 self._renew(name, now)
+            elif event is Event.CANCELLED:
+                self._cancel(name, "it has taken too long", now)
             elif (asked := self._asked.get(name)) is not None:
                 self._step(asked, event, now)
         return self._told()
@@ -340,7 +354,7 @@ class Asking:
         if server is None:
             server = self._servers[asked.server] = _Server(self._patience.pulse)
         server.kept[asked.request.id] = asked
-        server.period = min(server.period, asked.request.lease / 3)
+        server.period = max(SHORTEST_PULSE, min(server.period, asked.request.lease / 3))
         self._renew_soon(asked.server, now, server.period)
 
     def _let_go(self, asked: _Asked, now: Seconds = 0.0) -> None:

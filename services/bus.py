@@ -210,7 +210,7 @@ class Bus(ABC):
         """
         return Containing(self, what, then)
 
-    def failed(self, error: Exception, what: object) -> Fault:
+    def failed(self, error: BaseException, what: object) -> Fault:
         """Log, count and tell an exception that nobody has foreseen."""
         reason = error.fault.reason if isinstance(error, EngageError) else f"{type(error).__name__}: {error}"
         fault = Fault(
@@ -272,12 +272,18 @@ class Containing:
         pass
 
     def __exit__(self, kind: object, error: BaseException | None, trace: object) -> bool:
-        if not isinstance(error, Exception):
+        if not isinstance(error, Exception | asyncio.CancelledError) or is_asked_to_stop():
             return False
         fault = self._bus.failed(error, self._what)
         if self._then is not None:
             self._then(fault)
         return True
+
+
+def is_asked_to_stop() -> bool:
+    """Has somebody cancelled this task? Else a CancelledError in it is a mistake of what it awaits."""
+    task = asyncio.current_task()
+    return task is not None and task.cancelling() > 0
 
 
 def _told(what: object) -> str:

@@ -185,9 +185,9 @@ class Robot:
         try:
             yield
         finally:
-            if not pending.outcome.done():
-                self._requests.cancel(request.id, "released")
-                await self._answer_of(pending, asyncio.shield(pending.outcome), ttl)
+            self._requests.cancel(request.id, "released")
+        # Only on the good way: who is cancelled, or fails, is not to wait, nor to hear of a lease that was lost.
+        await asyncio.wait([pending.outcome], timeout=ttl)
 
     async def _ask(self, key: str, request: Request, timeout: Seconds | None) -> Outcome:
         pending = self._requests.send(key, request)

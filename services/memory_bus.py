@@ -245,7 +245,7 @@ class MemoryBus(Bus):
             return decode(encode(answer(decode(encode(message)))))
         except EngageError as error:
             raise InputRefused(error.fault) from error
-        except Exception as error:
+        except (Exception, asyncio.CancelledError) as error:  # nothing is awaited here: it is the server's mistake
             raise InputRefused(server.failed(error, f"a question on {key}")) from error
 
     def answer(self, key: str, answer: Answer, *, empty: Message | None = None) -> None:

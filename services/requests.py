@@ -113,16 +113,17 @@ class Requester:
         self._listening: asyncio.Task[None] | None = None
         self._broken: EngageError | None = None
 
-    def send(self, key: str, request: Request) -> Pending:
+    def send(self, key: str, request: Request, within: Seconds | None = None) -> Pending:
         """Publish the request and keep at it. A known id is an update: the newest content is what is sent again.
 
-        key: the expression of the command (`keys.BLOCK`). An update of a request that is being cancelled is void.
-        An id that a live request of another kind has, or one that was given up, is refused at once.
+        key: the expression of the command (`keys.BLOCK`). within: seconds until it is cancelled. An update of a
+        request that is being cancelled is void. An id that a live request of another kind has, or one that was given
+        up, is refused at once.
         """
         if self._broken is not None:
             return self._failed(key, request, self._broken)
         known = self._pending.get(request.id)
-        effects = self._asking.send(key, request, self._bus.now())
+        effects = self._asking.send(key, request, self._bus.now(), within)
         match effects:
             case [asking.TellEnd(end=EngageError() as error)]:
                 return self._failed(key, request, error)

@@ -87,7 +87,7 @@ _Key = tuple[str, str, str]
 
 
 class _Record:
-    """One request. run: the requester's life by its token. kind: of the request, though only its cancellation came."""
+    """One request. run: the requester's life by its token. kind: of the request, or of what a cancellation ends."""
 
     __slots__ = ("answer", "ended_at", "key", "kind", "lease", "name", "request", "run", "state")
 
@@ -235,7 +235,9 @@ class Serving:
 
     def _new(self, request: Request) -> _Record:
         run = self._runs.get(request.requester, "")
-        record = _Record(self._names.unique(request.id), request, run)
+        while (name := self._names.unique(request.id)) in self._named:
+            pass  # a live one from so long ago that its name is forgotten
+        record = _Record(name, request, run)
         known = (record.key, record.kind)
         if (before := self._known.get(known)) is not None:
             self._forget(before)

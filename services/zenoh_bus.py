@@ -271,7 +271,7 @@ class ZenohBus(Bus):
                 query.reply(key, payload, encoding=encoding)
             except EngageError as error:
                 refuse(query, error.fault, form)
-            except Exception as error:
+            except (Exception, asyncio.CancelledError) as error:
                 refuse(query, self.failed(error, f"a question on {key}"), form)
             finally:
                 finish(query)

@@ -2,7 +2,7 @@
 
 import asyncio
 from collections.abc import AsyncIterator, Callable
-from contextlib import asynccontextmanager
+from contextlib import asynccontextmanager, suppress
 from typing import Any
 
 import pytest
@@ -16,8 +16,9 @@ from schemas.body import GoHome, PerformBehavior
 from schemas.faults import Fault, InputRefused
 from schemas.fragments import FragmentOutcome, PerformFragment, TurnFragment
 from schemas.messages import Message, encode_json
+from schemas.presence import PeerGone
 from schemas.requests import Refused, Request
-from services.client import Robot, connect
+from services.client import PerformFailed, Robot, connect
 from services.commandline import roster
 from services.config import load
 from services.memory_bus import MemoryHub
@@ -349,3 +350,74 @@ async def test_a_question_that_breaks_its_server_is_answered_with_a_fault(
     with pytest.raises(InputRefused, match="ZeroDivisionError: describe broke"):
         await hub.join("asker").query(keys.DESCRIBE, HOME)
     assert bus.health.failures == 1
+
+
+@pytest.mark.parametrize("gone", ["killed", "cut"])
+@pytest.mark.parametrize("how", ["cancelled", "timeout", "own error"])
+async def test_who_leaves_a_lease_leaves_it_at_once_whatever_became_of_generation(
+    hub: MemoryHub, gone: str, how: str
+) -> None:
+    async def hold(robot: Robot) -> None:
+        async with robot.inhibit_gaze(ttl=5.0):
+            if how == "own error":
+                await asyncio.sleep(1.0)
+                raise KeyError("mine")
+            await asyncio.sleep(100.0)
+
+    async with robot_of(hub) as robot:
+        holding = asyncio.create_task(hold(robot) if how != "timeout" else asyncio.wait_for(hold(robot), 1.0))
+        await asyncio.sleep(0.5)
+        if gone == "cut":
+            hub.partition("generation")
+        else:
+            hub.announce("generation", PeerGone(participant="generation"))
+        await asyncio.sleep(0.5)
+        if how == "cancelled":
+            holding.cancel()
+        began = robot.now()
+        expected = {"cancelled": asyncio.CancelledError, "timeout": TimeoutError, "own error": KeyError}[how]
+        with pytest.raises(expected):
+            await holding
+        assert robot.now() - began < 0.1
+        hub.heal()
+
+
+def cancelled_by_itself(*arguments: object, **named: object) -> Any:
+    raise asyncio.CancelledError
+
+
+@pytest.mark.contained
+@pytest.mark.parametrize("method", ["perform", "estimate", "home"])
+async def test_a_driver_that_is_cancelled_by_itself_ends_one_behavior(
+    hub: MemoryHub, monkeypatch: pytest.MonkeyPatch, method: str
+) -> None:
+    behaviors = [Gaze(id="g", target="human"), Speech(id="s", text="one two")]
+    async with robot_of(hub) as robot:
+        with monkeypatch.context() as patch:
+            patch.setattr(f"services.control.simulated.SimulatedBody.{method}", cancelled_by_itself)
+            for number in range(2):
+                began = robot.now()
+                with suppress(InputRefused, PerformFailed):
+                    composition: Any = ("MERGE", "REPLACE")[number]
+                    await asyncio.wait_for(robot.realize(f"b{number}", behaviors, composition=composition), 60.0)
+                assert robot.now() - began < 5.0
+        await asyncio.sleep(15.0)
+        assert (await robot.realize("after", behaviors, composition="REPLACE")).status == "done"
+
+
+async def test_a_way_home_that_never_ends_is_not_asked_for_for_ever(
+    hub: MemoryHub, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    async def never(*arguments: object) -> None:
+        await asyncio.Event().wait()
+
+    monkeypatch.setattr("services.control.simulated.SimulatedBody.home", never)
+    with hub.join("ear").subscribe(keys.keep_alive("control")) as pulses:
+        async with robot_of(hub) as robot:
+            for number in range(3):
+                asking = robot.realize(f"b{number}", [Pointing(id="p", target="blue-square")], composition="REPLACE")
+                await asyncio.wait([asyncio.ensure_future(asking)], timeout=1.0)
+            await asyncio.sleep(60.0)
+            await everything(pulses)
+            await asyncio.sleep(60.0)
+            assert not any(kept.kind == "go_home" for each in await everything(pulses) for kept in each.message.live)

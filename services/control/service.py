@@ -30,7 +30,7 @@ from schemas.messages import Message
 from schemas.requests import Cancel, Request
 from schemas.units import Seconds
 from schemas.world import World
-from services.bus import Bus, Received
+from services.bus import Bus, Received, is_asked_to_stop
 from services.control import variability
 from services.control.actions import ActionMessage, Deeds
 from services.control.body import Arrived, Authority, BehaviorRefused, Body, BodyFailed, Progress, Reached, Spoke
@@ -98,6 +98,8 @@ class _Control:
         self._world = World(entities=())
         self._objects = CoveredObjects(config.covered_for)
         self._live: dict[str, _Performance] = {}
+        self._ways: dict[str, asyncio.Task[None]] = {}
+        """Home, as somebody has asked for."""
         self._sent = 0
         self._loop = asyncio.get_running_loop()
         self._next_state: asyncio.TimerHandle | None = None
@@ -153,7 +155,12 @@ class _Control:
                 live.authority.revoke()
             case GoHome():
                 self.desk.accept(request.id)
-                self._tasks.create_task(self._go_home(request), name=f"home {request.id}")
+                way = self._tasks.create_task(self._go_home(request), name=f"home {request.id}")
+                self._ways[request.id] = way
+                way.add_done_callback(lambda _: self._ways.pop(request.id, None))
+            case Cancel(id=id) if id in self._ways:
+                self._ways[id].cancel()
+                self.desk.refuse(id, Fault(reason="given up on the way home", where=id, service="control"))
 
     def _begin(self, request: PerformBehavior) -> None:
         try:
@@ -209,7 +216,9 @@ class _Control:
             return
         except BodyFailed as error:
             live.status, fault = "failed", error.fault
-        except Exception as error:
+        except (Exception, asyncio.CancelledError) as error:
+            if is_asked_to_stop():
+                raise
             # A mistake of the body's driver ends this behavior. Where its parts are nobody knows: all go home.
             live.status, fault = "failed", self._bus.failed(error, f"behavior {live.label}")
             self._take_home(f"after {live.label} broke")

@@ -16,7 +16,7 @@ from schemas.fragments import PerformFragment
 from schemas.recognition import ConnectionEvent, SignalTurn
 from schemas.units import Seconds
 from schemas.world import World
-from services.bus import Bus
+from services.bus import Bus, is_asked_to_stop
 from services.generation.arbiter import Arbiter
 from services.generation.body_link import BodyLink
 from services.generation.config import GenerationConfig
@@ -245,7 +245,9 @@ class Conductor:
             performance.refuse(error.fault, self._bus.now())  # the realizer did
         except EngageError as error:
             performance.fail(error, self._bus.now())
-        except Exception as error:
+        except (Exception, asyncio.CancelledError) as error:
+            if is_asked_to_stop():
+                raise
             fault = self._bus.failed(error, f"fragment {fragment.id}")
             performance.fail(RunFailed(fault), self._bus.now())
         self._block_ended(performance)

@@ -8,10 +8,15 @@ from msgspec import Struct
 from schemas.attention import Claim, Inhibit
 from schemas.behaviors import Hand
 from schemas.faults import Fault, InputRefused
+from schemas.units import Seconds
 from services.generation.config import GenerationConfig
 from services.generation.permits import HANDS, Permits
 
 _HAND_OF: dict[str, Hand] = {"point-left": "LEFT_HAND", "point-right": "RIGHT_HAND"}
+
+
+SHORTEST: Seconds = 0.1
+"""Of a lease: it is renewed three times as often."""
 
 
 class Inhibition(Struct, frozen=True):
@@ -34,8 +39,8 @@ class Leases:
 
     def take(self, request: Inhibit) -> None:
         """A new lease, or one whose owner has changed its mind. Raises InputRefused."""
-        if not 0 < request.ttl < inf:
-            reason = f"ttl {request.ttl} is not a positive number of seconds"
+        if not SHORTEST <= request.ttl < inf:
+            reason = f"ttl {request.ttl} is not a number of seconds, {SHORTEST} or more"
             raise InputRefused(Fault(reason=reason, where=f"{request.id}: ttl"))
         if request.mode == "target" and not request.target:
             raise InputRefused(Fault(reason="mode 'target' without a target", where=f"{request.id}: target"))

@@ -5,9 +5,13 @@ from collections.abc import Iterable
 from schemas import keys
 from schemas.behaviors import BlockBehavior
 from schemas.body import GoHome, PerformBehavior, PlannedInstant
+from schemas.units import Seconds
 from services.bus import Bus
 from services.realizer.effects import Begin, Extend
 from services.requests import Pending, Requester
+
+LONGEST_WAY: Seconds = 10.0
+"""Home: a body that does not say that it is there is not asked for longer."""
 
 
 class BodyLink:
@@ -40,4 +44,4 @@ class BodyLink:
     def go_home(self, parts: Iterable[str], behavior: str = "") -> None:
         """behavior: for whose sake; empty: the block's."""
         going = GoHome(id=f"{self.id(behavior)}:home", parts=tuple(sorted(parts)))
-        self._requests.send(keys.BEHAVIOR, going)
+        self._requests.send(keys.BEHAVIOR, going, within=LONGEST_WAY)

@@ -26,6 +26,7 @@ from schemas.feedback import WarningFeedback
 from schemas.presence import PeerAlive, PeerGone
 from schemas.requests import Cancel, Outcome, Request, Unreadable
 from services.bus import Bus, Received
+from services.realizer.body_link import LONGEST_WAY
 from services.realizer.config import RealizerConfig
 from services.realizer.executor import Performance
 from services.realizer.ledger import Ledger
@@ -273,7 +274,7 @@ class _Realizer:
         parts = parts.difference(*(other.parts_moving for other in self.performing() if other not in replaced))
         if parts:
             home = GoHome(id=f"{live.request.id}/:way", parts=tuple(sorted(parts)))
-            way = self.requests.send(keys.BEHAVIOR, home).outcome
+            way = self.requests.send(keys.BEHAVIOR, home, within=LONGEST_WAY).outcome
             self.homing.add(way)
             way.add_done_callback(self.homing.discard)
 

@@ -15,6 +15,7 @@ from schemas.presence import PeerAlive, PeerGone
 from schemas.requests import Accepted, Cancel, Heard, KeepAlive, Kept, Outdated, Refused, Request
 from schemas.units import Stamp
 from services.asking import Asking, Patience, RequestRefused, TellEnd
+from services.asking import Publish as AskedToPublish
 from services.bus import read_payload
 from services.memory_bus import MemoryHub
 from services.serving import LIFELESS_KEPT, Complain, Hand, Names, Publish, Serving
@@ -212,3 +213,35 @@ async def test_presence_is_no_payload(hub: MemoryHub, message: Any) -> None:
         read_payload(payload, "application/json", key_of(hub.join("me"), keys.BLOCK), "")
     with pytest.raises(TypeError, match="never sent"):
         hub.join("you").publish(keys.WORLD, message)
+
+
+def test_a_live_name_is_never_given_away() -> None:
+    serving = Serving("generation")
+    serving.take(BLOCK, 0.0)
+    for number in range(5000):
+        serving.take(replace(BLOCK, id=f"x{number}"), 0.0)
+        serving.answer(f"x{number}", Refused(id="", fault=Fault(reason="no")), 0.0)
+
+    (second,) = handed(serving.take(replace(BLOCK, requester="you"), 0.0))
+
+    assert second.id == "a~2"
+
+
+def test_a_request_that_takes_longer_than_it_may_is_cancelled_once() -> None:
+    asking = Asking("me", "1", Patience())
+    asking.send(keys.BLOCK, PerformBlock(id="a", block=Block(id="b")), 0.0, within=2.0)
+    asking.hear(Accepted(id="a", requester="me", life="1", kind="perform_block"), 0.1, "realizer")
+    cancelled = [each.message for each in asking.tick(2.0) if isinstance(each, AskedToPublish)]
+
+    assert [(type(each), each.reason) for each in cancelled if isinstance(each, Cancel)] == [
+        (Cancel, "it has taken too long")
+    ]
+
+
+@pytest.mark.parametrize("lease", [1e-12, 1e-6])
+def test_a_tiny_lease_floods_nobody(lease: float) -> None:
+    asking = Asking("me", "1", Patience(lease=lease))
+    asking.send(keys.BLOCK, PerformBlock(id="a", block=Block(id="b")), 1e6)
+    asking.hear(Accepted(id="a", requester="me", life="1", kind="perform_block"), 1e6, "realizer")
+
+    assert len(asking.tick(1e6 + 1.0)) < 30
