@@ -67,6 +67,8 @@ class Robot:
         self._bus = bus
         self._requests = requests
         self._numbers = count(1)
+        self._life = bus.new_life()
+        """In the names of fragments that have none: another client of this name, or its next life, has others."""
 
     @classmethod
     @asynccontextmanager
@@ -98,7 +100,7 @@ class Robot:
         timeout: how long to wait for it to be accepted, for example until generation is there.
         Raises InputRefused (nothing has moved), PerformFailed, or RunFailed (generation is gone, or never came).
         """
-        parsed = _fragment(fragment, f"{self._bus.name}-{next(self._numbers)}")
+        parsed = _fragment(fragment, f"{self._bus.name}-{self._life}-{next(self._numbers)}")
         request = self._fragment_request(parsed)
         answered = await_answer and parsed.turn_status in ("end", "full")
         outcome = await (self._answered(request, timeout) if answered else self._performed(request, timeout))

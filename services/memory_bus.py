@@ -85,22 +85,30 @@ class MemoryHub(Hub):
     def send(self, sender: str, key: str, message: Message) -> None:
         if isinstance(message, LOCAL):
             raise TypeError(f"{type(message).__name__} is never sent")
+        try:
+            message = decode(*published(message))
+        except InputRefused as error:  # as on a wire: those who get it refuse it, not who has sent it
+            self._refuse(key, error)
+            return
         life = self._buses[sender].run
-        self._pass_on(sender, Received(key, decode(*published(message)), sender, self._loop.time(), life=life))
+        self._pass_on(sender, Received(key, message, sender, self._loop.time(), life=life))
 
     def inject(self, key: str, payload: bytes, encoding: str) -> None:
         """A payload from outside, as another program would send it. A bad one is answered with a Fault."""
         try:
             message = read_payload(payload, encoding, key, "")
         except InputRefused as error:
-            for bus in [bus for bus in self._buses.values() if bus.wants(key)]:
-                bus.publish(keys.fault(bus.name), msgspec.structs.replace(error.fault, where=key, service=bus.name))
-            refused = unreadable(error, key)
-            if refused is not None and (server := self._buses.get(keys.server_of(key))):
-                self.sent += 1
-                server.deliver(Received(key, refused, "", self._loop.time()), self.sent)
+            self._refuse(key, error)
         else:
             self._pass_on("", Received(key, message, "", self._loop.time()))
+
+    def _refuse(self, key: str, error: InputRefused) -> None:
+        for bus in [bus for bus in self._buses.values() if bus.wants(key)]:
+            bus.publish(keys.fault(bus.name), msgspec.structs.replace(error.fault, where=key, service=bus.name))
+        refused = unreadable(error, key)
+        if refused is not None and (server := self._buses.get(keys.server_of(key))):
+            self.sent += 1
+            server.deliver(Received(key, refused, "", self._loop.time()), self.sent)
 
     def _pass_on(self, sender: str, received: Received) -> None:
         self.sent += 1

@@ -193,11 +193,10 @@ class Requester:
         for id in self._asking.ids:
             self.cancel(id, "requester closed")
         self._alarm.stop()
-        for pending in self._pending.values():
-            pending.accepted.cancel()
-            pending.outcome.cancel()
-        self._pending.clear()
         self._broken = self._broken or RunFailed("the client is closed")
+        for pending in self._pending.values():
+            pending.end(self._broken)
+        self._pending.clear()
 
     # -- listening by itself ----------------------------------------------------------------------------------------
 

@@ -95,7 +95,10 @@ class _Speaking:
         self._await_answer = await_answer
         self._performing: list[asyncio.Task[FragmentOutcome]] = []
         self._refused: set[str] = set()
+        self._sent: set[str] = set()
+        """Fragments whose task has come to its first step before anything was cancelled."""
         self._is_finished = False
+        self._last = ""
 
     def begin(self, tasks: asyncio.TaskGroup, reading: "asyncio.Task[None]") -> None:
         self._tasks = tasks
@@ -121,14 +124,16 @@ class _Speaking:
 
     def break_off(self) -> None:
         """Where the robot was just silent there was no fragment to interrupt, and the turn is still open."""
-        performed = [task for task in self._performing if not task.cancelled() and task.exception() is None]
-        is_silent = bool(performed) and len(performed) == len(self._performing)
-        if is_silent and not self._is_finished and all(task.result().status == "done" for task in performed):
+        sent = [task for task in self._performing if task.get_name() in self._sent]
+        ended = [task.result() for task in sent if not task.cancelled() and task.exception() is None]
+        is_silent = bool(sent) and [outcome.status for outcome in ended] == ["done"] * len(sent)
+        if is_silent and (self._last not in self._sent or not self._is_finished):
             self._robot.begin_to_perform(self._fragment((), "end"))
 
     def _send(self, chunk: Chunk, status: TurnStatus) -> None:
         self._is_finished = status in ("end", "full")
         fragment = self._fragment(chunk, status)
+        self._last = fragment.id
         # Requests keep the order of these tasks: each is sent in its task's first step.
         self._performing.append(self._tasks.create_task(self._perform(fragment), name=fragment.id))
 
@@ -137,6 +142,7 @@ class _Speaking:
         return fragment_of(chunk, replace(self._turn, turn_status=status), id)
 
     async def _perform(self, fragment: TurnFragment) -> FragmentOutcome:
+        self._sent.add(fragment.id)
         try:
             outcome = await self._robot.perform(fragment, await_answer=self._await_answer)
         except EngageError as error:

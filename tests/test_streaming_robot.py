@@ -5,6 +5,8 @@ from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from typing import NamedTuple
 
+import pytest
+
 from schemas import keys
 from schemas.actions import ActionBegan, ActionEnded
 from schemas.summary import Summary, summary
@@ -155,3 +157,29 @@ async def first_word(pieces: AsyncIterator[Piece]) -> Seconds:
 
 async def test_a_part_of_words_is_spoken_while_the_next_one_is_written() -> None:
     assert await first_word(parts_as_written()) < len('{"say": "Hello there, nice to meet you."}, ') / 4 * TOKEN + 0.1
+
+
+async def test_a_stream_that_is_cancelled_as_a_piece_comes_leaves_no_turn_open(hub: MemoryHub) -> None:
+    """The last fragment's task is cancelled before its first step: nothing of it was sent."""
+    config = load(settings=["simulation.human=listening"])
+    services = {name: roster.service(name, config) for name in (*roster.ROBOT, "simulation")}
+    async with running(hub, services), connect(hub=hub) as robot:
+        await robot.person()
+        streaming: asyncio.Task[object]
+
+        async def pieces() -> AsyncIterator[str]:
+            yield "One sentence. "
+            yield "x"
+            await asyncio.sleep(5.0)
+            yield " is said. "
+            streaming.cancel()
+            yield "More. "
+
+        streaming = asyncio.create_task(stream(robot, pieces(), id="t"))
+        with pytest.raises(asyncio.CancelledError):
+            await streaming
+        await asyncio.sleep(1.0)
+
+        outcome = await robot.perform({"turn_status": "full", "parts": [{"say": "hello"}]})
+
+    assert outcome.status == "done"

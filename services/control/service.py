@@ -213,6 +213,7 @@ class _Control:
         except BehaviorRefused as error:
             del self._live[request.id]
             self.desk.refuse(request.id, error.fault)
+            self._end_aborts(live)
             return
         except BodyFailed as error:
             live.status, fault = "failed", error.fault
@@ -238,6 +239,9 @@ class _Control:
                 fault=fault,
             )
         )
+        self._end_aborts(live)
+
+    def _end_aborts(self, live: _Performance) -> None:
         for id in live.aborts:
             self.desk.end(BehaviorAborted(id=id))
 

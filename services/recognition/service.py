@@ -22,6 +22,8 @@ from services.recognition.witnesses import Witnesses
 from services.requests import RequestDesk
 from services.runtime import Ready
 
+OLDEST: Seconds = 60.0
+"""How long ago anything may have happened of which we hear now. What is counted in windows would count for ever."""
 COMPLAINTS = 100
 """How many bad ids are told of."""
 
@@ -120,7 +122,7 @@ class _Recognition:
         return False
 
     def _when(self, observation: Perceived, arrived: Seconds) -> Seconds:
-        """Local time of what happened. A stamp from the future is not believed."""
+        """Local time of what happened. A stamp from the future is not believed, nor one from long ago."""
         stamp: Stamp | None
         match observation:
             case HeadOwner(since=stamp) | World(at=stamp):
@@ -129,7 +131,8 @@ class _Recognition:
                 stamp = None
             case _:
                 stamp = observation.at
-        return arrived if stamp is None else min(self._bus.local(stamp), self._bus.now())
+        now = self._bus.now()
+        return arrived if stamp is None else max(min(self._bus.local(stamp), now), now - OLDEST)
 
     def _tell(self, effects: Iterable[Result]) -> Fault | None:
         """Publish what follows; the fault, if a bug has shown."""
