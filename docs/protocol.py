@@ -177,10 +177,27 @@ request: nothing is done twice. Other content under the id of a live request rep
 (`PerformBehavior`, `Inhibit`), and is ignored with a `Fault` else. `Cancel` ends it as interrupted; it is sent again
 until the outcome has come.
 
-What was accepted is not sent again. Where a request names a `lease`, it must be renewed within so many seconds: by being
-sent again, or by a `KeepAlive` that names it with all others (Engage's own once a second, leases of 5 s); else the
-server ends it. The lease of a `PerformBehavior` is that of the movement authority. `Outdated` answers a `KeepAlive` that
-speaks of newer content than the server has, `Refused` one that names what it does not know.
+What was accepted is not sent again. Where a request names a `lease` (an `Inhibit`: its `ttl`), it must be renewed within so
+many seconds: by being sent again, or by a `KeepAlive` that names it with all others (Engage's own once a second, leases of
+5 s); else the server ends it. The lease of a `PerformBehavior` is that of the movement authority. `live` is a list of
+lists, of kind, id, revision, authority (`through` of a `PerformBehavior`, else empty) and seconds from `at`; a clock that
+nobody knows reads as now:
+
+```json
+{{"type": "keep_alive", "life": "7", "at": ["mine", 0], "live": [["perform_fragment", "greeting-1", 0, "", 5.0]]}}
+```
+
+`Outdated` answers a `KeepAlive` that speaks of newer content than the server has, of a kind that can be changed; `Refused`
+one that names what the server does not know; the outcome, one that names what has ended.
+
+- The id of the request is what counts here. Fragments and blocks have ids of their own, which nobody else's live fragment
+  or block may have.
+- With a life, an id is spent when its request has ended or was refused: the same again is answered with the same, other
+  content too, and a `Fault` says so. A corrected request needs another id.
+- Content of the same or a higher `revision` replaces what is there; count it up.
+- `Cancel` names the life of what it cancels. One that comes before its request refuses that.
+- A payload that is none is answered with `Refused` if its id can be read, and with a `Fault` in any case.
+- The token of a participant is `<robot>/{keys.own("<run>", "alive/<name>")}`, with a run of its own making.
 
 When the requester's liveliness token stays away for 2 s, or comes back as another life, the server ends its requests. A
 requester without a token and without a lease is left alone, but by control.

@@ -1,6 +1,7 @@
 """What went wrong, where, and what to do about it: one message and one small hierarchy of exceptions."""
 
 from msgspec import Struct
+from msgspec.structs import force_setattr
 
 
 class Fault(Struct, frozen=True, kw_only=True, tag="fault", omit_defaults=True):
@@ -13,6 +14,16 @@ class Fault(Struct, frozen=True, kw_only=True, tag="fault", omit_defaults=True):
     """Line of the XML source, from 1; 0 when there is none."""
     advice: str = ""
     service: str = ""
+
+    def __post_init__(self) -> None:
+        """What is no Unicode is written with backslashes: a fault must always get through.
+
+        Python itself makes such text, of the names of files for instance.
+        """
+        for name in ("reason", "where", "advice", "service"):
+            text = getattr(self, name)
+            if isinstance(text, str) and not text.isascii():
+                force_setattr(self, name, text.encode("utf-8", "backslashreplace").decode())
 
     def __str__(self) -> str:
         place = ", ".join(part for part in (self.where, f"line {self.line}" if self.line else "") if part)
@@ -45,3 +56,15 @@ class RunFailed(EngageError):
 
 class NoReply(EngageError):
     """A query went unanswered within its timeout: the server is dead, absent or denied."""
+
+
+class RequestRefused(EngageError):
+    """The server refused; nothing of the request was done."""
+
+
+class ServerRestarted(RunFailed):
+    """The server that had accepted the request is there as another life, which knows nothing of it."""
+
+
+class NeverEnded(RunFailed):
+    """The server has not ended the request, though it was asked to."""

@@ -117,11 +117,13 @@ class Refused(Answer, frozen=True, kw_only=True, tag="refused", omit_defaults=Tr
 class Unreadable(Struct, frozen=True, kw_only=True, tag="unreadable", omit_defaults=True):
     """local: bus -> server of the key. What came there as a command is none: made on arrival, never sent.
 
-    id: of the request, as far as it could be read.
+    id, life, kind: of the request, as far as they could be read.
     """
 
     fault: Fault
     id: str = ""
+    life: str = ""
+    kind: str = ""
 
 
 class Outcome(Answer, frozen=True, kw_only=True, omit_defaults=True):

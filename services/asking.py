@@ -15,23 +15,11 @@ from msgspec import Struct
 from msgspec.structs import replace
 
 from schemas import keys
-from schemas.faults import EngageError, Fault, RunFailed
+from schemas.faults import EngageError, Fault, NeverEnded, RequestRefused, RunFailed, ServerRestarted
 from schemas.requests import Accepted, Answer, Cancel, Heard, Kept, Outcome, Outdated, Refused, Request, kind_of
 from schemas.units import Seconds
 from services.asking_table import TABLE, TELLING, Do, Event, State
 from services.deadlines import Deadlines
-
-
-class RequestRefused(EngageError):
-    """The server refused; nothing of the request was done."""
-
-
-class ServerRestarted(RunFailed):
-    """The server that had accepted the request is there as another life, which knows nothing of it."""
-
-
-class NeverEnded(RunFailed):
-    """The server has not ended the request, though it was asked to."""
 
 
 class Patience(Struct, frozen=True, kw_only=True):
@@ -195,6 +183,13 @@ class Asking:
     def cancel(self, id: str, reason: str, now: Seconds) -> list[Effect]:
         self._cancel(id, reason, now)
         return self._told()
+
+    def forget(self, id: str) -> None:
+        """It could not even be sent."""
+        if (asked := self._asked.pop(id, None)) is not None:
+            self._let_go(asked)
+            for clock in _CLOCKS:
+                self._deadlines.clear((clock, id))
 
     def _cancel(self, id: str, reason: str, now: Seconds) -> None:
         asked = self._asked.get(id)

@@ -13,6 +13,7 @@ from enum import Enum, auto
 from types import TracebackType
 from typing import Generic, Self, TypeVar
 
+import msgspec
 from msgspec import Struct
 
 from schemas import keys
@@ -212,20 +213,26 @@ class Bus(ABC):
 
     def failed(self, error: BaseException, what: object) -> Fault:
         """Log, count and tell an exception that nobody has foreseen."""
-        reason = error.fault.reason if isinstance(error, EngageError) else f"{type(error).__name__}: {error}"
+        reason = error.fault.reason if isinstance(error, EngageError) else _text(error)
         fault = Fault(
             reason=reason, where=_told(what), advice="this is a bug: the log has its traceback", service=self.name
         )
         self.failures += 1
         LOG.error("%s: %s", self.name, fault, exc_info=error)
-        self.publish(keys.fault(self.name), fault)
+        self._complain(fault)
         return fault
 
     def report(self, fault: Fault) -> None:
         """Log, count and tell a mistake of this participant."""
         self.failures += 1
         LOG.error("%s: %s", self.name, fault)
-        self.publish(keys.fault(self.name), fault)
+        self._complain(fault)
+
+    def _complain(self, fault: Fault) -> None:
+        try:
+            self.publish(keys.fault(self.name), fault)
+        except Exception:
+            LOG.exception("%s: the fault could not be told", self.name)
 
     @abstractmethod
     def publish(self, key: str, message: Message) -> None:
@@ -276,8 +283,18 @@ class Containing:
             return False
         fault = self._bus.failed(error, self._what)
         if self._then is not None:
-            self._then(fault)
+            try:
+                self._then(fault)
+            except Exception as worse:
+                self._bus.failed(worse, "what follows from the fault before")
         return True
+
+
+def _text(error: BaseException) -> str:
+    try:
+        return f"{type(error).__name__}: {error}"
+    except Exception:  # it can't even say what it is
+        return type(error).__name__
 
 
 def is_asked_to_stop() -> bool:
@@ -345,8 +362,22 @@ def read_payload(payload: bytes, encoding: str, key: str, source: str) -> Messag
     return PerformFragment(id=thing.id, requester=requester, fragment=thing)
 
 
-def unreadable(error: EngageError, key: str) -> Unreadable | None:
+class _Head(Struct):
+    """As much of a request as its answer needs."""
+
+    id: str = ""
+    life: str = ""
+    type: str = ""
+
+
+def unreadable(error: EngageError, key: str, payload: bytes = b"", encoding: str = "") -> Unreadable | None:
     """What the server of `key` gets to hear of a bad payload: it owes an answer. None on keys that have no server."""
     if keys.key_class(key) != "cmd":
         return None
-    return Unreadable(id=getattr(error, "block", None) or "", fault=error.fault)
+    codec = msgspec.json if encoding.startswith("application/json") else msgspec.msgpack
+    try:
+        head = codec.decode(payload, type=_Head)
+    except (msgspec.DecodeError, UnicodeDecodeError, RecursionError):
+        head = _Head()
+    id = getattr(error, "block", None) or head.id
+    return Unreadable(id=id, life=head.life, kind=head.type, fault=error.fault)

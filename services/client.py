@@ -37,6 +37,7 @@ from schemas.faults import Fault, InputRefused, NoReply, RunFailed
 from schemas.feedback import Feedback
 from schemas.fragments import FragmentOutcome, PerformFragment, TurnClosed, TurnFragment
 from schemas.json_codec import read
+from schemas.messages import decode, published
 from schemas.recognition import Statistics
 from schemas.requests import Outcome, Request
 from schemas.units import Seconds, Stamp
@@ -108,7 +109,7 @@ class Robot:
 
     def begin_to_perform(self, fragment: TurnFragment) -> None:
         """Send a fragment and do not wait for what becomes of it."""
-        self._requests.send(keys.FRAGMENT, self._fragment_request(fragment))
+        self._requests.send(keys.FRAGMENT, _checked(self._fragment_request(fragment)))
 
     def _fragment_request(self, fragment: TurnFragment) -> PerformFragment:
         return PerformFragment(id=self._request_id(fragment.id), fragment=fragment)
@@ -178,7 +179,7 @@ class Robot:
         Raises InputRefused, for example when `target` is unknown. If the lease is lost the body runs on.
         """
         request = Inhibit(id=self._request_id("inhibit"), part=part, mode=mode, target=target, ttl=ttl)
-        pending = self._requests.send(keys.INHIBIT, request)
+        pending = self._requests.send(keys.INHIBIT, _checked(request))
         try:
             await self._answer_of(pending, pending.accepted, timeout)
         except (asyncio.CancelledError, RunFailed):
@@ -192,7 +193,7 @@ class Robot:
         await asyncio.wait([pending.outcome], timeout=ttl)
 
     async def _ask(self, key: str, request: Request, timeout: Seconds | None) -> Outcome:
-        pending = self._requests.send(key, request)
+        pending = self._requests.send(key, _checked(request))
         try:
             if timeout is not None:
                 await self._answer_of(pending, pending.accepted, timeout)
@@ -344,6 +345,18 @@ def _fragment(source: FragmentSource, unnamed: str) -> TurnFragment:
         case (Block(),):
             raise InputRefused(Fault(reason="a BML block, not a turn fragment", where=place, advice="use `realize`"))
     raise InputRefused(Fault(reason=f"{len(things)} things, not one turn fragment", where=place))
+
+
+R = TypeVar("R", bound=Request)
+
+
+def _checked(request: R) -> R:
+    """As its server will get it: structs take any values where they are made. Raises InputRefused."""
+    try:
+        decode(*published(request))  # type: ignore[arg-type]
+    except (UnicodeEncodeError, OverflowError, TypeError, ValueError, RecursionError, msgspec.MsgspecError) as error:
+        raise InputRefused(Fault(reason=str(error), where=str(request.id))) from error
+    return request
 
 
 def _encoded(encode: Callable[[], bytes]) -> bytes:

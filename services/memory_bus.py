@@ -88,7 +88,7 @@ class MemoryHub(Hub):
         try:
             message = decode(*published(message))
         except InputRefused as error:  # as on a wire: those who get it refuse it, not who has sent it
-            self._refuse(key, error)
+            self._refuse(key, error, *published(message))
             return
         life = self._buses[sender].run
         self._pass_on(sender, Received(key, message, sender, self._loop.time(), life=life))
@@ -98,14 +98,14 @@ class MemoryHub(Hub):
         try:
             message = read_payload(payload, encoding, key, "")
         except InputRefused as error:
-            self._refuse(key, error)
+            self._refuse(key, error, payload, encoding)
         else:
             self._pass_on("", Received(key, message, "", self._loop.time()))
 
-    def _refuse(self, key: str, error: InputRefused) -> None:
+    def _refuse(self, key: str, error: InputRefused, payload: bytes, encoding: str) -> None:
         for bus in [bus for bus in self._buses.values() if bus.wants(key)]:
             bus.publish(keys.fault(bus.name), msgspec.structs.replace(error.fault, where=key, service=bus.name))
-        refused = unreadable(error, key)
+        refused = unreadable(error, key, payload, encoding)
         if refused is not None and (server := self._buses.get(keys.server_of(key))):
             self.sent += 1
             server.deliver(Received(key, refused, "", self._loop.time()), self.sent)

@@ -20,13 +20,14 @@ from typing import Self
 from msgspec.structs import replace
 
 from schemas import keys
-from schemas.faults import EngageError, Fault, RunFailed
+from schemas.faults import EngageError, Fault, InputRefused, NeverEnded, RequestRefused, RunFailed, ServerRestarted
 from schemas.messages import COMMANDS, Message
 from schemas.presence import PeerAlive, PeerGone
 from schemas.requests import Accepted, Answer, Cancel, KeepAlive, Outcome, Refused, Request, Unreadable
 from schemas.units import Seconds
 from services import asking, serving
-from services.asking import Asking, NeverEnded, Patience, RequestRefused, ServerRestarted
+from services.alarm import Alarm
+from services.asking import Asking, Patience
 from services.asking_table import State
 from services.bus import Bus, Containing, Received
 from services.serving import Serving
@@ -67,32 +68,6 @@ class Pending:
                 future.exception()  # seen: a caller may care for only one of the two
 
 
-class _Alarm:
-    """Calls `ring` when a deadline has come. It is set anew only for an earlier one: it may ring in vain."""
-
-    def __init__(self, ring: Callable[[], None]) -> None:
-        self._ring = ring
-        self._loop = asyncio.get_running_loop()
-        self._timer: asyncio.TimerHandle | None = None
-        self._at: Seconds = 0.0
-
-    def set(self, at: Seconds | None) -> None:
-        if at is None or (self._timer is not None and self._at <= at):
-            return
-        self.stop()
-        self._at = at
-        self._timer = self._loop.call_at(at, self._rings)
-
-    def _rings(self) -> None:
-        self._timer = None
-        self._ring()
-
-    def stop(self) -> None:
-        if self._timer is not None:
-            self._timer.cancel()
-            self._timer = None
-
-
 class Requester:
     """The asking side, for any number of requests at once.
 
@@ -109,7 +84,7 @@ class Requester:
         self._life = bus.new_life()
         self._asking = Asking(bus.name, self._life, patience or Patience())
         self._pending: dict[str, Pending] = {}
-        self._alarm = _Alarm(self._tick)
+        self._alarm = Alarm(self._tick)
         self._listening: asyncio.Task[None] | None = None
         self._broken: EngageError | None = None
 
@@ -170,7 +145,10 @@ class Requester:
     def _carry_out(self, effects: list[asking.Effect]) -> None:
         for effect in effects:  # by isinstance: with each message, and twice as quick as patterns
             if isinstance(effect, asking.Publish):
-                self._publish(effect.expression, _as_message(effect.message))
+                try:
+                    self._publish(effect.expression, _as_message(effect.message))
+                except Exception as error:
+                    self._could_not_send(effect.message.id, error)
             elif isinstance(effect, asking.TellAccepted):
                 if (pending := self._pending.get(effect.id)) is not None:
                     pending.accept()
@@ -184,6 +162,15 @@ class Requester:
             else:
                 self._bus.publish(keys.fault(self._bus.name), effect.fault)
         self._alarm.set(self._asking.deadline)
+
+    def _could_not_send(self, id: str, error: Exception) -> None:
+        """What has no encoded form, half a character for instance, ends this request and leaves the others alone."""
+        self._asking.forget(id)
+        fault = Fault(
+            reason=str(error), where=id, advice="text in Unicode, numbers in their range, fields of their type"
+        )
+        if (pending := self._pending.pop(id, None)) is not None:
+            pending.end(RequestRefused(error.fault if isinstance(error, InputRefused) else fault))
 
     def _publish(self, expression: str, message: Message) -> None:
         self._bus.publish(keys.command(expression, self._bus.role, self._bus.name), message)
@@ -269,7 +256,7 @@ class RequestDesk:
         self._on_extend = on_extend
         self._serving = Serving(server, term)
         self._answers = keys.request_state(server)
-        self._alarm = _Alarm(self._tick)
+        self._alarm = Alarm(self._tick)
 
     @staticmethod
     def patterns(server: str) -> tuple[str, str]:
@@ -297,8 +284,9 @@ class RequestDesk:
             is_ours = keys.is_command_of(self._server, received.key)
             return self._take(message, received, self._bus.now()) if is_ours else None
         match message:
-            case Unreadable(id=id, fault=fault) if id:
-                refused = Refused(id=id, requester=keys.requester_of(received.key), fault=fault)
+            case Unreadable(id=id, life=life, kind=kind, fault=fault) if id:
+                requester, life = keys.requester_of(received.key), life or received.life
+                refused = Refused(id=id, requester=requester, life=life, kind=kind, fault=fault)
                 self._bus.publish(self._answers, refused)
             case PeerGone(participant=requester):
                 return self._carry_out(self._serving.requester_gone(requester, self._bus.now()))
@@ -307,14 +295,15 @@ class RequestDesk:
         return None
 
     def _take(self, message: Request | KeepAlive, received: Received, now: Seconds) -> Request | None:
+        # A requester of ours that is still there sends it again; one that has left wants it no more.
+        if received.past and (message.life or self._serving.is_there(keys.requester_of(received.key))):
+            return None
         requester = keys.requester_of(received.key) or message.requester
         if requester != message.requester or not message.life:
             message = replace(message, requester=requester, life=message.life or received.life)
         if isinstance(message, KeepAlive):
             sent = min(now, self._bus.local(message.at))
-            return None if received.past else self._carry_out(self._serving.keep_alive(message, sent, now))
-        if received.past and self._serving.is_there(message.requester):
-            return None
+            return self._carry_out(self._serving.keep_alive(message, sent, now))
         if (fault := _misplaced(message, received.key)) is not None:
             return self._carry_out(self._serving.refuse(message, fault))
         return self._carry_out(self._serving.take(message, now))

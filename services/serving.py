@@ -296,14 +296,16 @@ class Serving:
                 case Do.REPEAT:
                     self._repeat(record, request or record.request)
                 case Do.REFUSE_UNHEARD:
-                    fault = self._fault(record.request.id, f"{self._server} has never heard of it")
+                    reason = f"{self._server} has never heard of it, and refuses it should it come yet"
+                    fault = self._fault(record.request.id, reason, "a cancellation names requester and life, too")
                     self._answer(record, Refused(id=record.name, fault=fault))
                 case Do.REFUSE_FORGOTTEN:
                     reason = f"{self._server} does not know it any more"
                     self._refuse(record.request, reason, "send it again under a new id")
                 case Do.WARN_DIFFERENT:
                     assert request is not None
-                    reason = f"a live {record.kind} of this id has other content, and goes on"
+                    which = "an ended" if before is State.ENDED else "a live"
+                    reason = f"{which} {record.kind} of this id has other content, and that counts"
                     self._complain(request.id, reason, "give what is new another id", is_ours=False)
                 case Do.WARN_ENDED:
                     assert answer is not None

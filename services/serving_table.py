@@ -82,7 +82,7 @@ class Do(Name):
     REFUSE_FORGOTTEN = auto()
     """A `KeepAlive` names what is not known here."""
     WARN_DIFFERENT = auto()
-    """The other content is ignored, and everybody is told."""
+    """The other content is ignored, and everybody is told. Of a request that names no life it would be a new one."""
     WARN_ENDED = auto()
     """The service answers what has ended or never was: a mistake of its own."""
 
@@ -160,7 +160,7 @@ TABLE: Mapping[State, Mapping[Event, Row]] = {
     S.ENDED: _rows(S.ENDED, {
         E.CAME: (S.ENDED, Do.REPEAT),
         E.CHANGED: (S.ENDED, Do.REPEAT),
-        E.DIFFERED: (S.ENDED, Do.REPEAT),
+        E.DIFFERED: (S.ENDED, Do.WARN_DIFFERENT, Do.REPEAT),
         E.CANCEL: (S.ENDED, Do.REPEAT),
         E.NAMED: (S.ENDED, Do.REPEAT),
         E.EXTENDED: (S.ENDED, Do.REPEAT),

@@ -159,7 +159,7 @@ class Readers:
                 where = f"{written.key} from {written.envelope.source or 'a stranger'}"
                 fault = msgspec.structs.replace(error.fault, where=where, service=bus.name)
                 bus.publish(keys.fault(bus.name), fault)
-            return unreadable(error, written.key)
+            return unreadable(error, written.key, written.payload, written.encoding)
 
     def _follow(self, reader: _Reader, run: str) -> Follower:
         follower = reader.followers.get(run)

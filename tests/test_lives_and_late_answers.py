@@ -1,8 +1,8 @@
 """Whole robots in which somebody is late, comes back, or uses an id again: nobody dies of it, or is told lies."""
 
 import asyncio
-from collections.abc import AsyncIterator, Callable
-from contextlib import asynccontextmanager, suppress
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
 from typing import Any
 
 import pytest
@@ -13,12 +13,11 @@ from schemas.attention import Inhibit
 from schemas.behaviors import Gaze, Gesture, Pointing, Speech, Wait
 from schemas.blocks import Block, BlockOutcome, InterruptBehavior, PerformBlock
 from schemas.body import GoHome, PerformBehavior
-from schemas.faults import Fault, InputRefused
+from schemas.faults import Fault
 from schemas.fragments import FragmentOutcome, PerformFragment, TurnFragment
-from schemas.messages import Message, encode_json
-from schemas.presence import PeerGone
+from schemas.messages import encode_json
 from schemas.requests import Refused, Request
-from services.client import PerformFailed, Robot, connect
+from services.client import Robot, connect
 from services.commandline import roster
 from services.config import load
 from services.memory_bus import MemoryHub
@@ -284,140 +283,3 @@ async def _serve_until(hub: MemoryHub, services: Any, stop: asyncio.Event) -> No
 
 async def everything(inbox: Any) -> list[Any]:
     return [await inbox.next() for _ in range(len(inbox))]
-
-
-# -- what is contained -------------------------------------------------------------------------------------------
-
-
-def breaking(attribute: str) -> Callable[..., Any]:
-    def broken(*arguments: object, **named: object) -> Message:
-        raise ZeroDivisionError(f"{attribute} broke")
-
-    return broken
-
-
-@pytest.mark.contained
-@pytest.mark.parametrize(
-    ("place", "what"),
-    [
-        ("services.generation.conductor.Conductor.admit", "perform"),
-        ("services.generation.planning.plan", "perform"),
-        ("services.generation.conductor.plan", "perform"),
-        ("services.realizer.service.plan_steps", "realize"),
-        ("services.realizer.executor.Authority", "realize"),
-        ("services.realizer.authority.Authority.advance", "realize"),
-        ("services.realizer.authority.Authority.reach", "realize"),
-        ("services.realizer.reporting.Reporter.reached", "realize"),
-        ("services.realizer.executor.Performance._by_body", "realize"),
-        ("services.control.service._Control._begin", "realize"),
-        ("services.control.service._Control._report", "realize"),
-        ("services.control.simulated.SimulatedBody.perform", "realize"),
-        ("services.control.simulated.SimulatedBody.estimate", "realize"),
-        ("services.control.simulated.SimulatedBody.state", "realize"),
-        ("services.recognition.session.Session._request", "perform"),
-        ("services.recognition.recognizer.Recognizer.feed", "perform"),
-    ],
-)
-async def test_a_bug_ends_one_request_and_the_next_is_served(
-    hub: MemoryHub, monkeypatch: pytest.MonkeyPatch, place: str, what: str
-) -> None:
-    async def do(robot: Robot, id: str) -> str:
-        try:
-            if what == "perform":
-                parts = [{"say": "Look at"}, {"refer": "blue-square", "certainty": "high"}]
-                return (await robot.perform({"turn_status": "full", "parts": parts})).status
-            return (await robot.realize(id, [Gaze(id="g", target="human"), Speech(id="s", text="one two")])).status
-        except Exception as error:
-            return f"{type(error).__name__}: {error}"
-
-    async with robot_of(hub) as robot:
-        with monkeypatch.context() as patch:
-            patch.setattr(place, breaking(place.rpartition(".")[2]))
-            first = await asyncio.wait_for(do(robot, "first"), 120.0)
-        await asyncio.sleep(15.0)
-        second = await asyncio.wait_for(do(robot, "second"), 120.0)
-
-    assert isinstance(first, str)
-    assert second == "done"
-
-
-async def test_a_question_that_breaks_its_server_is_answered_with_a_fault(
-    hub: MemoryHub, monkeypatch: pytest.MonkeyPatch, request: pytest.FixtureRequest
-) -> None:
-    request.node.add_marker(pytest.mark.contained)
-    bus = hub.join("server")
-    bus.answer(keys.DESCRIBE, breaking("describe"))
-    with pytest.raises(InputRefused, match="ZeroDivisionError: describe broke"):
-        await hub.join("asker").query(keys.DESCRIBE, HOME)
-    assert bus.health.failures == 1
-
-
-@pytest.mark.parametrize("gone", ["killed", "cut"])
-@pytest.mark.parametrize("how", ["cancelled", "timeout", "own error"])
-async def test_who_leaves_a_lease_leaves_it_at_once_whatever_became_of_generation(
-    hub: MemoryHub, gone: str, how: str
-) -> None:
-    async def hold(robot: Robot) -> None:
-        async with robot.inhibit_gaze(ttl=5.0):
-            if how == "own error":
-                await asyncio.sleep(1.0)
-                raise KeyError("mine")
-            await asyncio.sleep(100.0)
-
-    async with robot_of(hub) as robot:
-        holding = asyncio.create_task(hold(robot) if how != "timeout" else asyncio.wait_for(hold(robot), 1.0))
-        await asyncio.sleep(0.5)
-        if gone == "cut":
-            hub.partition("generation")
-        else:
-            hub.announce("generation", PeerGone(participant="generation"))
-        await asyncio.sleep(0.5)
-        if how == "cancelled":
-            holding.cancel()
-        began = robot.now()
-        expected = {"cancelled": asyncio.CancelledError, "timeout": TimeoutError, "own error": KeyError}[how]
-        with pytest.raises(expected):
-            await holding
-        assert robot.now() - began < 0.1
-        hub.heal()
-
-
-def cancelled_by_itself(*arguments: object, **named: object) -> Any:
-    raise asyncio.CancelledError
-
-
-@pytest.mark.contained
-@pytest.mark.parametrize("method", ["perform", "estimate", "home"])
-async def test_a_driver_that_is_cancelled_by_itself_ends_one_behavior(
-    hub: MemoryHub, monkeypatch: pytest.MonkeyPatch, method: str
-) -> None:
-    behaviors = [Gaze(id="g", target="human"), Speech(id="s", text="one two")]
-    async with robot_of(hub) as robot:
-        with monkeypatch.context() as patch:
-            patch.setattr(f"services.control.simulated.SimulatedBody.{method}", cancelled_by_itself)
-            for number in range(2):
-                began = robot.now()
-                with suppress(InputRefused, PerformFailed):
-                    composition: Any = ("MERGE", "REPLACE")[number]
-                    await asyncio.wait_for(robot.realize(f"b{number}", behaviors, composition=composition), 60.0)
-                assert robot.now() - began < 5.0
-        await asyncio.sleep(15.0)
-        assert (await robot.realize("after", behaviors, composition="REPLACE")).status == "done"
-
-
-async def test_a_way_home_that_never_ends_is_not_asked_for_for_ever(
-    hub: MemoryHub, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    async def never(*arguments: object) -> None:
-        await asyncio.Event().wait()
-
-    monkeypatch.setattr("services.control.simulated.SimulatedBody.home", never)
-    with hub.join("ear").subscribe(keys.keep_alive("control")) as pulses:
-        async with robot_of(hub) as robot:
-            for number in range(3):
-                asking = robot.realize(f"b{number}", [Pointing(id="p", target="blue-square")], composition="REPLACE")
-                await asyncio.wait([asyncio.ensure_future(asking)], timeout=1.0)
-            await asyncio.sleep(60.0)
-            await everything(pulses)
-            await asyncio.sleep(60.0)
-            assert not any(kept.kind == "go_home" for each in await everything(pulses) for kept in each.message.live)

@@ -33,7 +33,7 @@ from schemas.world import World
 from services.bus import Bus, Received, is_asked_to_stop
 from services.control import variability
 from services.control.actions import ActionMessage, Deeds
-from services.control.body import Arrived, Authority, BehaviorRefused, Body, BodyFailed, Progress, Reached, Spoke
+from services.control.body import Arrived, Authority, BehaviorRefused, Body, BodyFailed, How, Progress, Reached, Spoke
 from services.control.config import ControlConfig
 from services.control.simulated import SimulatedBody
 from services.covered import CoveredObjects
@@ -152,7 +152,7 @@ class _Control:
             case AbortBehavior():
                 self._abort(request)
             case Cancel() if live is not None:
-                live.authority.revoke()
+                self._revoke(live)
             case GoHome():
                 self.desk.accept(request.id)
                 way = self._tasks.create_task(self._go_home(request), name=f"home {request.id}")
@@ -185,8 +185,13 @@ class _Control:
             return
         self.desk.accept(request.id)
         for live in meant:
-            live.authority.revoke(request.how)
+            self._revoke(live, request.how)
             live.aborts.append(request.id)
+
+    def _revoke(self, live: _Performance, how: How = "relax") -> None:
+        """What a driver does on hearing of it may go wrong; the authority is gone all the same."""
+        with self._bus.containing(f"the end of behavior {live.label}"):
+            live.authority.revoke(how)
 
     def _pace(self, request: PerformBehavior) -> dict[str, Seconds]:
         return {planned.sync: self._bus.local(planned.at) for planned in request.pace}
@@ -349,7 +354,7 @@ class _Control:
         live = self._live.get(cancel.id)
         if live is None:
             return
-        live.authority.revoke()
+        self._revoke(live)
         others = (each for each in self._live.values() if each.request.requester == cancel.requester)
         if all(each.authority.revoked for each in others):
             self._take_home(f"after {cancel.requester}")

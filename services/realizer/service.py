@@ -155,7 +155,8 @@ class _Realizer:
         block = live.request.block
         elsewhere = self.ledger.blocks
         if block.id in elsewhere:
-            fault = Fault(reason="a block of this id is still being performed", where=block.id)
+            advice = "give it another id, or wait until that has ended: a cancelled one ends with its word"
+            fault = Fault(reason="a block of this id is still being performed", where=block.id, advice=advice)
             self._refuse(live, BlockRefused(fault))
             return
         if absent := set(live.request.follows) - {each.request.block.id for each in live.leaders}:

@@ -241,6 +241,7 @@ async def test_a_duplicate_is_answered_with_the_last_state(hub: MemoryHub):
 
 async def test_an_older_content_never_replaces_a_newer(hub: MemoryHub):
     server = Server(hub, name="control")
+    await asyncio.sleep(0)  # it listens
     client = hub.join("client")
     with requester_of(client) as requests:
         first = requests.send(keys.BEHAVIOR, extent("start")).request

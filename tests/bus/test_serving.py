@@ -65,7 +65,7 @@ def test_other_content_under_a_live_id_is_ignored_and_told_unless_its_kind_allow
     different = serving.take(OTHER, 0.0)
     assert handed(different) == []
     assert [each.fault.reason for each in different if isinstance(each, Complain)] == [
-        "a live perform_block of this id has other content, and goes on"
+        "a live perform_block of this id has other content, and that counts"
     ]
 
     control = Serving("control")

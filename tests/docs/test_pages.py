@@ -47,6 +47,8 @@ ELSEWHERE = {
     ("docs/control.md", "python"): "tests/control/test_docs.py",
     ("docs/recognition.md", "mermaid"): "tests/recognition/test_tables.py",
     ("docs/bus.md", "mermaid"): "tests/bus/test_request_model.py",
+    ("docs/hostile.md", "sh"): "tests/cli/test_hostile.py",
+    ("docs/hostile.md", "python"): "tests/hostile/test_docs.py",
 }
 """Blocks that the tests of their part hold to what they say."""
 IN_LESS_TIME = {

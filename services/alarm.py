@@ -1,0 +1,32 @@
+"""A timer for the earliest of many instants."""
+
+import asyncio
+from collections.abc import Callable
+
+from schemas.units import Seconds
+
+
+class Alarm:
+    """Calls `ring` when a deadline has come. It is set anew only for an earlier one: it may ring in vain."""
+
+    def __init__(self, ring: Callable[[], None]) -> None:
+        self._ring = ring
+        self._loop = asyncio.get_running_loop()
+        self._timer: asyncio.TimerHandle | None = None
+        self._at: Seconds = 0.0
+
+    def set(self, at: Seconds | None) -> None:
+        if at is None or (self._timer is not None and self._at <= at):
+            return
+        self.stop()
+        self._at = at
+        self._timer = self._loop.call_at(at, self._rings)
+
+    def _rings(self) -> None:
+        self._timer = None
+        self._ring()
+
+    def stop(self) -> None:
+        if self._timer is not None:
+            self._timer.cancel()
+            self._timer = None
