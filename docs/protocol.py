@@ -183,7 +183,7 @@ many seconds: by being sent again, or by a `KeepAlive` that names it with all ot
 lists, of kind, id, revision, authority (`through` of a `PerformBehavior`, else empty) and seconds from `at`; a clock that
 nobody knows reads as now:
 
-```json
+```text
 {{"type": "keep_alive", "life": "7", "at": ["mine", 0], "live": [["perform_fragment", "greeting-1", 0, "", 5.0]]}}
 ```
 

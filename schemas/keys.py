@@ -96,7 +96,7 @@ def command(expression: str, role: str, requester: str) -> str:
 
 def is_command_of(server: str, key: str) -> bool:
     """Does `commands(server)` include the key?"""
-    return key.startswith(f"{PREFIX}/cmd/{server}/")
+    return f"{key}/".startswith(f"{PREFIX}/cmd/{server}/")
 
 
 @lru_cache(4096)  # asked for every command

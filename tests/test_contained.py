@@ -180,7 +180,7 @@ async def test_what_cannot_be_sent_is_refused_and_other_requests_live_on(hub: Me
 
 
 @pytest.mark.contained
-@pytest.mark.parametrize("text", ["/home/j\udcf6rg/beat.qi", None], ids=["surrogate", "none"])
+@pytest.mark.parametrize("text", ["j\udcf6rg/beat.qi", None], ids=["surrogate", "none"])
 async def test_an_error_of_a_driver_that_cannot_even_be_written_down_ends_one_behavior(
     hub: MemoryHub, monkeypatch: pytest.MonkeyPatch, text: str | None
 ) -> None:
