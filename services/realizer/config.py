@@ -19,8 +19,8 @@ class RealizerConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
     pulse: between two renewals of what the body, and recognition, are asked for. lease: how long movement authority
     lasts that is not renewed, so that a body stops by itself when the realizer is gone. At least three pulses.
     utterance: characters of one speech, some five minutes; a block with a longer one is refused.
-    blocks: live blocks; one more is refused. The default is where a command follows its sync point within 50 ms in 99
-    of 100 cases on two cores (benchmarks/live_blocks.py).
+    blocks: live blocks; one more is refused. The default is the most with which a command follows its sync point
+        within 50 ms in 99 of 100 cases on two cores, if they begin at once, too (benchmarks/live_blocks.py).
     event_grace: an event ends as failed this much after its limit if recognition is not there to decide it.
     event_patience: and this much if it is there, but says nothing.
     most: behaviors, marks and sync references in a block; more is refused. Planning takes 0.1 ms each.
