@@ -285,9 +285,10 @@ class RequestDesk:
             return self._take(message, received, self._bus.now()) if is_ours else None
         match message:
             case Unreadable(id=id, life=life, kind=kind, fault=fault) if id:
+                # As far as it could be read it is this request, which may be live, or have ended.
                 requester, life = keys.requester_of(received.key), life or received.life
-                refused = Refused(id=id, requester=requester, life=life, kind=kind, fault=fault)
-                self._bus.publish(self._answers, refused)
+                known = Cancel(id=id, requester=requester, life=life, of=kind)
+                return self._carry_out(self._serving.refuse(known, fault))
             case PeerGone(participant=requester):
                 return self._carry_out(self._serving.requester_gone(requester, self._bus.now()))
             case PeerAlive(participant=requester, run=run):

@@ -1,5 +1,6 @@
 """The serving side by itself: what it knows a request by, what it hands over, and what it answers."""
 
+import asyncio
 from typing import Any
 
 import pytest
@@ -19,6 +20,7 @@ from services.asking import Publish as AskedToPublish
 from services.bus import read_payload
 from services.memory_bus import MemoryHub
 from services.serving import LIFELESS_KEPT, Complain, Hand, Names, Publish, Serving
+from tests.bus.performer import Server
 from tests.commanding import key_of
 
 BLOCK = PerformBlock(id="a", requester="me", life="1", block=Block(id="b"))
@@ -245,3 +247,21 @@ def test_a_tiny_lease_floods_nobody(lease: float) -> None:
     asking.hear(Accepted(id="a", requester="me", life="1", kind="perform_block"), 1e6, "realizer")
 
     assert len(asking.tick(1e6 + 1.0)) < 30
+
+
+async def test_a_damaged_repetition_of_a_request_changes_nothing_of_what_became_of_it(hub: MemoryHub) -> None:
+    server = Server(hub)
+    await asyncio.sleep(0)
+    payload = encode_json(PerformBlock(id="b", life="1", block=Block(id="b")))
+    damaged = payload.replace(b'"block":{', b'"block":[{').replace(b"}}", b"}]}")
+    with hub.join("ear").subscribe(keys.ANY_REQUEST_STATE) as states:
+        for content in (damaged, payload, damaged):
+            hub.inject(keys.command(keys.BLOCK, "manager", "me"), content, "application/json")
+            await asyncio.sleep(0.1)
+        await asyncio.sleep(1.0)
+        hub.inject(keys.command(keys.BLOCK, "manager", "me"), damaged, "application/json")
+        await asyncio.sleep(0.1)
+        told = [type((await states.next()).message).__name__ for _ in range(len(states))]  # type: ignore[union-attr]
+
+    assert told == ["Refused", "Accepted", "BlockOutcome", "BlockOutcome"]
+    await server.die(hub)
