@@ -269,14 +269,15 @@ class Asking:
                 del self._asked[id]
 
     def _send_anew(self, asked: _Asked, now: Seconds) -> None:
-        asked.resend_after = self._patience.first_resend
-        self._send(asked, now)
-        self._deadlines.set((Event.RESEND_DUE, asked.request.id), now + asked.resend_after)
+        self._send_and_repeat(asked, now, self._patience.first_resend)
 
     def _send_again(self, asked: _Asked, now: Seconds) -> None:
-        asked.resend_after = min(2 * asked.resend_after, self._patience.longest_resend)
+        self._send_and_repeat(asked, now, min(2 * asked.resend_after, self._patience.longest_resend))
+
+    def _send_and_repeat(self, asked: _Asked, now: Seconds, after: Seconds) -> None:
+        asked.resend_after = after
         self._send(asked, now)
-        self._deadlines.set((Event.RESEND_DUE, asked.request.id), now + asked.resend_after)
+        self._deadlines.set((Event.RESEND_DUE, asked.request.id), now + after)
 
     def _send(self, asked: _Asked, now: Seconds) -> None:
         expression = asked.expression if asked.cancel is None else keys.cancel(asked.server)

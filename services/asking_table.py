@@ -4,13 +4,9 @@ Nothing that a caller, a server, the bus or the clock does at any moment is unde
 """
 
 from collections.abc import Mapping
-from enum import Enum, auto
+from enum import auto
 
-
-class Name(Enum):
-    """Looked up with each message: by identity, at the speed of an object."""
-
-    __hash__ = object.__hash__
+from services.transitions import Name, rows
 
 
 class State(Name):
@@ -97,19 +93,9 @@ TELLING = frozenset(action for action in Do if action.name.startswith("TELL_"))
 """What the caller gets to hear."""
 Row = tuple[State, tuple[Do, ...]]
 
-
-def _rows(state: State, rows: Mapping[Event, tuple[State, *tuple[Do, ...]] | None]) -> dict[Event, Row]:
-    """For brevity None stands for: it changes nothing."""
-    whole: dict[Event, Row] = {}
-    for event, row in rows.items():
-        after, *actions = row or (state,)
-        whole[event] = (after, tuple(actions))
-    return whole
-
-
 S, E = State, Event
 TABLE: Mapping[State, Mapping[Event, Row]] = {
-    S.SENT: _rows(S.SENT, {
+    S.SENT: rows(S.SENT, {
         E.ASKED: (S.SENT, Do.SEND, Do.HOPE),
         E.CANCELLED: (S.WITHDRAWING, Do.SEND, Do.BE_PATIENT),
         E.HEARD: (S.SENT, Do.HOPE),
@@ -125,7 +111,7 @@ TABLE: Mapping[State, Mapping[Event, Row]] = {
         E.PATIENCE_OVER: (S.GIVEN_UP, Do.TELL_SILENT, Do.CANCEL_ONCE, Do.SWALLOW),
         E.SWALLOW_OVER: None,
     }),
-    S.ACCEPTED: _rows(S.ACCEPTED, {
+    S.ACCEPTED: rows(S.ACCEPTED, {
         E.ASKED: (S.ACCEPTED, Do.SEND_ONCE, Do.KEEP_SOON),
         E.CANCELLED: (S.STOPPING, Do.LET_GO, Do.SEND, Do.BE_PATIENT),
         E.HEARD: None,
@@ -141,7 +127,7 @@ TABLE: Mapping[State, Mapping[Event, Row]] = {
         E.PATIENCE_OVER: None,
         E.SWALLOW_OVER: None,
     }),
-    S.WITHDRAWING: _rows(S.WITHDRAWING, {
+    S.WITHDRAWING: rows(S.WITHDRAWING, {
         E.ASKED: None,
         E.CANCELLED: None,
         E.HEARD: None,
@@ -157,7 +143,7 @@ TABLE: Mapping[State, Mapping[Event, Row]] = {
         E.PATIENCE_OVER: (S.GIVEN_UP, Do.TELL_UNSTOPPABLE, Do.SWALLOW),
         E.SWALLOW_OVER: None,
     }),
-    S.STOPPING: _rows(S.STOPPING, {
+    S.STOPPING: rows(S.STOPPING, {
         E.ASKED: None,
         E.CANCELLED: None,
         E.HEARD: None,
@@ -173,7 +159,7 @@ TABLE: Mapping[State, Mapping[Event, Row]] = {
         E.PATIENCE_OVER: (S.GIVEN_UP, Do.TELL_UNSTOPPABLE, Do.SWALLOW),
         E.SWALLOW_OVER: None,
     }),
-    S.GIVEN_UP: _rows(S.GIVEN_UP, {
+    S.GIVEN_UP: rows(S.GIVEN_UP, {
         E.ASKED: None,
         E.CANCELLED: None,
         # A server that still works for nobody hears of it by the lease, which is not renewed. To answer each of these
@@ -191,5 +177,5 @@ TABLE: Mapping[State, Mapping[Event, Row]] = {
         E.PATIENCE_OVER: None,
         E.SWALLOW_OVER: (S.ENDED,),
     }),
-    S.ENDED: _rows(S.ENDED, dict.fromkeys(Event)),
+    S.ENDED: rows(S.ENDED, dict.fromkeys(Event)),
 }  # fmt: skip

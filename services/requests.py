@@ -179,10 +179,14 @@ class Requester:
         """Stop sending again; what has not ended is cancelled at its server."""
         for id in self._asking.ids:
             self.cancel(id, "requester closed")
+        self._fail_all(self._broken or RunFailed("the client is closed"))
+
+    def _fail_all(self, error: EngageError) -> None:
+        """Nothing is sent or awaited any more."""
+        self._broken = error
         self._alarm.stop()
-        self._broken = self._broken or RunFailed("the client is closed")
         for pending in self._pending.values():
-            pending.end(self._broken)
+            pending.end(error)
         self._pending.clear()
 
     # -- listening by itself ----------------------------------------------------------------------------------------
@@ -204,11 +208,7 @@ class Requester:
             return
         error = task.exception()
         reason = f"the client hears nothing any more: {error or 'it has left the bus'}"
-        self._broken = RunFailed(Fault(reason=reason, advice="connect again", service=self._bus.name))
-        for pending in self._pending.values():
-            pending.end(self._broken)
-        self._pending.clear()
-        self._alarm.stop()
+        self._fail_all(RunFailed(Fault(reason=reason, advice="connect again", service=self._bus.name)))
 
     async def __aenter__(self) -> Self:
         self._listening = asyncio.create_task(self._listen(), name=f"requests of {self._bus.name}")

@@ -5,13 +5,9 @@ services/serving.py follows it.
 """
 
 from collections.abc import Mapping
-from enum import Enum, auto
+from enum import auto
 
-
-class Name(Enum):
-    """Looked up with each message: by identity, at the speed of an object."""
-
-    __hash__ = object.__hash__
+from services.transitions import Name, rows
 
 
 class State(Name):
@@ -89,19 +85,9 @@ class Do(Name):
 
 Row = tuple[State, tuple[Do, ...]]
 
-
-def _rows(state: State, rows: Mapping[Event, tuple[State, *tuple[Do, ...]] | None]) -> dict[Event, Row]:
-    """For brevity None stands for: it changes nothing."""
-    whole: dict[Event, Row] = {}
-    for event, row in rows.items():
-        after, *actions = row or (state,)
-        whole[event] = (after, tuple(actions))
-    return whole
-
-
 S, E = State, Event
 TABLE: Mapping[State, Mapping[Event, Row]] = {
-    S.UNKNOWN: _rows(S.UNKNOWN, {
+    S.UNKNOWN: rows(S.UNKNOWN, {
         E.CAME: (S.TAKEN, Do.RENEW, Do.HAND),
         E.CHANGED: (S.TAKEN, Do.RENEW, Do.HAND),
         E.DIFFERED: (S.TAKEN, Do.RENEW, Do.HAND),
@@ -113,7 +99,7 @@ TABLE: Mapping[State, Mapping[Event, Row]] = {
         E.END: (S.UNKNOWN, Do.WARN_ENDED),
         E.GONE: None, E.BACK: None, E.REBORN: None, E.GRACE_OVER: None, E.LEASE_OVER: None,
     }),
-    S.TAKEN: _rows(S.TAKEN, {
+    S.TAKEN: rows(S.TAKEN, {
         E.CAME: (S.TAKEN, Do.RENEW, Do.REPEAT),
         E.CHANGED: (S.TAKEN, Do.RENEW, Do.HAND),
         E.DIFFERED: (S.TAKEN, Do.RENEW, Do.WARN_DIFFERENT, Do.REPEAT),
@@ -129,7 +115,7 @@ TABLE: Mapping[State, Mapping[Event, Row]] = {
         E.GRACE_OVER: (S.CANCELLED, Do.HAND_GONE),
         E.LEASE_OVER: (S.CANCELLED, Do.HAND_LAPSED),
     }),
-    S.ACCEPTED: _rows(S.ACCEPTED, {
+    S.ACCEPTED: rows(S.ACCEPTED, {
         E.CAME: (S.ACCEPTED, Do.RENEW, Do.REPEAT),
         E.CHANGED: (S.ACCEPTED, Do.RENEW, Do.HAND),
         E.DIFFERED: (S.ACCEPTED, Do.RENEW, Do.WARN_DIFFERENT, Do.REPEAT),
@@ -145,7 +131,7 @@ TABLE: Mapping[State, Mapping[Event, Row]] = {
         E.GRACE_OVER: (S.CANCELLED, Do.HAND_GONE),
         E.LEASE_OVER: (S.CANCELLED, Do.HAND_LAPSED),
     }),
-    S.CANCELLED: _rows(S.CANCELLED, {
+    S.CANCELLED: rows(S.CANCELLED, {
         E.CAME: (S.CANCELLED, Do.REPEAT),
         E.CHANGED: (S.CANCELLED, Do.REPEAT),
         E.DIFFERED: (S.CANCELLED, Do.REPEAT),
@@ -157,7 +143,7 @@ TABLE: Mapping[State, Mapping[Event, Row]] = {
         E.END: (S.ENDED, Do.ANSWER),
         E.GONE: None, E.BACK: None, E.REBORN: None, E.GRACE_OVER: None, E.LEASE_OVER: None,
     }),
-    S.ENDED: _rows(S.ENDED, {
+    S.ENDED: rows(S.ENDED, {
         E.CAME: (S.ENDED, Do.REPEAT),
         E.CHANGED: (S.ENDED, Do.REPEAT),
         E.DIFFERED: (S.ENDED, Do.WARN_DIFFERENT, Do.REPEAT),
