@@ -1,6 +1,7 @@
 """Every message of the bus in one tagged union, and its two encodings."""
 
 from collections.abc import Mapping
+from functools import cache, lru_cache
 from typing import Any
 
 import msgspec
@@ -81,7 +82,12 @@ _json_decoder: msgspec.json.Decoder[Any] = msgspec.json.Decoder(Message)
 
 def encoding_of(message: Message, form: str = "msgpack") -> str:
     """`application/msgpack;engage.SyncPointReached/1`."""
-    return f"application/{form};engage.{type(message).__name__}/{MAJOR}"
+    return _encoding_of(type(message), form)
+
+
+@cache  # asked for every message
+def _encoding_of(kind: type, form: str) -> str:
+    return f"application/{form};engage.{kind.__name__}/{MAJOR}"
 
 
 def encode(message: Message) -> bytes:
@@ -101,15 +107,22 @@ def published(message: Message) -> tuple[bytes, str]:
 
 def decode(payload: bytes, encoding: str = "application/msgpack") -> Message:
     """The message in `payload`. Raises InputRefused: another major version, an unknown form, or bad content."""
+    decoder = _decoder_of(encoding)
+    try:
+        return decoder.decode(payload)  # type: ignore[no-any-return]
+    except (msgspec.DecodeError, RecursionError, UnicodeDecodeError) as error:
+        reason = f"a text that is not UTF-8 ({error.reason})" if isinstance(error, UnicodeDecodeError) else str(error)
+        form, _, schema = encoding.partition(";")
+        raise InputRefused(Fault(reason=reason, where=schema or form)) from error
+
+
+@lru_cache(1024)  # asked for every message; who it comes from may write what it likes
+def _decoder_of(encoding: str) -> "msgspec.msgpack.Decoder[Any] | msgspec.json.Decoder[Any]":
     form, _, schema = encoding.partition(";")
     if schema and schema.rpartition("/")[2] not in ("", str(MAJOR)):
         raise InputRefused(Fault(reason=f"{schema} is not version {MAJOR}", advice="run the same engage everywhere"))
-    try:
-        if form == "application/json":
-            return _json_decoder.decode(payload)  # type: ignore[no-any-return]
-        if form == "application/msgpack":
-            return _msgpack_decoder.decode(payload)  # type: ignore[no-any-return]
-    except (msgspec.DecodeError, RecursionError, UnicodeDecodeError) as error:
-        reason = f"a text that is not UTF-8 ({error.reason})" if isinstance(error, UnicodeDecodeError) else str(error)
-        raise InputRefused(Fault(reason=reason, where=schema or form)) from error
+    if form == "application/json":
+        return _json_decoder
+    if form == "application/msgpack":
+        return _msgpack_decoder
     raise InputRefused(Fault(reason=f"encoding {form!r}", advice="application/msgpack or application/json"))

@@ -1,4 +1,4 @@
-"""A timer for the earliest of many instants."""
+"""Timers of the loop that are set again and again."""
 
 import asyncio
 from collections.abc import Callable
@@ -30,3 +30,23 @@ class Alarm:
         if self._timer is not None:
             self._timer.cancel()
             self._timer = None
+
+
+class Timer:
+    """Calls `ring` at the one instant it was set to last; never, if that is None."""
+
+    def __init__(self, ring: Callable[[], None]) -> None:
+        self._ring = ring
+        self._loop = asyncio.get_running_loop()
+        self._handle: asyncio.TimerHandle | None = None
+
+    def set(self, at: Seconds | None) -> None:
+        if self._handle is not None:
+            if self._handle.when() == at:
+                return
+            self._handle.cancel()
+        self._handle = None if at is None else self._loop.call_at(at, self._rings)
+
+    def _rings(self) -> None:
+        self._handle = None
+        self._ring()

@@ -9,6 +9,7 @@ deadlines, and follows the table.
 """
 
 from collections.abc import Callable, Iterable, Mapping
+from functools import partial
 from math import inf
 
 from msgspec import Struct
@@ -18,7 +19,7 @@ from schemas import keys
 from schemas.faults import EngageError, Fault, NeverEnded, RequestRefused, RunFailed, ServerRestarted
 from schemas.requests import Accepted, Answer, Cancel, Heard, Kept, Outcome, Outdated, Refused, Request, kind_of
 from schemas.units import Seconds
-from services.asking_table import TABLE, TELLING, Do, Event, State
+from services.asking_table import TABLE, Do, Event, State
 from services.deadlines import Deadlines
 
 
@@ -74,6 +75,8 @@ class Complain(Struct, frozen=True):
 
 
 Effect = Publish | Renew | TellAccepted | TellEnd | Complain
+_Said = Answer | None
+"""By the server, if that is the event."""
 
 
 class _Asked:
@@ -82,6 +85,7 @@ class _Asked:
     def __init__(self, expression: str, request: Request) -> None:
         self.expression = expression
         self.server = keys.server_of(expression)
+        self.kind = kind_of(request)
         self.request = request
         self.cancel: Cancel | None = None
         self.state = State.SENT
@@ -98,14 +102,20 @@ class _Server:
         self.soon = period
 
 
-_CLOCKS = (
-    Event.RESEND_DUE, Event.GRACE_OVER, Event.PATIENCE_OVER, Event.CANCELLED, Event.SWALLOW_OVER,
-)  # fmt: skip
-
-
 SHORTEST_PULSE: Seconds = 0.05
 """Whatever the lease: a shorter one would flood the bus."""
+ANEW = "send it again under a new id"
+
+# Asked for with each message, and an enum is slow to give a member.
+_ENDED, _FINISHED = State.ENDED, Event.FINISHED
 _OVER = (State.GIVEN_UP, State.ENDED)
+_RESEND, _GRACE, _PATIENCE, _CANCEL, _SWALLOW = _CLOCKS = (
+    Event.RESEND_DUE, Event.GRACE_OVER, Event.PATIENCE_OVER, Event.CANCELLED, Event.SWALLOW_OVER,
+)  # fmt: skip
+_ANSWERS = {
+    Heard: Event.HEARD, Accepted: Event.ACCEPTED, Outdated: Event.OUTDATED, Refused: Event.REFUSED,
+}  # fmt: skip
+"""What an answer of the server is; each other one is an end."""
 
 
 class Asking:
@@ -127,8 +137,8 @@ class Asking:
 
     @property
     def deadline(self) -> Seconds | None:
-        """When to `tick`."""
-        return self._deadlines.earliest
+        """When to `tick`; what was due then may have been settled since."""
+        return None if self._deadlines.look == inf else self._deadlines.look
 
     def state(self, id: str) -> State:
         asked = self._asked.get(id)
@@ -163,7 +173,7 @@ class Asking:
                 request, requester=of.requester, life=of.life, lease=of.lease, revision=of.revision + 1
             )
         if within is not None:
-            self._deadlines.set((Event.CANCELLED, request.id), now + within)
+            self._deadlines.set((_CANCEL, request.id), now + within)
         self._step(asked, Event.ASKED, now)
         return self._told()
 
@@ -171,7 +181,7 @@ class Asking:
         return request.term if 0.0 < request.term < inf else self._patience.lease
 
     def _taken(self, asked: _Asked, request: Request) -> Fault | None:
-        theirs, ours = kind_of(asked.request), kind_of(request)
+        theirs, ours = asked.kind, kind_of(request)
         if asked.state is State.GIVEN_UP:
             reason = f"{theirs} {request.id!r} was given up, and may still be answered"
         elif theirs != ours:
@@ -200,21 +210,13 @@ class Asking:
     def hear(self, answer: Answer, now: Seconds, server: str) -> list[Effect]:
         """What a server says. An answer of another server, to somebody else, or to another life changes nothing."""
         asked = self._asked.get(answer.id)
-        ours = (self._requester, self._life)
-        is_ours = asked is not None and (answer.requester, answer.life) == ours
-        if asked is not None and is_ours and (answer.kind, server) == (kind_of(asked.request), asked.server):
-            match answer:
-                case Heard():
-                    self._step(asked, Event.HEARD, now)
-                case Accepted():
-                    asked.run = self._runs.get(asked.server, "")
-                    self._step(asked, Event.ACCEPTED, now)
-                case Outdated():
-                    self._step(asked, Event.OUTDATED, now)
-                case Refused():
-                    self._step(asked, Event.REFUSED, now, answer)
-                case Outcome():
-                    self._step(asked, Event.FINISHED, now, answer)
+        if asked is None or answer.life != self._life or answer.requester != self._requester:
+            return []
+        if answer.kind != asked.kind or server != asked.server:
+            return []
+        if isinstance(answer, Accepted):
+            asked.run = self._runs.get(server, "")
+        self._step(asked, _ANSWERS.get(type(answer), _FINISHED), now, answer)
         return self._told()
 
     def server_gone(self, server: str, now: Seconds) -> list[Effect]:
@@ -255,87 +257,85 @@ class Asking:
         before = asked.state
         asked.state, actions = TABLE[before][event]
         for action in actions:
-            if action in TELLING:
-                self._tell(asked, action, answer)
-            else:
-                _ACTS[action](self, asked, now)
+            _ACTS[action](self, asked, now, answer)
         if asked.state is not before and asked.state in _OVER:
             self._let_go(asked)
             id = asked.request.id
             for clock in _CLOCKS:
-                if clock is not Event.SWALLOW_OVER or asked.state is State.ENDED:
+                if clock is not _SWALLOW or asked.state is _ENDED:
                     self._deadlines.clear((clock, id))
-            if asked.state is State.ENDED:
+            if asked.state is _ENDED:
                 del self._asked[id]
 
-    def _send_anew(self, asked: _Asked, now: Seconds) -> None:
+    def _send_anew(self, asked: _Asked, now: Seconds, answer: _Said) -> None:
         self._send_and_repeat(asked, now, self._patience.first_resend)
 
-    def _send_again(self, asked: _Asked, now: Seconds) -> None:
+    def _send_again(self, asked: _Asked, now: Seconds, answer: _Said) -> None:
         self._send_and_repeat(asked, now, min(2 * asked.resend_after, self._patience.longest_resend))
 
     def _send_and_repeat(self, asked: _Asked, now: Seconds, after: Seconds) -> None:
         asked.resend_after = after
-        self._send(asked, now)
-        self._deadlines.set((Event.RESEND_DUE, asked.request.id), now + after)
+        self._send(asked, now, None)
+        self._deadlines.set((_RESEND, asked.request.id), now + after)
 
-    def _send(self, asked: _Asked, now: Seconds) -> None:
+    def _send(self, asked: _Asked, now: Seconds, answer: _Said) -> None:
         expression = asked.expression if asked.cancel is None else keys.cancel(asked.server)
         self._effects.append(Publish(expression, asked.cancel or asked.request))
 
-    def _cancel_once(self, asked: _Asked, now: Seconds) -> None:
+    def _cancel_once(self, asked: _Asked, now: Seconds, answer: _Said) -> None:
         cancel = asked.cancel or self._cancellation(asked, "given up")
         self._effects.append(Publish(keys.cancel(asked.server), cancel))
 
-    def _keep_soon(self, asked: _Asked, now: Seconds) -> None:
+    def _keep_soon(self, asked: _Asked, now: Seconds, answer: _Said) -> None:
         self._renew_soon(asked.server, now, self._patience.first_resend)
 
-    def _keep_now(self, asked: _Asked, now: Seconds) -> None:
+    def _keep_now(self, asked: _Asked, now: Seconds, answer: _Said) -> None:
         self._renew_soon(asked.server, now, 0.0)
 
-    def _wait_grace(self, asked: _Asked, now: Seconds) -> None:
-        self._deadlines.set((Event.GRACE_OVER, asked.request.id), now + self._patience.grace)
+    def _wait_grace(self, asked: _Asked, now: Seconds, answer: _Said) -> None:
+        self._deadlines.set((_GRACE, asked.request.id), now + self._patience.grace)
         if asked.cancel is None:
-            self._deadlines.clear((Event.PATIENCE_OVER, asked.request.id))
+            self._deadlines.clear((_PATIENCE, asked.request.id))
 
-    def _stop_grace(self, asked: _Asked, now: Seconds) -> None:
-        self._deadlines.clear((Event.GRACE_OVER, asked.request.id))
+    def _stop_grace(self, asked: _Asked, now: Seconds, answer: _Said) -> None:
+        self._deadlines.clear((_GRACE, asked.request.id))
 
-    def _hope(self, asked: _Asked, now: Seconds) -> None:
+    def _hope(self, asked: _Asked, now: Seconds, answer: _Said) -> None:
         if asked.server in self._runs:
-            self._deadlines.set((Event.PATIENCE_OVER, asked.request.id), now + self._patience.silence)
+            self._deadlines.set((_PATIENCE, asked.request.id), now + self._patience.silence)
 
-    def _be_patient(self, asked: _Asked, now: Seconds) -> None:
-        self._deadlines.set((Event.PATIENCE_OVER, asked.request.id), now + self._patience.cancel)
+    def _be_patient(self, asked: _Asked, now: Seconds, answer: _Said) -> None:
+        self._deadlines.set((_PATIENCE, asked.request.id), now + self._patience.cancel)
 
-    def _swallow(self, asked: _Asked, now: Seconds) -> None:
-        self._deadlines.set((Event.SWALLOW_OVER, asked.request.id), now + self._patience.swallow)
+    def _swallow(self, asked: _Asked, now: Seconds, answer: _Said) -> None:
+        self._deadlines.set((_SWALLOW, asked.request.id), now + self._patience.swallow)
 
-    def _tell(self, asked: _Asked, action: Do, answer: Answer | None) -> None:
-        id, server = asked.request.id, asked.server
-        if action is Do.TELL_ACCEPTED:
-            self._effects.append(TellAccepted(id))
-            return
-        if isinstance(answer, Outcome):
-            self._effects.append(TellEnd(id, answer))
-            return
-        if isinstance(answer, Refused):
-            refused = RequestRefused if action is Do.TELL_REFUSED else RunFailed
-            self._effects.append(TellEnd(id, refused(answer.fault)))
-            return
-        reason = {
-            Do.TELL_GONE: f"{server} is gone",
-            Do.TELL_REBORN: f"{server} was restarted",
-            Do.TELL_SILENT: f"{server} is there, but has not answered for {self._patience.silence:g} s",
-            Do.TELL_UNSTOPPABLE: f"{server} has not ended it within {self._patience.cancel:g} s of its cancellation",
-        }[action]
-        fault = Fault(reason=reason, where=id, advice="send it again under a new id", service=server)
-        if action is Do.TELL_UNSTOPPABLE:
-            fault = replace(fault, advice=f"is {server} stuck? It is not asked any more")
-            self._effects += [TellEnd(id, NeverEnded(fault)), Complain(fault)]
-        else:
-            failed = ServerRestarted if action is Do.TELL_REBORN else RunFailed
-            self._effects.append(TellEnd(id, failed(fault)))
+    def _tell_accepted(self, asked: _Asked, now: Seconds, answer: _Said) -> None:
+        self._effects.append(TellAccepted(asked.request.id))
+
+    def _tell_outcome(self, asked: _Asked, now: Seconds, answer: _Said) -> None:
+        assert isinstance(answer, Outcome)
+        self._effects.append(TellEnd(asked.request.id, answer))
+
+    def _tell_refused(self, asked: _Asked, now: Seconds, answer: _Said, *, error: type[EngageError]) -> None:
+        assert isinstance(answer, Refused)
+        self._effects.append(TellEnd(asked.request.id, error(answer.fault)))
+
+    def _tell_failed(self, asked: _Asked, now: Seconds, answer: _Said, *, error: type[EngageError], why: str) -> None:
+        self._fail(asked, error, why)
+
+    def _tell_silent(self, asked: _Asked, now: Seconds, answer: _Said) -> None:
+        self._fail(asked, RunFailed, f"is there, but has not answered for {self._patience.silence:g} s")
+
+    def _tell_unstoppable(self, asked: _Asked, now: Seconds, answer: _Said) -> None:
+        why = f"has not ended it within {self._patience.cancel:g} s of its cancellation"
+        fault = self._fail(asked, NeverEnded, why, f"is {asked.server} stuck? It is not asked any more")
+        self._effects.append(Complain(fault))
+
+    def _fail(self, asked: _Asked, error: type[EngageError], why: str, advice: str = ANEW) -> Fault:
+        fault = Fault(reason=f"{asked.server} {why}", where=asked.request.id, advice=advice, service=asked.server)
+        self._effects.append(TellEnd(asked.request.id, error(fault)))
+        return fault
 
     def _cancellation(self, asked: _Asked, reason: str) -> Cancel:
         request = asked.request
@@ -343,9 +343,9 @@ class Asking:
 
     # -- keeping alive --------------------------------------------------------------------------------------------
 
-    def _keep(self, asked: _Asked, now: Seconds) -> None:
-        self._deadlines.clear((Event.RESEND_DUE, asked.request.id))
-        self._deadlines.clear((Event.PATIENCE_OVER, asked.request.id))
+    def _keep(self, asked: _Asked, now: Seconds, answer: _Said) -> None:
+        self._deadlines.clear((_RESEND, asked.request.id))
+        self._deadlines.clear((_PATIENCE, asked.request.id))
         server = self._servers.get(asked.server)
         if server is None:
             server = self._servers[asked.server] = _Server(self._patience.pulse)
@@ -353,7 +353,7 @@ class Asking:
         server.period = max(SHORTEST_PULSE, min(server.period, asked.request.lease / 3))
         self._renew_soon(asked.server, now, server.period)
 
-    def _let_go(self, asked: _Asked, now: Seconds = 0.0) -> None:
+    def _let_go(self, asked: _Asked, now: Seconds = 0.0, answer: _Said = None) -> None:
         server = self._servers.get(asked.server)
         if server is not None and server.kept.pop(asked.request.id, None) is not None and not server.kept:
             del self._servers[asked.server]
@@ -375,7 +375,7 @@ class Asking:
         server.soon = min(2 * server.soon, server.period)
 
 
-_ACTS: Mapping[Do, Callable[[Asking, _Asked, Seconds], None]] = {
+_ACTS: Mapping[Do, Callable[[Asking, _Asked, Seconds, _Said], None]] = {
     Do.SEND: Asking._send_anew,
     Do.SEND_AGAIN: Asking._send_again,
     Do.SEND_ONCE: Asking._send,
@@ -389,4 +389,12 @@ _ACTS: Mapping[Do, Callable[[Asking, _Asked, Seconds], None]] = {
     Do.HOPE: Asking._hope,
     Do.BE_PATIENT: Asking._be_patient,
     Do.SWALLOW: Asking._swallow,
+    Do.TELL_ACCEPTED: Asking._tell_accepted,
+    Do.TELL_OUTCOME: Asking._tell_outcome,
+    Do.TELL_REFUSED: partial(Asking._tell_refused, error=RequestRefused),
+    Do.TELL_FORGOTTEN: partial(Asking._tell_refused, error=RunFailed),
+    Do.TELL_GONE: partial(Asking._tell_failed, error=RunFailed, why="is gone"),
+    Do.TELL_REBORN: partial(Asking._tell_failed, error=ServerRestarted, why="was restarted"),
+    Do.TELL_SILENT: Asking._tell_silent,
+    Do.TELL_UNSTOPPABLE: Asking._tell_unstoppable,
 }

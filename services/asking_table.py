@@ -89,8 +89,6 @@ class Do(Name):
     """The cancellation was in vain, which everybody is to know."""
 
 
-TELLING = frozenset(action for action in Do if action.name.startswith("TELL_"))
-"""What the caller gets to hear."""
 Row = tuple[State, tuple[Do, ...]]
 
 S, E = State, Event

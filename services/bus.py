@@ -106,7 +106,10 @@ class Subscription(Reading[Received]):
         self._carriers: dict[str, str | None] = {}
 
     def wants(self, key: str) -> bool:
-        return self.carrier(key) is not None
+        try:  # asked for every message and subscription
+            return self._carriers[key] is not None
+        except KeyError:
+            return self.carrier(key) is not None
 
     def carrier(self, key: str) -> str | None:
         """The first pattern that includes the key: each message comes once, however many patterns include it."""
@@ -279,7 +282,7 @@ class Containing:
         pass
 
     def __exit__(self, kind: object, error: BaseException | None, trace: object) -> bool:
-        if not isinstance(error, Exception | asyncio.CancelledError) or is_asked_to_stop():
+        if error is None or not isinstance(error, Exception | asyncio.CancelledError) or is_asked_to_stop():
             return False
         fault = self._bus.failed(error, self._what)
         if self._then is not None:

@@ -2,6 +2,7 @@
 
 import heapq
 from collections.abc import Hashable
+from math import inf
 from typing import Generic, TypeVar
 
 from schemas.units import Seconds
@@ -10,9 +11,14 @@ K = TypeVar("K", bound=Hashable)
 
 
 class Deadlines(Generic[K]):
-    """One instant for each name. Setting, clearing and asking for the earliest take logarithmic time."""
+    """One instant for each name. Setting, clearing and asking for the earliest take logarithmic time.
+
+    look: when to ask for what is due, not after the earliest instant; infinite if there is none. What was cleared
+    may hold it back until then.
+    """
 
     def __init__(self) -> None:
+        self.look = inf
         self._at: dict[K, Seconds] = {}
         self._heap: list[tuple[Seconds, int, K]] = []
         self._count = 0
@@ -25,6 +31,7 @@ class Deadlines(Generic[K]):
         """Its instant from now on."""
         if self._at.get(name) != at:
             self._at[name] = at
+            self.look = min(self.look, at)
             self._count += 1
             heapq.heappush(self._heap, (at, self._count, name))
             if len(self._heap) > 64 + 4 * len(self._at):  # mostly instants that do not hold any more
@@ -42,7 +49,9 @@ class Deadlines(Generic[K]):
 
     def due(self, now: Seconds) -> K | None:
         """The name of the earliest instant that has come, which is cleared; None if there is none."""
-        if (earliest := self.earliest) is None or earliest > now:
+        earliest = self.earliest
+        if earliest is None or earliest > now:
+            self.look = inf if earliest is None else earliest
             return None
         _, _, name = heapq.heappop(self._heap)
         del self._at[name]

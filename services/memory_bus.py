@@ -85,10 +85,11 @@ class MemoryHub(Hub):
     def send(self, sender: str, key: str, message: Message) -> None:
         if isinstance(message, LOCAL):
             raise TypeError(f"{type(message).__name__} is never sent")
+        payload, encoding = published(message)
         try:
-            message = decode(*published(message))
+            message = decode(payload, encoding)
         except InputRefused as error:  # as on a wire: those who get it refuse it, not who has sent it
-            self._refuse(key, error, *published(message))
+            self._refuse(key, error, payload, encoding)
             return
         life = self._buses[sender].run
         self._pass_on(sender, Received(key, message, sender, self._loop.time(), life=life))
@@ -118,15 +119,17 @@ class MemoryHub(Hub):
             self._state[received.key] = past
         elif kind in ("cmd", "evt"):
             self._past.append(past)
-        for bus in list(self._buses.values()):
-            self._carry(past, sender, bus)
+        is_sound = self.faults == NONE
+        for bus in tuple(self._buses.values()):
+            if self._cut and self._is_cut(sender, bus.name):
+                continue
+            if is_sound or bus.name == sender:
+                bus.deliver(received, past.number)
+            else:
+                self._carry(past, sender, bus)
 
     def _carry(self, past: _Past, sender: str, bus: "MemoryBus") -> None:
-        if self._is_cut(sender, bus.name):
-            return
-        if bus.name == sender or self.faults == NONE:
-            bus.deliver(past.received, past.number)
-            return
+        """As well as the faults let it."""
         if self._chance.random() < self.faults.loss:
             return
         copies = 2 if self._chance.random() < self.faults.duplicate else 1
@@ -228,9 +231,10 @@ class MemoryBus(Bus):
         return any(subscription.wants(key) for subscription in self._subscriptions)
 
     def deliver(self, received: Received, number: int) -> None:
+        key = received.key
         for subscription, replayed in self._subscriptions.items():
             # What was still on its way when the subscription came has been replayed to it.
-            if number > replayed and subscription.wants(received.key):
+            if number > replayed and subscription.wants(key):
                 subscription.offer(received)
 
     def subscribe(self, *patterns: str, keep: Keep = Keep.EVERY, capacity: int = 4096) -> Subscription:

@@ -35,6 +35,9 @@ from services.serving import Serving
 __all__ = ["NeverEnded", "Patience", "Pending", "RequestDesk", "RequestRefused", "Requester", "ServerRestarted"]
 
 
+_COMMANDS = (Request, KeepAlive)
+
+
 class Pending:
     """A request on its way. Both futures raise RequestRefused, or RunFailed if the server died or does not answer.
 
@@ -280,7 +283,7 @@ class RequestDesk:
     def take(self, received: Received) -> Request | None:
         """The request, if it is new, changed or a cancellation of a live one; each of these once."""
         message = received.message
-        if isinstance(message, Request | KeepAlive):
+        if isinstance(message, _COMMANDS):
             is_ours = keys.is_command_of(self._server, received.key)
             return self._take(message, received, self._bus.now()) if is_ours else None
         match message:

@@ -8,7 +8,8 @@ and id, and calls each by a name that no other request of this server has or had
 """
 
 from collections import OrderedDict
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Mapping
+from functools import partial
 from math import inf
 
 from msgspec import Struct
@@ -41,6 +42,13 @@ LIFELESS_KEPT: Seconds = 10.0
 NAMES_KEPT = 4096
 LAPSED = "nobody has renewed it"
 GONE = "requester is gone"
+
+# Asked for with each message, and an enum is slow to give a member.
+_ENDED, _UNKNOWN = State.ENDED, State.UNKNOWN
+_STOPPED = (State.CANCELLED, State.ENDED)
+_GRACE_OVER, _LEASE_OVER = Event.GRACE_OVER, Event.LEASE_OVER
+_DECISIONS = {Accepted: Event.ACCEPT, Refused: Event.REFUSE}
+"""What an answer of the service is; each other one is an end."""
 
 
 class Names:
@@ -82,6 +90,8 @@ class Complain(Struct, frozen=True):
 
 
 Effect = Publish | Hand | Complain
+_Cause = Request | Answer | Kept | None
+"""What has come with an event."""
 _Key = tuple[str, str, str]
 """Requester, life, id: what is live under it has one kind."""
 
@@ -97,9 +107,9 @@ class _Record:
         self.run = run
         self.key = _key(request)
         self.kind = _kind(request)
-        self.lease = (Event.LEASE_OVER, name)
+        self.lease = (_LEASE_OVER, name)
         """Its clock among the deadlines."""
-        self.state = State.UNKNOWN
+        self.state = _UNKNOWN
         self.answer: Answer | None = None
         self.ended_at: Seconds = inf
 
@@ -125,11 +135,11 @@ class Serving:
 
     @property
     def deadline(self) -> Seconds | None:
-        """When to `tick`."""
-        return self._deadlines.earliest
+        """When to `tick`; what was due then may have been settled since."""
+        return None if self._deadlines.look == inf else self._deadlines.look
 
     def is_live(self, name: str) -> bool:
-        return name in self._named and self._named[name].state is not State.ENDED
+        return name in self._named and self._named[name].state is not _ENDED
 
     @property
     def live(self) -> int:
@@ -150,7 +160,7 @@ class Serving:
         """A command that has come; `requester` as its key names it."""
         key, kind = _key(request), _kind(request)
         newest = self._newest.get(key)
-        if newest is not None and newest.state is not State.ENDED and kind not in ("", newest.kind):
+        if newest is not None and newest.state is not _ENDED and kind not in ("", newest.kind):
             self._refuse(request, f"{request.id!r} is the id of a live {newest.kind}", "give it another id")
         else:
             unnamed = newest if newest is not None and not (kind and newest.kind) else None
@@ -163,7 +173,7 @@ class Serving:
     def refuse(self, request: Request, fault: Fault) -> list[Effect]:
         """It came on a wrong key. The same request, if it is live here or has ended, is as it was."""
         record = self._known.get((_key(request), _kind(request)))
-        if record is not None and record.state is not State.ENDED:
+        if record is not None and record.state is not _ENDED:
             return [Complain(fault, False)]
         if record is not None and record.answer is not None:
             return [Publish(answering(request, record.answer))]
@@ -177,7 +187,7 @@ class Serving:
                 unknown = Cancel(id=kept.id, requester=message.requester, life=message.life, of=kept.kind)
                 record = _Record(kept.id, unknown, "")
             is_newer = record.request.is_updatable and kept.revision > record.request.revision
-            self._step(record, Event.EXTENDED if is_newer else Event.NAMED, now, kept=kept, sent=sent)
+            self._step(record, Event.EXTENDED if is_newer else Event.NAMED, sent, kept)
         return self._told()
 
     def answer(self, name: str, answer: Answer, now: Seconds) -> list[Effect]:
@@ -186,11 +196,7 @@ class Serving:
         if record is None:
             self._warn_ended(name, answer, "was never made")
         else:
-            event = (
-                Event.ACCEPT if isinstance(answer, Accepted)
-                else Event.REFUSE if isinstance(answer, Refused) else Event.END
-            )  # fmt: skip
-            self._step(record, event, now, answer=answer)
+            self._step(record, _DECISIONS.get(type(answer), Event.END), now, answer)
         return self._told()
 
     def requester_gone(self, requester: str, now: Seconds) -> list[Effect]:
@@ -222,12 +228,12 @@ class Serving:
         return effects
 
     def _of(self, requester: str) -> Iterable[_Record]:
-        live = (record for record in self._named.values() if record.state is not State.ENDED)
+        live = (record for record in self._named.values() if record.state is not _ENDED)
         return [record for record in live if record.request.requester == requester]
 
     def _is_new(self, record: _Record, request: Request, now: Seconds) -> bool:
         """Is it another than the one that has ended? Without a life nobody can tell a repetition for ever."""
-        if record.state is not State.ENDED or request.life:
+        if record.state is not _ENDED or request.life:
             return False
         may_differ = not isinstance(request, Cancel) and not isinstance(record.request, Cancel)
         differs = may_differ and _content(request) != _content(record.request)
@@ -252,95 +258,85 @@ class Serving:
         if self._newest.get(record.key) is record:
             del self._newest[record.key]
 
-    def _step(
-        self,
-        record: _Record,
-        event: Event,
-        now: Seconds,
-        request: Request | None = None,
-        *,
-        answer: Answer | None = None,
-        kept: Kept | None = None,
-        sent: Seconds | None = None,
-    ) -> None:
+    def _step(self, record: _Record, event: Event, now: Seconds, cause: _Cause = None) -> None:
         before = record.state
         record.state, actions = TABLE[before][event]
         for action in actions:
-            match action:  # the most frequent first
-                case Do.ANSWER:
-                    assert answer is not None
-                    self._answer(record, answer)
-                case Do.RENEW:
-                    self._renew(record, now if sent is None else sent, kept)
-                case Do.HAND:
-                    assert request is not None
-                    record.request = request
-                    self._hand(record, request, is_asked=True)
-                case Do.HAND_EXTENDED:
-                    assert kept is not None
-                    # The content itself is still the older one: the answer says so, and brings the newest.
-                    self._hand(record, record.request.with_authority(kept.authority))
-                case Do.HAND_CANCEL:
-                    assert request is not None
-                    self._hand(record, request, is_asked=True)
-                case Do.HAND_GONE | Do.HAND_LAPSED:
-                    reason = GONE if action is Do.HAND_GONE else LAPSED
-                    asked = record.request
-                    self._hand(record, Cancel(id=asked.id, requester=asked.requester, life=asked.life, reason=reason))
-                case Do.WAIT_GRACE:
-                    self._deadlines.set((Event.GRACE_OVER, record.name), now + GRACE)
-                case Do.STOP_GRACE:
-                    self._deadlines.clear((Event.GRACE_OVER, record.name))
-                case Do.SAY_OUTDATED:
-                    self._effects.append(Publish(answering(record.request, Outdated(id=record.name))))
-                case Do.REPEAT:
-                    self._repeat(record, request or record.request)
-                case Do.REFUSE_UNHEARD:
-                    reason = f"{self._server} has never heard of it, and refuses it should it come yet"
-                    fault = self._fault(record.request.id, reason, "a cancellation names requester and life, too")
-                    self._answer(record, Refused(id=record.name, fault=fault))
-                case Do.REFUSE_FORGOTTEN:
-                    reason = f"{self._server} does not know it any more"
-                    self._refuse(record.request, reason, "send it again under a new id")
-                case Do.WARN_DIFFERENT:
-                    assert request is not None
-                    which = "an ended" if before is State.ENDED else "a live"
-                    reason = f"{which} {record.kind} of this id has other content, and that counts"
-                    self._complain(request.id, reason, "give what is new another id", is_ours=False)
-                case Do.WARN_ENDED:
-                    assert answer is not None
-                    self._warn_ended(record.name, answer, f"has ended already, with {record.answer}")
-        if record.state is not before and record.state in (State.CANCELLED, State.ENDED):
-            self._deadlines.clear((Event.GRACE_OVER, record.name))
+            _ACTS[action](self, record, now, cause)
+        if record.state is not before and record.state in _STOPPED:
+            self._deadlines.clear((_GRACE_OVER, record.name))
             self._deadlines.clear(record.lease)
-            if record.state is State.ENDED:
+            if record.state is _ENDED:
                 record.ended_at = now
                 self._ended[record.name] = record
                 if len(self._ended) > ENDED_KEPT:
                     self._forget(next(iter(self._ended.values())))
 
-    def _hand(self, record: _Record, request: Request, *, is_asked: bool = False) -> None:
-        named = request if request.id == record.name else replace(request, id=record.name)
-        self._effects.append(Hand(named, is_asked))
+    # -- what follows: one for each of `Do`, with what has caused it ----------------------------------------------
 
-    def _renew(self, record: _Record, since: Seconds, kept: Kept | None) -> None:
+    def _hand_asked(self, record: _Record, now: Seconds, cause: _Cause) -> None:
+        assert isinstance(cause, Request)
+        if not isinstance(cause, Cancel):
+            record.request = cause
+        self._hand(record, cause, is_asked=True)
+
+    def _hand_extended(self, record: _Record, now: Seconds, cause: _Cause) -> None:
+        """The content itself is still the older one: the answer says so, and brings the newest."""
+        assert isinstance(cause, Kept)
+        self._hand(record, record.request.with_authority(cause.authority))
+
+    def _renew(self, record: _Record, now: Seconds, cause: _Cause) -> None:
         """A late message never shortens what a newer one has granted."""
-        term = kept.valid if kept is not None else record.request.term
+        term = cause.valid if isinstance(cause, Kept) else record.request.term
         if not 0.0 < term < inf:
             if self._term is None:
                 return
             term = self._term
-        self._deadlines.set(record.lease, max(self._deadlines[record.lease] or 0.0, since + term))
+        self._deadlines.set(record.lease, max(self._deadlines[record.lease] or 0.0, now + term))
 
-    def _answer(self, record: _Record, answer: Answer) -> None:
-        record.answer = answering(record.request, answer)
+    def _wait_grace(self, record: _Record, now: Seconds, cause: _Cause) -> None:
+        self._deadlines.set((_GRACE_OVER, record.name), now + GRACE)
+
+    def _stop_grace(self, record: _Record, now: Seconds, cause: _Cause) -> None:
+        self._deadlines.clear((_GRACE_OVER, record.name))
+
+    def _say_outdated(self, record: _Record, now: Seconds, cause: _Cause) -> None:
+        self._effects.append(Publish(answering(record.request, Outdated(id=record.name))))
+
+    def _answer(self, record: _Record, now: Seconds, cause: _Cause) -> None:
+        assert isinstance(cause, Answer)
+        record.answer = answering(record.request, cause)
         self._effects.append(Publish(record.answer))
 
-    def _repeat(self, record: _Record, request: Request) -> None:
+    def _repeat(self, record: _Record, now: Seconds, cause: _Cause) -> None:
         """To whoever asks now: of a request whose cancellation came first, that did not say which kind it is."""
-        if isinstance(request, Cancel):
-            request = record.request
-        self._effects.append(Publish(answering(request, record.answer or Heard(id=record.name))))
+        asks = cause if isinstance(cause, Request) and not isinstance(cause, Cancel) else record.request
+        self._effects.append(Publish(answering(asks, record.answer or Heard(id=record.name))))
+
+    def _refuse_unheard(self, record: _Record, now: Seconds, cause: _Cause) -> None:
+        reason = f"{self._server} has never heard of it, and refuses it should it come yet"
+        fault = self._fault(record.request.id, reason, "a cancellation names requester and life, too")
+        self._answer(record, now, Refused(id=record.name, fault=fault))
+
+    def _refuse_forgotten(self, record: _Record, now: Seconds, cause: _Cause) -> None:
+        self._refuse(record.request, f"{self._server} does not know it any more", "send it again under a new id")
+
+    def _warn_different(self, record: _Record, now: Seconds, cause: _Cause) -> None:
+        which = "an ended" if record.state is _ENDED else "a live"
+        reason = f"{which} {record.kind} of this id has other content, and that counts"
+        self._complain(record.request.id, reason, "give what is new another id", is_ours=False)
+
+    def _warn_over(self, record: _Record, now: Seconds, cause: _Cause) -> None:
+        assert isinstance(cause, Answer)
+        self._warn_ended(record.name, cause, f"has ended already, with {record.answer}")
+
+    def _hand(self, record: _Record, request: Request, *, is_asked: bool = False) -> None:
+        named = request if request.id == record.name else replace(request, id=record.name)
+        self._effects.append(Hand(named, is_asked))
+
+    def _hand_end(self, record: _Record, now: Seconds, cause: _Cause, *, reason: str) -> None:
+        asked = record.request
+        self._hand(record, Cancel(id=asked.id, requester=asked.requester, life=asked.life, reason=reason))
 
     # -- what is wrong --------------------------------------------------------------------------------------------
 
@@ -373,7 +369,7 @@ def _event(record: _Record, request: Request) -> Event:
     if isinstance(request, Cancel):
         return Event.CANCEL
     known = record.request
-    if record.state is State.UNKNOWN or isinstance(known, Cancel) or request == known:
+    if record.state is _UNKNOWN or isinstance(known, Cancel) or request == known:
         return Event.CAME
     if not request.is_updatable:
         return Event.CAME if _content(request) == _content(known) else Event.DIFFERED
@@ -383,3 +379,22 @@ def _event(record: _Record, request: Request) -> Event:
 def _content(request: Request) -> Request:
     """Without what does not count as content."""
     return replace(request, revision=0, lease=0.0)
+
+
+_ACTS: Mapping[Do, Callable[[Serving, _Record, Seconds, _Cause], None]] = {
+    Do.HAND: Serving._hand_asked,
+    Do.HAND_EXTENDED: Serving._hand_extended,
+    Do.HAND_CANCEL: Serving._hand_asked,
+    Do.HAND_GONE: partial(Serving._hand_end, reason=GONE),
+    Do.HAND_LAPSED: partial(Serving._hand_end, reason=LAPSED),
+    Do.RENEW: Serving._renew,
+    Do.WAIT_GRACE: Serving._wait_grace,
+    Do.STOP_GRACE: Serving._stop_grace,
+    Do.SAY_OUTDATED: Serving._say_outdated,
+    Do.REPEAT: Serving._repeat,
+    Do.ANSWER: Serving._answer,
+    Do.REFUSE_UNHEARD: Serving._refuse_unheard,
+    Do.REFUSE_FORGOTTEN: Serving._refuse_forgotten,
+    Do.WARN_DIFFERENT: Serving._warn_different,
+    Do.WARN_ENDED: Serving._warn_over,
+}

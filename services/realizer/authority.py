@@ -10,7 +10,7 @@ the prediction. Only what a fact touches is looked at again.
 
 import heapq
 from collections.abc import Iterable
-from math import isfinite
+from math import inf, isfinite
 
 from schemas.units import Seconds
 from services.realizer.assembly import Member
@@ -112,7 +112,7 @@ class Authority(Outlook):
     def _note(self, point: Point) -> None:
         """Count a point that is reached, or arrived at, into its instant."""
         transition = self.plan.at[point]
-        member = self._wiring.member(point)
+        member = self._wiring.members.get(point)
         at = self.reached.get(point)
         self._dirty.add(transition)
         if self.forecast is not None:
@@ -184,8 +184,10 @@ class Authority(Outlook):
     @property
     def deadline(self) -> Seconds | None:
         """When to ask again, whatever happens until then."""
-        wake = self._wakes[0][0] if self._wakes else None
-        return min((at for at in (wake, self.patience.deadline, self._overdue_at) if at is not None), default=None)
+        wake = self._wakes[0][0] if self._wakes else inf
+        patience, overdue = self.patience.deadline, self._overdue_at
+        at = min(wake, inf if patience is None else patience, inf if overdue is None else overdue)
+        return None if at == inf else at
 
     def _conclude(self, now: Seconds) -> None:
         """What is expected at another time than before is decided anew."""
@@ -282,11 +284,9 @@ class Authority(Outlook):
         return max(0, furthest)
 
     def may_pass(self, point: Point) -> bool:
-        transition = self.plan.at[point]
-        can_wait = self.member(point).can_wait or self._wiring.pauses(point)
-        if not can_wait or point in self.reached:
+        if point in self.reached or not (self.member(point).can_wait or self._wiring.pauses(point)):
             return True
-        return (transition, point.behavior) in self._granted
+        return (self.plan.at[point], point.behavior) in self._granted
 
     def _wake(self, transition: int, at: Seconds) -> None:
         heapq.heappush(self._wakes, (at, transition))

@@ -16,6 +16,7 @@ from schemas.faults import EngageError, Fault, InputRefused
 from schemas.feedback import WarningKind
 from schemas.syncref import BLOCK_ITSELF
 from schemas.units import Seconds
+from services.alarm import Timer
 from services.bus import Containing
 from services.realizer.authority import Authority
 from services.realizer.body_link import BodyLink
@@ -64,7 +65,7 @@ class Performance:
         """As they were begun: a later plan may have chosen another hand."""
         self.spoken = Spoken(plan.block.behaviors)
         self._ending = live.ending
-        self._timer: asyncio.TimerHandle | None = None
+        self._timer = Timer(self._take_in)
         self._is_stale = False
 
     def containing(self) -> Containing:
@@ -198,8 +199,7 @@ class Performance:
             self._go_home(self.parts_used)
 
     def _close(self) -> None:
-        if self._timer is not None:
-            self._timer.cancel()
+        self._timer.set(None)
         for behavior in self.plan.block.behaviors:
             self._around.routes.pop(self._body.id(behavior.id), None)
         for future in self._begun.values():
@@ -217,13 +217,9 @@ class Performance:
         if self.authority.is_surprised and self._report.may_expect() and not self._ending.done():
             self._report.expect(self.authority.plan, self.authority.began, self.authority.expected(self._bus.now()))
         self._around.ledger.foresee(self.plan.block.id, self.authority.ahead)
-        if self._timer is not None:
-            self._timer.cancel()
-            self._timer = None
         if self.authority.is_over:
             self._live.stop(Ending("done"))
-        elif self.authority.deadline is not None and not self._ending.done():
-            self._timer = asyncio.get_running_loop().call_at(self.authority.deadline, self._take_in)
+        self._timer.set(None if self._ending.done() else self.authority.deadline)
 
     def _apply(self, effect: Effect) -> bool:
         """Do what the authority says; whether that made new facts at once."""

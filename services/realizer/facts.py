@@ -68,7 +68,7 @@ class Facts:
 
     def holds(self, point: Point) -> bool:
         """Has it come to that instant? A gaze holds at `relax`, where its `stroke_end` is reported too."""
-        return self.member(point).point in self.arrived
+        return self._wiring.members[point].point in self.arrived
 
     def _is_there(self, member: Member) -> bool:
         can_wait = member.can_wait or self._wiring.pauses(member.point)
@@ -79,6 +79,5 @@ class Facts:
         return self._next.get(behavior, 0)
 
     def member(self, point: Point) -> Member:
-        member = self._wiring.member(point)
-        assert member is not None, f"{point} is in no instant"
-        return member
+        """Raises KeyError if it is in no instant."""
+        return self._wiring.members[point]

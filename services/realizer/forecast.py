@@ -207,6 +207,8 @@ class Forecast(LongestPaths):
 
     def is_hurried(self, behavior: str) -> bool:
         """Is it to be faster than is natural?"""
+        if not self._given_way:  # as is usual
+            return False
         hurried = (number for number in self._given_way if not self._arcs[number].is_bound)
         return any(self._arcs[number].behavior == behavior for number in hurried)
 
@@ -214,10 +216,11 @@ class Forecast(LongestPaths):
         """Draw the conclusions of all facts since the last time; the transitions whose time has changed."""
         if not self._todo and not self._old:
             return set()
-        for number in sorted(self._given_way | self._broken):
-            self._restore(number)
-        self._given_way.clear()
-        self._broken.clear()
+        if self._given_way or self._broken:
+            for number in sorted(self._given_way | self._broken):
+                self._restore(number)
+            self._given_way.clear()
+            self._broken.clear()
         for _ in range(REPAIRS):
             try:
                 excess = self._relax()

@@ -32,7 +32,7 @@ def pace(behavior: str, authority: "Authority", now: Seconds) -> Pace:
             if point is points[number] and not authority.paces.get(behavior):
                 natural = max(natural, authority.not_before.get(behavior, natural))  # overdue, not slower on purpose
             at = max(natural, now) if authority.holds(point) else natural
-            if authority.member(point).kind == "passive" and forecast.times[here] > natural + NOTICEABLE:
+            if forecast.times[here] > natural + NOTICEABLE and authority.member(point).kind == "passive":
                 at = max(natural, min(forecast.times[here], latest))
                 is_paced = is_paced or at > natural + NOTICEABLE
         before = here

@@ -45,6 +45,7 @@ class Reporter:
         self._bus = bus
         self._block = block
         self._tolerance = tolerance
+        self._spelling: dict[Point, str | None] = {}
         self._late: set[Point] = set()
         """Instants of behaviors of which that has been said."""
         self._character = ""
@@ -76,7 +77,7 @@ class Reporter:
         self._predicted = times
         points = []
         for point, time in times.items():
-            if (sync := _spelled(point, plan)) is not None:
+            if (sync := self._spelled(point, plan)) is not None:
                 type = type_name(plan.chains[point.behavior].behavior)
                 points.append(PlannedPoint(behavior=point.behavior, sync=sync, time=time, type=type))
         prediction = PredictionFeedback(
@@ -92,9 +93,9 @@ class Reporter:
         first_plan: the one the block began with, which said when the point was to be.
         """
         plan, at = authority.plan, authority.reached[point]
-        together = (authority.reached.get(member.point) for member in plan.members[plan.at[point]])
-        skew = at - min(time for time in (*together, at) if time is not None)
-        if (sync := _spelled(point, plan)) is not None:
+        together = (authority.reached.get(member.point, at) for member in plan.members[plan.at[point]])
+        skew = at - min(at, *together)
+        if (sync := self._spelled(point, plan)) is not None:
             told = self._no_earlier(at)
             self._say(
                 SyncPointProgress(
@@ -155,13 +156,17 @@ class Reporter:
     def _say(self, feedback: Feedback) -> None:
         self._bus.publish(keys.FEEDBACK, feedback)
 
+    def _spelled(self, point: Point, plan: Plan) -> str | None:
+        """As the block's dialect has it; None of what feedback does not tell: what is no default point there."""
+        try:
+            return self._spelling[point]
+        except KeyError:
+            is_repetition = point.sync.startswith("stroke:")
+            type = type_name(plan.chains[point.behavior].behavior)
+            spelled = None if is_repetition else dialect_sync(point.sync, type, plan.block.dialect)
+            self._spelling[point] = spelled
+            return spelled
+
 
 def _points(plan: Plan) -> Iterable[Point]:
     return (point for chain in plan.chains.values() for point in chain.points)
-
-
-def _spelled(point: Point, plan: Plan) -> str | None:
-    """As the block's dialect has it; None of what feedback does not tell: what is no default point there."""
-    is_repetition = point.sync.startswith("stroke:")
-    type = type_name(plan.chains[point.behavior].behavior)
-    return None if is_repetition else dialect_sync(point.sync, type, plan.block.dialect)

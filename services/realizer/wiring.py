@@ -2,13 +2,13 @@
 
 from schemas.behaviors import Speech
 from schemas.units import Seconds
-from services.realizer.assembly import Member
 from services.realizer.planner import Plan
 from services.realizer.points import Point
 
 
 class Wiring:
-    """points: of each behavior, in order. foreign: points of other blocks.
+    """points: of each behavior, in order. foreign: points of other blocks. members: of each point, the part of its
+    behavior in the point's instant.
 
     waits_for: of each transition, what must have been measured, and how many seconds before. awaited_by: those that
     wait for it. not_after: those that it may be later than by no more than so many seconds.
@@ -18,11 +18,15 @@ class Wiring:
         size = len(plan.net.transitions)
         self.points = {id: chain.points for id, chain in plan.chains.items()}
         self.foreign = frozenset(plan.foreign)
-        self._at = plan.at
-        self._members = {
+        of_behavior = {
             (member.behavior, transition): member
             for transition, members in enumerate(plan.members)
             for member in members
+        }
+        self.members = {
+            point: of_behavior[point.behavior, transition]
+            for point, transition in plan.at.items()
+            if (point.behavior, transition) in of_behavior
         }
         self.waits_for: list[list[tuple[int, Seconds]]] = [[] for _ in range(size)]
         self.awaited_by: list[list[int]] = [[] for _ in range(size)]
@@ -43,10 +47,6 @@ class Wiring:
     def pauses(self, point: Point) -> bool:
         """Can an utterance that has begun wait there, at a word gap, where it should not be too early?"""
         return point in self._pauses
-
-    def member(self, point: Point) -> Member | None:
-        """The part of its behavior in the point's instant."""
-        return self._members.get((point.behavior, self._at[point]))
 
 
 def _is_predictive(plan: Plan) -> bool:

@@ -158,6 +158,7 @@ def test_a_keep_alive_renews_grants_authority_and_finds_lost_content() -> None:
 
     assert [each.through for each in handed(effects) if isinstance(each, PerformBehavior)] == ["end"]
     assert [type(each) for each in told(effects)] == [Outdated]
+    assert not serving.tick(5.0)
     assert serving.deadline == 8.0
     (cancel,) = handed(serving.tick(8.0))
     assert isinstance(cancel, Cancel)
