@@ -2,7 +2,8 @@
 
 A request is known by its requester, the requester's life, its kind and its id; an answer names all four. It is sent
 again until it is accepted, refused or ended; the server repeats its last state. What is accepted is kept alive by
-`KeepAlive`. The states and what moves them are the tables in services/asking.py and services/serving.py.
+`KeepAlive`. The states and what moves them are the tables in services/asking_table.py and
+services/serving_table.py.
 """
 
 from typing import ClassVar, Self, TypeVar
@@ -138,7 +139,12 @@ def kind_of(request: Request) -> str:
     return str(request.__struct_config__.tag)
 
 
+def kind_meant(request: Request) -> str:
+    """Of a cancellation the kind of what it ends; empty if it does not say."""
+    return request.of if isinstance(request, Cancel) else kind_of(request)
+
+
 def answering(request: Request, answer: A) -> A:
     """`answer`, addressed to whoever has sent `request`. To a `Cancel` it is about the request that it ends."""
-    kind = request.of if isinstance(request, Cancel) else kind_of(request)
-    return replace(answer, id=request.id, requester=request.requester, life=request.life, kind=kind)
+    id, kind = request.id, kind_meant(request)
+    return replace(answer, id=id, requester=request.requester, life=request.life, kind=kind)

@@ -30,7 +30,7 @@ class Event(Name):
     """What can happen to one request."""
 
     ASKED = auto()
-    """The caller sends it once more, with other content."""
+    """The caller sends it: for the first time, or with other content."""
     CANCELLED = auto()
     HEARD = auto()
     ACCEPTED = auto()

@@ -339,10 +339,6 @@ def hostile(
     raise typer.Exit(hostile_.main(hostile_.Options(where, seed, runs, seconds, tuple(only or ()), body, quiet)))
 
 
-UsageError: type[Exception] = next(kind for kind in typer.BadParameter.__mro__ if kind.__name__ == "UsageError")
-"""Typer carries its own copy of click and does not show this class."""
-
-
 def main(arguments: list[str] | None = None) -> NoReturn:
     """Run a command. Bad input is one line on standard error, never a traceback; a bug of ours is a traceback."""
     sys.exit(exit_code(app, arguments))

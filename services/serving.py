@@ -27,7 +27,7 @@ from schemas.requests import (
     Refused,
     Request,
     answering,
-    kind_of,
+    kind_meant,
 )
 from schemas.units import Seconds
 from services.deadlines import Deadlines
@@ -106,7 +106,7 @@ class _Record:
         self.request = request
         self.run = run
         self.key = _key(request)
-        self.kind = _kind(request)
+        self.kind = kind_meant(request)
         self.lease = (_LEASE_OVER, name)
         """Its clock among the deadlines."""
         self.state = _UNKNOWN
@@ -158,7 +158,7 @@ class Serving:
 
     def take(self, request: Request, now: Seconds) -> list[Effect]:
         """A command that has come; `requester` as its key names it."""
-        key, kind = _key(request), _kind(request)
+        key, kind = _key(request), kind_meant(request)
         newest = self._newest.get(key)
         if newest is not None and newest.state is not _ENDED and kind not in ("", newest.kind):
             self._refuse(request, f"{request.id!r} is the id of a live {newest.kind}", "give it another id")
@@ -171,8 +171,8 @@ class Serving:
         return self._told()
 
     def refuse(self, request: Request, fault: Fault) -> list[Effect]:
-        """It came on a wrong key. The same request, if it is live here or has ended, is as it was."""
-        record = self._known.get((_key(request), _kind(request)))
+        """It came on a wrong key, or could not be read. The same request, if live here or ended, is as it was."""
+        record = self._known.get((_key(request), kind_meant(request)))
         if record is not None and record.state is not _ENDED:
             return [Complain(fault, False)]
         if record is not None and record.answer is not None:
@@ -357,11 +357,6 @@ class Serving:
 
 def _key(request: Request) -> _Key:
     return (request.requester, request.life, request.id)
-
-
-def _kind(request: Request) -> str:
-    """Of a cancellation the kind of what it ends; empty if it does not say."""
-    return request.of if isinstance(request, Cancel) else kind_of(request)
 
 
 def _event(record: _Record, request: Request) -> Event:

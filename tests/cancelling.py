@@ -26,11 +26,15 @@ WAYS = ("perform", "realize", "stream", "timeout", "inhibit", "interrupt", "twic
 
 
 @asynccontextmanager
-async def whole_robot() -> AsyncIterator[Robot]:
-    """On the memory bus, with a person who listens."""
-    config = load(settings=["simulation.human=listening"])
+async def whole_robot(hub: MemoryHub | None = None, *settings: str) -> AsyncIterator[Robot]:
+    """All services and a person who listens, on this bus or one of their own; a client of theirs."""
+    if hub is None:
+        async with MemoryHub() as hub, whole_robot(hub, *settings) as robot:
+            yield robot
+        return
+    config = load(settings=["simulation.human=listening", *settings])
     services = {name: roster.service(name, config) for name in (*roster.ROBOT, "simulation")}
-    async with MemoryHub(config.robot) as hub, running(hub, services), connect(hub=hub) as robot:
+    async with running(hub, services), connect(hub=hub) as robot:
         await robot.person()
         yield robot
 

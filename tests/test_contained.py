@@ -21,7 +21,8 @@ from services.config import load
 from services.control.body import Authority
 from services.memory_bus import MemoryHub
 from services.runtime import running
-from tests.test_lives_and_late_answers import HOME, _serve_until, everything, robot_of, says
+from tests.cancelling import whole_robot
+from tests.test_lives_and_late_answers import HOME, _serve_until, everything, says
 
 # -- what is contained -------------------------------------------------------------------------------------------
 
@@ -67,7 +68,7 @@ async def test_a_bug_ends_one_request_and_the_next_is_served(
         except Exception as error:
             return f"{type(error).__name__}: {error}"
 
-    async with robot_of(hub) as robot:
+    async with whole_robot(hub) as robot:
         with monkeypatch.context() as patch:
             patch.setattr(place, breaking(place.rpartition(".")[2]))
             first = await asyncio.wait_for(do(robot, "first"), 120.0)
@@ -101,7 +102,7 @@ async def test_who_leaves_a_lease_leaves_it_at_once_whatever_became_of_generatio
                 raise KeyError("mine")
             await asyncio.sleep(100.0)
 
-    async with robot_of(hub) as robot:
+    async with whole_robot(hub) as robot:
         holding = asyncio.create_task(hold(robot) if how != "timeout" else asyncio.wait_for(hold(robot), 1.0))
         await asyncio.sleep(0.5)
         if gone == "cut":
@@ -129,7 +130,7 @@ async def test_a_driver_that_is_cancelled_by_itself_ends_one_behavior(
     hub: MemoryHub, monkeypatch: pytest.MonkeyPatch, method: str
 ) -> None:
     behaviors = [Gaze(id="g", target="human"), Speech(id="s", text="one two")]
-    async with robot_of(hub) as robot:
+    async with whole_robot(hub) as robot:
         with monkeypatch.context() as patch:
             patch.setattr(f"services.control.simulated.SimulatedBody.{method}", cancelled_by_itself)
             for number in range(2):
@@ -150,7 +151,7 @@ async def test_a_way_home_that_never_ends_is_not_asked_for_for_ever(
 
     monkeypatch.setattr("services.control.simulated.SimulatedBody.home", never)
     with hub.join("ear").subscribe(keys.keep_alive("control")) as pulses:
-        async with robot_of(hub) as robot:
+        async with whole_robot(hub) as robot:
             for number in range(3):
                 asking = robot.realize(f"b{number}", [Pointing(id="p", target="blue-square")], composition="REPLACE")
                 await asyncio.wait([asyncio.ensure_future(asking)], timeout=1.0)
@@ -171,7 +172,7 @@ async def test_a_way_home_that_never_ends_is_not_asked_for_for_ever(
     ],
 )
 async def test_what_cannot_be_sent_is_refused_and_other_requests_live_on(hub: MemoryHub, call: Any) -> None:
-    async with robot_of(hub) as robot:
+    async with whole_robot(hub) as robot:
         other = asyncio.create_task(robot.realize("b", [Wait(id="w", duration=20.0)]))
         await asyncio.sleep(1.0)
         with pytest.raises(InputRefused):
@@ -192,7 +193,7 @@ async def test_an_error_of_a_driver_that_cannot_even_be_written_down_ends_one_be
         raise Odd
 
     monkeypatch.setattr(logging.getLogger("engage"), "disabled", True)  # pytest can't write it down, either
-    async with robot_of(hub) as robot:
+    async with whole_robot(hub) as robot:
         with monkeypatch.context() as patch:
             patch.setattr("services.control.simulated.SimulatedBody.perform", broken)
             await asyncio.wait_for(robot.realize("b", [Speech(id="s", text="one")]), 60.0)
@@ -233,7 +234,7 @@ async def test_a_driver_that_breaks_as_it_is_told_to_stop_is_taken_home_all_the_
         if authority.revoked:
             raise ZeroDivisionError("watcher broke")
 
-    async with robot_of(hub) as robot:
+    async with whole_robot(hub) as robot:
         monkeypatch.setattr(Authority, "_tell", broken)
         asking = asyncio.create_task(
             robot.realize("b", [Pointing(id="p", target="blue-square"), Wait(id="w", duration=9.0)])

@@ -19,6 +19,7 @@ from services.realizer.config import RealizerConfig
 from services.requests import RequestRefused
 from services.runtime import running
 from services.simulation.still import show_world
+from tests.cancelling import whole_robot
 from tests.realizer.stage import stage
 
 
@@ -40,12 +41,9 @@ async def test_one_live_block_too_many_is_refused_and_the_others_keep_their_time
 
 
 async def test_a_speech_too_long_is_refused_in_a_block_and_in_a_fragment(hub: MemoryHub) -> None:
-    config = load(settings=["simulation.human=listening"])
-    services = {name: roster.service(name, config) for name in (*roster.ROBOT, "simulation")}
     words = "word " * 1001
     speech = Speech(id="s", text=words)
-    async with running(hub, services), connect(hub=hub) as robot:
-        await robot.person()
+    async with whole_robot(hub) as robot:
         with pytest.raises(InputRefused, match=r"5005 characters of speech, at most 5000.*`realizer.utterance`"):
             await robot.realize("b", [Gaze(id="g", target="human"), speech])
         with pytest.raises(InputRefused, match=r"behaviors\[0\].text: 5005 characters.*`generation.utterance`"):
@@ -54,10 +52,7 @@ async def test_a_speech_too_long_is_refused_in_a_block_and_in_a_fragment(hub: Me
 
 
 async def test_one_fragment_too_many_is_refused_and_the_others_are_performed(hub: MemoryHub) -> None:
-    config = load(settings=["simulation.human=listening", "generation.fragments=5"])
-    services = {name: roster.service(name, config) for name in (*roster.ROBOT, "simulation")}
-    async with running(hub, services), connect(hub=hub) as robot:
-        await robot.person()
+    async with whole_robot(hub, "generation.fragments=5") as robot:
         asked = [
             asyncio.create_task(
                 robot.perform(TurnFragment(id=f"f{n}", turn_status="full", behaviors=(Speech(id="s", text="one"),)))

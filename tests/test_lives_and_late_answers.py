@@ -1,8 +1,6 @@
 """Whole robots in which somebody is late, comes back, or uses an id again: nobody dies of it, or is told lies."""
 
 import asyncio
-from collections.abc import AsyncIterator
-from contextlib import asynccontextmanager
 from typing import Any
 
 import pytest
@@ -35,21 +33,11 @@ def says(id: str = "f", text: str = WORDS) -> TurnFragment:
     return TurnFragment(id=id, turn_status="full", behaviors=(Speech(id="s", text=text),))
 
 
-@asynccontextmanager
-async def robot_of(hub: MemoryHub) -> AsyncIterator[Robot]:
-    """All services, and a client of theirs."""
-    config = load(settings=["simulation.human=listening"])
-    services = {name: roster.service(name, config) for name in (*roster.ROBOT, "simulation")}
-    async with running(hub, services), connect(hub=hub) as robot:
-        await robot.person()
-        yield robot
-
-
 # -- callers that change their mind ------------------------------------------------------------------------------
 
 
 async def test_after_a_cancelled_request_the_next_one_comes_to_its_end(hub: MemoryHub) -> None:
-    async with robot_of(hub) as robot:
+    async with whole_robot(hub) as robot:
         with pytest.raises(TimeoutError):
             await asyncio.wait_for(robot.perform(says()), 1.0)
         await asyncio.sleep(2.0)
@@ -84,7 +72,7 @@ async def test_a_client_whose_listening_has_died_says_so_at_every_call(hub: Memo
 
 @pytest.mark.parametrize("cut", [0.5, 4.0, 8.0, 20.0])
 async def test_a_body_that_was_cut_off_answers_late_and_the_robot_goes_on(hub: MemoryHub, cut: float) -> None:
-    async with robot_of(hub) as robot:
+    async with whole_robot(hub) as robot:
         block = (Pointing(id="p", target="blue-square", timing=()), Speech(id="s", text=WORDS))
         performing = asyncio.create_task(robot.realize("b", block))
         await asyncio.sleep(0.6)
@@ -165,7 +153,7 @@ HOME = GoHome(id="1")
 async def test_an_id_of_another_kind_or_of_somebody_else_ends_nobody(
     hub: MemoryHub, first: tuple[str, Request], second: tuple[str, Request], by: str
 ) -> None:
-    async with robot_of(hub) as robot:
+    async with whole_robot(hub) as robot:
         with hub.join("ear").subscribe(keys.ANY_REQUEST_STATE) as states:
             for (expression, request), name in zip((first, second), ("one", by), strict=True):
                 key = keys.command(expression, "manager", name)
@@ -214,7 +202,7 @@ async def test_an_interruption_that_comes_again_is_answered_again_and_ends_no_bl
 @pytest.mark.parametrize("pause", [0.0, 8.0])
 async def test_a_manager_of_a_fixed_name_and_id_that_comes_again_is_heard_again(hub: MemoryHub, pause: float) -> None:
     lengths = []
-    async with robot_of(hub):
+    async with whole_robot(hub):
         for _ in range(3):
             async with connect(hub=hub, name="honest") as manager:
                 began = manager.now()
@@ -230,7 +218,7 @@ async def test_a_program_without_a_life_that_uses_its_id_again_is_heard_again_af
     hub: MemoryHub, pause: float
 ) -> None:
     payload = encode_json(PerformFragment(id="1", fragment=says()))
-    async with robot_of(hub):
+    async with whole_robot(hub):
         with hub.join("ear").subscribe(keys.request_state("generation"), keys.FEEDBACK) as heard:
             for _ in range(2):
                 hub.inject(keys.command(keys.FRAGMENT, "manager", "me"), payload, "application/json")

@@ -21,6 +21,7 @@ from services.memory_bus import MemoryHub
 from services.runtime import running
 from services.simulation.still import tangram_world
 from services.streaming import Piece, perform_call, stream
+from tests.cancelling import whole_robot
 
 
 class Stage(NamedTuple):
@@ -161,10 +162,7 @@ async def test_a_part_of_words_is_spoken_while_the_next_one_is_written() -> None
 
 async def test_a_stream_that_is_cancelled_as_a_piece_comes_leaves_no_turn_open(hub: MemoryHub) -> None:
     """The last fragment's task is cancelled before its first step: nothing of it was sent."""
-    config = load(settings=["simulation.human=listening"])
-    services = {name: roster.service(name, config) for name in (*roster.ROBOT, "simulation")}
-    async with running(hub, services), connect(hub=hub) as robot:
-        await robot.person()
+    async with whole_robot(hub) as robot:
         streaming: asyncio.Task[object]
 
         async def pieces() -> AsyncIterator[str]:

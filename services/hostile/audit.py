@@ -10,7 +10,7 @@ from msgspec import Struct, field
 
 from schemas import keys
 from schemas.messages import Message, encode
-from schemas.requests import Answer, Cancel, KeepAlive, Outcome, Refused, Request, kind_of
+from schemas.requests import Answer, Cancel, KeepAlive, Outcome, Refused, Request, kind_meant
 from schemas.units import Seconds
 
 PATIENCE: Seconds = 3.0
@@ -78,8 +78,7 @@ class Book:
                     entry.mentioned_at = now
             return
         requester = requester or message.requester
-        kind = message.of if isinstance(message, Cancel) else kind_of(message)
-        name = Name(server, requester, life, kind, message.id)
+        name = Name(server, requester, life, kind_meant(message), message.id)
         entry = self.entries.get(name)
         if entry is None and not isinstance(message, Cancel):
             role = key.split("/")[4] if keys.expression_of(key) else "manager"

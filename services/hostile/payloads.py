@@ -22,7 +22,7 @@ from services.hostile.chance import Chance, happens
 from services.hostile.markup import document
 from services.hostile.typed import SURROGATE, Typed, distorted
 
-SERVERS = ("generation", "realizer", "recognition", "control")
+SERVERS = tuple(dict.fromkeys(map(keys.server_of, COMMANDS)))
 BROKEN = 0.05
 """Of the payloads have bits flipped, or end early."""
 DISTORTED = 0.15

@@ -24,7 +24,6 @@ from schemas.requests import Cancel, Request
 from schemas.units import Seconds
 from services.bus import Bus
 from services.hostile.lies import Lie, Status, Step, estimate, lie, points_of
-from services.hostile.typed import Words
 from services.requests import RequestDesk
 from services.runtime import Ready
 
@@ -36,9 +35,8 @@ TERM: Seconds = 2.0
 class LyingBody:
     """chance: of all its lies, which are the same for the same one."""
 
-    def __init__(self, chance: Random, words: Words) -> None:
+    def __init__(self, chance: Random) -> None:
         self._chance = chance
-        self._words = words
         self._acts: dict[str, _Act] = {}
 
     async def serve(self, bus: Bus, ready: Ready) -> None:

@@ -174,7 +174,7 @@ class _Trial:
 
     async def _play(self) -> None:
         if "body" in self.attack.kinds and not self.attack.own_body:
-            self.services[BODY] = LyingBody(self.chance("lies"), self.hub.words).serve
+            self.services[BODY] = LyingBody(self.chance("lies")).serve
         for name in self.services:
             await self._start(name)
         await self._learn_world()

@@ -206,9 +206,6 @@ class Session:
                 )
                 self._robot_ends(ended, at)
 
-    def _robot_gaze_expires(self) -> None:
-        self._robot_gaze_changed(self.scene.gaze.expire())
-
     def _robot_gaze_changed(self, at: Seconds) -> None:
         self._let_all(at, lambda person: person.gaze_changed(at))
 

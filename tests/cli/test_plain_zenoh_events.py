@@ -4,7 +4,6 @@ import asyncio
 import sys
 from asyncio.subprocess import PIPE, Process
 from collections.abc import Iterable
-from pathlib import Path
 
 import pytest
 
@@ -15,11 +14,10 @@ from services.zenoh_session import open_session
 from tests.bus.cable import Cable
 from tests.bus.places import free_endpoint
 from tests.cli.test_processes import PATIENCE, line, stopped
-from tests.cli.test_watch import MUTUAL, Scene, heard, scene
+from tests.cli.test_watch import EXAMPLE, MUTUAL, Scene, heard, scene
 
 pytestmark = pytest.mark.real_time
 
-EXAMPLE = Path(__file__).parents[2] / "examples" / "plain_zenoh_events.py"
 LIMIT = "recognition.mutual_facial_gaze_limit=1"
 LAST = "carl"
 Told = tuple[str, str]

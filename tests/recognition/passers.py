@@ -16,10 +16,10 @@ from services.recognition.recognizer import Perceived, Recognizer, Result
 from services.recognition.standings import Standings
 from services.recognition.witnesses import Witnesses
 from tests.recognition.observations import PIECES, ROBOT, stamp, world
+from tests.recognition.raw import EYES
 
 EVERY: Seconds = 8.0
 """Between two visits."""
-EYES = (1.3, 0.0, 1.2)
 
 
 class Lobby(Struct):

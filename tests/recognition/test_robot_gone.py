@@ -5,7 +5,6 @@ import pytest
 from schemas.presence import PeerGone
 from tests.recognition.observations import HUMAN, ROBOT, Log
 
-BLUE = "blue-square"
 CONTROL_GONE = PeerGone(participant="control")
 
 

@@ -10,7 +10,7 @@ from schemas.behaviors import Event, TurnSignal
 from schemas.feedback import BlockProgress, SyncPointProgress
 from schemas.recognition import ConnectionEvent, EventOutcome, RequestEvent, SignalTurn, Statistics
 from schemas.units import Stamp
-from services.bus import Bus, Subscription
+from services.bus import Bus
 from services.memory_bus import MemoryHub
 from services.recognition.config import RecognitionConfig
 from services.recognition.service import recognize
@@ -32,10 +32,6 @@ def request(bus: Bus, kind: str, *objects: str, id: str = "r-1", **event: object
 def perceive(bus: Bus, target: str, at: float | None = None) -> None:
     look = ActionBegan(actor=HUMAN, action="look", at=bus.stamp(at), targets=(target,))
     bus.publish(keys.PERCEIVED_ACTION, look)
-
-
-def drain(inbox: Subscription) -> list[ConnectionEvent]:
-    return [queued.message for queued in list(inbox._queue)]  # type: ignore[misc]
 
 
 async def test_directed_gaze_is_decided_by_the_look_of_the_person(hub: MemoryHub):

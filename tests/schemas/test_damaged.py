@@ -25,7 +25,6 @@ XML = b'<bml id="b">\n<speech id="s">caf\xc3\xa9 <sync id="m"/></speech><gaze id
 JSON = b'{"turn_status": "full",\n"parts": [{"say": "caf\xc3\xa9"}, {"refer": "cup"}]}'
 TOML = 'robot = "café"\n[realizer]\nlate = 0.5\n'.encode()
 FEEDBACK = b'<blockProgress xmlns="http://www.bml-initiative.org/bml/bml-1.0" id="b:start" globalTime="1.0"/>'
-TROUBLE = [b"", b"\xe9", b"\xff", b"\xed\xa0\x80", b"\xc3", b'"', b"{", b"\0"]
 
 
 @st.composite
