@@ -27,11 +27,11 @@ import zenoh
 import zenoh.ext
 from msgspec import Struct
 
-from schemas import keys
-from schemas.requests import Accepted
-from schemas.units import Seconds
-from services.zenoh_bus import ZenohHub, open_hub
-from services.zenoh_session import QOS, open_session
+from engage_hri.schemas import keys
+from engage_hri.schemas.requests import Accepted
+from engage_hri.schemas.units import Seconds
+from engage_hri.services.zenoh_bus import ZenohHub, open_hub
+from engage_hri.services.zenoh_session import QOS, open_session
 from tests.bus.cable import Cable
 from tests.bus.places import acquainted, free_endpoint
 

@@ -19,14 +19,14 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 import zenoh
 
 from benchmarks.harness import Contender, OtherSide, compare, report, stands
-from schemas import keys
-from schemas.body import SyncPointReached
-from schemas.messages import encode
-from schemas.units import Seconds, Stamp
-from services.bus import Bus
-from services.commandline.process import run, run_until_signal
-from services.zenoh_bus import open_hub
-from services.zenoh_session import QOS, open_session
+from engage_hri.schemas import keys
+from engage_hri.schemas.body import SyncPointReached
+from engage_hri.schemas.messages import encode
+from engage_hri.schemas.units import Seconds, Stamp
+from engage_hri.services.bus import Bus
+from engage_hri.services.commandline.process import run, run_until_signal
+from engage_hri.services.zenoh_bus import open_hub
+from engage_hri.services.zenoh_session import QOS, open_session
 
 ROBOT = "benchmark"
 PING, PONG = "raw/ping", "raw/pong"

@@ -21,8 +21,8 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from msgspec import Struct
 
-from schemas import keys
-from schemas.behaviors import (
+from engage_hri.schemas import keys
+from engage_hri.schemas.behaviors import (
     After,
     BlockBehavior,
     Constraint,
@@ -34,22 +34,22 @@ from schemas.behaviors import (
     Speech,
     Synchronize,
 )
-from schemas.blocks import Block, BlockOutcome, PerformBlock
-from schemas.body import EstimateBehaviors, EstimateItem, Estimates, PerformBehavior, SyncPointReached
-from schemas.units import Seconds
-from schemas.world import Entity, World
-from services.bus import Bus
-from services.control.config import ControlConfig, Displaced, Slow, Stall, Variability
-from services.control.service import embody
-from services.memory_bus import MemoryHub
-from services.realizer.config import RealizerConfig
-from services.realizer.planner import Plan, plan_block
-from services.realizer.points import Point
-from services.realizer.poses import poses_before
-from services.realizer.service import realize
-from services.requests import Requester
-from services.runtime import running
-from services.virtual_time import run_virtual
+from engage_hri.schemas.blocks import Block, BlockOutcome, PerformBlock
+from engage_hri.schemas.body import EstimateBehaviors, EstimateItem, Estimates, PerformBehavior, SyncPointReached
+from engage_hri.schemas.units import Seconds
+from engage_hri.schemas.world import Entity, World
+from engage_hri.services.bus import Bus
+from engage_hri.services.control.config import ControlConfig, Displaced, Slow, Stall, Variability
+from engage_hri.services.control.service import embody
+from engage_hri.services.memory_bus import MemoryHub
+from engage_hri.services.realizer.config import RealizerConfig
+from engage_hri.services.realizer.planner import Plan, plan_block
+from engage_hri.services.realizer.points import Point
+from engage_hri.services.realizer.poses import poses_before
+from engage_hri.services.realizer.service import realize
+from engage_hri.services.requests import Requester
+from engage_hri.services.runtime import running
+from engage_hri.services.virtual_time import run_virtual
 
 WORLD = World(
     entities=(

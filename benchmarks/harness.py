@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from statistics import quantiles
 from typing import Protocol, Self
 
-from schemas.units import Seconds
+from engage_hri.schemas.units import Seconds
 
 
 class Contender(Protocol):

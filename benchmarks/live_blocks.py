@@ -30,9 +30,9 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from benchmarks.harness import percentile
 from benchmarks.sync_to_command import chain
-from schemas import keys
-from schemas.blocks import BlockOutcome, PerformBlock
-from schemas.body import (
+from engage_hri.schemas import keys
+from engage_hri.schemas.blocks import BlockOutcome, PerformBlock
+from engage_hri.schemas.body import (
     BehaviorOutcome,
     Estimate,
     EstimateBehaviors,
@@ -41,14 +41,14 @@ from schemas.body import (
     Phase,
     SyncPointReached,
 )
-from schemas.messages import Message
-from schemas.units import Seconds
-from services.bus import Bus
-from services.memory_bus import MemoryHub
-from services.realizer.config import RealizerConfig
-from services.realizer.service import realize
-from services.requests import RequestDesk, Requester
-from services.runtime import running
+from engage_hri.schemas.messages import Message
+from engage_hri.schemas.units import Seconds
+from engage_hri.services.bus import Bus
+from engage_hri.services.memory_bus import MemoryHub
+from engage_hri.services.realizer.config import RealizerConfig
+from engage_hri.services.realizer.service import realize
+from engage_hri.services.requests import RequestDesk, Requester
+from engage_hri.services.runtime import running
 
 NATURAL: Seconds = 1.0
 SPEECHES = 3

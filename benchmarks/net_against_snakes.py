@@ -26,10 +26,10 @@ with warnings.catch_warnings():
     warnings.simplefilter("ignore", DeprecationWarning)  # it imports `imp`
     import snakes.nets as snakes
 
-from schemas.behaviors import After, BlockBehavior, Constraint, Pointing, Speech, Synchronize
-from schemas.blocks import Block
-from services.realizer.net import PetriNet, Place, Transition, enabled, fire, fire_once_each
-from services.realizer.planner import Plan, plan_block
+from engage_hri.schemas.behaviors import After, BlockBehavior, Constraint, Pointing, Speech, Synchronize
+from engage_hri.schemas.blocks import Block
+from engage_hri.services.realizer.net import PetriNet, Place, Transition, enabled, fire, fire_once_each
+from engage_hri.services.realizer.planner import Plan, plan_block
 
 SIZES = (100, 1000, 10000)
 PER_PAIR = 8

@@ -29,12 +29,12 @@ from typing import Any
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from schemas.recognition import ConnectionEvent
-from schemas.units import Seconds
-from services.recognition.config import RecognitionConfig
-from services.recognition.machine import Effect
-from services.recognition.session import Observation, Session
-from services.recognition.standings import Standings
+from engage_hri.schemas.recognition import ConnectionEvent
+from engage_hri.schemas.units import Seconds
+from engage_hri.services.recognition.config import RecognitionConfig
+from engage_hri.services.recognition.machine import Effect
+from engage_hri.services.recognition.session import Observation, Session
+from engage_hri.services.recognition.standings import Standings
 from tests.recognition import recomputed
 from tests.recognition.kept import reachable
 from tests.recognition.meeting import meeting

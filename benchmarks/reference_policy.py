@@ -24,24 +24,24 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 import msgspec
 
 from benchmarks.harness import Contender, compare, report
-from schemas import keys
-from schemas.behaviors import Reference, Speech, SpeechOption
-from schemas.blocks import BlockOutcome, PerformBlock
-from schemas.body import DescribeBody, Estimate, EstimateBehaviors, EstimateItem, Estimates
-from schemas.fragments import PerformFragment, TurnFragment
-from schemas.messages import Message
-from schemas.units import Seconds
-from schemas.world import Entity, World
-from services.bus import Bus
-from services.commandline.process import run
-from services.control.simulated import SimulatedBody
-from services.generation.config import GenerationConfig
-from services.generation.motions import Motions, collect, distinct, from_each_other, from_here
-from services.generation.reference_policy import Posture, Scene, choose, considered, cost
-from services.generation.service import generate
-from services.memory_bus import MemoryHub
-from services.requests import RequestDesk, Requester
-from services.runtime import running
+from engage_hri.schemas import keys
+from engage_hri.schemas.behaviors import Reference, Speech, SpeechOption
+from engage_hri.schemas.blocks import BlockOutcome, PerformBlock
+from engage_hri.schemas.body import DescribeBody, Estimate, EstimateBehaviors, EstimateItem, Estimates
+from engage_hri.schemas.fragments import PerformFragment, TurnFragment
+from engage_hri.schemas.messages import Message
+from engage_hri.schemas.units import Seconds
+from engage_hri.schemas.world import Entity, World
+from engage_hri.services.bus import Bus
+from engage_hri.services.commandline.process import run
+from engage_hri.services.control.simulated import SimulatedBody
+from engage_hri.services.generation.config import GenerationConfig
+from engage_hri.services.generation.motions import Motions, collect, distinct, from_each_other, from_here
+from engage_hri.services.generation.reference_policy import Posture, Scene, choose, considered, cost
+from engage_hri.services.generation.service import generate
+from engage_hri.services.memory_bus import MemoryHub
+from engage_hri.services.requests import RequestDesk, Requester
+from engage_hri.services.runtime import running
 
 OBJECTS, PHRASES = 100, 10
 SIZES = (1, 2, 5, 10)

@@ -26,10 +26,10 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from benchmarks.bus_roundtrip import BusPings, RawPings, connected, free_endpoint, serve_bus, serve_raw
 from benchmarks.harness import Contender, OtherSide, compare, report, stands
-from schemas import keys
-from schemas.behaviors import Constraint, Speech, Synchronize
-from schemas.blocks import Block, BlockOutcome, PerformBlock
-from schemas.body import (
+from engage_hri.schemas import keys
+from engage_hri.schemas.behaviors import Constraint, Speech, Synchronize
+from engage_hri.schemas.blocks import Block, BlockOutcome, PerformBlock
+from engage_hri.schemas.body import (
     BehaviorOutcome,
     Estimate,
     EstimateBehaviors,
@@ -38,16 +38,16 @@ from schemas.body import (
     Phase,
     SyncPointReached,
 )
-from schemas.messages import Message
-from schemas.units import Seconds
-from services.bus import Bus
-from services.commandline.process import run, run_until_signal
-from services.memory_bus import MemoryHub
-from services.realizer.config import RealizerConfig
-from services.realizer.service import realize
-from services.requests import RequestDesk, Requester
-from services.runtime import running, serve
-from services.zenoh_bus import open_hub
+from engage_hri.schemas.messages import Message
+from engage_hri.schemas.units import Seconds
+from engage_hri.services.bus import Bus
+from engage_hri.services.commandline.process import run, run_until_signal
+from engage_hri.services.memory_bus import MemoryHub
+from engage_hri.services.realizer.config import RealizerConfig
+from engage_hri.services.realizer.service import realize
+from engage_hri.services.requests import RequestDesk, Requester
+from engage_hri.services.runtime import running, serve
+from engage_hri.services.zenoh_bus import open_hub
 
 ROBOT = "benchmark"
 NATURAL: Seconds = 0.001

@@ -7,9 +7,7 @@ It waits for the robot and for a person, says one thing, and tells how it went.
 import asyncio
 import sys
 
-from schemas.behaviors import Reference, Speech, SpeechOption
-from schemas.fragments import TurnFragment
-from services.client import connect
+from engage_hri import Reference, Speech, SpeechOption, TurnFragment, connect
 
 PUZZLE = TurnFragment(
     id="puzzle",

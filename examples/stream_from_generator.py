@@ -15,15 +15,15 @@ import re
 from collections.abc import AsyncIterator, Sequence
 from contextlib import AbstractAsyncContextManager, asynccontextmanager
 
-from schemas.summary import Summary, summary
-from schemas.tool import ToolInput
-from services.client import Robot, connect
-from services.commandline import roster
-from services.config import load
-from services.memory_bus import MemoryHub
-from services.runtime import running
-from services.streaming import stream
-from services.virtual_time import VirtualTimeLoop
+from engage_hri.schemas.summary import Summary, summary
+from engage_hri.schemas.tool import ToolInput
+from engage_hri.services.client import Robot, connect
+from engage_hri.services.commandline import roster
+from engage_hri.services.config import load
+from engage_hri.services.memory_bus import MemoryHub
+from engage_hri.services.runtime import running
+from engage_hri.services.streaming import stream
+from engage_hri.services.virtual_time import VirtualTimeLoop
 
 GREETING = (
     "Hello! I could use your help with this puzzle, if you have a moment. First of all: do you see [red-square]?"

@@ -2,8 +2,8 @@
 
 from msgspec import Struct
 
-from schemas.behaviors import Action
-from schemas.units import Probability, Stamp
+from engage_hri.schemas.behaviors import Action
+from engage_hri.schemas.units import Probability, Stamp
 
 
 class ActionBegan(Struct, frozen=True, kw_only=True, tag="action_began", omit_defaults=True):

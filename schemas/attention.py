@@ -4,8 +4,8 @@ from typing import ClassVar, Literal
 
 from msgspec import Struct
 
-from schemas.requests import Outcome, Request
-from schemas.units import Seconds, Stamp
+from engage_hri.schemas.requests import Outcome, Request
+from engage_hri.schemas.units import Seconds, Stamp
 
 ClaimKind = Literal["inhibition", "fragment", "glance", "response", "hands", "face", "none"]
 

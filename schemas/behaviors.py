@@ -1,14 +1,14 @@
 """Behaviors: what a block or a turn fragment is made of, one struct per element of BML and its extension.
 
 The dialects of BML (thesis draft, draft without namespace, BML 1.0) decode to these same structs. A sync
-reference stays the string its author wrote (`speech-1:end+0.5`); `schemas.syncref` parses it.
+reference stays the string its author wrote (`speech-1:end+0.5`); `schemas/syncref.py` parses it.
 """
 
 from typing import Literal
 
 from msgspec import Struct
 
-from schemas.units import Degrees, Probability, Seconds
+from engage_hri.schemas.units import Degrees, Probability, Seconds
 
 Action = Literal["look", "point", "nod", "shake", "speak", "act"]
 """What an actor can be seen to do; `act` is the manipulation of an object."""

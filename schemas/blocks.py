@@ -4,10 +4,10 @@ from typing import Literal
 
 from msgspec import Struct
 
-from schemas.behaviors import BlockBehavior, Constraint
-from schemas.faults import Fault
-from schemas.feedback import WarningKind
-from schemas.requests import Outcome, Request
+from engage_hri.schemas.behaviors import BlockBehavior, Constraint
+from engage_hri.schemas.faults import Fault
+from engage_hri.schemas.feedback import WarningKind
+from engage_hri.schemas.requests import Outcome, Request
 
 Composition = Literal["MERGE", "APPEND", "REPLACE"]
 Dialect = Literal["draft", "bml-1.0"]

@@ -12,10 +12,10 @@ from typing import ClassVar, Literal, Self
 from msgspec import Struct
 from msgspec.structs import replace
 
-from schemas.behaviors import BlockBehavior
-from schemas.faults import Fault
-from schemas.requests import Outcome, Request
-from schemas.units import Degrees, Duration, Meters, Radians, Stamp, Vector
+from engage_hri.schemas.behaviors import BlockBehavior
+from engage_hri.schemas.faults import Fault
+from engage_hri.schemas.requests import Outcome, Request
+from engage_hri.schemas.units import Degrees, Duration, Meters, Radians, Stamp, Vector
 
 
 class PlannedInstant(Struct, frozen=True, kw_only=True, omit_defaults=True):

@@ -7,7 +7,7 @@ from collections.abc import Callable, Collection, Iterator, Mapping
 
 from msgspec.structs import replace
 
-from schemas.behaviors import (
+from engage_hri.schemas.behaviors import (
     After,
     Before,
     Behavior,
@@ -20,9 +20,9 @@ from schemas.behaviors import (
     TurnSignal,
     Unknown,
 )
-from schemas.blocks import Block, Dialect
-from schemas.references import in_draft_spelling, respelled, sites
-from schemas.syncref import BLOCK_ITSELF, SYNC_POINTS, SyncRef, dialect_sync
+from engage_hri.schemas.blocks import Block, Dialect
+from engage_hri.schemas.references import in_draft_spelling, respelled, sites
+from engage_hri.schemas.syncref import BLOCK_ITSELF, SYNC_POINTS, SyncRef, dialect_sync
 
 EXTENSIONS = (Event, TurnSignal, Reference, Unknown)
 """What no other realizer knows."""

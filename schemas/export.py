@@ -1,8 +1,8 @@
-"""JSON Schemas of everything that travels, for other languages: `python -m schemas.export [--check]`.
+"""JSON Schemas of everything that travels, for other languages: `python -m engage_hri.schemas.export [--check]`.
 
 One file per message of the bus, one each for a block and a turn fragment, and `lines.json` for the lines of
 `engage watch`. Draft 2020-12; quantities carry their unit as `description`. And the tool by which language models
-speak, as an API takes it (`schemas.tool`).
+speak, as an API takes it (`schemas/tool.py`).
 """
 
 import argparse
@@ -13,10 +13,10 @@ from typing import Any, get_args
 
 import msgspec
 
-from schemas import lines, tool
-from schemas.blocks import Block
-from schemas.fragments import TurnFragment
-from schemas.messages import MAJOR, Message
+from engage_hri.schemas import lines, tool
+from engage_hri.schemas.blocks import Block
+from engage_hri.schemas.fragments import TurnFragment
+from engage_hri.schemas.messages import MAJOR, Message
 
 EXPORTED = Path(__file__).parent / "exported"
 
@@ -43,7 +43,7 @@ def files() -> dict[str, bytes]:
     """What the folder should hold: name to content."""
     contents = {f"{kind.__name__}.json": schema(kind) for kind in exported_types()}
     contents["lines.json"] = schema(lines.Line, "lines")
-    contents[tool.FILE] = tool.definition()
+    contents[tool.FILE] = tool.tool_definition()
     return {
         name: msgspec.json.format(msgspec.json.encode(content), indent=2) + b"\n"
         for name, content in contents.items()
@@ -72,13 +72,13 @@ def write(folder: Path = EXPORTED) -> list[str]:
 
 def main(arguments: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(
-        prog="python -m schemas.export", description=inspect.getdoc(sys.modules[__name__])
+        prog="python -m engage_hri.schemas.export", description=inspect.getdoc(sys.modules[__name__])
     )
     parser.add_argument("--check", action="store_true", help="write nothing; fail if a file is stale")
     if parser.parse_args(arguments).check:
         names = stale()
         if names:
-            print(f"stale: {', '.join(names)}; run python -m schemas.export", file=sys.stderr)
+            print(f"stale: {', '.join(names)}; run python -m engage_hri.schemas.export", file=sys.stderr)
         return 1 if names else 0
     for name in write():
         print(name)

@@ -19,8 +19,8 @@ from typing import Any
 import msgspec
 from lxml import etree
 
-from schemas.faults import Fault, InputRefused
-from schemas.feedback import (
+from engage_hri.schemas.faults import Fault, InputRefused
+from engage_hri.schemas.feedback import (
     BlockProgress,
     Feedback,
     PlannedPoint,
@@ -28,8 +28,8 @@ from schemas.feedback import (
     SyncPointProgress,
     WarningFeedback,
 )
-from schemas.units import Seconds, Stamp
-from schemas.xml_source import BML_1_0, EBML, Source, split
+from engage_hri.schemas.units import Seconds, Stamp
+from engage_hri.schemas.xml_source import BML_1_0, EBML, Source, split
 
 HEAD = f'<?xml version="1.0" encoding="UTF-8"?>\n<ebml:feedback xmlns:ebml="{EBML}" xmlns="{BML_1_0}">\n'
 TAIL = "</ebml:feedback>\n"

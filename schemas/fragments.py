@@ -4,12 +4,12 @@ from typing import Literal
 
 from msgspec import Struct
 
-from schemas.behaviors import Action, Constraint, FragmentBehavior
-from schemas.blocks import SpokenText, Unread
-from schemas.faults import Fault
-from schemas.recognition import ConnectionEvent
-from schemas.requests import Outcome, Request
-from schemas.units import Probability, Seconds
+from engage_hri.schemas.behaviors import Action, Constraint, FragmentBehavior
+from engage_hri.schemas.blocks import SpokenText, Unread
+from engage_hri.schemas.faults import Fault
+from engage_hri.schemas.recognition import ConnectionEvent
+from engage_hri.schemas.requests import Outcome, Request
+from engage_hri.schemas.units import Probability, Seconds
 
 TurnStatus = Literal["beginning", "middle", "end", "full", "backchannel"]
 GestureChoice = Literal["none", "gaze", "directed_gaze", "directed_gaze_with_pointing"]
@@ -36,7 +36,7 @@ class TurnFragment(Struct, frozen=True, kw_only=True, tag="fragment", omit_defau
     unread: tuple[Unread, ...] = ()
     """Warned of when the block that it becomes begins."""
     from_parts: bool = False
-    """Of a language model's tool call, each behavior of one part: refusals name the part (`schemas.tool_call`)."""
+    """Of a language model's tool call, each behavior of one part: refusals name the part (`schemas/tool_call.py`)."""
     line: int = 0
 
 

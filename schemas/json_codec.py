@@ -1,7 +1,7 @@
 """Blocks and fragments from JSON, and back; and `read`, which takes XML, too. Errors carry the JSON path.
 
-The form is that of the structs, as in the exported schemas, or what a language model writes (schemas.tool). Unknown
-keys are refused: a misspelled `turn_status` must not silently become a full turn.
+The form is that of the structs, as in the exported schemas, or what a language model writes (schemas/tool.py).
+Unknown keys are refused: a misspelled `turn_status` must not silently become a full turn.
 """
 
 import json
@@ -11,15 +11,15 @@ from typing import Any, TypeVar
 import msgspec
 from msgspec import Struct
 
-from schemas.blocks import Block
-from schemas.check import sound
-from schemas.faults import Fault, InputRefused
-from schemas.fragments import TurnFragment
-from schemas.tool_call import from_tool, is_tool_input
-from schemas.utf8 import BYTE_ORDER_MARK, is_utf8, utf8
-from schemas.xml_codec import decode_xml
-from schemas.xml_names import snake
-from schemas.xml_source import LARGEST
+from engage_hri.schemas.blocks import Block
+from engage_hri.schemas.check import sound
+from engage_hri.schemas.faults import Fault, InputRefused
+from engage_hri.schemas.fragments import TurnFragment
+from engage_hri.schemas.tool_call import from_tool, is_tool_input
+from engage_hri.schemas.utf8 import BYTE_ORDER_MARK, is_utf8, utf8
+from engage_hri.schemas.xml_codec import decode_xml
+from engage_hri.schemas.xml_names import snake
+from engage_hri.schemas.xml_source import LARGEST
 
 T = TypeVar("T", Block, TurnFragment)
 

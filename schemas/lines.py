@@ -9,13 +9,19 @@ from typing import Any, TypeVar
 import msgspec
 from msgspec import Struct
 
-from schemas.attention import HeadOwner
-from schemas.behaviors import Action, Cause, EventKind
-from schemas.faults import Fault
-from schemas.feedback import BlockProgress, PlannedPoint, PredictionFeedback, SyncPointProgress, WarningFeedback
-from schemas.messages import Message
-from schemas.recognition import ConnectionEvent, EventState, KindStatistics, Statistics, WindowStatistics
-from schemas.units import Probability, Seconds
+from engage_hri.schemas.attention import HeadOwner
+from engage_hri.schemas.behaviors import Action, Cause, EventKind
+from engage_hri.schemas.faults import Fault
+from engage_hri.schemas.feedback import (
+    BlockProgress,
+    PlannedPoint,
+    PredictionFeedback,
+    SyncPointProgress,
+    WarningFeedback,
+)
+from engage_hri.schemas.messages import Message
+from engage_hri.schemas.recognition import ConnectionEvent, EventState, KindStatistics, Statistics, WindowStatistics
+from engage_hri.schemas.units import Probability, Seconds
 
 _encoder = msgspec.json.Encoder()
 

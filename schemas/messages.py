@@ -6,11 +6,11 @@ from typing import Any
 
 import msgspec
 
-from schemas import keys
-from schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost
-from schemas.attention import HeadOwner, Inhibit, InhibitionEnded
-from schemas.blocks import BehaviorInterrupted, BlockOutcome, InterruptBehavior, PerformBlock
-from schemas.body import (
+from engage_hri.schemas import keys
+from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost
+from engage_hri.schemas.attention import HeadOwner, Inhibit, InhibitionEnded
+from engage_hri.schemas.blocks import BehaviorInterrupted, BlockOutcome, InterruptBehavior, PerformBlock
+from engage_hri.schemas.body import (
     AbortBehavior,
     BehaviorAborted,
     BehaviorOutcome,
@@ -26,12 +26,12 @@ from schemas.body import (
     SyncPointReached,
     WordSpoken,
 )
-from schemas.faults import Fault, InputRefused
-from schemas.feedback import BlockProgress, PredictionFeedback, SyncPointProgress, WarningFeedback
-from schemas.fragments import FragmentOutcome, PerformFragment, TurnClosed
-from schemas.perception import HeadPose, VoiceActivity
-from schemas.presence import PeerAlive, PeerGone
-from schemas.recognition import (
+from engage_hri.schemas.faults import Fault, InputRefused
+from engage_hri.schemas.feedback import BlockProgress, PredictionFeedback, SyncPointProgress, WarningFeedback
+from engage_hri.schemas.fragments import FragmentOutcome, PerformFragment, TurnClosed
+from engage_hri.schemas.perception import HeadPose, VoiceActivity
+from engage_hri.schemas.presence import PeerAlive, PeerGone
+from engage_hri.schemas.recognition import (
     ConnectionEvent,
     EventOutcome,
     OpenEvents,
@@ -40,9 +40,9 @@ from schemas.recognition import (
     Statistics,
     TurnOutcome,
 )
-from schemas.requests import Accepted, Cancel, Heard, KeepAlive, Outdated, Refused, Request, Unreadable
-from schemas.status import AskStatus, Status
-from schemas.world import World
+from engage_hri.schemas.requests import Accepted, Cancel, Heard, KeepAlive, Outdated, Refused, Request, Unreadable
+from engage_hri.schemas.status import AskStatus, Status
+from engage_hri.schemas.world import World
 
 MAJOR = 1
 

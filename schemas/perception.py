@@ -5,7 +5,7 @@ Sent several times a second, newest only: a lost one costs nothing. Hands come w
 
 from msgspec import Struct
 
-from schemas.units import Probability, Stamp, Vector
+from engage_hri.schemas.units import Probability, Stamp, Vector
 
 
 class HeadPose(Struct, frozen=True, kw_only=True, tag="head_pose", omit_defaults=True):

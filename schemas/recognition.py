@@ -4,9 +4,9 @@ from typing import Literal
 
 from msgspec import Struct
 
-from schemas.behaviors import Action, Cause, Event, EventKind, TurnSignal
-from schemas.requests import Outcome, Request
-from schemas.units import Probability, Seconds, Stamp
+from engage_hri.schemas.behaviors import Action, Cause, Event, EventKind, TurnSignal
+from engage_hri.schemas.requests import Outcome, Request
+from engage_hri.schemas.units import Probability, Seconds, Stamp
 
 EventState = Literal["started", "succeeded", "failed", "preempted", "withdrawn", "superseded", "completed", "lost"]
 """`lost`: nobody knows what became of the event. Readers end so what was open when recognition died, of which

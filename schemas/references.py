@@ -5,10 +5,10 @@ from typing import Literal, NamedTuple, TypeVar
 
 from msgspec.structs import replace
 
-from schemas.behaviors import Behavior, Constraint, Event, Reference, Speech, Synchronize, Timing
-from schemas.blocks import Block
-from schemas.fragments import TurnFragment
-from schemas.syncref import SyncRef, canonical_sync
+from engage_hri.schemas.behaviors import Behavior, Constraint, Event, Reference, Speech, Synchronize, Timing
+from engage_hri.schemas.blocks import Block
+from engage_hri.schemas.fragments import TurnFragment
+from engage_hri.schemas.syncref import SyncRef, canonical_sync
 
 Input = Block | TurnFragment
 AnyInput = TypeVar("AnyInput", Block, TurnFragment)
@@ -129,7 +129,7 @@ def respelled(
 def in_draft_spelling(
     thing: AnyInput, dialect: Literal["draft", "bml-1.0"], elsewhere: Mapping[str, Block] | None = None
 ) -> AnyInput:
-    """The same with every sync point spelled as the drafts do (`schemas.syncref.canonical_sync`)."""
+    """The same with every sync point spelled as the drafts do (`canonical_sync` of `schemas/syncref.py`)."""
     return respelled(thing, lambda sync, type: canonical_sync(sync, type, dialect), elsewhere)
 
 

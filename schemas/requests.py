@@ -11,8 +11,8 @@ from typing import ClassVar, Self, TypeVar
 from msgspec import Struct
 from msgspec.structs import replace
 
-from schemas.faults import Fault
-from schemas.units import Seconds, Stamp
+from engage_hri.schemas.faults import Fault
+from engage_hri.schemas.units import Seconds, Stamp
 
 
 class Request(Struct, frozen=True, kw_only=True, omit_defaults=True):

@@ -2,7 +2,7 @@
 
 from msgspec import Struct
 
-from schemas.units import Seconds, Stamp
+from engage_hri.schemas.units import Seconds, Stamp
 
 
 class AskStatus(Struct, frozen=True, kw_only=True, tag="ask_status"):

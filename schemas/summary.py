@@ -6,13 +6,13 @@ from typing import Literal
 import msgspec
 from msgspec import Struct
 
-from schemas.behaviors import Action
-from schemas.blocks import SpokenText
-from schemas.faults import Fault
-from schemas.fragments import FragmentOutcome, GestureChoice, ReferenceChoice
-from schemas.recognition import ConnectionEvent
-from schemas.speakable import joined
-from schemas.units import Seconds
+from engage_hri.schemas.behaviors import Action
+from engage_hri.schemas.blocks import SpokenText
+from engage_hri.schemas.faults import Fault
+from engage_hri.schemas.fragments import FragmentOutcome, GestureChoice, ReferenceChoice
+from engage_hri.schemas.recognition import ConnectionEvent
+from engage_hri.schemas.speakable import joined
+from engage_hri.schemas.units import Seconds
 
 LONGEST_PROBLEM = 160
 MOST_PROBLEMS = 4

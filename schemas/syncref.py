@@ -19,8 +19,8 @@ from typing import Literal, Self
 
 from msgspec import Struct
 
-from schemas.units import Seconds
-from schemas.utf8 import is_utf8
+from engage_hri.schemas.units import Seconds
+from engage_hri.schemas.utf8 import is_utf8
 
 BLOCK_ITSELF = "bml"
 SYNC_POINTS = ("start", "ready", "stroke_start", "stroke", "stroke_end", "relax", "end")

@@ -1,7 +1,7 @@
 """What a language model is given to talk with: one tool, `perform_turn_fragment`, and the form of its input.
 
 The form is smaller than a turn fragment: parts in the order in which they are to be said and done. Neither gestures
-nor timing nor ids; Engage finds those. `schemas.tool_call` makes the fragment of it. The JSON Schema is made from
+nor timing nor ids; Engage finds those. `schemas/tool_call.py` makes the fragment of it. The JSON Schema is made from
 the structs below and keeps to what both APIs constrain sampling by: objects are closed, no `$ref`, no bounds, no
 defaults, and the alternatives of a part differ in their first key.
 """
@@ -11,8 +11,8 @@ from typing import Annotated, Any, Literal, get_args
 import msgspec
 from msgspec import Meta, Struct
 
-from schemas.fragments import TurnStatus
-from schemas.world import Entity, World
+from engage_hri.schemas.fragments import TurnStatus
+from engage_hri.schemas.world import Entity, World
 
 NAME = "perform_turn_fragment"
 FILE = f"{NAME}.tool.json"
@@ -120,7 +120,7 @@ class ToolInput(Struct, frozen=True, kw_only=True, omit_defaults=True, forbid_un
 Schema = dict[str, Any]
 
 
-def definition(format: Format = "anthropic", world: World | None = None) -> Schema:
+def tool_definition(format: Format = "anthropic", world: World | None = None) -> Schema:
     """The tool as an entry of the API's `tools`. world: its objects and people are the only ids allowed.
 
     OpenAI's are strict (every field required, null where it may be left out); to have Anthropic's so, add
@@ -135,7 +135,7 @@ def definition(format: Format = "anthropic", world: World | None = None) -> Sche
 
 
 def input_schema(world: World | None = None) -> Schema:
-    """The JSON Schema of `ToolInput`. Whatever it allows, `schemas.tool_call` decodes."""
+    """The JSON Schema of `ToolInput`. Whatever it allows, `schemas/tool_call.py` decodes."""
     parts = [_schema_of(kind) for kind in PARTS]
     whole = _schema_of(ToolInput)
     whole["properties"]["parts"]["items"] = {"anyOf": parts}

@@ -1,4 +1,4 @@
-"""From the input of the tool `perform_turn_fragment` (schemas.tool) to the turn fragment that it means.
+"""From the input of the tool `perform_turn_fragment` (schemas/tool.py) to the turn fragment that it means.
 
 Whatever is wrong is refused with its JSON path, so that the model can correct itself.
 """
@@ -10,12 +10,22 @@ from typing import Any, get_args, get_type_hints
 import msgspec
 from msgspec.structs import replace
 
-from schemas.behaviors import Action, After, Constraint, FragmentBehavior, Gaze, Head, Reference, Speech, SpeechOption
-from schemas.faults import Fault, InputRefused
-from schemas.fragments import TurnFragment
-from schemas.speakable import word_count
-from schemas.tool import PARTS, Certainty, Expects, Gesture, Look, Part, Refer, Say, ToolInput
-from schemas.units import Probability
+from engage_hri.schemas.behaviors import (
+    Action,
+    After,
+    Constraint,
+    FragmentBehavior,
+    Gaze,
+    Head,
+    Reference,
+    Speech,
+    SpeechOption,
+)
+from engage_hri.schemas.faults import Fault, InputRefused
+from engage_hri.schemas.fragments import TurnFragment
+from engage_hri.schemas.speakable import word_count
+from engage_hri.schemas.tool import PARTS, Certainty, Expects, Gesture, Look, Part, Refer, Say, ToolInput
+from engage_hri.schemas.units import Probability
 
 RELIABILITY: dict[Certainty, Probability | None] = {"normal": None, "high": 0.95}
 """The minimum for a reference: generation's default, or that of the pieces to be moved in the thesis' Appendix B."""

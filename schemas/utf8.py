@@ -1,6 +1,6 @@
 """Text that comes as bytes: UTF-8, or refused with the line."""
 
-from schemas.faults import Fault, InputRefused
+from engage_hri.schemas.faults import Fault, InputRefused
 
 BYTE_ORDER_MARK = b"\xef\xbb\xbf"
 

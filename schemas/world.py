@@ -4,7 +4,7 @@ from typing import Literal
 
 from msgspec import Struct
 
-from schemas.units import Coordinate, Extent, Heading, Named, Probability, Stamp, Vector
+from engage_hri.schemas.units import Coordinate, Extent, Heading, Named, Probability, Stamp, Vector
 
 EntityKind = Literal["object", "person", "hand", "surface"]
 

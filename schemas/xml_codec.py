@@ -3,7 +3,8 @@
 Dialects: the thesis' draft (namespace `org.mindmakers.bml`), the same without a namespace, BML 1.0. Turn
 fragments are an `ebml:ebml` (namespace `edu.wpi.ebml`) around the elements of any of these. What other
 namespaces hold is ignored. Two spellings of one block decode to equal structs, but for their `dialect` and the
-names of sync points, which stay as written (`schemas.syncref.canonical_sync`); in fragments these are the draft's.
+names of sync points, which stay as written (`canonical_sync` of schemas/syncref.py); in fragments they are those
+of the draft.
 
 A block is read leniently: what is unknown in it is left out and noted in `Block.unread`, an unknown behavior
 becomes `Unknown`; the realizer warns of both. A fragment is read strictly: it is a program's, not an author's. What
@@ -16,13 +17,13 @@ from typing import Any
 import msgspec
 from lxml import etree
 
-from schemas import behaviors as of
-from schemas.blocks import Block, Unread
-from schemas.check import check
-from schemas.feedback import WarningKind
-from schemas.fragments import TurnFragment
-from schemas.references import disambiguated, in_draft_spelling
-from schemas.xml_elements import (
+from engage_hri.schemas import behaviors as of
+from engage_hri.schemas.blocks import Block, Unread
+from engage_hri.schemas.check import check
+from engage_hri.schemas.feedback import WarningKind
+from engage_hri.schemas.fragments import TurnFragment
+from engage_hri.schemas.references import disambiguated, in_draft_spelling
+from engage_hri.schemas.xml_elements import (
     CHILDREN,
     CORE_BEHAVIORS,
     EXTENSIONS,
@@ -31,8 +32,8 @@ from schemas.xml_elements import (
     misplaced,
     take_out,
 )
-from schemas.xml_encode import encode_xml
-from schemas.xml_names import (
+from engage_hri.schemas.xml_encode import encode_xml
+from engage_hri.schemas.xml_names import (
     SYNC_ATTRIBUTES,
     attributes,
     camel,
@@ -45,8 +46,8 @@ from schemas.xml_names import (
     ours,
     unknown_attributes,
 )
-from schemas.xml_source import BML_1_0, CORE, EBML, Source, split
-from schemas.xml_speech import MARKS, spoken
+from engage_hri.schemas.xml_source import BML_1_0, CORE, EBML, Source, split
+from engage_hri.schemas.xml_speech import MARKS, spoken
 
 __all__ = ["decode_xml", "encode_xml"]
 

@@ -4,9 +4,9 @@ from collections.abc import Iterator
 
 from lxml import etree
 
-from schemas import behaviors as of
-from schemas.xml_names import ours
-from schemas.xml_source import CORE, EBML, split
+from engage_hri.schemas import behaviors as of
+from engage_hri.schemas.xml_names import ours
+from engage_hri.schemas.xml_source import CORE, EBML, split
 
 CORE_BEHAVIORS: dict[str, type[of.Behavior]] = {
     str(kind.__struct_config__.tag): kind

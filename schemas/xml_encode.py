@@ -10,14 +10,14 @@ from typing import Any
 from lxml import etree
 from msgspec import NODEFAULT, structs
 
-from schemas import behaviors as of
-from schemas.blocks import Block
-from schemas.faults import Fault, InputRefused
-from schemas.fragments import TurnFragment
-from schemas.references import type_name
-from schemas.syncref import SYNC_POINTS
-from schemas.xml_source import BML_1_0, DRAFT, EBML
-from schemas.xml_speech import fill, ties
+from engage_hri.schemas import behaviors as of
+from engage_hri.schemas.blocks import Block
+from engage_hri.schemas.faults import Fault, InputRefused
+from engage_hri.schemas.fragments import TurnFragment
+from engage_hri.schemas.references import type_name
+from engage_hri.schemas.syncref import SYNC_POINTS
+from engage_hri.schemas.xml_source import BML_1_0, DRAFT, EBML
+from engage_hri.schemas.xml_speech import fill, ties
 
 _EXTENSIONS = ("reference", "event", "turn", "unknown")
 _ELSEWHERE = frozenset({

@@ -9,9 +9,9 @@ from typing import Any, TypeVar, get_args, get_type_hints
 import msgspec
 from lxml import etree
 
-from schemas.faults import InputRefused
-from schemas.syncref import SYNC_POINTS, SyncRef
-from schemas.xml_source import CORE, EBML, Source, split
+from engage_hri.schemas.faults import InputRefused
+from engage_hri.schemas.syncref import SYNC_POINTS, SyncRef
+from engage_hri.schemas.xml_source import CORE, EBML, Source, split
 
 AnyStruct = TypeVar("AnyStruct", bound=msgspec.Struct)
 SYNC_ATTRIBUTES = frozenset({*SYNC_POINTS, "strokeStart", "strokeEnd", "attackPeak"})

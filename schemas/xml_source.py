@@ -10,7 +10,7 @@ from typing import cast
 
 from lxml import etree
 
-from schemas.faults import Fault, InputRefused
+from engage_hri.schemas.faults import Fault, InputRefused
 
 DRAFT = "org.mindmakers.bml"
 BML_1_0 = "http://www.bml-initiative.org/bml/bml-1.0"

@@ -11,9 +11,9 @@ from xml.sax.saxutils import escape, quoteattr
 
 from lxml import etree
 
-from schemas.behaviors import Mark, Speech, Timing
-from schemas.faults import InputRefused
-from schemas.xml_source import BML_1_0, CORE, EBML, Source, split
+from engage_hri.schemas.behaviors import Mark, Speech, Timing
+from engage_hri.schemas.faults import InputRefused
+from engage_hri.schemas.xml_source import BML_1_0, CORE, EBML, Source, split
 
 SSML = "http://www.w3.org/2001/10/synthesis"
 XML = "http://www.w3.org/XML/1998/namespace"

@@ -1,4 +1,4 @@
-"""`engage`, and `python -m services`: the way in. It loads next to nothing before it has seen to signals."""
+"""`engage`, and `python -m engage_hri`: the way in. It loads next to nothing before it has seen to signals."""
 
 import os
 import signal
@@ -6,12 +6,12 @@ import sys
 
 
 def main(arguments: list[str] | None = None) -> None:
-    """Run a command of `services.cli`."""
+    """Run a command of `services/cli.py`."""
     # Loading takes half a second. A KeyboardInterrupt in it is a traceback, or lost in somebody's callback; nothing
-    # has begun yet, so leaving at once is orderly. `services.commandline.process` takes over when something runs.
+    # has begun yet, so leaving at once is orderly. `services/commandline/process.py` takes over when something runs.
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda number, frame: os._exit(128 + number))
-    from services import cli
+    from engage_hri.services import cli
 
     cli.main(arguments)
 

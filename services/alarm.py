@@ -3,7 +3,7 @@
 import asyncio
 from collections.abc import Callable
 
-from schemas.units import Seconds
+from engage_hri.schemas.units import Seconds
 
 
 class Alarm:

@@ -6,7 +6,7 @@ Nothing that a caller, a server, the bus or the clock does at any moment is unde
 from collections.abc import Mapping
 from enum import auto
 
-from services.transitions import Name, rows
+from engage_hri.services.transitions import Name, rows
 
 
 class State(Name):

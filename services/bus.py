@@ -1,7 +1,7 @@
 """The bus, as services see it: one interface, two implementations (`memory_bus`, `zenoh_bus`), one contract suite.
 
 A `Hub` is what a process opens once; each service joins it under its own name and gets a `Bus`. Delivery is by
-the class of the key (`schemas.keys`). Messages are frozen structs. Nothing here starts a thread.
+the class of the key (`schemas/keys.py`). Messages are frozen structs. Nothing here starts a thread.
 """
 
 import asyncio
@@ -16,16 +16,16 @@ from typing import Generic, Self, TypeVar
 import msgspec
 from msgspec import Struct
 
-from schemas import keys
-from schemas.blocks import Block, PerformBlock
-from schemas.faults import EngageError, Fault, InputRefused
-from schemas.fragments import PerformFragment
-from schemas.messages import Message, decode
-from schemas.presence import PeerAlive, PeerGone
-from schemas.requests import Request, Unreadable, kind_of
-from schemas.status import BusHealth
-from schemas.units import Seconds, Stamp
-from schemas.xml_codec import decode_xml
+from engage_hri.schemas import keys
+from engage_hri.schemas.blocks import Block, PerformBlock
+from engage_hri.schemas.faults import EngageError, Fault, InputRefused
+from engage_hri.schemas.fragments import PerformFragment
+from engage_hri.schemas.messages import Message, decode
+from engage_hri.schemas.presence import PeerAlive, PeerGone
+from engage_hri.schemas.requests import Request, Unreadable, kind_of
+from engage_hri.schemas.status import BusHealth
+from engage_hri.schemas.units import Seconds, Stamp
+from engage_hri.schemas.xml_codec import decode_xml
 
 LOG = logging.getLogger("engage")
 """What is written here at level ERROR is a bug, and fails a test that did not expect it."""

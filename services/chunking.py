@@ -13,8 +13,8 @@ import re
 import unicodedata
 from collections.abc import Iterator
 
-from schemas.speakable import UNSPACED, joined, word_count
-from schemas.tool import Part, Refer, Say
+from engage_hri.schemas.speakable import UNSPACED, joined, word_count
+from engage_hri.schemas.tool import Part, Refer, Say
 
 Chunk = tuple[Part, ...]
 """Parts that are spoken without a pause."""

@@ -1,4 +1,4 @@
-"""The command line. Options are declared here; what they do is in `services.commandline`, loaded only when called."""
+"""The command line. Options are declared here; what they do is in `services/commandline`, loaded only when called."""
 
 import sys
 from pathlib import Path
@@ -6,8 +6,8 @@ from typing import Annotated, Literal, NoReturn
 
 import typer
 
-from services.commandline.ends import exit_code
-from services.commandline.roster import ServiceName
+from engage_hri.services.commandline.ends import exit_code
+from engage_hri.services.commandline.roster import ServiceName
 
 app = typer.Typer(
     name="engage",
@@ -64,7 +64,7 @@ WorldFile = Annotated[
 
 def _print_version(asked: bool) -> None:
     if asked:
-        from services.runtime import installed_version
+        from engage_hri.services.runtime import installed_version
 
         print(f"engage {installed_version()}")
         raise typer.Exit
@@ -92,8 +92,8 @@ def demo(
     quiet: Quiet = False,
 ) -> None:
     """Watch a robot and a person make a tangram: everything in this one process."""
-    from services.commandline import demo
-    from services.commandline import run as run_
+    from engage_hri.services.commandline import demo
+    from engage_hri.services.commandline import run as run_
 
     where = run_.Where(config, settings=(*demo.choices(seed, human, resolution), *(settings or ())))
     raise typer.Exit(demo.main(demo.Options(where, virtual_time, events, feedback, quiet)))
@@ -115,7 +115,7 @@ def up(
     quiet: Quiet = False,
 ) -> None:
     """Run the services as separate processes on this machine; Ctrl-C stops them all."""
-    from services.commandline import demo, run, up
+    from engage_hri.services.commandline import demo, run, up
 
     chosen = (*demo.choices(seed, human, resolution), *(settings or ()))
     where = run.Where(config, robot, tuple(connect or ()), tuple(listen or ()), chosen)
@@ -133,7 +133,7 @@ def run(
     attended: Annotated[bool, typer.Option("--attended", hidden=True)] = False,
 ) -> None:
     """Run one service, on whatever machine this is, until Ctrl-C."""
-    from services.commandline import run
+    from engage_hri.services.commandline import run
 
     where = run.Where(config, robot, tuple(connect or ()), tuple(listen or ()), tuple(settings or ()))
     raise typer.Exit(run.main(service, where, attended))
@@ -167,7 +167,7 @@ def play(
     quiet: Quiet = False,
 ) -> None:
     """Perform turn fragments and BML blocks. Exit 0 done, 2 input refused, 3 failed while running."""
-    from services.commandline import play, run
+    from engage_hri.services.commandline import play, run
 
     where = run.Where(config, robot, tuple(connect or ()), settings=tuple(settings or ()))
     options = play.Options(
@@ -187,7 +187,7 @@ def plan(
     settings: Settings = None,
 ) -> None:
     """Check a block and print its Petri net and predicted schedule. Nothing moves."""
-    from services.commandline import plan, run
+    from engage_hri.services.commandline import plan, run
 
     where = run.Where(config, settings=tuple(settings or ()))
     raise typer.Exit(plan.main(file, format, world, where))
@@ -207,7 +207,7 @@ def bml(
     settings: Settings = None,
 ) -> None:
     """Print the BML that a turn fragment becomes, or a block in another dialect. Nothing moves."""
-    from services.commandline import bml, run
+    from engage_hri.services.commandline import bml, run
 
     where = run.Where(config, settings=tuple(settings or ()))
     raise typer.Exit(bml.main(file, dialect, core, world, where))
@@ -226,7 +226,7 @@ def explain(
     settings: Settings = None,
 ) -> None:
     """Tell why each object reference is made as it is: all gestures with all phrases. Nothing moves."""
-    from services.commandline import explain, run
+    from engage_hri.services.commandline import explain, run
 
     where = run.Where(config, settings=tuple(settings or ()))
     raise typer.Exit(explain.main(file, format, world, where))
@@ -243,7 +243,7 @@ def tool(
     ] = None,
 ) -> None:
     """Print the tool by which a language model speaks through the robot, for its API."""
-    from services.commandline import tool
+    from engage_hri.services.commandline import tool
 
     raise typer.Exit(tool.main(format, world))
 
@@ -278,8 +278,8 @@ def simulate(
     quiet: Quiet = False,
 ) -> None:
     """Play many sessions in virtual time, and compare the conditions of the study. Exit 3 if one did not finish."""
-    from services.commandline import run
-    from services.commandline import simulate as simulate_
+    from engage_hri.services.commandline import run
+    from engage_hri.services.commandline import simulate as simulate_
 
     where = run.Where(config, settings=tuple(settings or ()))
     options = simulate_.Options(
@@ -291,7 +291,7 @@ def simulate(
 @app.command("play-sessions", hidden=True)
 def play_sessions() -> None:
     """Play the sessions that standard input orders: a child of `engage simulate`."""
-    from services.commandline import session
+    from engage_hri.services.commandline import session
 
     raise typer.Exit(session.serve())
 
@@ -312,7 +312,7 @@ def watch(
     config: ConfigFile = None,
 ) -> None:
     """Follow a running system: connection events, the open ones first, feedback, claims on the head, as they come."""
-    from services.commandline import run, watch
+    from engage_hri.services.commandline import run, watch
 
     where = run.Where(config, robot, tuple(connect or ()), ())
     raise typer.Exit(watch.main(where, json, watch.Wanted(tuple(only or ()), actor, tuple(kind or ()))))
@@ -332,8 +332,8 @@ def hostile(
     quiet: Quiet = False,
 ) -> None:
     """Attack the whole robot, in memory and virtual time only. Exit 1 if anything came of it that should not have."""
-    from services.commandline import hostile as hostile_
-    from services.commandline import run
+    from engage_hri.services.commandline import hostile as hostile_
+    from engage_hri.services.commandline import run
 
     where = run.Where(config, settings=tuple(settings or ()))
     raise typer.Exit(hostile_.main(hostile_.Options(where, seed, runs, seconds, tuple(only or ()), body, quiet)))

@@ -21,11 +21,11 @@ import msgspec
 from msgspec import Struct
 from msgspec.structs import replace
 
-from schemas import keys
-from schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost
-from schemas.attention import HeadOwner, Inhibit
-from schemas.behaviors import BlockBehavior, Constraint, EventKind
-from schemas.blocks import (
+from engage_hri.schemas import keys
+from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost
+from engage_hri.schemas.attention import HeadOwner, Inhibit
+from engage_hri.schemas.behaviors import BlockBehavior, Constraint, EventKind
+from engage_hri.schemas.blocks import (
     BehaviorInterrupted,
     Block,
     BlockOutcome,
@@ -33,19 +33,19 @@ from schemas.blocks import (
     InterruptBehavior,
     PerformBlock,
 )
-from schemas.faults import Fault, InputRefused, NoReply, RunFailed
-from schemas.feedback import Feedback
-from schemas.fragments import FragmentOutcome, PerformFragment, TurnClosed, TurnFragment
-from schemas.json_codec import read
-from schemas.messages import decode, published
-from schemas.recognition import Statistics
-from schemas.requests import Outcome, Request
-from schemas.units import Seconds, Stamp
-from schemas.world import Entity, World
-from services.bus import Bus, Hub, Keep
-from services.event_stream import EventStream
-from services.feeds import EventFeed, Feed
-from services.requests import Pending, Requester, RequestRefused
+from engage_hri.schemas.faults import Fault, InputRefused, NoReply, RunFailed
+from engage_hri.schemas.feedback import Feedback
+from engage_hri.schemas.fragments import FragmentOutcome, PerformFragment, TurnClosed, TurnFragment
+from engage_hri.schemas.json_codec import read
+from engage_hri.schemas.messages import decode, published
+from engage_hri.schemas.recognition import Statistics
+from engage_hri.schemas.requests import Outcome, Request
+from engage_hri.schemas.units import Seconds, Stamp
+from engage_hri.schemas.world import Entity, World
+from engage_hri.services.bus import Bus, Hub, Keep
+from engage_hri.services.event_stream import EventStream
+from engage_hri.services.feeds import EventFeed, Feed
+from engage_hri.services.requests import Pending, Requester, RequestRefused
 
 FragmentSource = TurnFragment | str | bytes | Path | dict[str, Any]
 """A fragment, or EBML or JSON that describes one (a language model's tool input, too), or the file it stands in."""
@@ -305,7 +305,7 @@ async def connect(
         async with _joined(hub, name) as client:
             yield client
         return
-    from services.zenoh_bus import open_hub  # only here: a client on an existing hub needs no Zenoh
+    from engage_hri.services.zenoh_bus import open_hub  # only here: a client on an existing hub needs no Zenoh
 
     async with await open_hub(robot, connect=connect, listen=listen) as opened, _joined(opened, name) as client:
         yield client

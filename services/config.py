@@ -13,14 +13,14 @@ from typing import Any, Literal, get_args, get_origin, get_type_hints
 import msgspec
 from msgspec import Struct
 
-from schemas.faults import Fault, InputRefused
-from schemas.utf8 import is_utf8, utf8
-from services.collaboration.config import CollaborationConfig
-from services.control.config import ControlConfig
-from services.generation.config import GenerationConfig
-from services.realizer.config import RealizerConfig
-from services.recognition.config import RecognitionConfig
-from services.simulation.config import SimulationConfig
+from engage_hri.schemas.faults import Fault, InputRefused
+from engage_hri.schemas.utf8 import is_utf8, utf8
+from engage_hri.services.collaboration.config import CollaborationConfig
+from engage_hri.services.control.config import ControlConfig
+from engage_hri.services.generation.config import GenerationConfig
+from engage_hri.services.realizer.config import RealizerConfig
+from engage_hri.services.recognition.config import RecognitionConfig
+from engage_hri.services.simulation.config import SimulationConfig
 
 _ADVICE = "see docs/configuration.md"
 

@@ -4,8 +4,8 @@ when nobody expects it (thesis 5.4.2). For those who act on the world, and would
 
 from msgspec.structs import replace
 
-from schemas.units import Seconds
-from schemas.world import Entity, World
+from engage_hri.schemas.units import Seconds
+from engage_hri.schemas.world import Entity, World
 
 
 class CoveredObjects:

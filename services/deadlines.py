@@ -5,7 +5,7 @@ from collections.abc import Hashable
 from math import inf
 from typing import Generic, TypeVar
 
-from schemas.units import Seconds
+from engage_hri.schemas.units import Seconds
 
 K = TypeVar("K", bound=Hashable)
 

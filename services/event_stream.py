@@ -9,10 +9,10 @@ from collections.abc import Callable, Collection
 
 from msgspec.structs import replace
 
-from schemas.messages import Message
-from schemas.presence import PeerAlive, PeerGone
-from schemas.recognition import ENDINGS, ConnectionEvent, OpenEvents, session_of
-from schemas.units import Seconds, Stamp
+from engage_hri.schemas.messages import Message
+from engage_hri.schemas.presence import PeerAlive, PeerGone
+from engage_hri.schemas.recognition import ENDINGS, ConnectionEvent, OpenEvents, session_of
+from engage_hri.schemas.units import Seconds, Stamp
 
 GRACE: Seconds = 2.0
 """How long recognition may be gone before its events are lost: a router's restart looks like a death."""

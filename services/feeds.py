@@ -4,10 +4,10 @@ from collections import deque
 from collections.abc import Callable, Iterable
 from typing import TypeVar
 
-from schemas.recognition import ConnectionEvent
-from schemas.units import Seconds
-from services.bus import Bus, Reading, Subscription
-from services.event_stream import EventStream
+from engage_hri.schemas.recognition import ConnectionEvent
+from engage_hri.schemas.units import Seconds
+from engage_hri.services.bus import Bus, Reading, Subscription
+from engage_hri.services.event_stream import EventStream
 
 M = TypeVar("M")
 

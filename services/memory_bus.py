@@ -9,13 +9,13 @@ from typing import NamedTuple
 import msgspec
 from msgspec import Struct
 
-from schemas import keys
-from schemas.faults import EngageError, Fault, InputRefused, NoReply
-from schemas.messages import Message, decode, encode, published
-from schemas.presence import PeerAlive, PeerGone
-from schemas.status import BusHealth
-from schemas.units import Probability, Seconds, Stamp
-from services.bus import LOCAL, Answer, Bus, Hub, Keep, Received, Subscription, read_payload, unreadable
+from engage_hri.schemas import keys
+from engage_hri.schemas.faults import EngageError, Fault, InputRefused, NoReply
+from engage_hri.schemas.messages import Message, decode, encode, published
+from engage_hri.schemas.presence import PeerAlive, PeerGone
+from engage_hri.schemas.status import BusHealth
+from engage_hri.schemas.units import Probability, Seconds, Stamp
+from engage_hri.services.bus import LOCAL, Answer, Bus, Hub, Keep, Received, Subscription, read_payload, unreadable
 
 
 class Faults(Struct, frozen=True, kw_only=True):

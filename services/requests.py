@@ -1,4 +1,4 @@
-"""Long requests over a bus that neither raises nor acknowledges: both ends of `schemas.requests`.
+"""Long requests over a bus that neither raises nor acknowledges: both ends of `schemas/requests.py`.
 
 Zenoh drops silently, a server may start late, restart or die, a link may be cut, a caller may be cancelled at any
 moment. What follows from each of these is in two tables (services/asking_table.py, services/serving_table.py), which
@@ -19,18 +19,27 @@ from typing import Self
 
 from msgspec.structs import replace
 
-from schemas import keys
-from schemas.faults import EngageError, Fault, InputRefused, NeverEnded, RequestRefused, RunFailed, ServerRestarted
-from schemas.messages import COMMANDS, Message
-from schemas.presence import PeerAlive, PeerGone
-from schemas.requests import Accepted, Answer, Cancel, KeepAlive, Outcome, Refused, Request, Unreadable
-from schemas.units import Seconds
-from services import asking, serving
-from services.alarm import Alarm
-from services.asking import Asking, Patience
-from services.asking_table import State
-from services.bus import Bus, Containing, Received
-from services.serving import Serving
+from engage_hri.schemas import keys
+from engage_hri.schemas.faults import (
+    EngageError,
+    Fault,
+    InputRefused,
+    NeverEnded,
+    RequestRefused,
+    RunFailed,
+    ServerRestarted,
+)
+from engage_hri.schemas.messages import COMMANDS, Message
+from engage_hri.schemas.presence import PeerAlive, PeerGone
+from engage_hri.schemas.requests import Accepted, Answer, Cancel, KeepAlive, Outcome, Refused, Request, Unreadable
+from engage_hri.schemas.units import Seconds
+from engage_hri.services import asking, serving
+from engage_hri.services.alarm import Alarm
+from engage_hri.services.asking import Asking
+from engage_hri.services.asking_table import State
+from engage_hri.services.bus import Bus, Containing, Received
+from engage_hri.services.patience import Patience
+from engage_hri.services.serving import Serving
 
 __all__ = ["NeverEnded", "Patience", "Pending", "RequestDesk", "RequestRefused", "Requester", "ServerRestarted"]
 

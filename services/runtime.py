@@ -11,11 +11,11 @@ from contextlib import asynccontextmanager
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 
-from schemas import keys
-from schemas.messages import Message
-from schemas.status import AskStatus, Status
-from schemas.units import Stamp
-from services.bus import Bus, Hub
+from engage_hri.schemas import keys
+from engage_hri.schemas.messages import Message
+from engage_hri.schemas.status import AskStatus, Status
+from engage_hri.schemas.units import Stamp
+from engage_hri.services.bus import Bus, Hub
 
 Ready = Callable[[], None]
 Service = Callable[[Bus, Ready], Awaitable[None]]

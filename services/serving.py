@@ -15,8 +15,8 @@ from math import inf
 from msgspec import Struct
 from msgspec.structs import replace
 
-from schemas.faults import Fault
-from schemas.requests import (
+from engage_hri.schemas.faults import Fault
+from engage_hri.schemas.requests import (
     Accepted,
     Answer,
     Cancel,
@@ -29,9 +29,9 @@ from schemas.requests import (
     answering,
     kind_meant,
 )
-from schemas.units import Seconds
-from services.deadlines import Deadlines
-from services.serving_table import TABLE, Do, Event, State
+from engage_hri.schemas.units import Seconds
+from engage_hri.services.deadlines import Deadlines
+from engage_hri.services.serving_table import TABLE, Do, Event, State
 
 GRACE: Seconds = 2.0
 """How long a requester may be gone before its requests end: a router's restart looks like a death."""

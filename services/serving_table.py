@@ -7,7 +7,7 @@ services/serving.py follows it.
 from collections.abc import Mapping
 from enum import auto
 
-from services.transitions import Name, rows
+from engage_hri.services.transitions import Name, rows
 
 
 class State(Name):

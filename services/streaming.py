@@ -1,12 +1,12 @@
 """For managers that are language models: tool calls, and speaking while the model still writes.
 
     async with connect() as robot:
-        result = await perform_call(robot, call)                        # the input of the tool of `schemas.tool`
+        result = await perform_call(robot, call)                        # the input of the tool of `schemas/tool.py`
         outcomes = await stream(robot, model_output(), id="turn-1")     # text, in which `[red-cup]` is an object
         print(result.json, summary(*outcomes).json)
 
-Of a stream each clause is sent as soon as it is complete (services.chunking); generation performs one fragment right
-after the other.
+Of a stream each clause is sent as soon as it is complete (services/chunking.py); generation performs one fragment
+right after the other.
 """
 
 import asyncio
@@ -16,14 +16,14 @@ from typing import Any
 
 from msgspec.structs import replace
 
-from schemas.faults import EngageError, InputRefused
-from schemas.fragments import FragmentOutcome, TurnFragment, TurnStatus
-from schemas.summary import Summary, refusal, summary
-from schemas.tool import Part, ToolInput
-from schemas.tool_call import fragment_of
-from schemas.units import Seconds
-from services.chunking import Chunk, Chunker
-from services.client import PerformFailed, Robot
+from engage_hri.schemas.faults import EngageError, InputRefused
+from engage_hri.schemas.fragments import FragmentOutcome, TurnFragment, TurnStatus
+from engage_hri.schemas.summary import Summary, refusal, summary
+from engage_hri.schemas.tool import Part, ToolInput
+from engage_hri.schemas.tool_call import fragment_of
+from engage_hri.schemas.units import Seconds
+from engage_hri.services.chunking import Chunk, Chunker
+from engage_hri.services.client import PerformFailed, Robot
 
 Piece = str | Part
 """A bit of text, however short, in which `[id]` refers to an object; or a part by itself."""

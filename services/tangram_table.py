@@ -14,8 +14,8 @@ from typing import Literal, NamedTuple
 import msgspec
 from msgspec import Struct
 
-from schemas.units import Degrees, Meters, Radians, Vector
-from schemas.world import Entity
+from engage_hri.schemas.units import Degrees, Meters, Radians, Vector
+from engage_hri.schemas.world import Entity
 
 Side = Literal["right", "top right", "top", "top left", "left", "bottom left", "bottom", "bottom right"]
 SIDES: tuple[Side, ...] = ("right", "top right", "top", "top left", "left", "bottom left", "bottom", "bottom right")

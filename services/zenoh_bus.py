@@ -14,18 +14,18 @@ from typing import Any
 import msgspec
 import zenoh
 
-from schemas import keys
-from schemas.faults import EngageError, Fault, InputRefused, NoReply
-from schemas.messages import Message, decode, encode, encoding_of, published
-from schemas.status import BusHealth
-from schemas.units import Seconds, Stamp
-from services.bus import LOG, Answer, Bus, Hub, Keep, Received, Subscription
-from services.zenoh_clocks import Clocks
-from services.zenoh_order import Envelope, Ledger, Pulse
-from services.zenoh_peers import Peers, finish, pack
-from services.zenoh_readers import Readers
-from services.zenoh_session import QOS, RENDEZVOUS, STREAM_QOS, Doorway, open_session
-from services.zenoh_visitors import Visitors, form_asked, in_form, refuse
+from engage_hri.schemas import keys
+from engage_hri.schemas.faults import EngageError, Fault, InputRefused, NoReply
+from engage_hri.schemas.messages import Message, decode, encode, encoding_of, published
+from engage_hri.schemas.status import BusHealth
+from engage_hri.schemas.units import Seconds, Stamp
+from engage_hri.services.bus import LOG, Answer, Bus, Hub, Keep, Received, Subscription
+from engage_hri.services.zenoh_clocks import Clocks
+from engage_hri.services.zenoh_order import Envelope, Ledger, Pulse
+from engage_hri.services.zenoh_peers import Peers, finish, pack
+from engage_hri.services.zenoh_readers import Readers
+from engage_hri.services.zenoh_session import QOS, RENDEZVOUS, STREAM_QOS, Doorway, open_session
+from engage_hri.services.zenoh_visitors import Visitors, form_asked, in_form, refuse
 
 FIRST_PULSE: Seconds = 0.25
 NEXT_PULSE: Seconds = 1.0

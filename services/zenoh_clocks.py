@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from typing import NamedTuple
 
-from schemas.units import Seconds, Stamp
+from engage_hri.schemas.units import Seconds, Stamp
 
 REFRESH: Seconds = 60.0
 """Two quartz clocks drift apart by some 10 ppm: under a millisecond in this time."""

@@ -16,8 +16,8 @@ from itertools import chain
 
 from msgspec import Struct
 
-from schemas import keys
-from schemas.units import Seconds
+from engage_hri.schemas import keys
+from engage_hri.schemas.units import Seconds
 
 KEPT = 4096
 """How many messages a process keeps for those who missed them."""

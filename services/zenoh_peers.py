@@ -8,11 +8,11 @@ from typing import Any
 import msgspec
 import zenoh
 
-from schemas import keys
-from schemas.units import Seconds
-from services.zenoh_clocks import Clocks
-from services.zenoh_order import Ledger, Missing, Past, Pulse
-from services.zenoh_session import QOS, Doorway
+from engage_hri.schemas import keys
+from engage_hri.schemas.units import Seconds
+from engage_hri.services.zenoh_clocks import Clocks
+from engage_hri.services.zenoh_order import Ledger, Missing, Past, Pulse
+from engage_hri.services.zenoh_session import QOS, Doorway
 
 CATCH_UP: Seconds = 1.0
 """How long a process may take to hand out its past."""

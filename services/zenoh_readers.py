@@ -7,15 +7,15 @@ from typing import Any
 import msgspec
 import zenoh
 
-from schemas import keys
-from schemas.faults import EngageError
-from schemas.messages import Message
-from schemas.presence import PeerAlive, PeerGone
-from schemas.requests import Unreadable
-from services.bus import Bus, Received, Subscription, read_payload, unreadable
-from services.zenoh_order import Envelope, Follower, Ledger, Missing, Past, Pulse, Written
-from services.zenoh_peers import BAD, Peers, finish
-from services.zenoh_session import Doorway
+from engage_hri.schemas import keys
+from engage_hri.schemas.faults import EngageError
+from engage_hri.schemas.messages import Message
+from engage_hri.schemas.presence import PeerAlive, PeerGone
+from engage_hri.schemas.requests import Unreadable
+from engage_hri.services.bus import Bus, Received, Subscription, read_payload, unreadable
+from engage_hri.services.zenoh_order import Envelope, Follower, Ledger, Missing, Past, Pulse, Written
+from engage_hri.services.zenoh_peers import BAD, Peers, finish
+from engage_hri.services.zenoh_session import Doorway
 
 _envelopes = msgspec.msgpack.Decoder(Envelope)
 _pulses = msgspec.msgpack.Decoder(Pulse)

@@ -10,8 +10,8 @@ from typing import Any
 import zenoh
 from msgspec import Struct
 
-from schemas.faults import Fault, InputRefused, RunFailed
-from schemas.units import Seconds
+from engage_hri.schemas.faults import Fault, InputRefused, RunFailed
+from engage_hri.schemas.units import Seconds
 
 RENDEZVOUS = "tcp/127.0.0.1:7447"
 """Where the processes of one machine find one another: the first listens there, all others connect."""

@@ -11,13 +11,13 @@ from math import isnan
 
 import zenoh
 
-from schemas import keys
-from schemas.faults import Fault, InputRefused
-from schemas.messages import Message, decode, encode, encode_json, encoding_of
-from schemas.units import Seconds
-from services.zenoh_order import KEPT, Written
-from services.zenoh_peers import finish, pack
-from services.zenoh_session import Doorway
+from engage_hri.schemas import keys
+from engage_hri.schemas.faults import Fault, InputRefused
+from engage_hri.schemas.messages import Message, decode, encode, encode_json, encoding_of
+from engage_hri.schemas.units import Seconds
+from engage_hri.services.zenoh_order import KEPT, Written
+from engage_hri.services.zenoh_peers import finish, pack
+from engage_hri.services.zenoh_session import Doorway
 
 BATCH = 32
 """Replies in one go: a question for everything must not hold up the loop."""

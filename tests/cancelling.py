@@ -10,15 +10,15 @@ import random
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 
-from schemas.behaviors import Gaze, Speech, Wait
-from schemas.fragments import TurnFragment
-from services.client import Robot, connect
-from services.commandline import roster
-from services.config import load
-from services.memory_bus import MemoryHub
-from services.runtime import running
-from services.streaming import stream
-from services.virtual_time import run_virtual
+from engage_hri.schemas.behaviors import Gaze, Speech, Wait
+from engage_hri.schemas.fragments import TurnFragment
+from engage_hri.services.client import Robot, connect
+from engage_hri.services.commandline import roster
+from engage_hri.services.config import load
+from engage_hri.services.memory_bus import MemoryHub
+from engage_hri.services.runtime import running
+from engage_hri.services.streaming import stream
+from engage_hri.services.virtual_time import run_virtual
 
 PATIENCE = 30.0
 """Seconds for one request, at the most."""

@@ -2,8 +2,8 @@
 
 from typing import Any
 
-from schemas import keys
-from services.bus import Bus
+from engage_hri.schemas import keys
+from engage_hri.services.bus import Bus
 
 
 def command(bus: Bus, expression: str, message: Any) -> None:

@@ -15,7 +15,7 @@ import pytest
 ROOT = Path(__file__).resolve().parents[1]
 LONGEST = 400
 """Lines."""
-CODE = ("schemas", "services", "examples", "benchmarks", "tests")
+CODE = ("engage_hri", "schemas", "services", "examples", "benchmarks", "tests")
 
 IMPURE = {"asyncio", "zenoh", "time", "random", "logging", "datetime", "socket", "subprocess"}
 """What values-in-values-out code has no use for: the loop, the wire, the clock, chance, talking to the console."""
@@ -80,6 +80,9 @@ def _in_code(place: PurePosixPath, text: str, tree: ast.Module) -> Iterator[str]
     lines = text.count("\n")
     if lines > LONGEST:
         yield f"{lines} lines, at most {LONGEST}"
+    for module in _imported(place, tree):
+        if module.split(".")[0] in ("schemas", "services"):
+            yield f"imports {module}: its name is engage_hri.{module}"
     for module in _imports(place, tree):
         yield from (f"imports {module}: {reason}" for reason in _import(place, module))
     if place.parts[0] in ("schemas", "services"):
@@ -150,7 +153,14 @@ def _sleeps(tree: ast.AST, name: str) -> Iterator[int]:
 
 
 def _imports(place: PurePosixPath, tree: ast.Module) -> Iterator[str]:
-    """Every module that is imported anywhere in the file, `from a import b` as both a and a.b."""
+    """Every module that is imported anywhere in the file, `from a import b` as both a and a.b.
+
+    Ours by their place in the tree: `services.bus`, not `services/bus.py`.
+    """
+    yield from (module.removeprefix("engage_hri.") for module in _imported(place, tree))
+
+
+def _imported(place: PurePosixPath, tree: ast.Module) -> Iterator[str]:
     for node in ast.walk(tree):
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names)
@@ -200,7 +210,12 @@ def test_the_list_of_shells_holds_only_files_that_need_it() -> None:
 @pytest.mark.parametrize(
     ("path", "text", "reason"),
     [
+        ("services/cli.py", "from services.bus import Bus", "its name is engage_hri.services.bus"),
+        ("tests/test_x.py", "import schemas.keys", "its name is engage_hri.schemas.keys"),
         ("schemas/x.py", "import asyncio", "pure"),
+        ("schemas/x.py", "from engage_hri.services import bus", "knows no service"),
+        ("services/realizer/net.py", "from engage_hri.services.bus import Bus", "pure"),
+        ("services/control/service.py", "from engage_hri.services.simulation import table", "no business on a robot"),
         ("schemas/x.py", "from services import bus", "knows no service"),
         ("schemas/x.py", "def f():\n    from time import monotonic", "pure"),
         ("services/realizer/net.py", "import random", "pure"),
@@ -246,14 +261,14 @@ def test_a_broken_rule_is_caught(path: str, text: str, reason: str) -> None:
     [
         (
             "services/realizer/service.py",
-            "import asyncio\nfrom services.bus import Bus\nfrom services.realizer import net",
+            "import asyncio\nfrom engage_hri.services.bus import Bus\nfrom engage_hri.services.realizer import net",
         ),
-        ("services/realizer/net.py", "import numpy\nfrom services.realizer.config import RealizerConfig"),
-        ("services/realizer/net.py", "from services.tangram_table import TangramTable"),
+        ("services/realizer/net.py", "import numpy\nfrom engage_hri.services.realizer.config import RealizerConfig"),
+        ("services/realizer/net.py", "from engage_hri.services.tangram_table import TangramTable"),
         ("services/realizer/executor.py", "import asyncio"),
         ("services/zenoh_bus.py", "import time\nimport zenoh"),
-        ("services/commandline/demo.py", "from services.simulation import service\nimport asyncio"),
-        ("services/cli.py", "from services.realizer.service import realize"),
+        ("services/commandline/demo.py", "from engage_hri.services.simulation import service\nimport asyncio"),
+        ("services/cli.py", "from engage_hri.services.realizer.service import realize"),
         ("schemas/keys.py", "PREFIX = 'engage/v1'"),
         ("tests/test_x.py", "async def test_x():\n    await asyncio.sleep(5)  # virtual"),
         ("tests/test_x.py", "@pytest.mark.real_time\nasync def test_x():\n    await asyncio.sleep(0)"),

@@ -6,8 +6,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from schemas.tool import Gesture, Part, Refer, Say
-from services.chunking import Chunk, Chunker
+from engage_hri.schemas.tool import Gesture, Part, Refer, Say
+from engage_hri.services.chunking import Chunk, Chunker
 
 
 def chunks(*pieces: str | Part, **settings: int) -> list[Chunk]:

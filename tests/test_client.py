@@ -9,21 +9,21 @@ import msgspec
 import pytest
 from msgspec.structs import replace
 
-from schemas import keys
-from schemas.attention import Inhibit, InhibitionEnded
-from schemas.behaviors import Speech
-from schemas.blocks import BehaviorInterrupted, Block, BlockOutcome, InterruptBehavior, PerformBlock
-from schemas.faults import Fault, InputRefused, NoReply, RunFailed
-from schemas.fragments import FragmentOutcome, PerformFragment, TurnClosed, TurnFragment
-from schemas.recognition import ConnectionEvent, Statistics, WindowStatistics
-from schemas.requests import Cancel
-from schemas.units import Stamp
-from schemas.world import Entity, World
-from services.bus import Bus
-from services.client import ANSWER_PATIENCE, PerformFailed, connect
-from services.memory_bus import MemoryHub
-from services.requests import RequestDesk
-from services.runtime import Ready, running
+from engage_hri.schemas import keys
+from engage_hri.schemas.attention import Inhibit, InhibitionEnded
+from engage_hri.schemas.behaviors import Speech
+from engage_hri.schemas.blocks import BehaviorInterrupted, Block, BlockOutcome, InterruptBehavior, PerformBlock
+from engage_hri.schemas.faults import Fault, InputRefused, NoReply, RunFailed
+from engage_hri.schemas.fragments import FragmentOutcome, PerformFragment, TurnClosed, TurnFragment
+from engage_hri.schemas.recognition import ConnectionEvent, Statistics, WindowStatistics
+from engage_hri.schemas.requests import Cancel
+from engage_hri.schemas.units import Stamp
+from engage_hri.schemas.world import Entity, World
+from engage_hri.services.bus import Bus
+from engage_hri.services.client import ANSWER_PATIENCE, PerformFailed, connect
+from engage_hri.services.memory_bus import MemoryHub
+from engage_hri.services.requests import RequestDesk
+from engage_hri.services.runtime import Ready, running
 
 HELLO = TurnFragment(id="hello", behaviors=(Speech(id="speech-1", text="Hello"),))
 Answering = Callable[[RequestDesk, PerformFragment], Awaitable[None]]

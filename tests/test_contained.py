@@ -8,19 +8,19 @@ from typing import Any
 
 import pytest
 
-from schemas import keys
-from schemas.behaviors import Gaze, Pointing, Speech, Wait
-from schemas.body import RobotState
-from schemas.faults import InputRefused
-from schemas.fragments import TurnFragment
-from schemas.messages import Message
-from schemas.presence import PeerGone
-from services.client import PerformFailed, Robot, connect
-from services.commandline import roster
-from services.config import load
-from services.control.body import Authority
-from services.memory_bus import MemoryHub
-from services.runtime import running
+from engage_hri.schemas import keys
+from engage_hri.schemas.behaviors import Gaze, Pointing, Speech, Wait
+from engage_hri.schemas.body import RobotState
+from engage_hri.schemas.faults import InputRefused
+from engage_hri.schemas.fragments import TurnFragment
+from engage_hri.schemas.messages import Message
+from engage_hri.schemas.presence import PeerGone
+from engage_hri.services.client import PerformFailed, Robot, connect
+from engage_hri.services.commandline import roster
+from engage_hri.services.config import load
+from engage_hri.services.control.body import Authority
+from engage_hri.services.memory_bus import MemoryHub
+from engage_hri.services.runtime import running
 from tests.cancelling import whole_robot
 from tests.test_lives_and_late_answers import HOME, _serve_until, everything, says
 
@@ -38,22 +38,22 @@ def breaking(attribute: str) -> Callable[..., Any]:
 @pytest.mark.parametrize(
     ("place", "what"),
     [
-        ("services.generation.conductor.Conductor.admit", "perform"),
-        ("services.generation.planning.plan", "perform"),
-        ("services.generation.conductor.plan", "perform"),
-        ("services.realizer.service.plan_steps", "realize"),
-        ("services.realizer.executor.Authority", "realize"),
-        ("services.realizer.authority.Authority.advance", "realize"),
-        ("services.realizer.authority.Authority.reach", "realize"),
-        ("services.realizer.reporting.Reporter.reached", "realize"),
-        ("services.realizer.executor.Performance._by_body", "realize"),
-        ("services.control.service._Control._begin", "realize"),
-        ("services.control.service._Control._report", "realize"),
-        ("services.control.simulated.SimulatedBody.perform", "realize"),
-        ("services.control.simulated.SimulatedBody.estimate", "realize"),
-        ("services.control.simulated.SimulatedBody.state", "realize"),
-        ("services.recognition.session.Session._request", "perform"),
-        ("services.recognition.recognizer.Recognizer.feed", "perform"),
+        ("engage_hri.services.generation.conductor.Conductor.admit", "perform"),
+        ("engage_hri.services.generation.planning.plan", "perform"),
+        ("engage_hri.services.generation.conductor.plan", "perform"),
+        ("engage_hri.services.realizer.service.plan_steps", "realize"),
+        ("engage_hri.services.realizer.executor.Authority", "realize"),
+        ("engage_hri.services.realizer.authority.Authority.advance", "realize"),
+        ("engage_hri.services.realizer.authority.Authority.reach", "realize"),
+        ("engage_hri.services.realizer.reporting.Reporter.reached", "realize"),
+        ("engage_hri.services.realizer.executor.Performance._by_body", "realize"),
+        ("engage_hri.services.control.service._Control._begin", "realize"),
+        ("engage_hri.services.control.service._Control._report", "realize"),
+        ("engage_hri.services.control.simulated.SimulatedBody.perform", "realize"),
+        ("engage_hri.services.control.simulated.SimulatedBody.estimate", "realize"),
+        ("engage_hri.services.control.simulated.SimulatedBody.state", "realize"),
+        ("engage_hri.services.recognition.session.Session._request", "perform"),
+        ("engage_hri.services.recognition.recognizer.Recognizer.feed", "perform"),
     ],
 )
 async def test_a_bug_ends_one_request_and_the_next_is_served(
@@ -132,7 +132,7 @@ async def test_a_driver_that_is_cancelled_by_itself_ends_one_behavior(
     behaviors = [Gaze(id="g", target="human"), Speech(id="s", text="one two")]
     async with whole_robot(hub) as robot:
         with monkeypatch.context() as patch:
-            patch.setattr(f"services.control.simulated.SimulatedBody.{method}", cancelled_by_itself)
+            patch.setattr(f"engage_hri.services.control.simulated.SimulatedBody.{method}", cancelled_by_itself)
             for number in range(2):
                 began = robot.now()
                 with suppress(InputRefused, PerformFailed):
@@ -149,7 +149,7 @@ async def test_a_way_home_that_never_ends_is_not_asked_for_for_ever(
     async def never(*arguments: object) -> None:
         await asyncio.Event().wait()
 
-    monkeypatch.setattr("services.control.simulated.SimulatedBody.home", never)
+    monkeypatch.setattr("engage_hri.services.control.simulated.SimulatedBody.home", never)
     with hub.join("ear").subscribe(keys.keep_alive("control")) as pulses:
         async with whole_robot(hub) as robot:
             for number in range(3):
@@ -195,7 +195,7 @@ async def test_an_error_of_a_driver_that_cannot_even_be_written_down_ends_one_be
     monkeypatch.setattr(logging.getLogger("engage"), "disabled", True)  # pytest can't write it down, either
     async with whole_robot(hub) as robot:
         with monkeypatch.context() as patch:
-            patch.setattr("services.control.simulated.SimulatedBody.perform", broken)
+            patch.setattr("engage_hri.services.control.simulated.SimulatedBody.perform", broken)
             await asyncio.wait_for(robot.realize("b", [Speech(id="s", text="one")]), 60.0)
         await asyncio.sleep(5.0)
         assert (await robot.realize("c", [Speech(id="s", text="one")])).spoken[0].text == "one"

@@ -2,8 +2,8 @@
 
 import pytest
 
-from schemas.world import Entity, World
-from services.covered import CoveredObjects
+from engage_hri.schemas.world import Entity, World
+from engage_hri.services.covered import CoveredObjects
 
 CUP = Entity(id="cup", kind="object", position=(0.5, 0.0, 0.7))
 PLATE = Entity(id="plate", kind="object", position=(0.5, 0.2, 0.7))

@@ -8,9 +8,9 @@ from types import ModuleType
 import msgspec
 import pytest
 
-from schemas.json_codec import decode_json
-from schemas.summary import Summary
-from schemas.tool import ToolInput
+from engage_hri.schemas.json_codec import decode_json
+from engage_hri.schemas.summary import Summary
+from engage_hri.schemas.tool import ToolInput
 
 ROOT = Path(__file__).parents[1]
 EXAMPLES = ROOT / "examples"

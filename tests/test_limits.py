@@ -5,20 +5,20 @@ from functools import partial
 
 import pytest
 
-from schemas.behaviors import Gaze, Speech, Wait
-from schemas.blocks import Block, BlockOutcome
-from schemas.faults import InputRefused
-from schemas.fragments import FragmentOutcome, TurnFragment
-from schemas.world import Entity, World
-from services.client import connect
-from services.commandline import roster
-from services.config import load
-from services.generation.config import GenerationConfig
-from services.memory_bus import MemoryHub
-from services.realizer.config import RealizerConfig
-from services.requests import RequestRefused
-from services.runtime import running
-from services.simulation.still import show_world
+from engage_hri.schemas.behaviors import Gaze, Speech, Wait
+from engage_hri.schemas.blocks import Block, BlockOutcome
+from engage_hri.schemas.faults import InputRefused
+from engage_hri.schemas.fragments import FragmentOutcome, TurnFragment
+from engage_hri.schemas.world import Entity, World
+from engage_hri.services.client import connect
+from engage_hri.services.commandline import roster
+from engage_hri.services.config import load
+from engage_hri.services.generation.config import GenerationConfig
+from engage_hri.services.memory_bus import MemoryHub
+from engage_hri.services.realizer.config import RealizerConfig
+from engage_hri.services.requests import RequestRefused
+from engage_hri.services.runtime import running
+from engage_hri.services.simulation.still import show_world
 from tests.cancelling import whole_robot
 from tests.realizer.stage import stage
 

@@ -6,21 +6,21 @@ from typing import Any
 import pytest
 from msgspec.structs import replace
 
-from schemas import keys
-from schemas.attention import Inhibit
-from schemas.behaviors import Gaze, Gesture, Pointing, Speech, Wait
-from schemas.blocks import Block, BlockOutcome, InterruptBehavior, PerformBlock
-from schemas.body import GoHome, PerformBehavior
-from schemas.faults import Fault
-from schemas.fragments import FragmentOutcome, PerformFragment, TurnFragment
-from schemas.messages import encode_json
-from schemas.requests import Refused, Request
-from services.client import Robot, connect
-from services.commandline import roster
-from services.config import load
-from services.memory_bus import MemoryHub
-from services.requests import Requester
-from services.runtime import running
+from engage_hri.schemas import keys
+from engage_hri.schemas.attention import Inhibit
+from engage_hri.schemas.behaviors import Gaze, Gesture, Pointing, Speech, Wait
+from engage_hri.schemas.blocks import Block, BlockOutcome, InterruptBehavior, PerformBlock
+from engage_hri.schemas.body import GoHome, PerformBehavior
+from engage_hri.schemas.faults import Fault
+from engage_hri.schemas.fragments import FragmentOutcome, PerformFragment, TurnFragment
+from engage_hri.schemas.messages import encode_json
+from engage_hri.schemas.requests import Refused, Request
+from engage_hri.services.client import Robot, connect
+from engage_hri.services.commandline import roster
+from engage_hri.services.config import load
+from engage_hri.services.memory_bus import MemoryHub
+from engage_hri.services.requests import Requester
+from engage_hri.services.runtime import running
 from tests.cancelling import change_mind_often, whole_robot
 from tests.commanding import command
 from tests.realizer.fake_body import FakeBody, Script

@@ -3,13 +3,13 @@ from importlib.metadata import version
 
 import pytest
 
-from schemas import keys
-from schemas.presence import PeerAlive, PeerGone
-from schemas.requests import Accepted
-from schemas.status import AskStatus, Status
-from services.bus import Bus
-from services.memory_bus import MemoryHub
-from services.runtime import Ready, running, serve
+from engage_hri.schemas import keys
+from engage_hri.schemas.presence import PeerAlive, PeerGone
+from engage_hri.schemas.requests import Accepted
+from engage_hri.schemas.status import AskStatus, Status
+from engage_hri.services.bus import Bus
+from engage_hri.services.memory_bus import MemoryHub
+from engage_hri.services.runtime import Ready, running, serve
 
 
 async def stand_late(bus: Bus, ready: Ready) -> None:

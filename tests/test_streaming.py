@@ -5,21 +5,21 @@ from collections.abc import AsyncIterator, Callable
 
 import pytest
 
-from schemas import keys
-from schemas.behaviors import Reference, Speech
-from schemas.blocks import SpokenText
-from schemas.faults import Fault
-from schemas.fragments import FragmentOutcome, PerformFragment, TurnClosed, TurnFragment
-from schemas.recognition import ConnectionEvent
-from schemas.requests import Cancel
-from schemas.summary import summary
-from schemas.tool import ToolInput
-from services.bus import Bus
-from services.client import connect
-from services.memory_bus import MemoryHub
-from services.requests import RequestDesk
-from services.runtime import Ready, running
-from services.streaming import perform_call, stream
+from engage_hri.schemas import keys
+from engage_hri.schemas.behaviors import Reference, Speech
+from engage_hri.schemas.blocks import SpokenText
+from engage_hri.schemas.faults import Fault
+from engage_hri.schemas.fragments import FragmentOutcome, PerformFragment, TurnClosed, TurnFragment
+from engage_hri.schemas.recognition import ConnectionEvent
+from engage_hri.schemas.requests import Cancel
+from engage_hri.schemas.summary import summary
+from engage_hri.schemas.tool import ToolInput
+from engage_hri.services.bus import Bus
+from engage_hri.services.client import connect
+from engage_hri.services.memory_bus import MemoryHub
+from engage_hri.services.requests import RequestDesk
+from engage_hri.services.runtime import Ready, running
+from engage_hri.services.streaming import perform_call, stream
 
 LASTS = 1.0
 """Seconds that each fragment takes, one after the other."""

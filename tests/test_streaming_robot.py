@@ -7,20 +7,20 @@ from typing import NamedTuple
 
 import pytest
 
-from schemas import keys
-from schemas.actions import ActionBegan, ActionEnded
-from schemas.summary import Summary, summary
-from schemas.tool import Say, ToolInput
-from schemas.units import Seconds
-from services.bus import Bus
-from services.client import Robot, connect
-from services.commandline import roster
-from services.commandline.sources import still
-from services.config import load
-from services.memory_bus import MemoryHub
-from services.runtime import running
-from services.simulation.still import tangram_world
-from services.streaming import Piece, perform_call, stream
+from engage_hri.schemas import keys
+from engage_hri.schemas.actions import ActionBegan, ActionEnded
+from engage_hri.schemas.summary import Summary, summary
+from engage_hri.schemas.tool import Say, ToolInput
+from engage_hri.schemas.units import Seconds
+from engage_hri.services.bus import Bus
+from engage_hri.services.client import Robot, connect
+from engage_hri.services.commandline import roster
+from engage_hri.services.commandline.sources import still
+from engage_hri.services.config import load
+from engage_hri.services.memory_bus import MemoryHub
+from engage_hri.services.runtime import running
+from engage_hri.services.simulation.still import tangram_world
+from engage_hri.services.streaming import Piece, perform_call, stream
 from tests.cancelling import whole_robot
 
 

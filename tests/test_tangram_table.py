@@ -4,8 +4,8 @@ from itertools import combinations
 
 import pytest
 
-from schemas.world import Entity
-from services.tangram_table import Pose, edges, overlap, poses_touching, tangram_table, touches
+from engage_hri.schemas.world import Entity
+from engage_hri.services.tangram_table import Pose, edges, overlap, poses_touching, tangram_table, touches
 
 TABLE = tangram_table()
 START = {piece.id: TABLE.lying(piece, piece.start) for piece in TABLE.pieces}

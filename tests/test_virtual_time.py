@@ -3,7 +3,7 @@ import math
 
 import pytest
 
-from services.virtual_time import Deadlock, TimeRanOut, VirtualTimeLoop, run_virtual
+from engage_hri.services.virtual_time import Deadlock, TimeRanOut, VirtualTimeLoop, run_virtual
 
 
 async def test_time_is_exact_and_starts_at_zero():

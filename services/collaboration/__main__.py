@@ -1,8 +1,8 @@
-"""`python -m services.collaboration`: the same as `engage run collaboration`."""
+"""`python -m engage_hri.services.collaboration`: the same as `engage run collaboration`."""
 
 import sys
 
-from services.__main__ import main
+from engage_hri.services.__main__ import main
 
 if __name__ == "__main__":
     sys.argv[1:1] = ["run", "collaboration"]

@@ -4,7 +4,7 @@ from typing import Literal
 
 from msgspec import Struct
 
-from schemas.units import Probability, Seconds
+from engage_hri.schemas.units import Probability, Seconds
 
 
 class CollaborationConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):

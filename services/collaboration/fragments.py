@@ -9,10 +9,19 @@ from typing import Literal
 
 from msgspec import Struct
 
-from schemas.behaviors import Action, After, Constraint, FragmentBehavior, Gaze, Reference, Speech, SpeechOption
-from schemas.fragments import TurnFragment, TurnStatus
-from services.collaboration.relations import Relation
-from services.tangram_table import Side, TangramTable
+from engage_hri.schemas.behaviors import (
+    Action,
+    After,
+    Constraint,
+    FragmentBehavior,
+    Gaze,
+    Reference,
+    Speech,
+    SpeechOption,
+)
+from engage_hri.schemas.fragments import TurnFragment, TurnStatus
+from engage_hri.services.collaboration.relations import Relation
+from engage_hri.services.tangram_table import Side, TangramTable
 
 MANIPULATION: tuple[Action, ...] = ("act", "speak", "nod", "shake")
 """What answers a request to move a piece."""

@@ -3,8 +3,8 @@
 import math
 from collections.abc import Iterable
 
-from schemas.units import Meters, Radians
-from schemas.world import Entity
+from engage_hri.schemas.units import Meters, Radians
+from engage_hri.schemas.world import Entity
 
 MOVED: Meters = 0.015
 TURNED: Radians = math.radians(10.0)

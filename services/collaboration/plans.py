@@ -8,13 +8,13 @@ from typing import TypeVar
 
 from msgspec import Struct
 
-from schemas.fragments import FragmentOutcome, TurnFragment
-from schemas.units import Seconds
-from schemas.world import Entity
-from services.collaboration.config import CollaborationConfig
-from services.collaboration.fragments import MANIPULATION, Mention, Sentence, fragment, request
-from services.collaboration.task import Goal, Instruction, check
-from services.tangram_table import TangramTable
+from engage_hri.schemas.fragments import FragmentOutcome, TurnFragment
+from engage_hri.schemas.units import Seconds
+from engage_hri.schemas.world import Entity
+from engage_hri.services.collaboration.config import CollaborationConfig
+from engage_hri.services.collaboration.fragments import MANIPULATION, Mention, Sentence, fragment, request
+from engage_hri.services.collaboration.task import Goal, Instruction, check
+from engage_hri.services.tangram_table import TangramTable
 
 # -- what a plan may wish for -----------------------------------------------------------------------------------
 

@@ -9,8 +9,8 @@ from itertools import permutations
 
 from msgspec import Struct
 
-from schemas.world import Entity
-from services.tangram_table import Side, edges, touches
+from engage_hri.schemas.world import Entity
+from engage_hri.services.tangram_table import Side, edges, touches
 
 
 class Relation(Struct, frozen=True):

@@ -11,9 +11,9 @@ from collections.abc import Callable, Iterable
 from msgspec import Struct
 from msgspec.structs import replace
 
-from schemas.units import Meters, Seconds
-from schemas.world import Entity, World
-from services.collaboration.placement import TRUSTED, is_moving
+from engage_hri.schemas.units import Meters, Seconds
+from engage_hri.schemas.world import Entity, World
+from engage_hri.services.collaboration.placement import TRUSTED, is_moving
 
 HAND_OVER: Meters = 0.08
 """How near to a piece's center, seen from above, a hand's center covers some of it: half a hand and half a piece."""

@@ -8,10 +8,10 @@ from collections.abc import Collection, Iterable
 
 from msgspec import Struct
 
-from schemas.world import Entity
-from services.collaboration.placement import TRUSTED
-from services.collaboration.relations import Relation, relation, relations
-from services.tangram_table import TangramTable
+from engage_hri.schemas.world import Entity
+from engage_hri.services.collaboration.placement import TRUSTED
+from engage_hri.services.collaboration.relations import Relation, relation, relations
+from engage_hri.services.tangram_table import TangramTable
 
 
 class Instruction(Struct, frozen=True, kw_only=True):

@@ -5,13 +5,13 @@ import sys
 from collections.abc import Iterator
 from pathlib import Path
 
-from schemas.blocks import Block, Dialect
-from schemas.dialects import core, spelled
-from schemas.xml_codec import encode_xml
-from services.commandline.generating import generated
-from services.commandline.process import DONE
-from services.commandline.run import Where
-from services.commandline.sources import read_source, read_world
+from engage_hri.schemas.blocks import Block, Dialect
+from engage_hri.schemas.dialects import core, spelled
+from engage_hri.schemas.xml_codec import encode_xml
+from engage_hri.services.commandline.generating import generated
+from engage_hri.services.commandline.process import DONE
+from engage_hri.services.commandline.run import Where
+from engage_hri.services.commandline.sources import read_source, read_world
 
 _XML_NAME = re.compile(r"[^\W\d][\w.-]*")
 

@@ -3,15 +3,15 @@
 from collections.abc import Sequence
 from pathlib import Path
 
-from schemas.blocks import Block
-from schemas.faults import Fault, InputRefused
-from schemas.feedback import WarningFeedback, WarningKind
-from schemas.references import sites
-from schemas.syncref import SyncRef
-from schemas.world import World
-from services.commandline.errors import readable
-from services.commandline.outputs import Outputs
-from services.commandline.sources import Source, read_source
+from engage_hri.schemas.blocks import Block
+from engage_hri.schemas.faults import Fault, InputRefused
+from engage_hri.schemas.feedback import WarningFeedback, WarningKind
+from engage_hri.schemas.references import sites
+from engage_hri.schemas.syncref import SyncRef
+from engage_hri.schemas.world import World
+from engage_hri.services.commandline.errors import readable
+from engage_hri.services.commandline.outputs import Outputs
+from engage_hri.services.commandline.sources import Source, read_source
 
 
 def read_all(files: Sequence[Path], outputs: Outputs) -> tuple[Source, ...]:
@@ -28,9 +28,9 @@ def read_all(files: Sequence[Path], outputs: Outputs) -> tuple[Source, ...]:
 
 def check(sources: Sequence[Source], world: World | None, robot: str, outputs: Outputs) -> None:
     """Contradictions in blocks; in fragments what the world does not know, if it is known. Raises InputRefused."""
-    from services.generation.fragment_check import checked
-    from services.realizer.planner import plan_block
-    from services.realizer.relations import BlockRefused
+    from engage_hri.services.generation.fragment_check import checked
+    from engage_hri.services.realizer.planner import plan_block
+    from engage_hri.services.realizer.relations import BlockRefused
 
     for source in sources:
         for thing in source.things:

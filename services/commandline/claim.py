@@ -11,12 +11,12 @@ import uuid
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 
-from schemas import keys
-from schemas.faults import Fault, InputRefused
-from schemas.messages import Message
-from schemas.presence import PeerAlive, PeerGone
-from schemas.units import Seconds
-from services.bus import Bus, Hub, Subscription
+from engage_hri.schemas import keys
+from engage_hri.schemas.faults import Fault, InputRefused
+from engage_hri.schemas.messages import Message
+from engage_hri.schemas.presence import PeerAlive, PeerGone
+from engage_hri.schemas.units import Seconds
+from engage_hri.services.bus import Bus, Hub, Subscription
 
 PATIENCE: Seconds = 4.0
 """How long one that was killed may still seem to be there."""

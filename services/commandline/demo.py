@@ -6,17 +6,17 @@ from typing import NamedTuple
 
 from rich.console import Console
 
-from schemas.messages import Message
-from schemas.units import Seconds
-from services.commandline.outputs import Outputs
-from services.commandline.process import DONE, run
-from services.commandline.run import Where
-from services.commandline.tangram import play_tangram
-from services.config import Config
-from services.console import tally
-from services.console.follow import Sink
-from services.console.live import LiveView, Log
-from services.console.log import Telling
+from engage_hri.schemas.messages import Message
+from engage_hri.schemas.units import Seconds
+from engage_hri.services.commandline.outputs import Outputs
+from engage_hri.services.commandline.process import DONE, run
+from engage_hri.services.commandline.run import Where
+from engage_hri.services.commandline.tangram import play_tangram
+from engage_hri.services.config import Config
+from engage_hri.services.console import tally
+from engage_hri.services.console.follow import Sink
+from engage_hri.services.console.live import LiveView, Log
+from engage_hri.services.console.log import Telling
 
 DEFAULTS = ("recognition.gaze_resolution=table",)
 """The transcript was annotated by people who saw that a look went to the table, rarely to which piece."""

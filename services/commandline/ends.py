@@ -7,9 +7,9 @@ from typing import Any
 
 import typer
 
-from schemas.faults import EngageError, Fault, InputRefused, RunFailed
-from services.commandline.errors import readable
-from services.commandline.process import DONE, FAILED, REFUSED, UNREAD, interrupted, silence
+from engage_hri.schemas.faults import EngageError, Fault, InputRefused, RunFailed
+from engage_hri.services.commandline.errors import readable
+from engage_hri.services.commandline.process import DONE, FAILED, REFUSED, UNREAD, interrupted, silence
 
 UsageError: type[Exception] = next(kind for kind in typer.BadParameter.__mro__ if kind.__name__ == "UsageError")
 """Typer carries its own copy of click and does not show this class."""

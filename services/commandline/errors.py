@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from schemas.faults import Fault
+from engage_hri.schemas.faults import Fault
 
 
 def readable(fault: Fault, source: Path | str = "") -> str:

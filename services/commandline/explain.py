@@ -10,14 +10,14 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from schemas.faults import Fault, InputRefused
-from schemas.fragments import GestureChoice, PairConsidered, ReferenceChoice, TurnFragment
-from services.commandline.generating import Unplanned, generated
-from services.commandline.outputs import Terminal
-from services.commandline.process import DONE
-from services.commandline.run import Where
-from services.commandline.sources import read_source, read_world
-from services.generation.planning import Plan
+from engage_hri.schemas.faults import Fault, InputRefused
+from engage_hri.schemas.fragments import GestureChoice, PairConsidered, ReferenceChoice, TurnFragment
+from engage_hri.services.commandline.generating import Unplanned, generated
+from engage_hri.services.commandline.outputs import Terminal
+from engage_hri.services.commandline.process import DONE
+from engage_hri.services.commandline.run import Where
+from engage_hri.services.commandline.sources import read_source, read_world
+from engage_hri.services.generation.planning import Plan
 
 GESTURES: dict[GestureChoice, str] = {
     "none": "none",

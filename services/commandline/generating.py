@@ -4,15 +4,15 @@ from collections.abc import Sequence
 
 from msgspec.structs import replace
 
-from schemas.blocks import Block
-from schemas.body import Estimate, EstimateItem
-from schemas.faults import Fault, RunFailed
-from schemas.fragments import ReferenceChoice, TurnFragment
-from schemas.world import World
-from services.commandline.sources import Thing
-from services.config import Config
-from services.generation.planning import Plan
-from services.virtual_time import run_virtual
+from engage_hri.schemas.blocks import Block
+from engage_hri.schemas.body import Estimate, EstimateItem
+from engage_hri.schemas.faults import Fault, RunFailed
+from engage_hri.schemas.fragments import ReferenceChoice, TurnFragment
+from engage_hri.schemas.world import World
+from engage_hri.services.commandline.sources import Thing
+from engage_hri.services.config import Config
+from engage_hri.services.generation.planning import Plan
+from engage_hri.services.virtual_time import run_virtual
 
 
 class Unplanned(RunFailed):
@@ -33,14 +33,14 @@ def generated(things: Sequence[Thing], world: World, config: Config, source: str
 
 
 async def _generated(things: Sequence[Thing], world: World, config: Config, source: str) -> list[Plan]:
-    from services.control.simulated import SimulatedBody
-    from services.generation.discourse import SILENCE
-    from services.generation.fragment_check import checked
-    from services.generation.leases import Leases
-    from services.generation.motions import collect, distinct, from_each_other, from_here
-    from services.generation.planning import glance, plan, targets
-    from services.generation.reference_policy import Unreferable
-    from services.generation.turn_policy import TurnPolicy
+    from engage_hri.services.control.simulated import SimulatedBody
+    from engage_hri.services.generation.discourse import SILENCE
+    from engage_hri.services.generation.fragment_check import checked
+    from engage_hri.services.generation.leases import Leases
+    from engage_hri.services.generation.motions import collect, distinct, from_each_other, from_here
+    from engage_hri.services.generation.planning import glance, plan, targets
+    from engage_hri.services.generation.reference_policy import Unreferable
+    from engage_hri.services.generation.turn_policy import TurnPolicy
 
     body = SimulatedBody(config.control.no_point_zones, config.control.variability)
     permits = Leases(config.generation).permits()

@@ -10,19 +10,19 @@ from typing import NamedTuple
 from rich.console import Console
 from rich.table import Table
 
-from schemas.faults import Fault, InputRefused
-from schemas.units import Seconds
-from services.bus import Bus
-from services.commandline import roster
-from services.commandline.process import DONE
-from services.commandline.run import Where
-from services.commandline.sources import still
-from services.config import Config
-from services.control.body import Body
-from services.control.service import embody
-from services.hostile.trial import KINDS, Attack, Client, Kind, Report, run
-from services.runtime import Ready, Service
-from services.simulation.still import tangram_world
+from engage_hri.schemas.faults import Fault, InputRefused
+from engage_hri.schemas.units import Seconds
+from engage_hri.services.bus import Bus
+from engage_hri.services.commandline import roster
+from engage_hri.services.commandline.process import DONE
+from engage_hri.services.commandline.run import Where
+from engage_hri.services.commandline.sources import still
+from engage_hri.services.config import Config
+from engage_hri.services.control.body import Body
+from engage_hri.services.control.service import embody
+from engage_hri.services.hostile.trial import KINDS, Attack, Client, Kind, Report, run
+from engage_hri.services.runtime import Ready, Service
+from engage_hri.services.simulation.still import tangram_world
 
 WRONG = 1
 """Exit code: something came of it that should not have."""

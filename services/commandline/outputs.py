@@ -12,21 +12,21 @@ from typing import Any, Literal, Self, TextIO
 import msgspec
 from rich.console import Console
 
-from schemas import lines
-from schemas.faults import Fault, InputRefused, RunFailed
-from schemas.feedback import BlockProgress, PredictionFeedback, SyncPointProgress, WarningFeedback
-from schemas.feedback_xml import HEAD, TAIL, encode_feedback
-from schemas.messages import Message
-from schemas.recognition import ConnectionEvent
-from schemas.summary import Summary
-from schemas.units import Seconds
+from engage_hri.schemas import lines
+from engage_hri.schemas.faults import Fault, InputRefused, RunFailed
+from engage_hri.schemas.feedback import BlockProgress, PredictionFeedback, SyncPointProgress, WarningFeedback
+from engage_hri.schemas.feedback_xml import HEAD, TAIL, encode_feedback
+from engage_hri.schemas.messages import Message
+from engage_hri.schemas.recognition import ConnectionEvent
+from engage_hri.schemas.summary import Summary
+from engage_hri.schemas.units import Seconds
 
 STDOUT = Path("-")
 FeedbackFormat = Literal["json", "xml"]
 
 
 class Terminal(Console):
-    """Rich's console, but it leaves it to `services.cli` what becomes of us when nobody reads on.
+    """Rich's console, but it leaves it to `services/cli.py` what becomes of us when nobody reads on.
 
     And an id between colons is no emoji: `b:x:start`.
     """

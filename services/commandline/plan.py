@@ -2,19 +2,19 @@
 
 from pathlib import Path
 
-from schemas.blocks import Block
-from schemas.body import Estimate
-from schemas.world import World
-from services.commandline.generating import generated
-from services.commandline.process import DONE
-from services.commandline.run import Where
-from services.commandline.sources import read_source, read_world
-from services.config import Config
-from services.virtual_time import run_virtual
+from engage_hri.schemas.blocks import Block
+from engage_hri.schemas.body import Estimate
+from engage_hri.schemas.world import World
+from engage_hri.services.commandline.generating import generated
+from engage_hri.services.commandline.process import DONE
+from engage_hri.services.commandline.run import Where
+from engage_hri.services.commandline.sources import read_source, read_world
+from engage_hri.services.config import Config
+from engage_hri.services.virtual_time import run_virtual
 
 
 def main(path: Path, format: str, world: Path | None, where: Where) -> int:
-    from services.realizer import export
+    from engage_hri.services.realizer import export
 
     config = where.load()
     source = read_source(path)
@@ -31,8 +31,8 @@ def main(path: Path, format: str, world: Path | None, where: Where) -> int:
 
 async def estimated(block: Block, world: World, config: Config) -> tuple[Estimate, ...]:
     """What the simulated body expects of the block in that world, from its home position."""
-    from services.control.simulated import SimulatedBody
-    from services.realizer.points import performer
+    from engage_hri.services.control.simulated import SimulatedBody
+    from engage_hri.services.realizer.points import performer
 
     body = SimulatedBody(config.control.no_point_zones, config.control.variability)
     asked = [behavior for behavior in block.behaviors if performer(behavior) == "body"]

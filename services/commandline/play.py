@@ -9,31 +9,31 @@ from typing import NamedTuple
 
 from rich.console import Console
 
-from schemas import keys
-from schemas.blocks import Block, BlockOutcome
-from schemas.faults import EngageError, Fault, InputRefused, NoReply, RunFailed
-from schemas.fragments import FragmentOutcome, TurnFragment
-from schemas.messages import Message
-from schemas.status import AskStatus
-from schemas.summary import summary
-from schemas.units import Seconds
-from schemas.world import World
-from services.bus import Hub
-from services.client import Robot, connect
-from services.commandline import checking, roster
-from services.commandline.errors import readable
-from services.commandline.outputs import FeedbackFormat, Outputs
-from services.commandline.played import Played
-from services.commandline.process import DONE, FAILED, REFUSED, run
-from services.commandline.run import Where, unique
-from services.commandline.sources import Source, Thing, read_world, still
-from services.config import Config
-from services.console.follow import Sink, following
-from services.console.live import Log
-from services.console.log import Telling
-from services.memory_bus import MemoryHub
-from services.runtime import Service, running
-from services.streaming import summary_of
+from engage_hri.schemas import keys
+from engage_hri.schemas.blocks import Block, BlockOutcome
+from engage_hri.schemas.faults import EngageError, Fault, InputRefused, NoReply, RunFailed
+from engage_hri.schemas.fragments import FragmentOutcome, TurnFragment
+from engage_hri.schemas.messages import Message
+from engage_hri.schemas.status import AskStatus
+from engage_hri.schemas.summary import summary
+from engage_hri.schemas.units import Seconds
+from engage_hri.schemas.world import World
+from engage_hri.services.bus import Hub
+from engage_hri.services.client import Robot, connect
+from engage_hri.services.commandline import checking, roster
+from engage_hri.services.commandline.errors import readable
+from engage_hri.services.commandline.outputs import FeedbackFormat, Outputs
+from engage_hri.services.commandline.played import Played
+from engage_hri.services.commandline.process import DONE, FAILED, REFUSED, run
+from engage_hri.services.commandline.run import Where, unique
+from engage_hri.services.commandline.sources import Source, Thing, read_world, still
+from engage_hri.services.config import Config
+from engage_hri.services.console.follow import Sink, following
+from engage_hri.services.console.live import Log
+from engage_hri.services.console.log import Telling
+from engage_hri.services.memory_bus import MemoryHub
+from engage_hri.services.runtime import Service, running
+from engage_hri.services.streaming import summary_of
 
 PATIENCE: Seconds = 5.0
 """How long a running system may take to answer at all."""

@@ -3,15 +3,15 @@
 import asyncio
 from collections.abc import Iterable
 
-from schemas.behaviors import Event
-from schemas.blocks import Block, BlockOutcome
-from schemas.feedback import BlockProgress, PredictionFeedback, SyncPointProgress, WarningFeedback
-from schemas.fragments import FragmentOutcome, TurnFragment
-from schemas.messages import Message
-from schemas.recognition import ENDINGS, ConnectionEvent
-from schemas.units import Seconds
-from services.commandline.process import DONE, FAILED
-from services.commandline.sources import Thing
+from engage_hri.schemas.behaviors import Event
+from engage_hri.schemas.blocks import Block, BlockOutcome
+from engage_hri.schemas.feedback import BlockProgress, PredictionFeedback, SyncPointProgress, WarningFeedback
+from engage_hri.schemas.fragments import FragmentOutcome, TurnFragment
+from engage_hri.schemas.messages import Message
+from engage_hri.schemas.recognition import ENDINGS, ConnectionEvent
+from engage_hri.schemas.units import Seconds
+from engage_hri.services.commandline.process import DONE, FAILED
+from engage_hri.services.commandline.sources import Thing
 
 GRACE: Seconds = 0.5
 """How long after its limit the end of an event may take to get here."""

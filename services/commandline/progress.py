@@ -7,7 +7,7 @@ from typing import Self
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
-from services.study.records import SessionRecord
+from engage_hri.services.study.records import SessionRecord
 
 
 class Following:

@@ -3,9 +3,9 @@
 from functools import partial
 from typing import Literal, get_args
 
-from schemas.faults import Fault, InputRefused
-from services.config import Config
-from services.runtime import Service
+from engage_hri.schemas.faults import Fault, InputRefused
+from engage_hri.services.config import Config
+from engage_hri.services.runtime import Service
 
 ServiceName = Literal["generation", "realizer", "recognition", "control", "simulation", "collaboration"]
 NAMES: tuple[str, ...] = get_args(ServiceName)
@@ -17,27 +17,27 @@ def service(name: str, config: Config) -> Service:
     """The service's coroutine function with its section of the configuration bound. Raises InputRefused."""
     match name:
         case "generation":
-            from services.generation.service import generate
+            from engage_hri.services.generation.service import generate
 
             return partial(generate, config=config.generation)
         case "realizer":
-            from services.realizer.service import realize
+            from engage_hri.services.realizer.service import realize
 
             return partial(realize, config=config.realizer)
         case "recognition":
-            from services.recognition.service import recognize
+            from engage_hri.services.recognition.service import recognize
 
             return partial(recognize, config=config.recognition)
         case "control":
-            from services.control.service import embody
+            from engage_hri.services.control.service import embody
 
             return partial(embody, config=config.control)
         case "simulation":
-            from services.simulation.service import simulate
+            from engage_hri.services.simulation.service import simulate
 
             return partial(simulate, config=config.simulation)
         case "collaboration":
-            from services.collaboration.service import collaborate
+            from engage_hri.services.collaboration.service import collaborate
 
             return partial(collaborate, config=config.collaboration)
     raise InputRefused(Fault(reason=f"no service {name!r}", advice=f"one of {', '.join(NAMES)}"))

@@ -15,24 +15,24 @@ from rich.markup import escape
 from rich.table import Table as RichTable
 from rich.text import Text
 
-from schemas.faults import Fault, InputRefused
-from schemas.units import Seconds
-from services.commandline import demo
-from services.commandline.folder import Folder
-from services.commandline.outputs import Terminal
-from services.commandline.process import DONE, FAILED, interrupted, run
-from services.commandline.progress import Following
-from services.commandline.run import Where
-from services.commandline.session import Order, Played
-from services.commandline.validation import beside_table_2_1
-from services.commandline.workers import play_all
-from services.config import Config
-from services.runtime import installed_version
-from services.study import files, summary
-from services.study.conditions import CONDITIONS, WORSE
-from services.study.hypotheses import Finding, findings
-from services.study.records import EventRecord, SessionRecord
-from services.study.summary import Table
+from engage_hri.schemas.faults import Fault, InputRefused
+from engage_hri.schemas.units import Seconds
+from engage_hri.services.commandline import demo
+from engage_hri.services.commandline.folder import Folder
+from engage_hri.services.commandline.outputs import Terminal
+from engage_hri.services.commandline.process import DONE, FAILED, interrupted, run
+from engage_hri.services.commandline.progress import Following
+from engage_hri.services.commandline.run import Where
+from engage_hri.services.commandline.session import Order, Played
+from engage_hri.services.commandline.validation import beside_table_2_1
+from engage_hri.services.commandline.workers import play_all
+from engage_hri.services.config import Config
+from engage_hri.services.runtime import installed_version
+from engage_hri.services.study import files, summary
+from engage_hri.services.study.conditions import CONDITIONS, WORSE
+from engage_hri.services.study.hypotheses import Finding, findings
+from engage_hri.services.study.records import EventRecord, SessionRecord
+from engage_hri.services.study.summary import Table
 
 PEOPLE = "table-2-1"
 """The human whose sessions have no robot, and so no condition."""
@@ -106,7 +106,7 @@ def main(options: Options) -> int:
 def _plotting() -> Draw:
     """Raises InputRefused without the extra, before any session has been played for nothing."""
     try:
-        from services.study.plots import draw
+        from engage_hri.services.study.plots import draw
     except ImportError as error:
         fault = Fault(reason=f"plots need matplotlib: {error}", advice="pip install 'engage-hri[study]'")
         raise InputRefused(fault) from error

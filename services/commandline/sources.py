@@ -8,13 +8,13 @@ from pathlib import Path
 import msgspec
 from msgspec import Struct
 
-from schemas import json_codec
-from schemas.blocks import Block
-from schemas.faults import Fault, InputRefused
-from schemas.fragments import TurnFragment
-from schemas.syncref import is_id
-from schemas.world import World
-from services.runtime import Service
+from engage_hri.schemas import json_codec
+from engage_hri.schemas.blocks import Block
+from engage_hri.schemas.faults import Fault, InputRefused
+from engage_hri.schemas.fragments import TurnFragment
+from engage_hri.schemas.syncref import is_id
+from engage_hri.schemas.world import World
+from engage_hri.services.runtime import Service
 
 Thing = Block | TurnFragment
 
@@ -52,7 +52,7 @@ def read_world(path: Path | None) -> World:
 
     If there is nobody in the file, the person of the tangram table is, so that there is somebody to speak to.
     """
-    from services.simulation.still import load_world, tangram_world
+    from engage_hri.services.simulation.still import load_world, tangram_world
 
     if path is None:
         return tangram_world()
@@ -62,7 +62,7 @@ def read_world(path: Path | None) -> World:
 
 def still(world: World) -> Service:
     """Perception for a world in which nothing moves by itself."""
-    from services.simulation.still import show_world
+    from engage_hri.services.simulation.still import show_world
 
     return partial(show_world, world=world)
 

@@ -11,8 +11,8 @@ from collections.abc import AsyncIterator, Awaitable, Callable, Coroutine, Itera
 from contextlib import asynccontextmanager, contextmanager, suppress
 from typing import Any
 
-from schemas.faults import Fault, RunFailed
-from schemas.units import Seconds
+from engage_hri.schemas.faults import Fault, RunFailed
+from engage_hri.schemas.units import Seconds
 
 Tell = Callable[[str, str], None]
 """Takes a child's name and a line of its log."""

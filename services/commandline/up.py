@@ -9,16 +9,16 @@ from typing import NamedTuple
 from rich.console import Console
 from rich.text import Text
 
-from services.commandline.claim import claiming
-from services.commandline.demo import DEFAULTS, Tallying, shown
-from services.commandline.outputs import Outputs
-from services.commandline.process import DONE, run_until_signal
-from services.commandline.roster import ROBOT
-from services.commandline.run import Where, forever, is_ready
-from services.commandline.supervisor import Child, supervised
-from services.config import Config
-from services.console import tally
-from services.console.follow import following
+from engage_hri.services.commandline.claim import claiming
+from engage_hri.services.commandline.demo import DEFAULTS, Tallying, shown
+from engage_hri.services.commandline.outputs import Outputs
+from engage_hri.services.commandline.process import DONE, run_until_signal
+from engage_hri.services.commandline.roster import ROBOT
+from engage_hri.services.commandline.run import Where, forever, is_ready
+from engage_hri.services.commandline.supervisor import Child, supervised
+from engage_hri.services.config import Config
+from engage_hri.services.console import tally
+from engage_hri.services.console.follow import following
 
 STYLES = ("cyan", "magenta", "green", "yellow", "blue", "red")
 
@@ -89,7 +89,7 @@ def command(name: str, where: Where, config: Config) -> list[str]:
     settings = (*where.settings, f"recognition.gaze_resolution={config.recognition.gaze_resolution}")
     endpoints = (*where.listen, *where.connect)
     return [
-        *(sys.executable, "-P", "-m", "services", "run", name, "--attended", "--robot", config.robot),
+        *(sys.executable, "-P", "-m", "engage_hri", "run", name, "--attended", "--robot", config.robot),
         *(("--config", str(where.config)) if where.config else ()),
         *(part for setting in settings for part in ("--set", setting)),
         *(part for endpoint in endpoints for part in ("--connect", endpoint)),

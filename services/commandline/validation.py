@@ -2,9 +2,9 @@
 
 from collections.abc import Sequence
 
-from services.simulation.table_2_1 import EVENTS, LONGEST_GAP, MTBCE, TABLE
-from services.study.records import SessionRecord
-from services.study.summary import Table, known, number, numbers, pooled, spelled
+from engage_hri.services.simulation.table_2_1 import EVENTS, LONGEST_GAP, MTBCE, TABLE
+from engage_hri.services.study.records import SessionRecord
+from engage_hri.services.study.summary import Table, known, number, numbers, pooled, spelled
 
 
 def beside_table_2_1(records: Sequence[SessionRecord]) -> Table:

@@ -3,21 +3,21 @@
 from collections.abc import Collection
 from typing import NamedTuple, get_args
 
-from schemas import keys, lines
-from schemas.attention import HeadOwner
-from schemas.behaviors import EventKind
-from schemas.faults import Fault, InputRefused
-from schemas.feedback import BlockProgress, SyncPointProgress, WarningFeedback
-from schemas.messages import Message
-from schemas.recognition import ConnectionEvent, Statistics
-from schemas.units import Seconds
-from services.commandline.outputs import Terminal
-from services.commandline.process import DONE, run_until_signal
-from services.commandline.run import Where, forever, unique
-from services.config import Config
-from services.console.follow import FOLLOWED, Sink, following
-from services.console.live import Log
-from services.console.log import Telling
+from engage_hri.schemas import keys, lines
+from engage_hri.schemas.attention import HeadOwner
+from engage_hri.schemas.behaviors import EventKind
+from engage_hri.schemas.faults import Fault, InputRefused
+from engage_hri.schemas.feedback import BlockProgress, SyncPointProgress, WarningFeedback
+from engage_hri.schemas.messages import Message
+from engage_hri.schemas.recognition import ConnectionEvent, Statistics
+from engage_hri.schemas.units import Seconds
+from engage_hri.services.commandline.outputs import Terminal
+from engage_hri.services.commandline.process import DONE, run_until_signal
+from engage_hri.services.commandline.run import Where, forever, unique
+from engage_hri.services.config import Config
+from engage_hri.services.console.follow import FOLLOWED, Sink, following
+from engage_hri.services.console.live import Log
+from engage_hri.services.console.log import Telling
 
 OTHERS = (keys.ANY_FEEDBACK, keys.HEAD_OWNER, keys.ANY_FAULT)
 SUBJECTS: dict[str, tuple[type[Message], ...]] = {

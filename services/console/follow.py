@@ -4,13 +4,13 @@ import asyncio
 from collections.abc import AsyncIterator, Callable, Collection, Iterable
 from contextlib import asynccontextmanager
 
-from schemas import keys
-from schemas.attention import HeadOwner
-from schemas.messages import Message
-from schemas.recognition import ConnectionEvent, OpenEvents
-from schemas.units import Seconds, Stamp
-from services.bus import Bus, Received
-from services.event_stream import EventStream
+from engage_hri.schemas import keys
+from engage_hri.schemas.attention import HeadOwner
+from engage_hri.schemas.messages import Message
+from engage_hri.schemas.recognition import ConnectionEvent, OpenEvents
+from engage_hri.schemas.units import Seconds, Stamp
+from engage_hri.services.bus import Bus, Received
+from engage_hri.services.event_stream import EventStream
 
 Sink = Callable[[Message, Seconds], None]
 FOLLOWED = (

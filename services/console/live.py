@@ -7,10 +7,10 @@ from typing import Self
 from rich.console import Console, RenderableType
 from rich.live import Live
 
-from schemas.messages import Message
-from schemas.units import Seconds
-from services.console import log, view
-from services.console.render import render
+from engage_hri.schemas.messages import Message
+from engage_hri.schemas.units import Seconds
+from engage_hri.services.console import log, view
+from engage_hri.services.console.render import render
 
 REDRAW: Seconds = 0.1
 """At most ten pictures a second, each drawn because something happened."""

@@ -2,16 +2,16 @@
 
 from msgspec import Struct
 
-from schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost
-from schemas.attention import HeadOwner
-from schemas.behaviors import Action
-from schemas.faults import Fault
-from schemas.feedback import BlockProgress, SyncPointProgress, WarningFeedback
-from schemas.messages import Message
-from schemas.recognition import ConnectionEvent, Statistics
-from schemas.units import Seconds
-from services.console import wording
-from services.console.view import OWN_BLOCKS, Scene
+from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost
+from engage_hri.schemas.attention import HeadOwner
+from engage_hri.schemas.behaviors import Action
+from engage_hri.schemas.faults import Fault
+from engage_hri.schemas.feedback import BlockProgress, SyncPointProgress, WarningFeedback
+from engage_hri.schemas.messages import Message
+from engage_hri.schemas.recognition import ConnectionEvent, Statistics
+from engage_hri.schemas.units import Seconds
+from engage_hri.services.console import wording
+from engage_hri.services.console.view import OWN_BLOCKS, Scene
 
 VERBS: dict[Action, str] = {
     "look": "looks",

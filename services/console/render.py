@@ -9,9 +9,9 @@ from rich.segment import Segment
 from rich.table import Table
 from rich.text import Text
 
-from schemas.units import Seconds
-from services.console import wording
-from services.console.view import EventInView, Point, Scene
+from engage_hri.schemas.units import Seconds
+from engage_hri.services.console import wording
+from engage_hri.services.console.view import EventInView, Point, Scene
 
 POINTS_SHOWN = 11
 AHEAD = 4

@@ -7,13 +7,13 @@ from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
-from schemas.behaviors import EventKind
-from schemas.feedback import BlockProgress
-from schemas.fragments import FragmentOutcome
-from schemas.messages import Message
-from schemas.recognition import ConnectionEvent, Statistics, WindowStatistics
-from schemas.units import Seconds
-from services.console import wording
+from engage_hri.schemas.behaviors import EventKind
+from engage_hri.schemas.feedback import BlockProgress
+from engage_hri.schemas.fragments import FragmentOutcome
+from engage_hri.schemas.messages import Message
+from engage_hri.schemas.recognition import ConnectionEvent, Statistics, WindowStatistics
+from engage_hri.schemas.units import Seconds
+from engage_hri.services.console import wording
 
 
 class Counted(Struct, frozen=True, kw_only=True):

@@ -1,6 +1,6 @@
 """What is going on, as one value: who speaks, who looks where, what is planned and realised, which events are open.
 
-`feed(scene, message, at)` gives the next scene; `services.console.render` draws one. Nothing here knows the bus.
+`feed(scene, message, at)` gives the next scene; `services/console/render.py` draws one. Nothing here knows the bus.
 """
 
 from collections.abc import Mapping
@@ -8,18 +8,18 @@ from collections.abc import Mapping
 import msgspec
 from msgspec import Struct
 
-from schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost
-from schemas.attention import Claim, HeadOwner
-from schemas.behaviors import Action
-from schemas.body import WordSpoken
-from schemas.faults import Fault
-from schemas.feedback import BlockProgress, PredictionFeedback, SyncPointProgress, WarningFeedback
-from schemas.fragments import PerformFragment
-from schemas.messages import Message
-from schemas.presence import PeerAlive, PeerGone
-from schemas.recognition import ConnectionEvent, Statistics, WindowStatistics
-from schemas.speakable import joined
-from schemas.units import Seconds
+from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost
+from engage_hri.schemas.attention import Claim, HeadOwner
+from engage_hri.schemas.behaviors import Action
+from engage_hri.schemas.body import WordSpoken
+from engage_hri.schemas.faults import Fault
+from engage_hri.schemas.feedback import BlockProgress, PredictionFeedback, SyncPointProgress, WarningFeedback
+from engage_hri.schemas.fragments import PerformFragment
+from engage_hri.schemas.messages import Message
+from engage_hri.schemas.presence import PeerAlive, PeerGone
+from engage_hri.schemas.recognition import ConnectionEvent, Statistics, WindowStatistics
+from engage_hri.schemas.speakable import joined
+from engage_hri.schemas.units import Seconds
 
 UTTERANCES_KEPT = 8
 EVENTS_KEPT = 12

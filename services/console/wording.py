@@ -2,10 +2,10 @@
 
 from collections.abc import Sequence
 
-from schemas.attention import Claim
-from schemas.behaviors import EventKind
-from schemas.recognition import ConnectionEvent, Statistics
-from schemas.units import Seconds
+from engage_hri.schemas.attention import Claim
+from engage_hri.schemas.behaviors import EventKind
+from engage_hri.schemas.recognition import ConnectionEvent, Statistics
+from engage_hri.schemas.units import Seconds
 
 KINDS: dict[EventKind, str] = {
     "directed_gaze": "directed gaze",

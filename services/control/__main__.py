@@ -1,7 +1,7 @@
-"""`python -m services.control` is `engage run control`."""
+"""`python -m engage_hri.services.control` is `engage run control`."""
 
 import sys
 
-from services.__main__ import main
+from engage_hri.services.__main__ import main
 
 main(["run", "control", *sys.argv[1:]])

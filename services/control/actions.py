@@ -1,9 +1,9 @@
 """What the robot is seen to do, from the sync points its body reports and from what its eyes rest on. Pure."""
 
-from schemas.actions import ActionBegan, ActionEnded
-from schemas.behaviors import Action, BlockBehavior, Head, Pointing, Speech
-from schemas.units import Seconds, Stamp
-from services.control.body import Reached
+from engage_hri.schemas.actions import ActionBegan, ActionEnded
+from engage_hri.schemas.behaviors import Action, BlockBehavior, Head, Pointing, Speech
+from engage_hri.schemas.units import Seconds, Stamp
+from engage_hri.services.control.body import Reached
 
 ActionMessage = ActionBegan | ActionEnded
 

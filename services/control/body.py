@@ -11,7 +11,7 @@ from typing import Literal
 
 from msgspec import Struct
 
-from schemas.behaviors import (
+from engage_hri.schemas.behaviors import (
     BlockBehavior,
     Face,
     FaceFacs,
@@ -23,10 +23,10 @@ from schemas.behaviors import (
     Posture,
     Speech,
 )
-from schemas.body import BodyPose, Capabilities, Estimate, Ray
-from schemas.faults import EngageError
-from schemas.units import Seconds
-from schemas.world import World
+from engage_hri.schemas.body import BodyPose, Capabilities, Estimate, Ray
+from engage_hri.schemas.faults import EngageError
+from engage_hri.schemas.units import Seconds
+from engage_hri.schemas.world import World
 
 SEVEN = ("start", "ready", "stroke_start", "stroke", "stroke_end", "relax", "end")
 How = Literal["relax", "freeze"]

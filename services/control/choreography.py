@@ -11,7 +11,7 @@ from math import radians
 
 from msgspec.structs import replace
 
-from schemas.behaviors import (
+from engage_hri.schemas.behaviors import (
     BlockBehavior,
     Face,
     FaceFacs,
@@ -27,15 +27,15 @@ from schemas.behaviors import (
     Posture,
     PostureShift,
 )
-from schemas.body import Ray
-from schemas.units import Degrees, Seconds
-from schemas.world import Entity, World
-from services.control import kinematics
-from services.control.body import SEVEN
-from services.control.course import Course, Impossible, Point, Scene
-from services.control.kinematics import Side, Unreachable
-from services.control.motion import Leg
-from services.control.vocabulary import ACTION_UNITS, FACES, GESTURES, POSTURES
+from engage_hri.schemas.body import Ray
+from engage_hri.schemas.units import Degrees, Seconds
+from engage_hri.schemas.world import Entity, World
+from engage_hri.services.control import kinematics
+from engage_hri.services.control.body import SEVEN
+from engage_hri.services.control.course import Course, Impossible, Point, Scene
+from engage_hri.services.control.kinematics import Side, Unreachable
+from engage_hri.services.control.motion import Leg
+from engage_hri.services.control.vocabulary import ACTION_UNITS, FACES, GESTURES, POSTURES
 
 NOD_RESERVE = radians(18.0)
 """Kept free of the neck's range by gaze, so that a nod finds room anywhere."""

@@ -4,8 +4,8 @@ from typing import Literal
 
 from msgspec import Struct
 
-from schemas.body import NoPointZone
-from schemas.units import Degrees, Probability, Seconds
+from engage_hri.schemas.body import NoPointZone
+from engage_hri.schemas.units import Degrees, Probability, Seconds
 
 
 class Displaced(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):

@@ -4,11 +4,11 @@ from collections.abc import Mapping
 
 from msgspec import Struct
 
-from schemas.body import NoPointZone, Ray
-from schemas.feedback import WarningKind
-from schemas.units import Degrees
-from schemas.world import World
-from services.control.motion import Leg
+from engage_hri.schemas.body import NoPointZone, Ray
+from engage_hri.schemas.feedback import WarningKind
+from engage_hri.schemas.units import Degrees
+from engage_hri.schemas.world import World
+from engage_hri.services.control.motion import Leg
 
 
 class Impossible(Exception):

@@ -3,15 +3,15 @@
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
 
-from schemas.behaviors import BlockBehavior, Speech, Wait
-from schemas.body import BodyPose, Estimate, Phase
-from schemas.faults import Fault
-from schemas.units import Seconds
-from services.control.body import sync_points
-from services.control.course import Course, Point
-from services.control.motion import SLOWEST, Path
-from services.control.sizing import quickest
-from services.control.voice import Utterance
+from engage_hri.schemas.behaviors import BlockBehavior, Speech, Wait
+from engage_hri.schemas.body import BodyPose, Estimate, Phase
+from engage_hri.schemas.faults import Fault
+from engage_hri.schemas.units import Seconds
+from engage_hri.services.control.body import sync_points
+from engage_hri.services.control.course import Course, Point
+from engage_hri.services.control.motion import SLOWEST, Path
+from engage_hri.services.control.sizing import quickest
+from engage_hri.services.control.voice import Utterance
 
 
 def infeasible(behavior: BlockBehavior, warning: str, fault: Fault) -> Estimate:

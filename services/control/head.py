@@ -3,13 +3,13 @@
 from collections.abc import Mapping
 from math import inf, radians
 
-from schemas.behaviors import BlockBehavior, Gaze, GazeShift, HeadDirectionShift
-from schemas.units import Seconds
-from services.control import choreography, tracks
-from services.control.course import Course, Impossible, Scene
-from services.control.motion import Leg, Motion, Path
-from services.control.runs import Run
-from services.control.tracks import Track
+from engage_hri.schemas.behaviors import BlockBehavior, Gaze, GazeShift, HeadDirectionShift
+from engage_hri.schemas.units import Seconds
+from engage_hri.services.control import choreography, tracks
+from engage_hri.services.control.course import Course, Impossible, Scene
+from engage_hri.services.control.motion import Leg, Motion, Path
+from engage_hri.services.control.runs import Run
+from engage_hri.services.control.tracks import Track
 
 NOTICED = radians(0.5)
 """A target that moves less does not move the head."""

@@ -12,8 +12,8 @@ from typing import Literal
 
 from msgspec import Struct
 
-from schemas.body import BodyPose, JointAngle, JointLimit, Ray
-from schemas.units import Meters, Radians, Vector
+from engage_hri.schemas.body import BodyPose, JointAngle, JointLimit, Ray
+from engage_hri.schemas.units import Meters, Radians, Vector
 
 Side = Literal["left", "right"]
 Pose = Mapping[str, float]

@@ -18,8 +18,8 @@ import numpy as np
 from msgspec import Struct
 from numpy.typing import NDArray
 
-from schemas.body import JointLimit
-from schemas.units import Seconds
+from engage_hri.schemas.body import JointLimit
+from engage_hri.schemas.units import Seconds
 
 Array = NDArray[np.float64]
 

@@ -4,15 +4,15 @@ from math import inf
 
 from msgspec.structs import replace
 
-from schemas.behaviors import BlockBehavior
-from schemas.units import Seconds
-from services.control import variability
-from services.control.body import Authority
-from services.control.config import Stall, Variability
-from services.control.course import Course, Point
-from services.control.motion import Leg, Motion, Path
-from services.control.sizing import hurried
-from services.control.waiting import Bell
+from engage_hri.schemas.behaviors import BlockBehavior
+from engage_hri.schemas.units import Seconds
+from engage_hri.services.control import variability
+from engage_hri.services.control.body import Authority
+from engage_hri.services.control.config import Stall, Variability
+from engage_hri.services.control.course import Course, Point
+from engage_hri.services.control.motion import Leg, Motion, Path
+from engage_hri.services.control.sizing import hurried
+from engage_hri.services.control.waiting import Bell
 
 STALL, OVERHEAT = "(stall)", "(overheat)"
 """Points of a path that only the simulation knows."""

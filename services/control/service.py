@@ -5,9 +5,9 @@ from contextlib import aclosing
 from math import inf
 from typing import Literal
 
-from schemas import keys
-from schemas.behaviors import BlockBehavior, Gaze, GazeShift, HeadDirectionShift, Speech
-from schemas.body import (
+from engage_hri.schemas import keys
+from engage_hri.schemas.behaviors import BlockBehavior, Gaze, GazeShift, HeadDirectionShift, Speech
+from engage_hri.schemas.body import (
     AbortBehavior,
     BehaviorAborted,
     BehaviorOutcome,
@@ -24,21 +24,31 @@ from schemas.body import (
     SyncPointReached,
     WordSpoken,
 )
-from schemas.check import check_behavior
-from schemas.faults import Fault, InputRefused
-from schemas.messages import Message
-from schemas.requests import Cancel, Request
-from schemas.units import Seconds
-from schemas.world import World
-from services.bus import Bus, Received, is_asked_to_stop
-from services.control import variability
-from services.control.actions import ActionMessage, Deeds
-from services.control.body import Arrived, Authority, BehaviorRefused, Body, BodyFailed, How, Progress, Reached, Spoke
-from services.control.config import ControlConfig
-from services.control.simulated import SimulatedBody
-from services.covered import CoveredObjects
-from services.requests import RequestDesk
-from services.runtime import Ready
+from engage_hri.schemas.check import check_behavior
+from engage_hri.schemas.faults import Fault, InputRefused
+from engage_hri.schemas.messages import Message
+from engage_hri.schemas.requests import Cancel, Request
+from engage_hri.schemas.units import Seconds
+from engage_hri.schemas.world import World
+from engage_hri.services.bus import Bus, Received, is_asked_to_stop
+from engage_hri.services.control import variability
+from engage_hri.services.control.actions import ActionMessage, Deeds
+from engage_hri.services.control.body import (
+    Arrived,
+    Authority,
+    BehaviorRefused,
+    Body,
+    BodyFailed,
+    How,
+    Progress,
+    Reached,
+    Spoke,
+)
+from engage_hri.services.control.config import ControlConfig
+from engage_hri.services.control.simulated import SimulatedBody
+from engage_hri.services.covered import CoveredObjects
+from engage_hri.services.requests import RequestDesk
+from engage_hri.services.runtime import Ready
 
 IDLE: Seconds = 1.0
 """Between two `RobotState` while nothing moves."""

@@ -9,14 +9,14 @@ from collections.abc import AsyncGenerator
 from contextlib import aclosing
 from math import inf, radians
 
-from schemas.behaviors import BlockBehavior, Gaze, GazeShift, HeadDirectionShift, Speech, Wait
-from schemas.body import BodyPose, Capabilities, Estimate, NoPointZone
-from schemas.faults import Fault
-from schemas.references import type_name
-from schemas.units import Seconds
-from schemas.world import World
-from services.control import choreography, head, kinematics, speaking, tracks, variability
-from services.control.body import (
+from engage_hri.schemas.behaviors import BlockBehavior, Gaze, GazeShift, HeadDirectionShift, Speech, Wait
+from engage_hri.schemas.body import BodyPose, Capabilities, Estimate, NoPointZone
+from engage_hri.schemas.faults import Fault
+from engage_hri.schemas.references import type_name
+from engage_hri.schemas.units import Seconds
+from engage_hri.schemas.world import World
+from engage_hri.services.control import choreography, head, kinematics, speaking, tracks, variability
+from engage_hri.services.control.body import (
     Arrived,
     Authority,
     BehaviorRefused,
@@ -26,16 +26,16 @@ from services.control.body import (
     Progress,
     Reached,
 )
-from services.control.config import Variability
-from services.control.course import Course, Impossible, Point, Scene
-from services.control.estimates import infeasible, moved, spoken, waited
-from services.control.head import Attention
-from services.control.motion import Motion, Path, resting
-from services.control.runs import OVERHEAT, STALL, Run
-from services.control.tracks import Track
-from services.control.vocabulary import TYPES
-from services.control.voice import utter
-from services.control.waiting import Bell
+from engage_hri.services.control.config import Variability
+from engage_hri.services.control.course import Course, Impossible, Point, Scene
+from engage_hri.services.control.estimates import infeasible, moved, spoken, waited
+from engage_hri.services.control.head import Attention
+from engage_hri.services.control.motion import Motion, Path, resting
+from engage_hri.services.control.runs import OVERHEAT, STALL, Run
+from engage_hri.services.control.tracks import Track
+from engage_hri.services.control.vocabulary import TYPES
+from engage_hri.services.control.voice import utter
+from engage_hri.services.control.waiting import Bell
 
 FREEZE: Seconds = 0.5
 """How long a part stands still when it is told to freeze, before it relaxes."""

@@ -6,10 +6,10 @@ from math import inf
 
 from msgspec import Struct
 
-from schemas.units import Seconds
-from services.control import tracks
-from services.control.course import Course
-from services.control.motion import Leg, Motion, Path
+from engage_hri.schemas.units import Seconds
+from engage_hri.services.control import tracks
+from engage_hri.services.control.course import Course
+from engage_hri.services.control.motion import Leg, Motion, Path
 
 SIZES = (0.9, 0.8, 0.7, 0.6, 0.5, 0.4)
 """Of its full amplitude, largest first. Smaller than the last, nobody would take it for a gesture."""

@@ -3,11 +3,11 @@
 from collections.abc import AsyncGenerator
 from math import inf
 
-from schemas.behaviors import Speech, Wait
-from schemas.units import Seconds
-from services.control.body import Arrived, Authority, Progress, Reached, Spoke
-from services.control.voice import Utterance, utter
-from services.control.waiting import Bell
+from engage_hri.schemas.behaviors import Speech, Wait
+from engage_hri.schemas.units import Seconds
+from engage_hri.services.control.body import Arrived, Authority, Progress, Reached, Spoke
+from engage_hri.services.control.voice import Utterance, utter
+from engage_hri.services.control.waiting import Bell
 
 
 async def speak(behavior: Speech, authority: Authority, pace: float = 1.0) -> AsyncGenerator[Progress, None]:

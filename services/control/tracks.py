@@ -8,10 +8,10 @@ from collections.abc import Mapping, Sequence
 import msgspec
 import numpy as np
 
-from schemas.body import BodyPose, JointLimit
-from schemas.units import Seconds
-from services.control import choreography, kinematics
-from services.control.motion import Leg, Motion, Path, State, resting
+from engage_hri.schemas.body import BodyPose, JointLimit
+from engage_hri.schemas.units import Seconds
+from engage_hri.services.control import choreography, kinematics
+from engage_hri.services.control.motion import Leg, Motion, Path, State, resting
 
 NECK = ("neck_yaw", "neck_pitch")
 GAZE_SHARE = 0.7

@@ -3,9 +3,9 @@
 import math
 from hashlib import blake2b
 
-from schemas.behaviors import BlockBehavior
-from schemas.units import Seconds
-from services.control.config import Stall, Variability
+from engage_hri.schemas.behaviors import BlockBehavior
+from engage_hri.schemas.units import Seconds
+from engage_hri.services.control.config import Stall, Variability
 
 
 def chance(seed: int, *what: str) -> float:

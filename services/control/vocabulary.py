@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 
-from schemas.behaviors import (
+from engage_hri.schemas.behaviors import (
     BlockBehavior,
     Face,
     FaceFacs,

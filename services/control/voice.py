@@ -2,8 +2,8 @@
 
 from msgspec import Struct
 
-from schemas.speakable import Script, Token, tokens
-from schemas.units import Seconds
+from engage_hri.schemas.speakable import Script, Token, tokens
+from engage_hri.schemas.units import Seconds
 
 BEFORE_WORD: Seconds = 0.12
 PER_LETTER: Seconds = 0.05

@@ -3,7 +3,7 @@
 import asyncio
 from math import inf
 
-from schemas.units import Seconds
+from engage_hri.schemas.units import Seconds
 
 EARLY: Seconds = 1e-9
 """A loop runs its timers by up to this too early; who then found an instant still to come would wait for ever."""

@@ -1,7 +1,7 @@
-"""`python -m services.generation` is `engage run generation`."""
+"""`python -m engage_hri.services.generation` is `engage run generation`."""
 
 import sys
 
-from services.__main__ import main
+from engage_hri.services.__main__ import main
 
 main(["run", "generation", *sys.argv[1:]])

@@ -9,18 +9,18 @@ So it does when an inhibition that holds the head has a fragment's gaze aborted:
 
 from msgspec import Struct
 
-from schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost
-from schemas.attention import Claim
-from schemas.behaviors import Event, GazeShift, Timing
-from schemas.blocks import Block
-from schemas.body import RobotState
-from schemas.recognition import ConnectionEvent, Statistics
-from schemas.units import Degrees, Radians, Seconds
-from schemas.world import World
-from services.generation.config import GenerationConfig
-from services.generation.leases import Inhibition
-from services.generation.response_policy import ResponsePolicy
-from services.generation.watches import FaceWatch, GlanceWatch, HandWatch
+from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost
+from engage_hri.schemas.attention import Claim
+from engage_hri.schemas.behaviors import Event, GazeShift, Timing
+from engage_hri.schemas.blocks import Block
+from engage_hri.schemas.body import RobotState
+from engage_hri.schemas.recognition import ConnectionEvent, Statistics
+from engage_hri.schemas.units import Degrees, Radians, Seconds
+from engage_hri.schemas.world import World
+from engage_hri.services.generation.config import GenerationConfig
+from engage_hri.services.generation.leases import Inhibition
+from engage_hri.services.generation.response_policy import ResponsePolicy
+from engage_hri.services.generation.watches import FaceWatch, GlanceWatch, HandWatch
 
 NOBODY = Claim(kind="none", priority=0, reason="nobody has been seen")
 UP_RIGHT: Degrees = 60.0

@@ -2,14 +2,14 @@
 
 from collections.abc import Sequence
 
-from schemas import keys
-from schemas.behaviors import BlockBehavior, Hand
-from schemas.body import Capabilities, DescribeBody, Estimate, EstimateBehaviors, EstimateItem, Estimates
-from schemas.faults import Fault, NoReply, RunFailed
-from schemas.messages import Message
-from schemas.units import Seconds
-from services.bus import Bus
-from services.generation.motions import (
+from engage_hri.schemas import keys
+from engage_hri.schemas.behaviors import BlockBehavior, Hand
+from engage_hri.schemas.body import Capabilities, DescribeBody, Estimate, EstimateBehaviors, EstimateItem, Estimates
+from engage_hri.schemas.faults import Fault, NoReply, RunFailed
+from engage_hri.schemas.messages import Message
+from engage_hri.schemas.units import Seconds
+from engage_hri.services.bus import Bus
+from engage_hri.services.generation.motions import (
     Motions,
     collect,
     distinct,

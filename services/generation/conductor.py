@@ -5,31 +5,31 @@ from collections.abc import Callable, Collection, Iterable
 from functools import reduce
 from typing import Literal
 
-from schemas import keys
-from schemas.actions import ActionBegan, ActionEnded
-from schemas.behaviors import GazeShift, TurnSignal
-from schemas.blocks import BlockOutcome, PerformBlock
-from schemas.body import AbortBehavior
-from schemas.faults import EngageError, Fault, InputRefused, RunFailed
-from schemas.feedback import SyncPointProgress, WarningFeedback
-from schemas.fragments import PerformFragment
-from schemas.recognition import ConnectionEvent, SignalTurn
-from schemas.units import Seconds
-from schemas.world import World
-from services.bus import Bus, is_asked_to_stop
-from services.generation.arbiter import Arbiter
-from services.generation.body_link import BodyLink
-from services.generation.config import GenerationConfig
-from services.generation.discourse import SILENCE, Discourse
-from services.generation.fragment_check import checked
-from services.generation.leases import Leases
-from services.generation.performance import GazesOfFragments, Performance
-from services.generation.planning import glance, plan, targets
-from services.generation.trail import NOTHING, Trail
-from services.generation.turn_events import TurnEvents, TurnOutcomes
-from services.generation.turn_policy import Aborted, TurnPlan, TurnPolicy
-from services.requests import Pending, RequestDesk, Requester, RequestRefused
-from services.serving import GRACE
+from engage_hri.schemas import keys
+from engage_hri.schemas.actions import ActionBegan, ActionEnded
+from engage_hri.schemas.behaviors import GazeShift, TurnSignal
+from engage_hri.schemas.blocks import BlockOutcome, PerformBlock
+from engage_hri.schemas.body import AbortBehavior
+from engage_hri.schemas.faults import EngageError, Fault, InputRefused, RunFailed
+from engage_hri.schemas.feedback import SyncPointProgress, WarningFeedback
+from engage_hri.schemas.fragments import PerformFragment
+from engage_hri.schemas.recognition import ConnectionEvent, SignalTurn
+from engage_hri.schemas.units import Seconds
+from engage_hri.schemas.world import World
+from engage_hri.services.bus import Bus, is_asked_to_stop
+from engage_hri.services.generation.arbiter import Arbiter
+from engage_hri.services.generation.body_link import BodyLink
+from engage_hri.services.generation.config import GenerationConfig
+from engage_hri.services.generation.discourse import SILENCE, Discourse
+from engage_hri.services.generation.fragment_check import checked
+from engage_hri.services.generation.leases import Leases
+from engage_hri.services.generation.performance import GazesOfFragments, Performance
+from engage_hri.services.generation.planning import glance, plan, targets
+from engage_hri.services.generation.trail import NOTHING, Trail
+from engage_hri.services.generation.turn_events import TurnEvents, TurnOutcomes
+from engage_hri.services.generation.turn_policy import Aborted, TurnPlan, TurnPolicy
+from engage_hri.services.requests import Pending, RequestDesk, Requester, RequestRefused
+from engage_hri.services.serving import GRACE
 
 
 class Conductor:

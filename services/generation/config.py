@@ -5,7 +5,7 @@ from typing import Literal
 
 from msgspec import Struct
 
-from schemas.units import Degrees, Meters, Probability, Radians, Seconds
+from engage_hri.schemas.units import Degrees, Meters, Probability, Radians, Seconds
 
 Channel = Literal["sum", "independent"]
 Profile = Literal["check-back", "figure-3.3"]

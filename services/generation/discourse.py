@@ -5,7 +5,7 @@ from collections.abc import Collection
 from msgspec import Struct
 from msgspec.structs import replace
 
-from schemas.recognition import ConnectionEvent
+from engage_hri.schemas.recognition import ConnectionEvent
 
 
 class Named(Struct, frozen=True):

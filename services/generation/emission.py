@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 import msgspec
 from msgspec import Struct
 
-from schemas.behaviors import (
+from engage_hri.schemas.behaviors import (
     After,
     BlockBehavior,
     Constraint,
@@ -25,18 +25,18 @@ from schemas.behaviors import (
     Timing,
     TurnSignal,
 )
-from schemas.blocks import Block
-from schemas.fragments import ReferenceChoice, TurnFragment
-from schemas.references import type_name
-from services.generation.config import GenerationConfig
-from services.generation.ordering import ordered
-from services.generation.parts import Mention, Names, Parts
-from services.generation.permits import Permits
-from services.generation.profiles import after, as_in_the_figure, checking_back, same
-from services.generation.punctuation import joined
-from services.generation.rewriting import Operator, Rewriting, instants, points_named
-from services.generation.trail import NOTHING, Stroke, Trail, first_met, stroke
-from services.generation.turn_policy import TurnPlan
+from engage_hri.schemas.blocks import Block
+from engage_hri.schemas.fragments import ReferenceChoice, TurnFragment
+from engage_hri.schemas.references import type_name
+from engage_hri.services.generation.config import GenerationConfig
+from engage_hri.services.generation.ordering import ordered
+from engage_hri.services.generation.parts import Mention, Names, Parts
+from engage_hri.services.generation.permits import Permits
+from engage_hri.services.generation.profiles import after, as_in_the_figure, checking_back, same
+from engage_hri.services.generation.punctuation import joined
+from engage_hri.services.generation.rewriting import Operator, Rewriting, instants, points_named
+from engage_hri.services.generation.trail import NOTHING, Stroke, Trail, first_met, stroke
+from engage_hri.services.generation.turn_policy import TurnPlan
 
 _LASTING = frozenset({"gaze", "face", "faceLexeme", "faceFacs", "posture", "event", "turn"})
 """Types whose behaviors last as long as the rest of the block, or end when recognition says so."""

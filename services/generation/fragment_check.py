@@ -6,13 +6,13 @@ from difflib import get_close_matches
 
 from msgspec.structs import replace
 
-from schemas.behaviors import Gaze, GazeShift, HeadDirectionShift, Pointing, Reference, Speech
-from schemas.check import sound
-from schemas.faults import Fault, InputRefused
-from schemas.fragments import TurnFragment
-from schemas.syncref import SyncRef
-from schemas.tool_call import in_call
-from schemas.world import Entity, World
+from engage_hri.schemas.behaviors import Gaze, GazeShift, HeadDirectionShift, Pointing, Reference, Speech
+from engage_hri.schemas.check import sound
+from engage_hri.schemas.faults import Fault, InputRefused
+from engage_hri.schemas.fragments import TurnFragment
+from engage_hri.schemas.syncref import SyncRef
+from engage_hri.schemas.tool_call import in_call
+from engage_hri.schemas.world import Entity, World
 
 
 def checked(fragment: TurnFragment, world: World, robot: str, longest: int = sys.maxsize) -> TurnFragment:

@@ -7,9 +7,9 @@ import numpy as np
 from msgspec import Struct
 from numpy.typing import NDArray
 
-from schemas.body import NoPointZone, Ray
-from schemas.units import Meters, Radians, Vector
-from schemas.world import Entity
+from engage_hri.schemas.body import NoPointZone, Ray
+from engage_hri.schemas.units import Meters, Radians, Vector
+from engage_hri.schemas.world import Entity
 
 TOLERANCE = 1e-9
 """On an angle or distance: an object exactly on the edge is inside, whatever the rounding."""

@@ -1,16 +1,16 @@
-"""Inhibition of gaze and of pointing: leases, which end when their request does (`schemas.requests`)."""
+"""Inhibition of gaze and of pointing: leases, which end when their request does (`schemas/requests.py`)."""
 
 from math import inf
 from typing import Literal
 
 from msgspec import Struct
 
-from schemas.attention import Claim, Inhibit
-from schemas.behaviors import Hand
-from schemas.faults import Fault, InputRefused
-from schemas.units import Seconds
-from services.generation.config import GenerationConfig
-from services.generation.permits import HANDS, Permits
+from engage_hri.schemas.attention import Claim, Inhibit
+from engage_hri.schemas.behaviors import Hand
+from engage_hri.schemas.faults import Fault, InputRefused
+from engage_hri.schemas.units import Seconds
+from engage_hri.services.generation.config import GenerationConfig
+from engage_hri.services.generation.permits import HANDS, Permits
 
 _HAND_OF: dict[str, Hand] = {"point-left": "LEFT_HAND", "point-right": "RIGHT_HAND"}
 

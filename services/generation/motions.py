@@ -4,8 +4,8 @@ from collections.abc import Iterator, Sequence
 
 from msgspec import Struct
 
-from schemas.behaviors import BlockBehavior, Gaze, Hand, Pointing
-from schemas.body import BodyPose, Estimate, EstimateItem
+from engage_hri.schemas.behaviors import BlockBehavior, Gaze, Hand, Pointing
+from engage_hri.schemas.body import BodyPose, Estimate, EstimateItem
 
 HERE = ""
 """Where the body is now, as the place a motion starts from."""

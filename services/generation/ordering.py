@@ -11,9 +11,9 @@ from itertools import pairwise
 
 from msgspec import Struct
 
-from schemas.behaviors import After, Before, Constraint, FragmentBehavior, Gaze, Reference, Speech
-from schemas.syncref import SYNC_POINTS, SyncRef, canonical_sync
-from schemas.units import Seconds
+from engage_hri.schemas.behaviors import After, Before, Constraint, FragmentBehavior, Gaze, Reference, Speech
+from engage_hri.schemas.syncref import SYNC_POINTS, SyncRef, canonical_sync
+from engage_hri.schemas.units import Seconds
 
 Sync = tuple[str, str, str]
 """Block ("" for this one), behavior ("" for the block itself), sync point."""

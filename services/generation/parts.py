@@ -2,10 +2,10 @@
 
 from msgspec import Struct
 
-from schemas.behaviors import BlockBehavior, Event, Gaze, Hand, Pointing, Reference, Speech, Timing
-from schemas.fragments import ReferenceChoice, TurnFragment
-from services.generation.rewriting import Point, Replacement
-from services.generation.turn_policy import TurnPlan
+from engage_hri.schemas.behaviors import BlockBehavior, Event, Gaze, Hand, Pointing, Reference, Speech, Timing
+from engage_hri.schemas.fragments import ReferenceChoice, TurnFragment
+from engage_hri.services.generation.rewriting import Point, Replacement
+from engage_hri.services.generation.turn_policy import TurnPlan
 
 
 class Mention(Struct, frozen=True):

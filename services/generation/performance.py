@@ -5,7 +5,7 @@ from itertools import zip_longest
 
 from msgspec import Struct
 
-from schemas.behaviors import (
+from engage_hri.schemas.behaviors import (
     Behavior,
     BlockBehavior,
     Event,
@@ -16,18 +16,18 @@ from schemas.behaviors import (
     Speech,
     TurnSignal,
 )
-from schemas.blocks import BlockOutcome, SpokenText
-from schemas.faults import EngageError, Fault
-from schemas.feedback import SyncPointProgress
-from schemas.fragments import FragmentOutcome, PerformFragment, ReferenceChoice, TurnFragment
-from schemas.speakable import has_words
-from schemas.units import Seconds
-from services.generation.permits import Permits
-from services.generation.planning import Plan
-from services.generation.reference_policy import Unreferable
-from services.generation.trail import NOTHING, Trail
-from services.generation.turn_events import TurnEvents
-from services.generation.turn_policy import TurnPlan
+from engage_hri.schemas.blocks import BlockOutcome, SpokenText
+from engage_hri.schemas.faults import EngageError, Fault
+from engage_hri.schemas.feedback import SyncPointProgress
+from engage_hri.schemas.fragments import FragmentOutcome, PerformFragment, ReferenceChoice, TurnFragment
+from engage_hri.schemas.speakable import has_words
+from engage_hri.schemas.units import Seconds
+from engage_hri.services.generation.permits import Permits
+from engage_hri.services.generation.planning import Plan
+from engage_hri.services.generation.reference_policy import Unreferable
+from engage_hri.services.generation.trail import NOTHING, Trail
+from engage_hri.services.generation.turn_events import TurnEvents
+from engage_hri.services.generation.turn_policy import TurnPlan
 
 AWAITED = ("directed_gaze", "mutual_facial_gaze")
 """Events that must be decided before the outcome. An adjacency pair may take as long as its answer."""

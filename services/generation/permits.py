@@ -3,7 +3,7 @@
 from msgspec import Struct
 from msgspec.structs import replace
 
-from schemas.behaviors import (
+from engage_hri.schemas.behaviors import (
     Behavior,
     Emit,
     Event,

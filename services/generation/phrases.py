@@ -15,12 +15,12 @@ from typing import get_args
 from msgspec import Struct
 from msgspec.structs import replace
 
-from schemas.behaviors import Reference, SpeechOption
-from schemas.speakable import word_count
-from schemas.world import Entity, World
-from services.generation.config import GenerationConfig, PhraseAttribute
-from services.generation.discourse import SILENCE, Discourse
-from services.generation.geometry import extent
+from engage_hri.schemas.behaviors import Reference, SpeechOption
+from engage_hri.schemas.speakable import word_count
+from engage_hri.schemas.world import Entity, World
+from engage_hri.services.generation.config import GenerationConfig, PhraseAttribute
+from engage_hri.services.generation.discourse import SILENCE, Discourse
+from engage_hri.services.generation.geometry import extent
 
 SPOKEN: tuple[PhraseAttribute, ...] = get_args(PhraseAttribute)
 """The order in which English says modifiers, whatever the order of preference."""

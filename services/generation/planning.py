@@ -4,22 +4,22 @@ from collections.abc import Sequence
 
 from msgspec import Struct
 
-from schemas.behaviors import Reference
-from schemas.blocks import Block
-from schemas.body import Capabilities
-from schemas.fragments import ReferenceChoice, TurnFragment
-from schemas.world import World
-from services.generation.config import GenerationConfig
-from services.generation.discourse import SILENCE, Discourse
-from services.generation.emission import emit
-from services.generation.motions import Motions
-from services.generation.ordering import ordered
-from services.generation.parts import Mention
-from services.generation.permits import Permits
-from services.generation.phrases import proposed
-from services.generation.reference_policy import Choices, Scene, choose
-from services.generation.trail import NOTHING, Trail
-from services.generation.turn_policy import TurnPlan, vain_delay
+from engage_hri.schemas.behaviors import Reference
+from engage_hri.schemas.blocks import Block
+from engage_hri.schemas.body import Capabilities
+from engage_hri.schemas.fragments import ReferenceChoice, TurnFragment
+from engage_hri.schemas.world import World
+from engage_hri.services.generation.config import GenerationConfig
+from engage_hri.services.generation.discourse import SILENCE, Discourse
+from engage_hri.services.generation.emission import emit
+from engage_hri.services.generation.motions import Motions
+from engage_hri.services.generation.ordering import ordered
+from engage_hri.services.generation.parts import Mention
+from engage_hri.services.generation.permits import Permits
+from engage_hri.services.generation.phrases import proposed
+from engage_hri.services.generation.reference_policy import Choices, Scene, choose
+from engage_hri.services.generation.trail import NOTHING, Trail
+from engage_hri.services.generation.turn_policy import TurnPlan, vain_delay
 
 
 class Plan(Struct, frozen=True, kw_only=True):

@@ -1,9 +1,9 @@
 """How a chosen gesture and phrase are timed: as in Appendix B (`check-back`), or as in Fig. 3.3 (`figure-3.3`)."""
 
-from schemas.behaviors import After, Synchronize
-from schemas.units import Seconds
-from services.generation.parts import Parts
-from services.generation.rewriting import Operator
+from engage_hri.schemas.behaviors import After, Synchronize
+from engage_hri.schemas.units import Seconds
+from engage_hri.services.generation.parts import Parts
+from engage_hri.services.generation.rewriting import Operator
 
 
 def checking_back(

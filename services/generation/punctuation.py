@@ -6,7 +6,7 @@ from collections.abc import Collection, Sequence
 from msgspec import Struct
 from msgspec.structs import replace
 
-from schemas.behaviors import FragmentBehavior, Mark, Reference, Speech
+from engage_hri.schemas.behaviors import FragmentBehavior, Mark, Reference, Speech
 
 _ALPHABETIC = r"""(?:['’](?:s|d|m|ll|re|ve)\b)?[.,;:!?…)\]"'”’»]*(?=\s|$)"""
 _IDEOGRAPHIC = "[、。，．；：！？…）］」』】》〉]+"

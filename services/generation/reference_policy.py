@@ -12,16 +12,16 @@ from typing import get_args
 from msgspec import Struct
 from msgspec.structs import replace
 
-from schemas.behaviors import Hand, Reference, SpeechOption
-from schemas.body import Estimate, NoPointZone
-from schemas.faults import Fault, RunFailed
-from schemas.fragments import GestureChoice, PairConsidered, ReferenceChoice
-from schemas.units import Meters, Probability, Radians, Seconds
-from schemas.world import World
-from services.generation.config import GenerationConfig
-from services.generation.geometry import Layout, in_gaze_cone, in_pointing_cylinder, in_zone, laid_out
-from services.generation.motions import HERE, Motions, arm_of, hand_of
-from services.generation.reliability import channel_reliability, reliability
+from engage_hri.schemas.behaviors import Hand, Reference, SpeechOption
+from engage_hri.schemas.body import Estimate, NoPointZone
+from engage_hri.schemas.faults import Fault, RunFailed
+from engage_hri.schemas.fragments import GestureChoice, PairConsidered, ReferenceChoice
+from engage_hri.schemas.units import Meters, Probability, Radians, Seconds
+from engage_hri.schemas.world import World
+from engage_hri.services.generation.config import GenerationConfig
+from engage_hri.services.generation.geometry import Layout, in_gaze_cone, in_pointing_cylinder, in_zone, laid_out
+from engage_hri.services.generation.motions import HERE, Motions, arm_of, hand_of
+from engage_hri.services.generation.reliability import channel_reliability, reliability
 
 GESTURES: tuple[GestureChoice, ...] = get_args(GestureChoice)
 """J, from fewer gestures to more."""

@@ -1,8 +1,8 @@
 """How likely a reference is understood: R(j, s) = 1 / (|D| + 1 / r), and the channel r of a gesture with a phrase."""
 
-from schemas.fragments import GestureChoice
-from schemas.units import Probability
-from services.generation.config import GenerationConfig
+from engage_hri.schemas.fragments import GestureChoice
+from engage_hri.schemas.units import Probability
+from engage_hri.services.generation.config import GenerationConfig
 
 
 def reliability(distractors: int, channel: Probability) -> Probability:

@@ -5,13 +5,13 @@ from collections.abc import Sequence
 import numpy as np
 from msgspec import Struct
 
-from schemas.attention import Claim
-from schemas.body import Ray
-from schemas.recognition import ConnectionEvent
-from schemas.units import Radians, Seconds
-from schemas.world import Entity, World
-from services.generation.config import GenerationConfig
-from services.generation.geometry import TOLERANCE, angle_off_axis
+from engage_hri.schemas.attention import Claim
+from engage_hri.schemas.body import Ray
+from engage_hri.schemas.recognition import ConnectionEvent
+from engage_hri.schemas.units import Radians, Seconds
+from engage_hri.schemas.world import Entity, World
+from engage_hri.services.generation.config import GenerationConfig
+from engage_hri.services.generation.geometry import TOLERANCE, angle_off_axis
 
 ANSWERED = ("directed_gaze", "mutual_facial_gaze")
 """Adjacency pairs and backchannels belong to the collaboration manager."""

@@ -7,8 +7,8 @@ from functools import cached_property
 from msgspec import Struct
 from msgspec.structs import replace
 
-from schemas.behaviors import After, Before, Behavior, Constraint, Synchronize, Timing
-from schemas.syncref import BLOCK_ITSELF, SyncRef
+from engage_hri.schemas.behaviors import After, Before, Behavior, Constraint, Synchronize, Timing
+from engage_hri.schemas.syncref import BLOCK_ITSELF, SyncRef
 
 Operator = Synchronize | Before | After
 Point = tuple[str, str]

@@ -2,29 +2,29 @@
 
 import asyncio
 
-from schemas import keys
-from schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost
-from schemas.attention import HeadOwner, Inhibit, InhibitionEnded
-from schemas.blocks import BlockOutcome, PerformBlock
-from schemas.body import RobotState
-from schemas.faults import EngageError, Fault, InputRefused
-from schemas.feedback import SyncPointProgress, WarningFeedback, WarningKind
-from schemas.fragments import PerformFragment
-from schemas.presence import PeerAlive, PeerGone
-from schemas.recognition import ConnectionEvent, Statistics, session_of
-from schemas.requests import Cancel, Request, Unreadable
-from schemas.units import Seconds
-from schemas.world import World
-from services.bus import Bus, Received
-from services.covered import CoveredObjects
-from services.generation.arbiter import Arbiter, Shift
-from services.generation.conductor import Conductor
-from services.generation.config import GenerationConfig
-from services.generation.fragment_check import lacks_people
-from services.generation.leases import Leases
-from services.requests import RequestDesk, Requester
-from services.runtime import Ready
-from services.serving import GONE, LAPSED
+from engage_hri.schemas import keys
+from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost
+from engage_hri.schemas.attention import HeadOwner, Inhibit, InhibitionEnded
+from engage_hri.schemas.blocks import BlockOutcome, PerformBlock
+from engage_hri.schemas.body import RobotState
+from engage_hri.schemas.faults import EngageError, Fault, InputRefused
+from engage_hri.schemas.feedback import SyncPointProgress, WarningFeedback, WarningKind
+from engage_hri.schemas.fragments import PerformFragment
+from engage_hri.schemas.presence import PeerAlive, PeerGone
+from engage_hri.schemas.recognition import ConnectionEvent, Statistics, session_of
+from engage_hri.schemas.requests import Cancel, Request, Unreadable
+from engage_hri.schemas.units import Seconds
+from engage_hri.schemas.world import World
+from engage_hri.services.bus import Bus, Received
+from engage_hri.services.covered import CoveredObjects
+from engage_hri.services.generation.arbiter import Arbiter, Shift
+from engage_hri.services.generation.conductor import Conductor
+from engage_hri.services.generation.config import GenerationConfig
+from engage_hri.services.generation.fragment_check import lacks_people
+from engage_hri.services.generation.leases import Leases
+from engage_hri.services.requests import RequestDesk, Requester
+from engage_hri.services.runtime import Ready
+from engage_hri.services.serving import GONE, LAPSED
 
 NAME = "generation"
 PATTERNS = (

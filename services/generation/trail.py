@@ -9,9 +9,9 @@ from typing import Literal
 
 from msgspec import Struct
 
-from schemas.behaviors import Behavior, Gesture, Hand, Head, Pointing
-from schemas.references import type_name
-from schemas.syncref import SYNC_POINTS, canonical_sync
+from engage_hri.schemas.behaviors import Behavior, Gesture, Hand, Head, Pointing
+from engage_hri.schemas.references import type_name
+from engage_hri.schemas.syncref import SYNC_POINTS, canonical_sync
 
 Limb = Hand | Literal["head"] | None
 """What a stroke is made with; None: whichever arm the body chooses."""

@@ -6,11 +6,11 @@ from typing import Literal
 from msgspec import Struct
 from msgspec.structs import replace
 
-from schemas.blocks import SpokenText
-from schemas.fragments import FragmentOutcome, TurnClosed
-from schemas.recognition import ConnectionEvent
-from schemas.units import Seconds
-from services.generation.turn_policy import Aborted, TurnPlan
+from engage_hri.schemas.blocks import SpokenText
+from engage_hri.schemas.fragments import FragmentOutcome, TurnClosed
+from engage_hri.schemas.recognition import ConnectionEvent
+from engage_hri.schemas.units import Seconds
+from engage_hri.services.generation.turn_policy import Aborted, TurnPlan
 
 
 class TurnEvents:

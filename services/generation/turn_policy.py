@@ -8,12 +8,12 @@ from typing import Literal
 
 from msgspec import Struct
 
-from schemas.actions import ActionBegan, ActionEnded
-from schemas.behaviors import Action
-from schemas.faults import Fault, InputRefused
-from schemas.fragments import TurnFragment, TurnStatus
-from schemas.units import Seconds
-from services.generation.config import GenerationConfig
+from engage_hri.schemas.actions import ActionBegan, ActionEnded
+from engage_hri.schemas.behaviors import Action
+from engage_hri.schemas.faults import Fault, InputRefused
+from engage_hri.schemas.fragments import TurnFragment, TurnStatus
+from engage_hri.schemas.units import Seconds
+from engage_hri.services.generation.config import GenerationConfig
 
 
 class StatusRule(Struct, frozen=True):

@@ -4,12 +4,12 @@ import math
 
 from msgspec import Struct
 
-from schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost
-from schemas.attention import Claim
-from schemas.recognition import ConnectionEvent, Statistics
-from schemas.units import Seconds
-from schemas.world import Entity, World
-from services.generation.config import GenerationConfig
+from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost
+from engage_hri.schemas.attention import Claim
+from engage_hri.schemas.recognition import ConnectionEvent, Statistics
+from engage_hri.schemas.units import Seconds
+from engage_hri.schemas.world import Entity, World
+from engage_hri.services.generation.config import GenerationConfig
 
 
 class _Hand(Struct):

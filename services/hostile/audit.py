@@ -8,10 +8,10 @@ from collections import Counter
 
 from msgspec import Struct, field
 
-from schemas import keys
-from schemas.messages import Message, encode
-from schemas.requests import Answer, Cancel, KeepAlive, Outcome, Refused, Request, kind_meant
-from schemas.units import Seconds
+from engage_hri.schemas import keys
+from engage_hri.schemas.messages import Message, encode
+from engage_hri.schemas.requests import Answer, Cancel, KeepAlive, Outcome, Refused, Request, kind_meant
+from engage_hri.schemas.units import Seconds
 
 PATIENCE: Seconds = 3.0
 """How long a requester may go on about what has ended: its last words may have been on their way."""

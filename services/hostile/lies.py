@@ -5,7 +5,7 @@ from typing import Literal
 
 from msgspec import Struct
 
-from schemas.behaviors import (
+from engage_hri.schemas.behaviors import (
     BlockBehavior,
     Face,
     FaceFacs,
@@ -17,11 +17,11 @@ from schemas.behaviors import (
     Posture,
     Speech,
 )
-from schemas.body import Estimate, Phase
-from schemas.faults import Fault
-from schemas.syncref import SYNC_POINTS
-from schemas.units import Seconds
-from services.hostile.chance import Chance, happens
+from engage_hri.schemas.body import Estimate, Phase
+from engage_hri.schemas.faults import Fault
+from engage_hri.schemas.syncref import SYNC_POINTS
+from engage_hri.schemas.units import Seconds
+from engage_hri.services.hostile.chance import Chance, happens
 
 Status = Literal["done", "aborted", "failed"]
 FAR = (1e9, -1e9, 1e308, -1e308, -1.0, 60.0)

@@ -5,22 +5,22 @@ from typing import NamedTuple
 
 import msgspec
 
-from schemas import keys
-from schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost
-from schemas.attention import HeadOwner, InhibitionEnded
-from schemas.blocks import BehaviorInterrupted, BlockOutcome
-from schemas.body import RobotState, SyncPointArrived, SyncPointReached, WordSpoken
-from schemas.feedback import BlockProgress, PredictionFeedback, SyncPointProgress, WarningFeedback
-from schemas.fragments import FragmentOutcome, TurnClosed
-from schemas.messages import COMMANDS, MAJOR, Message
-from schemas.perception import HeadPose, VoiceActivity
-from schemas.recognition import ConnectionEvent, EventOutcome, OpenEvents, Statistics, TurnOutcome
-from schemas.requests import Cancel, KeepAlive, Request
-from schemas.units import Seconds
-from schemas.world import World
-from services.hostile.chance import Chance, happens
-from services.hostile.markup import document
-from services.hostile.typed import SURROGATE, Typed, distorted
+from engage_hri.schemas import keys
+from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost
+from engage_hri.schemas.attention import HeadOwner, InhibitionEnded
+from engage_hri.schemas.blocks import BehaviorInterrupted, BlockOutcome
+from engage_hri.schemas.body import RobotState, SyncPointArrived, SyncPointReached, WordSpoken
+from engage_hri.schemas.feedback import BlockProgress, PredictionFeedback, SyncPointProgress, WarningFeedback
+from engage_hri.schemas.fragments import FragmentOutcome, TurnClosed
+from engage_hri.schemas.messages import COMMANDS, MAJOR, Message
+from engage_hri.schemas.perception import HeadPose, VoiceActivity
+from engage_hri.schemas.recognition import ConnectionEvent, EventOutcome, OpenEvents, Statistics, TurnOutcome
+from engage_hri.schemas.requests import Cancel, KeepAlive, Request
+from engage_hri.schemas.units import Seconds
+from engage_hri.schemas.world import World
+from engage_hri.services.hostile.chance import Chance, happens
+from engage_hri.services.hostile.markup import document
+from engage_hri.services.hostile.typed import SURROGATE, Typed, distorted
 
 SERVERS = tuple(dict.fromkeys(map(keys.server_of, COMMANDS)))
 BROKEN = 0.05

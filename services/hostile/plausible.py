@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from itertools import pairwise
 
-from schemas.behaviors import (
+from engage_hri.schemas.behaviors import (
     After,
     BlockBehavior,
     Constraint,
@@ -20,9 +20,9 @@ from schemas.behaviors import (
     Synchronize,
     Wait,
 )
-from schemas.blocks import Block
-from schemas.fragments import TurnFragment
-from services.hostile.chance import Chance, happens
+from engage_hri.schemas.blocks import Block
+from engage_hri.schemas.fragments import TurnFragment
+from engage_hri.services.hostile.chance import Chance, happens
 
 TEXT = "Please move the blue piece"
 

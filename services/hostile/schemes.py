@@ -7,19 +7,30 @@ from typing import Literal
 from msgspec import Struct
 from msgspec.structs import replace
 
-from schemas import keys
-from schemas.attention import Inhibit
-from schemas.blocks import BlockOutcome, InterruptBehavior, PerformBlock
-from schemas.body import AbortBehavior, BehaviorOutcome, GoHome, PerformBehavior
-from schemas.faults import Fault
-from schemas.fragments import FragmentOutcome, PerformFragment
-from schemas.messages import COMMANDS, Message
-from schemas.requests import Accepted, Answer, Cancel, Heard, KeepAlive, Kept, Outdated, Refused, Request, kind_of
-from schemas.units import Seconds, Stamp
-from services.hostile import plausible
-from services.hostile.chance import Chance, happens
-from services.hostile.payloads import SERVERS
-from services.hostile.typed import NASTY_FLOATS, NASTY_INTS, Typed, Words
+from engage_hri.schemas import keys
+from engage_hri.schemas.attention import Inhibit
+from engage_hri.schemas.blocks import BlockOutcome, InterruptBehavior, PerformBlock
+from engage_hri.schemas.body import AbortBehavior, BehaviorOutcome, GoHome, PerformBehavior
+from engage_hri.schemas.faults import Fault
+from engage_hri.schemas.fragments import FragmentOutcome, PerformFragment
+from engage_hri.schemas.messages import COMMANDS, Message
+from engage_hri.schemas.requests import (
+    Accepted,
+    Answer,
+    Cancel,
+    Heard,
+    KeepAlive,
+    Kept,
+    Outdated,
+    Refused,
+    Request,
+    kind_of,
+)
+from engage_hri.schemas.units import Seconds, Stamp
+from engage_hri.services.hostile import plausible
+from engage_hri.services.hostile.chance import Chance, happens
+from engage_hri.services.hostile.payloads import SERVERS
+from engage_hri.services.hostile.typed import NASTY_FLOATS, NASTY_INTS, Typed, Words
 
 IDS = ("1", "2", "3", "same", "1~2")
 """Which all peers use."""

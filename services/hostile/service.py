@@ -3,8 +3,8 @@
 import asyncio
 from random import Random
 
-from schemas import keys
-from schemas.body import (
+from engage_hri.schemas import keys
+from engage_hri.schemas.body import (
     AbortBehavior,
     BehaviorAborted,
     BehaviorOutcome,
@@ -18,14 +18,14 @@ from schemas.body import (
     SyncPointReached,
     WordSpoken,
 )
-from schemas.faults import Fault, InputRefused
-from schemas.messages import Message
-from schemas.requests import Cancel, Request
-from schemas.units import Seconds
-from services.bus import Bus
-from services.hostile.lies import Lie, Status, Step, estimate, lie, points_of
-from services.requests import RequestDesk
-from services.runtime import Ready
+from engage_hri.schemas.faults import Fault, InputRefused
+from engage_hri.schemas.messages import Message
+from engage_hri.schemas.requests import Cancel, Request
+from engage_hri.schemas.units import Seconds
+from engage_hri.services.bus import Bus
+from engage_hri.services.hostile.lies import Lie, Status, Step, estimate, lie, points_of
+from engage_hri.services.requests import RequestDesk
+from engage_hri.services.runtime import Ready
 
 NAME = "control"
 TERM: Seconds = 2.0

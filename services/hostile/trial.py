@@ -17,26 +17,26 @@ from typing import Any, Literal, get_args
 
 from msgspec import Struct
 
-from schemas import keys
-from schemas.faults import EngageError, Fault, InputRefused
-from schemas.messages import encode
-from schemas.requests import Cancel
-from schemas.status import AskStatus, Status
-from schemas.units import Seconds
-from schemas.world import World
-from services.bus import LOG, Hub, Received, read_payload
-from services.hostile.audit import Book, Entry
-from services.hostile.payloads import SERVERS, Payload, Payloads
-from services.hostile.schemes import Deed, Schemer
-from services.hostile.service import NAME as BODY
-from services.hostile.service import LyingBody
-from services.hostile.typed import Typed, Words
-from services.hostile.visitor import NAME as VISITOR
-from services.hostile.visitor import Visitor, guest
-from services.memory_bus import MemoryBus, MemoryHub
-from services.requests import Requester
-from services.runtime import Service, serve
-from services.virtual_time import Deadlock, TimeRanOut, VirtualTimeLoop
+from engage_hri.schemas import keys
+from engage_hri.schemas.faults import EngageError, Fault, InputRefused
+from engage_hri.schemas.messages import encode
+from engage_hri.schemas.requests import Cancel
+from engage_hri.schemas.status import AskStatus, Status
+from engage_hri.schemas.units import Seconds
+from engage_hri.schemas.world import World
+from engage_hri.services.bus import LOG, Hub, Received, read_payload
+from engage_hri.services.hostile.audit import Book, Entry
+from engage_hri.services.hostile.payloads import SERVERS, Payload, Payloads
+from engage_hri.services.hostile.schemes import Deed, Schemer
+from engage_hri.services.hostile.service import NAME as BODY
+from engage_hri.services.hostile.service import LyingBody
+from engage_hri.services.hostile.typed import Typed, Words
+from engage_hri.services.hostile.visitor import NAME as VISITOR
+from engage_hri.services.hostile.visitor import Visitor, guest
+from engage_hri.services.memory_bus import MemoryBus, MemoryHub
+from engage_hri.services.requests import Requester
+from engage_hri.services.runtime import Service, serve
+from engage_hri.services.virtual_time import Deadlock, TimeRanOut, VirtualTimeLoop
 
 Kind = Literal["messages", "requests", "body"]
 KINDS: tuple[Kind, ...] = get_args(Kind)

@@ -11,9 +11,9 @@ import msgspec
 import msgspec.inspect as shapes
 from msgspec import Struct
 
-from schemas.messages import Message
-from schemas.units import Seconds
-from services.hostile.chance import Chance, happens
+from engage_hri.schemas.messages import Message
+from engage_hri.schemas.units import Seconds
+from engage_hri.services.hostile.chance import Chance, happens
 
 SURROGATE = "\u2620"
 """Stands for half a surrogate pair, which no encoder takes: `payloads` replaces its bytes."""

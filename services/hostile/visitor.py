@@ -3,15 +3,15 @@
 import asyncio
 from random import Random
 
-from schemas import keys
-from schemas.blocks import InterruptBehavior, PerformBlock
-from schemas.faults import EngageError
-from schemas.fragments import PerformFragment
-from schemas.requests import Request
-from schemas.units import Seconds
-from services.bus import Bus
-from services.hostile import plausible
-from services.requests import Pending, Requester
+from engage_hri.schemas import keys
+from engage_hri.schemas.blocks import InterruptBehavior, PerformBlock
+from engage_hri.schemas.faults import EngageError
+from engage_hri.schemas.fragments import PerformFragment
+from engage_hri.schemas.requests import Request
+from engage_hri.schemas.units import Seconds
+from engage_hri.services.bus import Bus
+from engage_hri.services.hostile import plausible
+from engage_hri.services.requests import Pending, Requester
 
 NAME = "visitor"
 MOST = 5

@@ -1,7 +1,7 @@
-"""`python -m services.realizer` is `engage run realizer`."""
+"""`python -m engage_hri.services.realizer` is `engage run realizer`."""
 
 import sys
 
-from services.__main__ import main
+from engage_hri.services.__main__ import main
 
 main(["run", "realizer", *sys.argv[1:]])

@@ -8,17 +8,26 @@ from operator import or_
 from msgspec import Struct
 from msgspec.structs import replace
 
-from schemas.units import Seconds
-from services.realizer.chains import Chain
-from services.realizer.circles import components
-from services.realizer.classes import Classes, Instant, instants
-from services.realizer.handover import Arrangement
-from services.realizer.net import Bound, PetriNet, Place, PlaceKind, Transition
-from services.realizer.numbering import numbered
-from services.realizer.points import ORIGIN, WITH_STROKE, Gate, Point, gate, gate_point, one_instant, performer
-from services.realizer.relations import Order, Relations
-from services.realizer.schedule import EPSILON
-from services.realizer.steps import PORTION, Steps, portions
+from engage_hri.schemas.units import Seconds
+from engage_hri.services.realizer.chains import Chain
+from engage_hri.services.realizer.circles import components
+from engage_hri.services.realizer.classes import Classes, Instant, instants
+from engage_hri.services.realizer.handover import Arrangement
+from engage_hri.services.realizer.net import Bound, PetriNet, Place, PlaceKind, Transition
+from engage_hri.services.realizer.numbering import numbered
+from engage_hri.services.realizer.points import (
+    ORIGIN,
+    WITH_STROKE,
+    Gate,
+    Point,
+    gate,
+    gate_point,
+    one_instant,
+    performer,
+)
+from engage_hri.services.realizer.relations import Order, Relations
+from engage_hri.services.realizer.schedule import EPSILON
+from engage_hri.services.realizer.steps import PORTION, Steps, portions
 
 
 class Member(Struct, frozen=True, gc=False):

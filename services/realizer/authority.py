@@ -12,16 +12,16 @@ import heapq
 from collections.abc import Iterable
 from math import inf, isfinite
 
-from schemas.units import Seconds
-from services.realizer.assembly import Member
-from services.realizer.config import RealizerConfig
-from services.realizer.effects import Begin, Effect, Extend
-from services.realizer.outlook import SURPRISE, Outlook
-from services.realizer.pacing import differs, pace
-from services.realizer.patience import Patience
-from services.realizer.planner import Plan
-from services.realizer.points import Point, performer
-from services.realizer.schedule import EPSILON
+from engage_hri.schemas.units import Seconds
+from engage_hri.services.realizer.assembly import Member
+from engage_hri.services.realizer.config import RealizerConfig
+from engage_hri.services.realizer.effects import Begin, Effect, Extend
+from engage_hri.services.realizer.outlook import SURPRISE, Outlook
+from engage_hri.services.realizer.pacing import differs, pace
+from engage_hri.services.realizer.patience import Patience
+from engage_hri.services.realizer.planner import Plan
+from engage_hri.services.realizer.points import Point, performer
+from engage_hri.services.realizer.schedule import EPSILON
 
 
 class Authority(Outlook):

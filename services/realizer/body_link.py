@@ -2,13 +2,13 @@
 
 from collections.abc import Iterable
 
-from schemas import keys
-from schemas.behaviors import BlockBehavior
-from schemas.body import GoHome, PerformBehavior, PlannedInstant
-from schemas.units import Seconds
-from services.bus import Bus
-from services.realizer.effects import Begin, Extend
-from services.requests import Pending, Requester
+from engage_hri.schemas import keys
+from engage_hri.schemas.behaviors import BlockBehavior
+from engage_hri.schemas.body import GoHome, PerformBehavior, PlannedInstant
+from engage_hri.schemas.units import Seconds
+from engage_hri.services.bus import Bus
+from engage_hri.services.realizer.effects import Begin, Extend
+from engage_hri.services.requests import Pending, Requester
 
 LONGEST_WAY: Seconds = 10.0
 """Home: a body that does not say that it is there is not asked for longer."""

@@ -4,12 +4,12 @@ from collections.abc import Mapping
 
 from msgspec import Struct
 
-from schemas.behaviors import BlockBehavior, Gesture, Head, Pointing
-from schemas.body import Estimate
-from schemas.references import type_name
-from schemas.units import Seconds
-from services.realizer.points import BENEATH, ON_TARGET, Point, Segment, family, segments
-from services.realizer.relations import Relations
+from engage_hri.schemas.behaviors import BlockBehavior, Gesture, Head, Pointing
+from engage_hri.schemas.body import Estimate
+from engage_hri.schemas.references import type_name
+from engage_hri.schemas.units import Seconds
+from engage_hri.services.realizer.points import BENEATH, ON_TARGET, Point, Segment, family, segments
+from engage_hri.services.realizer.relations import Relations
 
 _ARMS = {"LEFT_HAND": ("left_arm",), "RIGHT_HAND": ("right_arm",), "BOTH_HANDS": ("left_arm", "right_arm")}
 _SHARED = ON_TARGET | BENEATH | {"pointing", "gesture", "head", "speech", "faceShift", "postureShift", "pose"}

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 
-from services.realizer.steps import PORTION, Steps
+from engage_hri.services.realizer.steps import PORTION, Steps
 
 
 def components(size: int, out: Mapping[int, Sequence[int]]) -> Steps[list[list[int]]]:

@@ -8,12 +8,12 @@ from collections.abc import Collection
 
 from msgspec import Struct
 
-from schemas.faults import Fault
-from schemas.units import Seconds
-from services.realizer.points import ORIGIN, Point
-from services.realizer.relations import BlockRefused, Equal, Term
-from services.realizer.schedule import EPSILON
-from services.realizer.steps import PORTION, Steps, portions
+from engage_hri.schemas.faults import Fault
+from engage_hri.schemas.units import Seconds
+from engage_hri.services.realizer.points import ORIGIN, Point
+from engage_hri.services.realizer.relations import BlockRefused, Equal, Term
+from engage_hri.services.realizer.schedule import EPSILON
+from engage_hri.services.realizer.steps import PORTION, Steps, portions
 
 
 class Instant(Struct, frozen=True, gc=False):

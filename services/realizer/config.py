@@ -2,8 +2,8 @@
 
 from msgspec import Struct
 
-from schemas.behaviors import EventKind
-from schemas.units import Seconds
+from engage_hri.schemas.behaviors import EventKind
+from engage_hri.schemas.units import Seconds
 
 
 class RealizerConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):

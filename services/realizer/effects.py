@@ -2,8 +2,8 @@
 
 from msgspec import Struct
 
-from services.realizer.pacing import Pace
-from services.realizer.patience import Late, Stalled
+from engage_hri.services.realizer.pacing import Pace
+from engage_hri.services.realizer.patience import Late, Stalled
 
 
 class Begin(Struct, frozen=True):

@@ -9,27 +9,27 @@ from functools import partial
 
 from msgspec.structs import replace
 
-from schemas.behaviors import BlockBehavior, Event, TurnSignal, Wait
-from schemas.blocks import Block, BlockOutcome
-from schemas.body import BehaviorOutcome, SyncPointArrived, SyncPointReached
-from schemas.faults import EngageError, Fault, InputRefused
-from schemas.feedback import WarningKind
-from schemas.syncref import BLOCK_ITSELF
-from schemas.units import Seconds
-from services.alarm import Timer
-from services.bus import Containing
-from services.realizer.authority import Authority
-from services.realizer.body_link import BodyLink
-from services.realizer.effects import Begin, Effect, Extend
-from services.realizer.patience import Late, Stalled
-from services.realizer.planner import Plan, plan_block
-from services.realizer.points import Point, performer, sync_points
-from services.realizer.recognition_link import RecognitionLink
-from services.realizer.relations import DROPPED
-from services.realizer.reporting import Reporter
-from services.realizer.spoken import Spoken
-from services.realizer.surroundings import Ending, Live, Surroundings
-from services.requests import NeverEnded, Pending, RequestRefused
+from engage_hri.schemas.behaviors import BlockBehavior, Event, TurnSignal, Wait
+from engage_hri.schemas.blocks import Block, BlockOutcome
+from engage_hri.schemas.body import BehaviorOutcome, SyncPointArrived, SyncPointReached
+from engage_hri.schemas.faults import EngageError, Fault, InputRefused
+from engage_hri.schemas.feedback import WarningKind
+from engage_hri.schemas.syncref import BLOCK_ITSELF
+from engage_hri.schemas.units import Seconds
+from engage_hri.services.alarm import Timer
+from engage_hri.services.bus import Containing
+from engage_hri.services.realizer.authority import Authority
+from engage_hri.services.realizer.body_link import BodyLink
+from engage_hri.services.realizer.effects import Begin, Effect, Extend
+from engage_hri.services.realizer.patience import Late, Stalled
+from engage_hri.services.realizer.planner import Plan, plan_block
+from engage_hri.services.realizer.points import Point, performer, sync_points
+from engage_hri.services.realizer.recognition_link import RecognitionLink
+from engage_hri.services.realizer.relations import DROPPED
+from engage_hri.services.realizer.reporting import Reporter
+from engage_hri.services.realizer.spoken import Spoken
+from engage_hri.services.realizer.surroundings import Ending, Live, Surroundings
+from engage_hri.services.requests import NeverEnded, Pending, RequestRefused
 
 
 class Performance:

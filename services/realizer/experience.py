@@ -4,8 +4,8 @@ from collections import deque
 from collections.abc import Iterable, Mapping
 from statistics import median_low
 
-from schemas.body import Estimate
-from schemas.units import Seconds
+from engage_hri.schemas.body import Estimate
+from engage_hri.schemas.units import Seconds
 
 SHORT: Seconds = 0.05
 """A phase shorter than this says nothing about speed."""

@@ -2,10 +2,10 @@
 
 import json
 
-from services.realizer import pnml
-from services.realizer.net import Bound, Place, is_live, is_safe
-from services.realizer.planner import Plan, plan_block
-from services.realizer.points import Point
+from engage_hri.services.realizer import pnml
+from engage_hri.services.realizer.net import Bound, Place, is_live, is_safe
+from engage_hri.services.realizer.planner import Plan, plan_block
+from engage_hri.services.realizer.points import Point
 
 __all__ = ["as_dot", "as_json", "as_pnml", "as_text", "plan_block"]
 

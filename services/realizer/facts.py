@@ -6,11 +6,11 @@ changes nothing.
 
 from math import isfinite
 
-from schemas.units import Seconds
-from services.realizer.assembly import Member
-from services.realizer.planner import Plan
-from services.realizer.points import Point
-from services.realizer.wiring import Wiring
+from engage_hri.schemas.units import Seconds
+from engage_hri.services.realizer.assembly import Member
+from engage_hri.services.realizer.planner import Plan
+from engage_hri.services.realizer.points import Point
+from engage_hri.services.realizer.wiring import Wiring
 
 
 class Facts:

@@ -7,12 +7,12 @@ Longest paths from what was measured, through phases at the pace measured so far
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from math import inf
 
-from schemas.units import Seconds
-from services.realizer.longest_paths import FINEST, Arc, Circle, LongestPaths
-from services.realizer.net import order
-from services.realizer.planner import Plan
-from services.realizer.points import Point
-from services.realizer.schedule import EPSILON
+from engage_hri.schemas.units import Seconds
+from engage_hri.services.realizer.longest_paths import FINEST, Arc, Circle, LongestPaths
+from engage_hri.services.realizer.net import order
+from engage_hri.services.realizer.planner import Plan
+from engage_hri.services.realizer.points import Point
+from engage_hri.services.realizer.schedule import EPSILON
 
 REPAIRS = 200
 """Bounds that are made way for in one go, before those that are left are given up for this time."""

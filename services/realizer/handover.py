@@ -7,15 +7,15 @@ from typing import NamedTuple
 
 from msgspec import Struct
 
-from schemas.behaviors import Gesture, Hand, Pointing
-from schemas.syncref import SYNC_POINTS
-from schemas.units import Seconds
-from services.realizer.chains import Chain
-from services.realizer.classes import Classes
-from services.realizer.points import BENEATH, WITH_STROKE, Point
-from services.realizer.relations import Relations
-from services.realizer.schedule import EPSILON
-from services.realizer.steps import Steps
+from engage_hri.schemas.behaviors import Gesture, Hand, Pointing
+from engage_hri.schemas.syncref import SYNC_POINTS
+from engage_hri.schemas.units import Seconds
+from engage_hri.services.realizer.chains import Chain
+from engage_hri.services.realizer.classes import Classes
+from engage_hri.services.realizer.points import BENEATH, WITH_STROKE, Point
+from engage_hri.services.realizer.relations import Relations
+from engage_hri.services.realizer.schedule import EPSILON
+from engage_hri.services.realizer.steps import Steps
 
 _OTHER: dict[str, tuple[str, Hand]] = {
     "left_arm": ("right_arm", "RIGHT_HAND"),

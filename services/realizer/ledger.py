@@ -6,11 +6,11 @@ from contextlib import contextmanager
 from math import inf
 from typing import Protocol
 
-from schemas.blocks import Block
-from schemas.syncref import BLOCK_ITSELF
-from schemas.units import Seconds
-from services.realizer.points import Point
-from services.realizer.schedule import EPSILON
+from engage_hri.schemas.blocks import Block
+from engage_hri.schemas.syncref import BLOCK_ITSELF
+from engage_hri.schemas.units import Seconds
+from engage_hri.services.realizer.points import Point
+from engage_hri.services.realizer.schedule import EPSILON
 
 
 class Follower(Protocol):

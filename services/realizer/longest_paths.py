@@ -6,8 +6,8 @@ from collections.abc import Sequence
 
 from msgspec import Struct
 
-from schemas.units import Seconds
-from services.realizer.schedule import EPSILON
+from engage_hri.schemas.units import Seconds
+from engage_hri.services.realizer.schedule import EPSILON
 
 FINEST: Seconds = 1e-8
 """Changes below are rounding."""

@@ -18,8 +18,8 @@ from typing import Literal, NamedTuple
 
 from msgspec import Struct
 
-from schemas.units import Seconds
-from services.realizer.points import Point
+from engage_hri.schemas.units import Seconds
+from engage_hri.services.realizer.points import Point
 
 PlaceKind = Literal["phase", "delay", "order", "series", "handover", "idle"]
 """handover: where the start of its successor cuts a behavior short. Nobody waits for it: who is early goes home."""

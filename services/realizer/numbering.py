@@ -4,9 +4,9 @@ import heapq
 from collections.abc import Sequence
 from math import inf
 
-from schemas.units import Seconds
-from services.realizer.net import Bound, PetriNet, Place, PlaceKind, Transition
-from services.realizer.steps import PORTION, Steps, portions
+from engage_hri.schemas.units import Seconds
+from engage_hri.services.realizer.net import Bound, PetriNet, Place, PlaceKind, Transition
+from engage_hri.services.realizer.steps import PORTION, Steps, portions
 
 _Tie = tuple[int, int, PlaceKind, Seconds, str, tuple[int, ...], Seconds]
 

@@ -3,15 +3,15 @@
 import heapq
 from collections.abc import Iterable, Mapping
 
-from schemas.units import Seconds
-from services.realizer.assembly import Member
-from services.realizer.experience import Experience
-from services.realizer.facts import Facts
-from services.realizer.forecast import Forecast, full_forecast
-from services.realizer.pacing import Pace
-from services.realizer.planner import Plan
-from services.realizer.points import Point, performer
-from services.realizer.schedule import EPSILON
+from engage_hri.schemas.units import Seconds
+from engage_hri.services.realizer.assembly import Member
+from engage_hri.services.realizer.experience import Experience
+from engage_hri.services.realizer.facts import Facts
+from engage_hri.services.realizer.forecast import Forecast, full_forecast
+from engage_hri.services.realizer.pacing import Pace
+from engage_hri.services.realizer.planner import Plan
+from engage_hri.services.realizer.points import Point, performer
+from engage_hri.services.realizer.schedule import EPSILON
 
 SURPRISE: Seconds = 0.1
 """What comes as far from when it was expected as this moves what depends on it noticeably."""

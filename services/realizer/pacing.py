@@ -2,10 +2,10 @@
 
 from typing import TYPE_CHECKING
 
-from schemas.units import Seconds
+from engage_hri.schemas.units import Seconds
 
 if TYPE_CHECKING:
-    from services.realizer.authority import Authority
+    from engage_hri.services.realizer.authority import Authority
 
 Pace = tuple[tuple[str, Seconds], ...]
 """Sync points and their instants, by loop time. Empty: as is natural."""

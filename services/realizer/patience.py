@@ -5,14 +5,14 @@ from collections.abc import Mapping
 
 from msgspec import Struct
 
-from schemas.behaviors import Event, Speech
-from schemas.blocks import Block
-from schemas.references import type_name
-from schemas.syncref import SyncRef, canonical_sync
-from schemas.units import Seconds
-from services.realizer.config import RealizerConfig
-from services.realizer.points import Point
-from services.realizer.schedule import EPSILON
+from engage_hri.schemas.behaviors import Event, Speech
+from engage_hri.schemas.blocks import Block
+from engage_hri.schemas.references import type_name
+from engage_hri.schemas.syncref import SyncRef, canonical_sync
+from engage_hri.schemas.units import Seconds
+from engage_hri.services.realizer.config import RealizerConfig
+from engage_hri.services.realizer.points import Point
+from engage_hri.services.realizer.schedule import EPSILON
 
 
 class Late(Struct, frozen=True):

@@ -11,20 +11,20 @@ from typing import get_args
 from msgspec import Struct
 from msgspec.structs import replace
 
-from schemas.behaviors import BlockBehavior, Event, Hand, Head, Unknown
-from schemas.blocks import Block
-from schemas.body import Estimate, Estimates
-from schemas.faults import Fault
-from schemas.feedback import WarningKind
-from schemas.units import Seconds
-from services.realizer.assembly import Assembler, Assembly, Member, assembling
-from services.realizer.chains import Chain, chain, natural_ends
-from services.realizer.classes import Classes
-from services.realizer.handover import Arrangement, Conflict, arrange, entering
-from services.realizer.net import Bound, PetriNet
-from services.realizer.points import ORIGIN, Point, one_instant
-from services.realizer.prediction import Impossible, predict
-from services.realizer.relations import (
+from engage_hri.schemas.behaviors import BlockBehavior, Event, Hand, Head, Unknown
+from engage_hri.schemas.blocks import Block
+from engage_hri.schemas.body import Estimate, Estimates
+from engage_hri.schemas.faults import Fault
+from engage_hri.schemas.feedback import WarningKind
+from engage_hri.schemas.units import Seconds
+from engage_hri.services.realizer.assembly import Assembler, Assembly, Member, assembling
+from engage_hri.services.realizer.chains import Chain, chain, natural_ends
+from engage_hri.services.realizer.classes import Classes
+from engage_hri.services.realizer.handover import Arrangement, Conflict, arrange, entering
+from engage_hri.services.realizer.net import Bound, PetriNet
+from engage_hri.services.realizer.points import ORIGIN, Point, one_instant
+from engage_hri.services.realizer.prediction import Impossible, predict
+from engage_hri.services.realizer.relations import (
     DROPPED,
     BlockRefused,
     Elsewhere,
@@ -36,9 +36,9 @@ from services.realizer.relations import (
     at_line,
     relation_steps,
 )
-from services.realizer.schedule import EPSILON, Solution
-from services.realizer.steps import PORTION, Steps, finished, portions
-from services.realizer.verdict import Losses, clashes, judge
+from engage_hri.services.realizer.schedule import EPSILON, Solution
+from engage_hri.services.realizer.steps import PORTION, Steps, finished, portions
+from engage_hri.services.realizer.verdict import Losses, clashes, judge
 
 
 class Plan(Struct, frozen=True, kw_only=True):

@@ -9,10 +9,10 @@ from typing import get_args
 
 from lxml import etree
 
-from schemas.faults import Fault, InputRefused
-from schemas.units import Seconds
-from services.realizer.net import Bound, PetriNet, Place, PlaceKind, Transition
-from services.realizer.points import Point
+from engage_hri.schemas.faults import Fault, InputRefused
+from engage_hri.schemas.units import Seconds
+from engage_hri.services.realizer.net import Bound, PetriNet, Place, PlaceKind, Transition
+from engage_hri.services.realizer.points import Point
 
 PNML = "http://www.pnml.org/version-2009/grammar/pnml"
 PT_NET = "http://www.pnml.org/version-2009/grammar/ptnet"

@@ -1,17 +1,17 @@
 """Which sync points each type of behavior has, which of them are one instant, and at which it can wait.
 
-Thesis 4.1.2, with BML 1.0's types. Everything here uses the drafts' names; `schemas.syncref` knows the dialects.
+Thesis 4.1.2, with BML 1.0's types. Everything here uses the drafts' names; `schemas/syncref.py` knows the dialects.
 """
 
 from functools import lru_cache
 from itertools import pairwise
 from typing import Literal, NamedTuple
 
-from schemas.behaviors import Behavior, Event, Mark, Speech, TurnSignal, Wait
-from schemas.body import Estimate
-from schemas.references import type_name
-from schemas.syncref import SYNC_POINTS
-from schemas.units import Seconds
+from engage_hri.schemas.behaviors import Behavior, Event, Mark, Speech, TurnSignal, Wait
+from engage_hri.schemas.body import Estimate
+from engage_hri.schemas.references import type_name
+from engage_hri.schemas.syncref import SYNC_POINTS
+from engage_hri.schemas.units import Seconds
 
 
 class Point(NamedTuple):

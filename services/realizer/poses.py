@@ -2,11 +2,11 @@
 
 from collections.abc import Mapping
 
-from schemas.body import BodyPose, Estimate
-from schemas.units import Seconds
-from services.realizer.planner import Plan
-from services.realizer.points import BENEATH, Point, family
-from services.realizer.schedule import EPSILON
+from engage_hri.schemas.body import BodyPose, Estimate
+from engage_hri.schemas.units import Seconds
+from engage_hri.services.realizer.planner import Plan
+from engage_hri.services.realizer.points import BENEATH, Point, family
+from engage_hri.services.realizer.schedule import EPSILON
 
 EVERYTHING_HOME: Mapping[str, BodyPose] = {}
 

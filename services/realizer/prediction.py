@@ -3,10 +3,10 @@
 from collections.abc import Callable, Iterable, Sequence
 from math import inf
 
-from schemas.units import Seconds
-from services.realizer.net import Bound, PetriNet, Place
-from services.realizer.schedule import EPSILON, Lag, PositiveCycle, Solution, solve
-from services.realizer.steps import PORTION, Steps
+from engage_hri.schemas.units import Seconds
+from engage_hri.services.realizer.net import Bound, PetriNet, Place
+from engage_hri.services.realizer.schedule import EPSILON, Lag, PositiveCycle, Solution, solve
+from engage_hri.services.realizer.steps import PORTION, Steps
 
 Circle = tuple[tuple[Place | Bound, Seconds], ...]
 """Ties that lead back to their start, in order, each with the seconds it asks for: more than none in all."""

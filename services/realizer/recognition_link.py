@@ -6,19 +6,19 @@ from typing import Any
 
 from msgspec import Struct
 
-from schemas import keys
-from schemas.behaviors import Event, TurnSignal
-from schemas.blocks import Block
-from schemas.faults import EngageError
-from schemas.recognition import EventOutcome, RequestEvent, SignalTurn
-from schemas.units import Seconds
-from services.bus import Bus
-from services.realizer.config import RealizerConfig
-from services.realizer.patience import event_deadline
-from services.realizer.points import Point
-from services.realizer.schedule import EPSILON
-from services.realizer.surroundings import Presence
-from services.requests import Pending, Requester, RequestRefused, ServerRestarted
+from engage_hri.schemas import keys
+from engage_hri.schemas.behaviors import Event, TurnSignal
+from engage_hri.schemas.blocks import Block
+from engage_hri.schemas.faults import EngageError
+from engage_hri.schemas.recognition import EventOutcome, RequestEvent, SignalTurn
+from engage_hri.schemas.units import Seconds
+from engage_hri.services.bus import Bus
+from engage_hri.services.realizer.config import RealizerConfig
+from engage_hri.services.realizer.patience import event_deadline
+from engage_hri.services.realizer.points import Point
+from engage_hri.services.realizer.schedule import EPSILON
+from engage_hri.services.realizer.surroundings import Presence
+from engage_hri.services.requests import Pending, Requester, RequestRefused, ServerRestarted
 
 
 class Decision(Struct, frozen=True):

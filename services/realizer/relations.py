@@ -9,15 +9,25 @@ from functools import cached_property
 from msgspec import Struct
 from msgspec.structs import replace
 
-from schemas.behaviors import After, Before, Behavior, BlockBehavior, Head, Speech, Synchronize, Unknown, Wait
-from schemas.blocks import Block
-from schemas.faults import Fault, InputRefused
-from schemas.feedback import WarningKind
-from schemas.references import type_name
-from schemas.syncref import BLOCK_ITSELF, SyncRef, canonical_sync, dialect_sync
-from schemas.units import Seconds
-from services.realizer.points import ORIGIN, Point, sync_points
-from services.realizer.steps import PORTION, Steps, finished, portions
+from engage_hri.schemas.behaviors import (
+    After,
+    Before,
+    Behavior,
+    BlockBehavior,
+    Head,
+    Speech,
+    Synchronize,
+    Unknown,
+    Wait,
+)
+from engage_hri.schemas.blocks import Block
+from engage_hri.schemas.faults import Fault, InputRefused
+from engage_hri.schemas.feedback import WarningKind
+from engage_hri.schemas.references import type_name
+from engage_hri.schemas.syncref import BLOCK_ITSELF, SyncRef, canonical_sync, dialect_sync
+from engage_hri.schemas.units import Seconds
+from engage_hri.services.realizer.points import ORIGIN, Point, sync_points
+from engage_hri.services.realizer.steps import PORTION, Steps, finished, portions
 
 
 class BlockRefused(InputRefused):

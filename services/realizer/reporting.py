@@ -3,9 +3,9 @@
 from collections.abc import Iterable, Mapping
 from math import inf
 
-from schemas import keys
-from schemas.blocks import SpokenText
-from schemas.feedback import (
+from engage_hri.schemas import keys
+from engage_hri.schemas.blocks import SpokenText
+from engage_hri.schemas.feedback import (
     BlockProgress,
     Feedback,
     PlannedPoint,
@@ -14,13 +14,13 @@ from schemas.feedback import (
     WarningFeedback,
     WarningKind,
 )
-from schemas.references import type_name
-from schemas.syncref import dialect_sync
-from schemas.units import Seconds
-from services.bus import Bus
-from services.realizer.authority import Authority
-from services.realizer.planner import Plan
-from services.realizer.points import Point
+from engage_hri.schemas.references import type_name
+from engage_hri.schemas.syncref import dialect_sync
+from engage_hri.schemas.units import Seconds
+from engage_hri.services.bus import Bus
+from engage_hri.services.realizer.authority import Authority
+from engage_hri.services.realizer.planner import Plan
+from engage_hri.services.realizer.points import Point
 
 NOTICEABLE: Seconds = 0.1
 """What people notice between what they see and what they hear; a prediction that moves less is not worth telling."""

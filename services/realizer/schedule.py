@@ -3,8 +3,8 @@
 from collections.abc import Iterable, Mapping, Sequence
 from typing import NamedTuple
 
-from schemas.units import Seconds
-from services.realizer.steps import Steps
+from engage_hri.schemas.units import Seconds
+from engage_hri.services.realizer.steps import Steps
 
 EPSILON: Seconds = 1e-6
 """Times closer than this are the same instant."""

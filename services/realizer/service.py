@@ -6,10 +6,10 @@ from typing import Any, TypeVar
 
 from msgspec.structs import replace
 
-from schemas import keys
-from schemas.behaviors import Gesture, Hand, Pointing, Speech
-from schemas.blocks import BehaviorInterrupted, Block, BlockOutcome, InterruptBehavior, PerformBlock
-from schemas.body import (
+from engage_hri.schemas import keys
+from engage_hri.schemas.behaviors import Gesture, Hand, Pointing, Speech
+from engage_hri.schemas.blocks import BehaviorInterrupted, Block, BlockOutcome, InterruptBehavior, PerformBlock
+from engage_hri.schemas.body import (
     BodyPose,
     Estimate,
     EstimateBehaviors,
@@ -20,24 +20,24 @@ from schemas.body import (
     SyncPointReached,
     WordSpoken,
 )
-from schemas.check import sound
-from schemas.faults import EngageError, Fault, NoReply
-from schemas.feedback import WarningFeedback
-from schemas.presence import PeerAlive, PeerGone
-from schemas.requests import Cancel, Outcome, Request, Unreadable
-from services.bus import Bus, Received
-from services.realizer.body_link import LONGEST_WAY
-from services.realizer.config import RealizerConfig
-from services.realizer.executor import Performance
-from services.realizer.ledger import Ledger
-from services.realizer.planner import Plan, plan_steps
-from services.realizer.points import Point, performer
-from services.realizer.poses import poses_before, poses_left
-from services.realizer.relations import BlockRefused, extent, relation_steps
-from services.realizer.surroundings import Ending, Live, Presence, Surroundings
-from services.realizer.unhurried import unhurried
-from services.requests import Patience, RequestDesk, Requester
-from services.runtime import Ready
+from engage_hri.schemas.check import sound
+from engage_hri.schemas.faults import EngageError, Fault, NoReply
+from engage_hri.schemas.feedback import WarningFeedback
+from engage_hri.schemas.presence import PeerAlive, PeerGone
+from engage_hri.schemas.requests import Cancel, Outcome, Request, Unreadable
+from engage_hri.services.bus import Bus, Received
+from engage_hri.services.realizer.body_link import LONGEST_WAY
+from engage_hri.services.realizer.config import RealizerConfig
+from engage_hri.services.realizer.executor import Performance
+from engage_hri.services.realizer.ledger import Ledger
+from engage_hri.services.realizer.planner import Plan, plan_steps
+from engage_hri.services.realizer.points import Point, performer
+from engage_hri.services.realizer.poses import poses_before, poses_left
+from engage_hri.services.realizer.relations import BlockRefused, extent, relation_steps
+from engage_hri.services.realizer.surroundings import Ending, Live, Presence, Surroundings
+from engage_hri.services.realizer.unhurried import unhurried
+from engage_hri.services.requests import Patience, RequestDesk, Requester
+from engage_hri.services.runtime import Ready
 
 Result = TypeVar("Result")
 

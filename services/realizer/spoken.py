@@ -2,10 +2,10 @@
 
 from collections.abc import Iterable
 
-from schemas.behaviors import BlockBehavior, Speech
-from schemas.blocks import SpokenText
-from schemas.body import BehaviorOutcome
-from services.realizer.points import Point
+from engage_hri.schemas.behaviors import BlockBehavior, Speech
+from engage_hri.schemas.blocks import SpokenText
+from engage_hri.schemas.body import BehaviorOutcome
+from engage_hri.services.realizer.points import Point
 
 
 class Spoken:

@@ -7,16 +7,16 @@ from typing import TYPE_CHECKING, Literal
 
 from msgspec import Struct
 
-from schemas.blocks import BlockOutcome, PerformBlock
-from schemas.faults import Fault
-from schemas.presence import PeerAlive, PeerGone
-from services.bus import Bus
-from services.realizer.config import RealizerConfig
-from services.realizer.ledger import Ledger
-from services.requests import Requester
+from engage_hri.schemas.blocks import BlockOutcome, PerformBlock
+from engage_hri.schemas.faults import Fault
+from engage_hri.schemas.presence import PeerAlive, PeerGone
+from engage_hri.services.bus import Bus
+from engage_hri.services.realizer.config import RealizerConfig
+from engage_hri.services.realizer.ledger import Ledger
+from engage_hri.services.requests import Requester
 
 if TYPE_CHECKING:
-    from services.realizer.executor import Performance
+    from engage_hri.services.realizer.executor import Performance
 
 Status = Literal["done", "failed", "interrupted"]
 

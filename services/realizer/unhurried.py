@@ -2,7 +2,7 @@
 
 import asyncio
 
-from services.realizer.steps import Steps, T
+from engage_hri.services.realizer.steps import Steps, T
 
 SLICE = 512
 """Elements, see `steps`: one to five milliseconds of processor. Counted, not timed: equal runs stay equal."""

@@ -4,16 +4,16 @@ from collections.abc import Collection, Container, Iterable, Mapping, Sequence
 from itertools import accumulate
 from typing import NamedTuple
 
-from schemas.faults import Fault
-from services.realizer.assembly import Assembly
-from services.realizer.chains import Chain
-from services.realizer.classes import Classes
-from services.realizer.net import Bound, PetriNet, Place
-from services.realizer.points import Point
-from services.realizer.prediction import Circle, Impossible
-from services.realizer.relations import BlockRefused
-from services.realizer.schedule import EPSILON
-from services.realizer.steps import Steps
+from engage_hri.schemas.faults import Fault
+from engage_hri.services.realizer.assembly import Assembly
+from engage_hri.services.realizer.chains import Chain
+from engage_hri.services.realizer.classes import Classes
+from engage_hri.services.realizer.net import Bound, PetriNet, Place
+from engage_hri.services.realizer.points import Point
+from engage_hri.services.realizer.prediction import Circle, Impossible
+from engage_hri.services.realizer.relations import BlockRefused
+from engage_hri.services.realizer.schedule import EPSILON
+from engage_hri.services.realizer.steps import Steps
 
 Turn = tuple[str, Point]
 """Who waits for which point of another before it takes its part."""

@@ -1,9 +1,9 @@
 """A plan, indexed by what decisions ask of it."""
 
-from schemas.behaviors import Speech
-from schemas.units import Seconds
-from services.realizer.planner import Plan
-from services.realizer.points import Point
+from engage_hri.schemas.behaviors import Speech
+from engage_hri.schemas.units import Seconds
+from engage_hri.services.realizer.planner import Plan
+from engage_hri.services.realizer.points import Point
 
 
 class Wiring:

@@ -1,7 +1,7 @@
-"""`python -m services.recognition` is `engage run recognition`."""
+"""`python -m engage_hri.services.recognition` is `engage run recognition`."""
 
 import sys
 
-from services.__main__ import main
+from engage_hri.services.__main__ import main
 
 main(["run", "recognition", *sys.argv[1:]])

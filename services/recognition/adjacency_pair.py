@@ -4,10 +4,10 @@ Thesis 2.2.3. The delay runs from the end of the first turn and is negative for 
 that comes while the turn still goes on is known at once, but decided only when the turn has ended.
 """
 
-from schemas.behaviors import Action
-from schemas.units import Probability, Seconds
-from services.recognition.limits import in_time
-from services.recognition.machine import IDLE, Ledger, Machine, Row, UnderWay, table
+from engage_hri.schemas.behaviors import Action
+from engage_hri.schemas.units import Probability, Seconds
+from engage_hri.services.recognition.limits import in_time
+from engage_hri.services.recognition.machine import IDLE, Ledger, Machine, Row, UnderWay, table
 
 ROBOT_WAITING, HUMAN_WAITING = "robot_waiting", "human_waiting"
 INTERRUPTED, RESPONDING = "interrupted", "responding"

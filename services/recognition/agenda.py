@@ -3,7 +3,7 @@
 import heapq
 from typing import Generic, TypeVar
 
-from schemas.units import Seconds
+from engage_hri.schemas.units import Seconds
 
 Key = TypeVar("Key", str, tuple[int, str])
 SLACK = 32

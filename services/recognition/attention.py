@@ -11,19 +11,19 @@ began and ended, though they are known only later; until then `undecided` says f
 
 from collections.abc import Iterable, Iterator
 
-from schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost
-from schemas.behaviors import Action
-from schemas.body import RobotState
-from schemas.perception import HeadPose, VoiceActivity
-from schemas.units import Seconds, Stamp
-from schemas.world import World
-from services.recognition.config import RecognitionConfig
-from services.recognition.looking import ROUNDING, Change, Looking
-from services.recognition.manipulation import Manipulation
-from services.recognition.presence import NEVER
-from services.recognition.scene import Covered
-from services.recognition.sight import Sight, is_direction, is_place
-from services.recognition.voice import Voice
+from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost
+from engage_hri.schemas.behaviors import Action
+from engage_hri.schemas.body import RobotState
+from engage_hri.schemas.perception import HeadPose, VoiceActivity
+from engage_hri.schemas.units import Seconds, Stamp
+from engage_hri.schemas.world import World
+from engage_hri.services.recognition.config import RecognitionConfig
+from engage_hri.services.recognition.looking import ROUNDING, Change, Looking
+from engage_hri.services.recognition.manipulation import Manipulation
+from engage_hri.services.recognition.presence import NEVER
+from engage_hri.services.recognition.scene import Covered
+from engage_hri.services.recognition.sight import Sight, is_direction, is_place
+from engage_hri.services.recognition.voice import Voice
 
 Raw = HeadPose | VoiceActivity | World | RobotState
 Symbolic = ActionBegan | ActionEnded | ActorFound | ActorLost

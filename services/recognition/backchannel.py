@@ -4,8 +4,8 @@ It starts with the responder, has no delay and cannot fail. Speech shows only at
 whether it was one; longer speech is a change of floor, and so is speech that outlasts the other's turn.
 """
 
-from schemas.units import Seconds
-from services.recognition.machine import IDLE, Ledger, Machine, Row, UnderWay, table
+from engage_hri.schemas.units import Seconds
+from engage_hri.services.recognition.machine import IDLE, Ledger, Machine, Row, UnderWay, table
 
 UNDECIDED, BRIEF = "undecided", "brief"
 

@@ -6,9 +6,9 @@ a short pause, is left out. Until the pause is over it is undecided whether ther
 
 from msgspec import Struct
 
-from schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost
-from schemas.units import Seconds
-from services.recognition.limits import in_time
+from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost
+from engage_hri.schemas.units import Seconds
+from engage_hri.services.recognition.limits import in_time
 
 Told = ActionBegan | ActionEnded | ActorFound | ActorLost
 Passed = tuple[Seconds, Told]

@@ -6,13 +6,13 @@ are remembered for a while, in case they come back.
 
 from collections.abc import Callable
 
-from schemas.units import Seconds
-from schemas.world import World
-from services.recognition.agenda import Agenda
-from services.recognition.config import RecognitionConfig
-from services.recognition.machine import Forgotten, Ledger, Mishap
-from services.recognition.person import Person
-from services.recognition.scene import Scene
+from engage_hri.schemas.units import Seconds
+from engage_hri.schemas.world import World
+from engage_hri.services.recognition.agenda import Agenda
+from engage_hri.services.recognition.config import RecognitionConfig
+from engage_hri.services.recognition.machine import Forgotten, Ledger, Mishap
+from engage_hri.services.recognition.person import Person
+from engage_hri.services.recognition.scene import Scene
 
 
 class Company:

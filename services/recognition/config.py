@@ -4,8 +4,8 @@ from typing import Literal
 
 from msgspec import Struct
 
-from schemas.behaviors import Action
-from schemas.units import Degrees, Meters, Probability, Seconds, Vector
+from engage_hri.schemas.behaviors import Action
+from engage_hri.schemas.units import Degrees, Meters, Probability, Seconds, Vector
 
 GazeResolution = Literal["object", "table"]
 

@@ -5,14 +5,14 @@ Input of the adjacency pair and of the two backchannels, the person's own and th
 
 from collections.abc import Callable, Iterator
 
-from schemas.behaviors import Action, Cause
-from schemas.units import Probability, Seconds
-from services.recognition.adjacency_pair import AdjacencyPair
-from services.recognition.backchannel import BRIEF, UNDECIDED, Backchannel
-from services.recognition.config import RecognitionConfig
-from services.recognition.limits import in_time
-from services.recognition.machine import IDLE, Ledger, UnderWay
-from services.recognition.scene import Scene
+from engage_hri.schemas.behaviors import Action, Cause
+from engage_hri.schemas.units import Probability, Seconds
+from engage_hri.services.recognition.adjacency_pair import AdjacencyPair
+from engage_hri.services.recognition.backchannel import BRIEF, UNDECIDED, Backchannel
+from engage_hri.services.recognition.config import RecognitionConfig
+from engage_hri.services.recognition.limits import in_time
+from engage_hri.services.recognition.machine import IDLE, Ledger, UnderWay
+from engage_hri.services.recognition.scene import Scene
 
 
 class Conversation:

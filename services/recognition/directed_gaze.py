@@ -5,8 +5,8 @@ matters only for how long the gaze was shared. When the human is there first the
 way: the sharing begins with its arrival.
 """
 
-from services.recognition.machine import IDLE, Ledger, Row, table
-from services.recognition.shared_gaze import SharedGaze
+from engage_hri.services.recognition.machine import IDLE, Ledger, Row, table
+from engage_hri.services.recognition.shared_gaze import SharedGaze
 
 ROBOT_DIRECTING, HUMAN_DIRECTING, SHARED = "robot_directing", "human_directing", "shared"
 

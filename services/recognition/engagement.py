@@ -7,9 +7,9 @@ task nothing is concluded from silence: that explains the 70 s gap of the canap√
 
 from typing import Literal, NamedTuple
 
-from schemas.units import Probability, Seconds
-from services.recognition.config import RecognitionConfig
-from services.recognition.statistics import Tally
+from engage_hri.schemas.units import Probability, Seconds
+from engage_hri.services.recognition.config import RecognitionConfig
+from engage_hri.services.recognition.statistics import Tally
 
 Level = Literal["engaged", "weakening", "disengaged", "unknown"]
 

@@ -3,9 +3,9 @@
 import math
 from collections.abc import Iterable
 
-from schemas.syncref import BLOCK_ITSELF, SyncRef, canonical_sync
-from schemas.units import Seconds
-from services.recognition.latest import Latest
+from engage_hri.schemas.syncref import BLOCK_ITSELF, SyncRef, canonical_sync
+from engage_hri.schemas.units import Seconds
+from engage_hri.services.recognition.latest import Latest
 
 ROUNDING: Seconds = 1e-6
 """Sums of times are off by less than this, on clocks that have run for decades, too."""

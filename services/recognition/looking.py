@@ -5,9 +5,9 @@ Decided by the poses' own times. A beginning needs evidence: a pose after the dw
 
 from typing import NamedTuple
 
-from schemas.behaviors import Action
-from schemas.units import Probability, Seconds
-from services.recognition.sight import Seen, Targets
+from engage_hri.schemas.behaviors import Action
+from engage_hri.schemas.units import Probability, Seconds
+from engage_hri.services.recognition.sight import Seen, Targets
 
 ROUNDING: Seconds = 1e-9
 

@@ -9,10 +9,10 @@ from typing import ClassVar, NamedTuple
 
 from msgspec import Struct
 
-from schemas.behaviors import Action, Cause, EventKind
-from schemas.recognition import ENDINGS, ConnectionEvent, EventOutcome, EventState, TurnOutcome
-from schemas.requests import Accepted, Refused
-from schemas.units import Probability, Seconds, Stamp
+from engage_hri.schemas.behaviors import Action, Cause, EventKind
+from engage_hri.schemas.recognition import ENDINGS, ConnectionEvent, EventOutcome, EventState, TurnOutcome
+from engage_hri.schemas.requests import Accepted, Refused
+from engage_hri.schemas.units import Probability, Seconds, Stamp
 
 
 class Forgotten(NamedTuple):

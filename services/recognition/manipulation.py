@@ -11,11 +11,11 @@ from typing import NamedTuple
 
 from msgspec import Struct, field
 
-from schemas.units import Probability, Seconds, Vector
-from schemas.world import Entity, World
-from services.recognition.config import RecognitionConfig
-from services.recognition.looking import ROUNDING, Change
-from services.recognition.scene import Covering
+from engage_hri.schemas.units import Probability, Seconds, Vector
+from engage_hri.schemas.world import Entity, World
+from engage_hri.services.recognition.config import RecognitionConfig
+from engage_hri.services.recognition.looking import ROUNDING, Change
+from engage_hri.services.recognition.scene import Covering
 
 ALONG = 0.5
 """Share of the piece's way that a hand must have gone meanwhile, to have moved it."""

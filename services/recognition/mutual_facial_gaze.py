@@ -4,9 +4,9 @@ The robot asks for it when its head begins to move. Its turning away counts only
 face since the request; before that it has not yet come.
 """
 
-from schemas.units import Seconds
-from services.recognition.machine import IDLE, Row, table
-from services.recognition.shared_gaze import SharedGaze
+from engage_hri.schemas.units import Seconds
+from engage_hri.services.recognition.machine import IDLE, Row, table
+from engage_hri.services.recognition.shared_gaze import SharedGaze
 
 ROBOT_WAITING, HUMAN_WAITING, MUTUAL = "robot_waiting", "human_waiting", "mutual"
 

@@ -1,10 +1,10 @@
 """Is an observed action news? It may come twice, or so late that something newer of its kind has been seen."""
 
-from schemas.actions import ActionBegan, ActionEnded
-from schemas.behaviors import Action
-from schemas.units import Seconds
-from services.recognition.latest import Latest
-from services.recognition.presence import NEVER
+from engage_hri.schemas.actions import ActionBegan, ActionEnded
+from engage_hri.schemas.behaviors import Action
+from engage_hri.schemas.units import Seconds
+from engage_hri.services.recognition.latest import Latest
+from engage_hri.services.recognition.presence import NEVER
 
 
 class News:

@@ -2,8 +2,8 @@
 
 from collections.abc import Iterable
 
-from schemas.recognition import ENDINGS, ConnectionEvent, OpenEvents
-from schemas.units import Stamp
+from engage_hri.schemas.recognition import ENDINGS, ConnectionEvent, OpenEvents
+from engage_hri.schemas.units import Stamp
 
 
 class OpenBook:

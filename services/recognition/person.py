@@ -4,19 +4,19 @@ from collections.abc import Callable, Iterator
 from functools import partial
 from typing import NamedTuple
 
-from schemas.actions import ActionBegan, ActionEnded
-from schemas.behaviors import Action, EventKind
-from schemas.units import Probability, Seconds
-from services.recognition.config import RecognitionConfig
-from services.recognition.conversation import Conversation
-from services.recognition.directed_gaze import HUMAN_DIRECTING, DirectedGaze
-from services.recognition.limits import LimitClock, in_time
-from services.recognition.machine import IDLE, Ledger, UnderWay
-from services.recognition.mutual_facial_gaze import HUMAN_WAITING, MutualFacialGaze
-from services.recognition.news import News
-from services.recognition.presence import Presence
-from services.recognition.scene import Gaze, Scene
-from services.recognition.shared_gaze import SharedGaze
+from engage_hri.schemas.actions import ActionBegan, ActionEnded
+from engage_hri.schemas.behaviors import Action, EventKind
+from engage_hri.schemas.units import Probability, Seconds
+from engage_hri.services.recognition.config import RecognitionConfig
+from engage_hri.services.recognition.conversation import Conversation
+from engage_hri.services.recognition.directed_gaze import HUMAN_DIRECTING, DirectedGaze
+from engage_hri.services.recognition.limits import LimitClock, in_time
+from engage_hri.services.recognition.machine import IDLE, Ledger, UnderWay
+from engage_hri.services.recognition.mutual_facial_gaze import HUMAN_WAITING, MutualFacialGaze
+from engage_hri.services.recognition.news import News
+from engage_hri.services.recognition.presence import Presence
+from engage_hri.services.recognition.scene import Gaze, Scene
+from engage_hri.services.recognition.shared_gaze import SharedGaze
 
 ACTIONS_KEPT = 64
 """Of each person; of those it is known when they last began and ended."""

@@ -1,6 +1,6 @@
 """Is a person there? Faces get lost and found again, and reports of it may come late or twice."""
 
-from schemas.units import Seconds
+from engage_hri.schemas.units import Seconds
 
 NEVER: Seconds = float("-inf")
 

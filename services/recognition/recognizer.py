@@ -10,17 +10,17 @@ import math
 from collections.abc import Callable
 from itertools import count
 
-from schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost
-from schemas.body import RobotState
-from schemas.perception import HeadPose, VoiceActivity
-from schemas.units import Seconds
-from schemas.world import World
-from services.recognition.attention import Attention, Symbolic
-from services.recognition.breaks import Breaks
-from services.recognition.config import RecognitionConfig
-from services.recognition.machine import Effect, Forgotten, Mishap
-from services.recognition.scene import Covered
-from services.recognition.session import Observation, Session
+from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost
+from engage_hri.schemas.body import RobotState
+from engage_hri.schemas.perception import HeadPose, VoiceActivity
+from engage_hri.schemas.units import Seconds
+from engage_hri.schemas.world import World
+from engage_hri.services.recognition.attention import Attention, Symbolic
+from engage_hri.services.recognition.breaks import Breaks
+from engage_hri.services.recognition.config import RecognitionConfig
+from engage_hri.services.recognition.machine import Effect, Forgotten, Mishap
+from engage_hri.services.recognition.scene import Covered
+from engage_hri.services.recognition.session import Observation, Session
 
 Perceived = Observation | HeadPose | VoiceActivity | RobotState
 Result = Effect | Symbolic

@@ -4,10 +4,10 @@ from typing import NamedTuple
 
 from msgspec import Struct
 
-from schemas.attention import Claim
-from schemas.units import Probability, Seconds
-from schemas.world import World
-from services.recognition.config import GazeResolution
+from engage_hri.schemas.attention import Claim
+from engage_hri.schemas.units import Probability, Seconds
+from engage_hri.schemas.world import World
+from engage_hri.services.recognition.config import GazeResolution
 
 SAME_INSTANT: Seconds = 0.001
 """A look that ends and begins again at the same target within this has not been interrupted."""

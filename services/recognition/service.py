@@ -2,25 +2,32 @@
 
 from collections.abc import Iterable
 
-from schemas import keys
-from schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost
-from schemas.attention import HeadOwner
-from schemas.faults import Fault
-from schemas.perception import HeadPose, VoiceActivity
-from schemas.presence import PeerAlive, PeerGone
-from schemas.recognition import ConnectionEvent, EventOutcome, RequestEvent, SignalTurn, TurnOutcome, session_of
-from schemas.requests import Accepted, Cancel, Refused
-from schemas.units import Seconds, Stamp
-from schemas.world import World
-from services.bus import Bus, Received
-from services.recognition.config import RecognitionConfig
-from services.recognition.machine import Forgotten, Mishap
-from services.recognition.open_events import OpenBook
-from services.recognition.recognizer import Perceived, Recognizer, Result
-from services.recognition.standings import Standings
-from services.recognition.witnesses import Witnesses
-from services.requests import RequestDesk
-from services.runtime import Ready
+from engage_hri.schemas import keys
+from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost
+from engage_hri.schemas.attention import HeadOwner
+from engage_hri.schemas.faults import Fault
+from engage_hri.schemas.perception import HeadPose, VoiceActivity
+from engage_hri.schemas.presence import PeerAlive, PeerGone
+from engage_hri.schemas.recognition import (
+    ConnectionEvent,
+    EventOutcome,
+    RequestEvent,
+    SignalTurn,
+    TurnOutcome,
+    session_of,
+)
+from engage_hri.schemas.requests import Accepted, Cancel, Refused
+from engage_hri.schemas.units import Seconds, Stamp
+from engage_hri.schemas.world import World
+from engage_hri.services.bus import Bus, Received
+from engage_hri.services.recognition.config import RecognitionConfig
+from engage_hri.services.recognition.machine import Forgotten, Mishap
+from engage_hri.services.recognition.open_events import OpenBook
+from engage_hri.services.recognition.recognizer import Perceived, Recognizer, Result
+from engage_hri.services.recognition.standings import Standings
+from engage_hri.services.recognition.witnesses import Witnesses
+from engage_hri.services.requests import RequestDesk
+from engage_hri.services.runtime import Ready
 
 OLDEST: Seconds = 60.0
 """How long ago anything may have happened of which we hear now. What is counted in windows would count for ever."""

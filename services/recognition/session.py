@@ -10,24 +10,24 @@ happens before it, at its own time. An answer at the very limit still counts.
 
 from collections.abc import Callable, Set
 
-from schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost
-from schemas.attention import HeadOwner
-from schemas.behaviors import Action, Event
-from schemas.faults import Fault
-from schemas.feedback import BlockProgress, SyncPointProgress
-from schemas.presence import PeerGone
-from schemas.recognition import EventOutcome, RequestEvent, SignalTurn, TurnOutcome
-from schemas.requests import Accepted, Cancel, Refused
-from schemas.units import Seconds
-from schemas.world import World
-from services.recognition.company import Company
-from services.recognition.config import RecognitionConfig
-from services.recognition.latest import Latest
-from services.recognition.limits import BLOCKS_KEPT, ROUNDING, Blocks, LimitClock
-from services.recognition.machine import Effect, Ledger, UnderWay
-from services.recognition.news import News
-from services.recognition.person import Person
-from services.recognition.scene import Covered, Scene
+from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost
+from engage_hri.schemas.attention import HeadOwner
+from engage_hri.schemas.behaviors import Action, Event
+from engage_hri.schemas.faults import Fault
+from engage_hri.schemas.feedback import BlockProgress, SyncPointProgress
+from engage_hri.schemas.presence import PeerGone
+from engage_hri.schemas.recognition import EventOutcome, RequestEvent, SignalTurn, TurnOutcome
+from engage_hri.schemas.requests import Accepted, Cancel, Refused
+from engage_hri.schemas.units import Seconds
+from engage_hri.schemas.world import World
+from engage_hri.services.recognition.company import Company
+from engage_hri.services.recognition.config import RecognitionConfig
+from engage_hri.services.recognition.latest import Latest
+from engage_hri.services.recognition.limits import BLOCKS_KEPT, ROUNDING, Blocks, LimitClock
+from engage_hri.services.recognition.machine import Effect, Ledger, UnderWay
+from engage_hri.services.recognition.news import News
+from engage_hri.services.recognition.person import Person
+from engage_hri.services.recognition.scene import Covered, Scene
 
 Observation = (
     ActionBegan | ActionEnded | ActorFound | ActorLost | RequestEvent | SignalTurn | Cancel

@@ -5,10 +5,10 @@ Which names the states and inputs have is data of the subclasses; what follows f
 
 from typing import ClassVar
 
-from schemas.units import Probability, Seconds
-from services.recognition.limits import LimitClock
-from services.recognition.machine import IDLE, Ledger, Machine, UnderWay
-from services.recognition.scene import Gaze
+from engage_hri.schemas.units import Probability, Seconds
+from engage_hri.services.recognition.limits import LimitClock
+from engage_hri.services.recognition.machine import IDLE, Ledger, Machine, UnderWay
+from engage_hri.services.recognition.scene import Gaze
 
 
 class SharedGaze(Machine):

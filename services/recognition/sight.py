@@ -8,9 +8,9 @@ import math
 from functools import cached_property, lru_cache
 from typing import NamedTuple
 
-from schemas.units import FARTHEST, Meters, Probability, Radians, Seconds, Vector
-from schemas.world import Entity, World
-from services.recognition.config import RecognitionConfig
+from engage_hri.schemas.units import FARTHEST, Meters, Probability, Radians, Seconds, Vector
+from engage_hri.schemas.world import Entity, World
+from engage_hri.services.recognition.config import RecognitionConfig
 
 Targets = tuple[str, ...]
 AWAY: Targets = ()

@@ -2,13 +2,13 @@
 
 from collections.abc import Iterable, Set
 
-from schemas.recognition import ConnectionEvent, Statistics
-from schemas.units import Seconds, Stamp
-from services.recognition.agenda import Agenda
-from services.recognition.config import RecognitionConfig
-from services.recognition.engagement import Engagement
-from services.recognition.machine import Forgotten
-from services.recognition.statistics import Tally
+from engage_hri.schemas.recognition import ConnectionEvent, Statistics
+from engage_hri.schemas.units import Seconds, Stamp
+from engage_hri.services.recognition.agenda import Agenda
+from engage_hri.services.recognition.config import RecognitionConfig
+from engage_hri.services.recognition.engagement import Engagement
+from engage_hri.services.recognition.machine import Forgotten
+from engage_hri.services.recognition.statistics import Tally
 
 EVERYBODY = ""
 

@@ -12,9 +12,9 @@ from typing import get_args
 
 from msgspec import Struct
 
-from schemas.behaviors import EventKind
-from schemas.recognition import ENDINGS, ConnectionEvent, KindStatistics, WindowStatistics
-from schemas.units import Seconds, Stamp
+from engage_hri.schemas.behaviors import EventKind
+from engage_hri.schemas.recognition import ENDINGS, ConnectionEvent, KindStatistics, WindowStatistics
+from engage_hri.schemas.units import Seconds, Stamp
 
 SETTLED: Seconds = 120.0
 """No start becomes known later than this: one that does is counted, but splits no gap."""

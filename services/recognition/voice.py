@@ -3,9 +3,9 @@
 Levels, not edges: any of them may be lost. A beginning needs evidence, for an end its absence is enough.
 """
 
-from schemas.units import Probability, Seconds
-from services.recognition.config import Sensing
-from services.recognition.looking import ROUNDING, Change
+from engage_hri.schemas.units import Probability, Seconds
+from engage_hri.services.recognition.config import Sensing
+from engage_hri.services.recognition.looking import ROUNDING, Change
 
 
 class Voice:

@@ -1,9 +1,9 @@
 """Who says what people do: when such a perception vanishes from the bus nobody will report their ends."""
 
-from schemas.actions import ActionBegan, ActorFound, ActorLost
-from schemas.messages import Message
-from schemas.presence import PeerAlive, PeerGone
-from schemas.units import Stamp
+from engage_hri.schemas.actions import ActionBegan, ActorFound, ActorLost
+from engage_hri.schemas.messages import Message
+from engage_hri.schemas.presence import PeerAlive, PeerGone
+from engage_hri.schemas.units import Stamp
 
 
 class Witnesses:

@@ -1,8 +1,8 @@
-"""`python -m services.simulation`: the same as `engage run simulation`."""
+"""`python -m engage_hri.services.simulation`: the same as `engage run simulation`."""
 
 import sys
 
-from services.__main__ import main
+from engage_hri.services.__main__ import main
 
 if __name__ == "__main__":
     sys.argv[1:1] = ["run", "simulation"]

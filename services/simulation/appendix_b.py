@@ -5,7 +5,7 @@ Delays are human reaction times, chosen so that every event of the scenario has 
 
 from msgspec import structs
 
-from services.simulation.human import (
+from engage_hri.services.simulation.human import (
     AWAY,
     FACE,
     TABLE,
@@ -24,7 +24,7 @@ from services.simulation.human import (
     Withdraw,
     Word,
 )
-from services.tangram_table import Side
+from engage_hri.services.tangram_table import Side
 
 GLANCE = 0.2
 """From a word to the gaze it causes."""

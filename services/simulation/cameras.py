@@ -6,16 +6,16 @@ does the world where it is not seen steadily.
 
 from collections.abc import Iterator
 
-from schemas.actions import ActorFound, ActorLost
-from schemas.body import RobotState
-from schemas.messages import Message
-from schemas.units import Seconds
-from schemas.world import Entity, World
-from services.simulation.config import SimulationConfig
-from services.simulation.faults import Chances, FaceLoss, TableVision
-from services.simulation.head import Sightlines
-from services.simulation.perception import Scene, Stamper
-from services.simulation.reports import Actions, Reports, Signals
+from engage_hri.schemas.actions import ActorFound, ActorLost
+from engage_hri.schemas.body import RobotState
+from engage_hri.schemas.messages import Message
+from engage_hri.schemas.units import Seconds
+from engage_hri.schemas.world import Entity, World
+from engage_hri.services.simulation.config import SimulationConfig
+from engage_hri.services.simulation.faults import Chances, FaceLoss, TableVision
+from engage_hri.services.simulation.head import Sightlines
+from engage_hri.services.simulation.perception import Scene, Stamper
+from engage_hri.services.simulation.reports import Actions, Reports, Signals
 
 
 class Cameras:

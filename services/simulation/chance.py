@@ -5,7 +5,7 @@ from typing import Any, Protocol, TypeVar
 
 from msgspec import Struct
 
-from schemas.units import Seconds
+from engage_hri.schemas.units import Seconds
 
 T = TypeVar("T")
 CONCENTRATION = 3.0

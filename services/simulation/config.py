@@ -5,7 +5,7 @@ from typing import Literal
 
 from msgspec import Struct
 
-from schemas.units import Degrees, Meters, Probability, Seconds
+from engage_hri.schemas.units import Degrees, Meters, Probability, Seconds
 
 HumanKind = Literal["scripted", "misplacing", "listening", "stochastic", "none"]
 

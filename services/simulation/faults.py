@@ -8,11 +8,11 @@ from collections.abc import Callable, Iterable
 
 from msgspec.structs import replace
 
-from schemas.units import Seconds, Vector
-from schemas.world import Entity
-from services.simulation.chance import Chance
-from services.simulation.config import PerceptionFaults
-from services.simulation.head import unit
+from engage_hri.schemas.units import Seconds, Vector
+from engage_hri.schemas.world import Entity
+from engage_hri.services.simulation.chance import Chance
+from engage_hri.services.simulation.config import PerceptionFaults
+from engage_hri.services.simulation.head import unit
 
 FAINT = 0.3
 """Confidence in a thing that is where it was seen last, covered now."""

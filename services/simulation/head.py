@@ -5,8 +5,8 @@ Pure; directions are unit vectors in the robot's frame.
 
 import math
 
-from schemas.units import Seconds, Vector
-from services.simulation.table import Table, minimum_jerk
+from engage_hri.schemas.units import Seconds, Vector
+from engage_hri.services.simulation.table import Table, minimum_jerk
 
 ASIDE: Vector = (-0.3, 0.95, 0.1)
 """Toward nothing: past the robot's shoulder."""

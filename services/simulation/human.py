@@ -12,14 +12,14 @@ from heapq import heappop, heappush
 
 from msgspec import Struct
 
-from schemas.actions import ActionBegan
-from schemas.behaviors import Action, EventKind
-from schemas.body import WordSpoken
-from schemas.feedback import BlockProgress
-from schemas.messages import Message
-from schemas.recognition import ConnectionEvent, EventState
-from schemas.units import Seconds
-from services.tangram_table import Side
+from engage_hri.schemas.actions import ActionBegan
+from engage_hri.schemas.behaviors import Action, EventKind
+from engage_hri.schemas.body import WordSpoken
+from engage_hri.schemas.feedback import BlockProgress
+from engage_hri.schemas.messages import Message
+from engage_hri.schemas.recognition import ConnectionEvent, EventState
+from engage_hri.schemas.units import Seconds
+from engage_hri.services.tangram_table import Side
 
 FACE = "@robot"
 """Stands for the robot's face, whose id the script does not know."""

@@ -16,13 +16,13 @@ from collections.abc import Iterable, Iterator, Sequence
 import msgspec
 from msgspec import Struct
 
-from schemas.actions import ActionBegan, ActionEnded, ActorFound
-from schemas.behaviors import Action, Event, EventKind, TurnSignal
-from schemas.recognition import RequestEvent, SignalTurn
-from schemas.units import Probability, Seconds, Stamp
-from schemas.world import Entity, World
-from services.simulation.chance import Chance
-from services.simulation.table_2_1 import DELAYS, EVENTS, LONGEST_GAP, MTBCE, TABLE
+from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound
+from engage_hri.schemas.behaviors import Action, Event, EventKind, TurnSignal
+from engage_hri.schemas.recognition import RequestEvent, SignalTurn
+from engage_hri.schemas.units import Probability, Seconds, Stamp
+from engage_hri.schemas.world import Entity, World
+from engage_hri.services.simulation.chance import Chance
+from engage_hri.services.simulation.table_2_1 import DELAYS, EVENTS, LONGEST_GAP, MTBCE, TABLE
 
 Observation = World | ActorFound | ActionBegan | ActionEnded | RequestEvent | SignalTurn
 

@@ -5,11 +5,11 @@ Pure. For managers whose plan nobody knows beforehand.
 
 from collections.abc import Callable
 
-from schemas.actions import ActionBegan
-from schemas.messages import Message
-from schemas.units import Seconds
-from services.simulation.hearing import Hearing, Utterance, wanted
-from services.simulation.human import (
+from engage_hri.schemas.actions import ActionBegan
+from engage_hri.schemas.messages import Message
+from engage_hri.schemas.units import Seconds
+from engage_hri.services.simulation.hearing import Hearing, Utterance, wanted
+from engage_hri.services.simulation.human import (
     FACE,
     TABLE,
     Act,
@@ -22,7 +22,7 @@ from services.simulation.human import (
     Sit,
     Withdraw,
 )
-from services.tangram_table import TangramTable
+from engage_hri.services.tangram_table import TangramTable
 
 COMES: tuple[Act, ...] = (LookAt(TABLE), Pause(0.8), Sit(), Pause(0.8), LookAt(FACE))
 GOES: tuple[Act, ...] = (LookAt(TABLE), Pause(1.0), LookAt(FACE), Pause(1.0), Leave())

@@ -6,14 +6,27 @@ it is in `cameras.py`.
 
 from collections.abc import Callable, Iterator
 
-from schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost
-from schemas.behaviors import Action
-from schemas.messages import Message
-from schemas.units import Seconds, Stamp
-from schemas.world import Entity, World
-from services.simulation.human import FACE, Act, Grab, Human, Lay, Leave, LookAt, Pause, Sit, Start, Stop, Withdraw
-from services.simulation.table import Table
-from services.tangram_table import Pose, overlap, poses_touching
+from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost
+from engage_hri.schemas.behaviors import Action
+from engage_hri.schemas.messages import Message
+from engage_hri.schemas.units import Seconds, Stamp
+from engage_hri.schemas.world import Entity, World
+from engage_hri.services.simulation.human import (
+    FACE,
+    Act,
+    Grab,
+    Human,
+    Lay,
+    Leave,
+    LookAt,
+    Pause,
+    Sit,
+    Start,
+    Stop,
+    Withdraw,
+)
+from engage_hri.services.simulation.table import Table
+from engage_hri.services.tangram_table import Pose, overlap, poses_touching
 
 Stamper = Callable[[Seconds], Stamp]
 

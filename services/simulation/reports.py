@@ -9,13 +9,13 @@ from typing import Protocol
 
 from msgspec.structs import replace
 
-from schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost
-from schemas.messages import Message
-from schemas.perception import HeadPose, VoiceActivity
-from schemas.units import Seconds, Stamp
-from services.simulation.config import PerceptionFaults
-from services.simulation.faults import Chances, off_by
-from services.simulation.head import Head, Sightlines
+from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost
+from engage_hri.schemas.messages import Message
+from engage_hri.schemas.perception import HeadPose, VoiceActivity
+from engage_hri.schemas.units import Seconds, Stamp
+from engage_hri.services.simulation.config import PerceptionFaults
+from engage_hri.services.simulation.faults import Chances, off_by
+from engage_hri.services.simulation.head import Head, Sightlines
 
 
 class Reports(Protocol):

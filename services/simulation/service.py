@@ -3,24 +3,24 @@
 import random
 from functools import partial
 
-from schemas import keys
-from schemas.messages import Message
-from schemas.perception import HeadPose, VoiceActivity
-from schemas.presence import PeerAlive
-from schemas.units import Seconds
-from schemas.world import World
-from services.bus import Bus, Subscription
-from services.runtime import Ready
-from services.simulation.appendix_b import misplacing_rules, rules
-from services.simulation.cameras import Cameras
-from services.simulation.config import SimulationConfig
-from services.simulation.head import Sightlines
-from services.simulation.human import Human
-from services.simulation.listening import ListeningHuman
-from services.simulation.perception import Scene
-from services.simulation.stochastic import StochasticHuman
-from services.simulation.table import Table
-from services.tangram_table import tangram_table
+from engage_hri.schemas import keys
+from engage_hri.schemas.messages import Message
+from engage_hri.schemas.perception import HeadPose, VoiceActivity
+from engage_hri.schemas.presence import PeerAlive
+from engage_hri.schemas.units import Seconds
+from engage_hri.schemas.world import World
+from engage_hri.services.bus import Bus, Subscription
+from engage_hri.services.runtime import Ready
+from engage_hri.services.simulation.appendix_b import misplacing_rules, rules
+from engage_hri.services.simulation.cameras import Cameras
+from engage_hri.services.simulation.config import SimulationConfig
+from engage_hri.services.simulation.head import Sightlines
+from engage_hri.services.simulation.human import Human
+from engage_hri.services.simulation.listening import ListeningHuman
+from engage_hri.services.simulation.perception import Scene
+from engage_hri.services.simulation.stochastic import StochasticHuman
+from engage_hri.services.simulation.table import Table
+from engage_hri.services.tangram_table import tangram_table
 
 
 async def simulate(bus: Bus, ready: Ready, config: SimulationConfig) -> None:

@@ -7,17 +7,17 @@ from typing import Literal
 import msgspec
 from msgspec import Struct
 
-from schemas import keys
-from schemas.actions import ActorFound
-from schemas.faults import Fault, InputRefused
-from schemas.units import FARTHEST, Stamp
-from schemas.utf8 import utf8
-from schemas.world import Entity, World
-from services.bus import Bus
-from services.runtime import Ready
-from services.simulation.config import SimulationConfig
-from services.simulation.table import Table
-from services.tangram_table import tangram_table
+from engage_hri.schemas import keys
+from engage_hri.schemas.actions import ActorFound
+from engage_hri.schemas.faults import Fault, InputRefused
+from engage_hri.schemas.units import FARTHEST, Stamp
+from engage_hri.schemas.utf8 import utf8
+from engage_hri.schemas.world import Entity, World
+from engage_hri.services.bus import Bus
+from engage_hri.services.runtime import Ready
+from engage_hri.services.simulation.config import SimulationConfig
+from engage_hri.services.simulation.table import Table
+from engage_hri.services.tangram_table import tangram_table
 
 EXAMPLE = '{"entities": [{"id": "cup", "kind": "object", "position": [0.5, 0.1, 0.8], "category": "cup"}]}'
 ADVICE = f"for example {EXAMPLE}; places are in metres, at most {FARTHEST:.0e}"

@@ -9,15 +9,15 @@ from heapq import heappop, heappush
 
 from msgspec import Struct
 
-from schemas.actions import ActionBegan, ActionEnded
-from schemas.behaviors import Action
-from schemas.body import WordSpoken
-from schemas.messages import Message
-from schemas.units import Probability, Seconds
-from services.simulation.chance import Chance, Delays
-from services.simulation.config import Habits
-from services.simulation.hearing import Hearing, Utterance, wanted
-from services.simulation.human import (
+from engage_hri.schemas.actions import ActionBegan, ActionEnded
+from engage_hri.schemas.behaviors import Action
+from engage_hri.schemas.body import WordSpoken
+from engage_hri.schemas.messages import Message
+from engage_hri.schemas.units import Probability, Seconds
+from engage_hri.services.simulation.chance import Chance, Delays
+from engage_hri.services.simulation.config import Habits
+from engage_hri.services.simulation.hearing import Hearing, Utterance, wanted
+from engage_hri.services.simulation.human import (
     FACE,
     TABLE,
     Act,
@@ -31,8 +31,8 @@ from services.simulation.human import (
     Stop,
     Withdraw,
 )
-from services.simulation.listening import COMES, GOES, moves
-from services.tangram_table import SIDES, TangramTable, poses_touching
+from engage_hri.services.simulation.listening import COMES, GOES, moves
+from engage_hri.services.tangram_table import SIDES, TangramTable, poses_touching
 
 NOD: Seconds = 0.5
 WORD: Seconds = 0.5

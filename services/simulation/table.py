@@ -10,9 +10,9 @@ from typing import Literal
 import msgspec
 from msgspec import Struct
 
-from schemas.units import Meters, Seconds, Vector
-from schemas.world import Entity
-from services.tangram_table import Pose, TangramTable
+from engage_hri.schemas.units import Meters, Seconds, Vector
+from engage_hri.schemas.world import Entity
+from engage_hri.services.tangram_table import Pose, TangramTable
 
 HandSide = Literal["left", "right"]
 LIFT: Meters = 0.03

@@ -4,9 +4,9 @@ from collections.abc import Mapping
 
 from msgspec import Struct
 
-from schemas.behaviors import EventKind
-from schemas.units import Seconds
-from services.simulation.chance import Delays
+from engage_hri.schemas.behaviors import EventKind
+from engage_hri.schemas.units import Seconds
+from engage_hri.services.simulation.chance import Delays
 
 
 class Row(Struct, frozen=True, kw_only=True):

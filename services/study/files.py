@@ -6,10 +6,10 @@ from collections.abc import Iterable, Sequence
 
 import msgspec
 
-from schemas.units import Seconds
-from services.study.hypotheses import Finding
-from services.study.records import EventRecord, SessionRecord
-from services.study.summary import KINDS
+from engage_hri.schemas.units import Seconds
+from engage_hri.services.study.hypotheses import Finding
+from engage_hri.services.study.records import EventRecord, SessionRecord
+from engage_hri.services.study.summary import KINDS
 
 EVENT_COLUMNS = EventRecord.__struct_fields__
 KIND_COLUMNS = ("count", "succeeded", "failed", "failure_rate", "delay_mean", "failed_delay_mean")

@@ -4,10 +4,10 @@ from collections.abc import Callable, Sequence
 
 from msgspec import Struct
 
-from schemas.units import Probability
-from services.study.conditions import BASELINE, DEGRADED
-from services.study.permutation import LEVEL, Paired, holm, paired
-from services.study.records import SessionRecord
+from engage_hri.schemas.units import Probability
+from engage_hri.services.study.conditions import BASELINE, DEGRADED
+from engage_hri.services.study.permutation import LEVEL, Paired, holm, paired
+from engage_hri.services.study.records import SessionRecord
 
 Measure = Callable[[SessionRecord], float | None]
 

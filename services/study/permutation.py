@@ -12,7 +12,7 @@ import numpy as np
 from msgspec import Struct
 from numpy.typing import NDArray
 
-from schemas.units import Probability
+from engage_hri.schemas.units import Probability
 
 EXACT = 14
 """Up to so many pairs all choices of signs are counted."""

@@ -9,9 +9,9 @@ from collections.abc import Callable, Mapping, Sequence
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from schemas.behaviors import EventKind
-from services.study.records import EventRecord, SessionRecord
-from services.study.summary import KINDS, RESPONDED, by_condition, pooled
+from engage_hri.schemas.behaviors import EventKind
+from engage_hri.services.study.records import EventRecord, SessionRecord
+from engage_hri.services.study.summary import KINDS, RESPONDED, by_condition, pooled
 
 COLORS = ("#0072B2", "#E69F00", "#009E73")
 HATCHES = ("", "//", "..")

@@ -5,11 +5,11 @@ from typing import Literal
 
 from msgspec import Struct
 
-from schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost
-from schemas.behaviors import Cause, EventKind
-from schemas.messages import Message
-from schemas.recognition import ConnectionEvent, KindStatistics, Statistics, WindowStatistics
-from schemas.units import Probability, Seconds
+from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost
+from engage_hri.schemas.behaviors import Cause, EventKind
+from engage_hri.schemas.messages import Message
+from engage_hri.schemas.recognition import ConnectionEvent, KindStatistics, Statistics, WindowStatistics
+from engage_hri.schemas.units import Probability, Seconds
 
 Outcome = Literal["succeeded", "failed", "preempted", "withdrawn", "superseded", "open"]
 

@@ -7,10 +7,10 @@ from typing import get_args
 
 from msgspec import Struct
 
-from schemas.behaviors import EventKind
-from schemas.recognition import KindStatistics
-from services.study.hypotheses import CAVEAT, HYPOTHESES, Finding
-from services.study.records import SessionRecord
+from engage_hri.schemas.behaviors import EventKind
+from engage_hri.schemas.recognition import KindStatistics
+from engage_hri.services.study.hypotheses import CAVEAT, HYPOTHESES, Finding
+from engage_hri.services.study.records import SessionRecord
 
 KINDS: tuple[EventKind, ...] = get_args(EventKind)
 RESPONDED = tuple(kind for kind in KINDS if kind != "backchannel")

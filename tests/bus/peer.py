@@ -5,14 +5,14 @@ import os
 import sys
 import threading
 
-from schemas import keys
-from schemas.blocks import Block, BlockOutcome, PerformBlock
-from schemas.faults import EngageError
-from schemas.feedback import BlockProgress
-from schemas.requests import Cancel
-from services.bus import Bus
-from services.requests import RequestDesk, Requester
-from services.zenoh_bus import open_hub
+from engage_hri.schemas import keys
+from engage_hri.schemas.blocks import Block, BlockOutcome, PerformBlock
+from engage_hri.schemas.faults import EngageError
+from engage_hri.schemas.feedback import BlockProgress
+from engage_hri.schemas.requests import Cancel
+from engage_hri.services.bus import Bus
+from engage_hri.services.requests import RequestDesk, Requester
+from engage_hri.services.zenoh_bus import open_hub
 
 
 def say(*words: object) -> None:

@@ -5,12 +5,12 @@ from typing import Any
 
 from msgspec.structs import replace
 
-from schemas.behaviors import Wait
-from schemas.blocks import Block, BlockOutcome, PerformBlock
-from schemas.body import PerformBehavior
-from schemas.requests import A, Cancel, Request, answering
-from services.memory_bus import MemoryHub
-from services.requests import Pending, RequestDesk
+from engage_hri.schemas.behaviors import Wait
+from engage_hri.schemas.blocks import Block, BlockOutcome, PerformBlock
+from engage_hri.schemas.body import PerformBehavior
+from engage_hri.schemas.requests import A, Cancel, Request, answering
+from engage_hri.services.memory_bus import MemoryHub
+from engage_hri.services.requests import Pending, RequestDesk
 
 
 def block(id: str = "b", requester: str = "client", of: str = "") -> PerformBlock:

@@ -7,12 +7,12 @@ from typing import Any
 
 import zenoh
 
-from schemas.faults import Fault, InputRefused
-from schemas.messages import Message
-from schemas.requests import Accepted
-from services.bus import Bus, Hub, Received, Subscription
-from services.memory_bus import MemoryHub
-from services.zenoh_bus import ZenohHub, open_hub
+from engage_hri.schemas.faults import Fault, InputRefused
+from engage_hri.schemas.messages import Message
+from engage_hri.schemas.requests import Accepted
+from engage_hri.services.bus import Bus, Hub, Received, Subscription
+from engage_hri.services.memory_bus import MemoryHub
+from engage_hri.services.zenoh_bus import ZenohHub, open_hub
 
 PATIENCE = 60.0
 """Seconds until something that must come counts as lost. A limit of failure, never waited for."""

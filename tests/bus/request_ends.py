@@ -4,16 +4,17 @@ import random
 from collections import Counter, defaultdict
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from schemas import keys
-from schemas.behaviors import Wait
-from schemas.blocks import Block, BlockOutcome, InterruptBehavior, PerformBlock
-from schemas.body import BehaviorOutcome, PerformBehavior
-from schemas.faults import EngageError, Fault
-from schemas.requests import Accepted, Answer, Cancel, KeepAlive, Outcome, Refused, Request
-from schemas.units import Stamp
-from services import asking, serving
-from services.asking import Asking, Patience
-from services.serving import Serving
+from engage_hri.schemas import keys
+from engage_hri.schemas.behaviors import Wait
+from engage_hri.schemas.blocks import Block, BlockOutcome, InterruptBehavior, PerformBlock
+from engage_hri.schemas.body import BehaviorOutcome, PerformBehavior
+from engage_hri.schemas.faults import EngageError, Fault
+from engage_hri.schemas.requests import Accepted, Answer, Cancel, KeepAlive, Outcome, Refused, Request
+from engage_hri.schemas.units import Stamp
+from engage_hri.services import asking, serving
+from engage_hri.services.asking import Asking
+from engage_hri.services.patience import Patience
+from engage_hri.services.serving import Serving
 
 if TYPE_CHECKING:
     from tests.bus.request_world import World

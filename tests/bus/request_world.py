@@ -8,10 +8,10 @@ import heapq
 import random
 from collections.abc import Callable
 
-from schemas.faults import EngageError, RunFailed
-from schemas.requests import Answer, KeepAlive, Outcome, Refused, Request
-from services import asking
-from services.asking import NeverEnded, RequestRefused
+from engage_hri.schemas.faults import EngageError, RunFailed
+from engage_hri.schemas.requests import Answer, KeepAlive, Outcome, Refused, Request
+from engage_hri.services import asking
+from engage_hri.services.asking import NeverEnded, RequestRefused
 from tests.bus.request_ends import REQUESTS, Asked, Client, Server
 
 CALM = 150.0

@@ -2,8 +2,8 @@ from math import inf
 
 import pytest
 
-from schemas.units import Stamp
-from services.zenoh_clocks import REFRESH, Clocks
+from engage_hri.schemas.units import Stamp
+from engage_hri.services.zenoh_clocks import REFRESH, Clocks
 
 
 def test_the_own_clock_needs_no_estimate():

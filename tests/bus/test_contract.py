@@ -5,13 +5,13 @@ import threading
 
 import pytest
 
-from schemas import keys
-from schemas.attention import Claim, HeadOwner
-from schemas.faults import NoReply
-from schemas.presence import PeerAlive, PeerGone
-from schemas.requests import Accepted
-from schemas.units import Stamp
-from services.bus import Keep
+from engage_hri.schemas import keys
+from engage_hri.schemas.attention import Claim, HeadOwner
+from engage_hri.schemas.faults import NoReply
+from engage_hri.schemas.presence import PeerAlive, PeerGone
+from engage_hri.schemas.requests import Accepted
+from engage_hri.schemas.units import Stamp
+from engage_hri.services.bus import Keep
 from tests.bus.places import Place, echo, heard, messages, numbers, state, take
 from tests.commanding import command
 

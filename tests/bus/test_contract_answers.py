@@ -4,11 +4,11 @@ import asyncio
 
 import pytest
 
-from schemas import keys
-from schemas.blocks import PerformBlock
-from schemas.faults import Fault, InputRefused, NoReply
-from schemas.messages import encode, encode_json, encoding_of
-from schemas.requests import Accepted, Cancel
+from engage_hri.schemas import keys
+from engage_hri.schemas.blocks import PerformBlock
+from engage_hri.schemas.faults import Fault, InputRefused, NoReply
+from engage_hri.schemas.messages import encode, encode_json, encoding_of
+from engage_hri.schemas.requests import Accepted, Cancel
 from tests.bus.places import Place, echo, messages, numbers, state, take
 
 pytestmark = pytest.mark.each_bus

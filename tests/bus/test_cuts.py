@@ -7,11 +7,11 @@ from collections.abc import AsyncIterator
 import pytest
 import pytest_asyncio
 
-from schemas import keys
-from schemas.blocks import Block, BlockOutcome, PerformBlock
-from schemas.presence import PeerAlive, PeerGone
-from services.requests import RequestDesk, Requester
-from services.zenoh_bus import ZenohHub, open_hub
+from engage_hri.schemas import keys
+from engage_hri.schemas.blocks import Block, BlockOutcome, PerformBlock
+from engage_hri.schemas.presence import PeerAlive, PeerGone
+from engage_hri.services.requests import RequestDesk, Requester
+from engage_hri.services.zenoh_bus import ZenohHub, open_hub
 from tests.bus.cable import Cable
 from tests.bus.places import PATIENCE, acquainted, free_endpoint, messages, numbers, state
 from tests.commanding import command

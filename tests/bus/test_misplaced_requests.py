@@ -5,21 +5,21 @@ from typing import get_args
 
 import pytest
 
-from schemas import keys
-from schemas.attention import Inhibit
-from schemas.behaviors import TurnSignal
-from schemas.blocks import Block, InterruptBehavior, PerformBlock
-from schemas.body import GoHome
-from schemas.fragments import PerformFragment, TurnFragment
-from schemas.messages import COMMANDS, Message
-from schemas.recognition import SignalTurn
-from schemas.requests import Refused, Request
-from schemas.units import Stamp
-from services.commandline.roster import service
-from services.config import Config
-from services.memory_bus import MemoryHub
-from services.requests import Requester, RequestRefused
-from services.runtime import running
+from engage_hri.schemas import keys
+from engage_hri.schemas.attention import Inhibit
+from engage_hri.schemas.behaviors import TurnSignal
+from engage_hri.schemas.blocks import Block, InterruptBehavior, PerformBlock
+from engage_hri.schemas.body import GoHome
+from engage_hri.schemas.fragments import PerformFragment, TurnFragment
+from engage_hri.schemas.messages import COMMANDS, Message
+from engage_hri.schemas.recognition import SignalTurn
+from engage_hri.schemas.requests import Refused, Request
+from engage_hri.schemas.units import Stamp
+from engage_hri.services.commandline.roster import service
+from engage_hri.services.config import Config
+from engage_hri.services.memory_bus import MemoryHub
+from engage_hri.services.requests import Requester, RequestRefused
+from engage_hri.services.runtime import running
 from tests.commanding import command
 
 FRAGMENT = PerformFragment(id="r", requester="test", fragment=TurnFragment(id="f", turn_status="full"))

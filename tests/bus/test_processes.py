@@ -11,12 +11,12 @@ from typing import Any
 import pytest
 import pytest_asyncio
 
-from schemas import keys
-from schemas.blocks import Block, BlockOutcome, PerformBlock
-from schemas.faults import RunFailed
-from schemas.presence import PeerAlive, PeerGone
-from services.requests import Requester
-from services.zenoh_bus import ZenohHub, open_hub
+from engage_hri.schemas import keys
+from engage_hri.schemas.blocks import Block, BlockOutcome, PerformBlock
+from engage_hri.schemas.faults import RunFailed
+from engage_hri.schemas.presence import PeerAlive, PeerGone
+from engage_hri.services.requests import Requester
+from engage_hri.services.zenoh_bus import ZenohHub, open_hub
 from tests.bus.peer import FAR
 from tests.bus.places import PATIENCE, free_endpoint, messages, take
 

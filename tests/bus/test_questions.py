@@ -7,10 +7,10 @@ from collections.abc import AsyncIterator, Callable
 import pytest
 import pytest_asyncio
 
-from schemas import keys
-from services.zenoh_bus import ZenohHub, open_hub
-from services.zenoh_order import Missing, Past
-from services.zenoh_readers import TRIES
+from engage_hri.schemas import keys
+from engage_hri.services.zenoh_bus import ZenohHub, open_hub
+from engage_hri.services.zenoh_order import Missing, Past
+from engage_hri.services.zenoh_readers import TRIES
 from tests.bus.places import acquainted, free_endpoint, messages, numbers, state
 
 pytestmark = pytest.mark.real_time

@@ -7,14 +7,15 @@ from typing import Any
 
 import pytest
 
-from schemas import keys
-from schemas.blocks import Block, BlockOutcome, PerformBlock
-from schemas.faults import Fault
-from schemas.requests import Accepted, Heard, KeepAlive, Kept, Outdated, Refused
-from schemas.units import Stamp
-from services import asking_table, serving_table
-from services.asking import Asking, Patience
-from services.serving import Serving
+from engage_hri.schemas import keys
+from engage_hri.schemas.blocks import Block, BlockOutcome, PerformBlock
+from engage_hri.schemas.faults import Fault
+from engage_hri.schemas.requests import Accepted, Heard, KeepAlive, Kept, Outdated, Refused
+from engage_hri.schemas.units import Stamp
+from engage_hri.services import asking_table, serving_table
+from engage_hri.services.asking import Asking
+from engage_hri.services.patience import Patience
+from engage_hri.services.serving import Serving
 from tests.bus.request_world import World
 
 ROOT = Path(__file__).parents[2]

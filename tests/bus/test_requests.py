@@ -7,15 +7,15 @@ from typing import Any
 
 import pytest
 
-from schemas import keys
-from schemas.blocks import BlockOutcome
-from schemas.faults import Fault, RunFailed
-from schemas.presence import PeerAlive, PeerGone
-from schemas.requests import Accepted, Cancel, Request
-from services.bus import Received
-from services.memory_bus import MemoryBus, MemoryHub
-from services.requests import RequestDesk, Requester, RequestRefused
-from services.serving import ENDED_KEPT, GRACE
+from engage_hri.schemas import keys
+from engage_hri.schemas.blocks import BlockOutcome
+from engage_hri.schemas.faults import Fault, RunFailed
+from engage_hri.schemas.presence import PeerAlive, PeerGone
+from engage_hri.schemas.requests import Accepted, Cancel, Request
+from engage_hri.services.bus import Received
+from engage_hri.services.memory_bus import MemoryBus, MemoryHub
+from engage_hri.services.requests import RequestDesk, Requester, RequestRefused
+from engage_hri.services.serving import ENDED_KEPT, GRACE
 from tests.bus.performer import Server, answered, bare, block, extent
 from tests.commanding import command, key_of
 

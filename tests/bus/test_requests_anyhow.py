@@ -5,13 +5,13 @@ import asyncio
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from schemas import keys
-from schemas.blocks import Block, PerformBlock
-from schemas.faults import EngageError
-from schemas.requests import Outcome
-from services.memory_bus import Faults, MemoryHub
-from services.requests import Requester
-from services.virtual_time import run_virtual
+from engage_hri.schemas import keys
+from engage_hri.schemas.blocks import Block, PerformBlock
+from engage_hri.schemas.faults import EngageError
+from engage_hri.schemas.requests import Outcome
+from engage_hri.services.memory_bus import Faults, MemoryHub
+from engage_hri.services.requests import Requester
+from engage_hri.services.virtual_time import run_virtual
 from tests.bus.performer import Server, block
 
 

@@ -6,20 +6,21 @@ from typing import Any
 import pytest
 from msgspec.structs import replace
 
-from schemas import keys
-from schemas.behaviors import Wait
-from schemas.blocks import Block, BlockOutcome, InterruptBehavior, PerformBlock
-from schemas.body import PerformBehavior
-from schemas.faults import Fault, InputRefused
-from schemas.messages import encode_json
-from schemas.presence import PeerAlive, PeerGone
-from schemas.requests import Accepted, Cancel, Heard, KeepAlive, Kept, Outdated, Refused, Request
-from schemas.units import Stamp
-from services.asking import Asking, Patience, RequestRefused, TellEnd
-from services.asking import Publish as AskedToPublish
-from services.bus import read_payload
-from services.memory_bus import MemoryHub
-from services.serving import LIFELESS_KEPT, Complain, Hand, Names, Publish, Serving
+from engage_hri.schemas import keys
+from engage_hri.schemas.behaviors import Wait
+from engage_hri.schemas.blocks import Block, BlockOutcome, InterruptBehavior, PerformBlock
+from engage_hri.schemas.body import PerformBehavior
+from engage_hri.schemas.faults import Fault, InputRefused
+from engage_hri.schemas.messages import encode_json
+from engage_hri.schemas.presence import PeerAlive, PeerGone
+from engage_hri.schemas.requests import Accepted, Cancel, Heard, KeepAlive, Kept, Outdated, Refused, Request
+from engage_hri.schemas.units import Stamp
+from engage_hri.services.asking import Asking, RequestRefused, TellEnd
+from engage_hri.services.asking import Publish as AskedToPublish
+from engage_hri.services.bus import read_payload
+from engage_hri.services.memory_bus import MemoryHub
+from engage_hri.services.patience import Patience
+from engage_hri.services.serving import LIFELESS_KEPT, Complain, Hand, Names, Publish, Serving
 from tests.bus.performer import Server
 from tests.commanding import key_of
 

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import pytest
 
-from services.cli import main
+from engage_hri.services.cli import main
 
 GOOD_BLOCK = """\
 <bml id="hello">
@@ -52,7 +52,7 @@ def engage(capsys: pytest.CaptureFixture[str]) -> Engage:
 async def start(*arguments: object, stdout: int = PIPE, **settings: str) -> Process:
     """A process of its own, with its log on stderr. settings: environment variables."""
     return await asyncio.create_subprocess_exec(
-        *(sys.executable, "-m", "services", *map(str, arguments)),
+        *(sys.executable, "-m", "engage_hri", *map(str, arguments)),
         stdin=PIPE, stdout=stdout, stderr=PIPE, env={**os.environ, **settings},
     )  # fmt: skip
 

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from schemas.blocks import Block
-from schemas.feedback_xml import decode_feedback
-from schemas.json_codec import read
+from engage_hri.schemas.blocks import Block
+from engage_hri.schemas.feedback_xml import decode_feedback
+from engage_hri.schemas.json_codec import read
 from tests.cli.command import FRAGMENT, GOOD_BLOCK, Engage
 from tests.schemas.grammar import violations
 

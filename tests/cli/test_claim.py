@@ -6,10 +6,10 @@ from contextlib import asynccontextmanager
 
 import pytest
 
-from schemas.faults import InputRefused
-from schemas.presence import PeerAlive, PeerGone
-from services.commandline.claim import PATIENCE, Claim, claiming
-from services.memory_bus import MemoryHub
+from engage_hri.schemas.faults import InputRefused
+from engage_hri.schemas.presence import PeerAlive, PeerGone
+from engage_hri.services.commandline.claim import PATIENCE, Claim, claiming
+from engage_hri.services.memory_bus import MemoryHub
 
 EARLY, LATE = "00000000", "ffffffff"
 

@@ -5,8 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from schemas.faults import InputRefused
-from services.config import Config, load
+from engage_hri.schemas.faults import InputRefused
+from engage_hri.services.config import Config, load
 
 ROOT = Path(__file__).parents[2]
 

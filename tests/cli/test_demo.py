@@ -27,7 +27,7 @@ def played(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
 
     folder = tmp_path_factory.mktemp("demo")
     done = subprocess.run(
-        [sys.executable, "-m", "services", *VIRTUAL, "--seed", "1",
+        [sys.executable, "-m", "engage_hri", *VIRTUAL, "--seed", "1",
          "--events", folder / "events.jsonl", "--feedback", folder / "feedback.jsonl"],
         capture_output=True, text=True, timeout=120, check=False,
     )  # fmt: skip

@@ -4,8 +4,8 @@ import asyncio
 
 import pytest
 
-from services.control.body import BodyState
-from services.control.simulated import SimulatedBody
+from engage_hri.services.control.body import BodyState
+from engage_hri.services.control.simulated import SimulatedBody
 from tests.cli.command import Engage
 
 
@@ -42,7 +42,7 @@ def test_what_goes_wrong_is_told_with_the_command_that_does_it_again(engage: Eng
     [
         ("--only", "kindness", "no attack 'kindness' (one of messages, requests, body)"),
         ("--body", "nowhere:Body", "no body 'nowhere:Body'"),
-        ("--body", "services.control.body:sync_points", "is no class of a Body"),
+        ("--body", "engage_hri.services.control.body:sync_points", "is no class of a Body"),
     ],
 )
 def test_what_is_no_attack_is_refused(engage: Engage, option: str, value: str, reason: str) -> None:

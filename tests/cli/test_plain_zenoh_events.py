@@ -7,10 +7,10 @@ from collections.abc import Iterable
 
 import pytest
 
-from services.client import connect
-from services.feeds import EventFeed
-from services.zenoh_bus import ZenohHub
-from services.zenoh_session import open_session
+from engage_hri.services.client import connect
+from engage_hri.services.feeds import EventFeed
+from engage_hri.services.zenoh_bus import ZenohHub
+from engage_hri.services.zenoh_session import open_session
 from tests.bus.cable import Cable
 from tests.bus.places import free_endpoint
 from tests.cli.test_processes import PATIENCE, line, stopped

@@ -4,13 +4,13 @@ import asyncio
 
 import pytest
 
-from schemas.behaviors import Event, EventKind
-from schemas.blocks import Block
-from schemas.feedback import SyncPointProgress
-from schemas.fragments import TurnFragment
-from schemas.recognition import ConnectionEvent, EventState
-from schemas.units import Seconds, Stamp
-from services.commandline.played import GRACE, Played
+from engage_hri.schemas.behaviors import Event, EventKind
+from engage_hri.schemas.blocks import Block
+from engage_hri.schemas.feedback import SyncPointProgress
+from engage_hri.schemas.fragments import TurnFragment
+from engage_hri.schemas.recognition import ConnectionEvent, EventState
+from engage_hri.schemas.units import Seconds, Stamp
+from engage_hri.services.commandline.played import GRACE, Played
 
 
 def event(state: EventState, kind: EventKind = "adjacency_pair", *, block: str = "ask") -> ConnectionEvent:

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from services.commandline.roster import NAMES
+from engage_hri.services.commandline.roster import NAMES
 from tests.bus.places import free_endpoint
 from tests.cli.command import FRAGMENT, GOOD_BLOCK, start, threads
 

@@ -10,15 +10,15 @@ from pathlib import Path
 import pytest
 from rich.console import Console
 
-from services.commandline import session as playing
-from services.commandline import simulate, workers
-from services.commandline.session import Order, Played, play
-from services.commandline.workers import play_all
-from services.config import Config
-from services.study import summary
-from services.study.hypotheses import Finding
-from services.study.records import SessionRecord
-from services.virtual_time import Deadlock
+from engage_hri.services.commandline import session as playing
+from engage_hri.services.commandline import simulate, workers
+from engage_hri.services.commandline.session import Order, Played, play
+from engage_hri.services.commandline.workers import play_all
+from engage_hri.services.config import Config
+from engage_hri.services.study import summary
+from engage_hri.services.study.hypotheses import Finding
+from engage_hri.services.study.records import SessionRecord
+from engage_hri.services.virtual_time import Deadlock
 from tests.cli.command import Engage, start, threads
 
 PEOPLE = ("--human", "table-2-1")
@@ -173,7 +173,7 @@ def test_a_directory_that_cannot_be_is_refused(engage: Engage, tmp_path: Path) -
 def test_without_matplotlib_nothing_is_played(
     engage: Engage, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.delitem(sys.modules, "services.study.plots", raising=False)
+    monkeypatch.delitem(sys.modules, "engage_hri.services.study.plots", raising=False)
     for name in [name for name in sys.modules if name.split(".")[0] == "matplotlib"]:
         monkeypatch.delitem(sys.modules, name)
     monkeypatch.setitem(sys.modules, "matplotlib", None)

@@ -5,8 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from schemas.tool import definition
-from services.simulation.still import tangram_world
+from engage_hri.schemas.tool import tool_definition
+from engage_hri.services.simulation.still import tangram_world
 from tests.cli.command import FRAGMENT, Engage
 
 CALL = {"turn_status": "full", "parts": [{"say": "Do you see"}, {"refer": "trapezoid", "certainty": "high"}]}
@@ -25,7 +25,7 @@ def test_the_tool_is_printed_in_the_form_of_each_api(engage: Engage, format: str
     result = engage("tool", "--format", format)
 
     assert result.code == 0
-    assert json.loads(result.out) == definition(format)  # type: ignore[arg-type]
+    assert json.loads(result.out) == tool_definition(format)  # type: ignore[arg-type]
 
 
 def test_a_world_leaves_only_its_ids(engage: Engage, tmp_path: Path) -> None:
@@ -116,6 +116,6 @@ def test_a_bad_call_is_one_line_with_its_path(engage: Engage, tmp_path: Path) ->
 
 
 def test_ids_of_the_tangram_stand_in_its_tool() -> None:
-    text = json.dumps(definition(world=tangram_world()))
+    text = json.dumps(tool_definition(world=tangram_world()))
 
     assert all(f'"{thing.id}"' in text for thing in tangram_world().objects)

@@ -15,13 +15,13 @@ from typing import Any, NamedTuple
 import msgspec
 import pytest
 
-from schemas import keys, lines
-from schemas.actions import ActionBegan, ActionEnded
-from schemas.recognition import ConnectionEvent
-from services.bus import Bus
-from services.client import Robot, connect
-from services.feeds import EventFeed
-from services.zenoh_bus import open_hub
+from engage_hri.schemas import keys, lines
+from engage_hri.schemas.actions import ActionBegan, ActionEnded
+from engage_hri.schemas.recognition import ConnectionEvent
+from engage_hri.services.bus import Bus
+from engage_hri.services.client import Robot, connect
+from engage_hri.services.feeds import EventFeed
+from engage_hri.services.zenoh_bus import open_hub
 from tests.bus.places import free_endpoint
 from tests.cli.command import engage, start
 from tests.cli.test_processes import PATIENCE, line, stopped

@@ -5,12 +5,12 @@ from collections.abc import Iterator
 import pytest
 from msgspec.structs import replace
 
-from schemas.behaviors import Gaze, Reference, Speech
-from schemas.fragments import TurnFragment
-from schemas.world import Entity
-from services.collaboration import appendix_b
-from services.collaboration.config import CollaborationConfig
-from services.collaboration.plans import (
+from engage_hri.schemas.behaviors import Gaze, Reference, Speech
+from engage_hri.schemas.fragments import TurnFragment
+from engage_hri.schemas.world import Entity
+from engage_hri.services.collaboration import appendix_b
+from engage_hri.services.collaboration.config import CollaborationConfig
+from engage_hri.services.collaboration.plans import (
     AwaitDeparture,
     AwaitPerson,
     AwaitPlacement,
@@ -22,7 +22,7 @@ from services.collaboration.plans import (
     script,
     task,
 )
-from services.tangram_table import poses_touching, tangram_table
+from engage_hri.services.tangram_table import poses_touching, tangram_table
 
 TABLE = tangram_table()
 UNIVERSE = {piece.id for piece in TABLE.pieces}
@@ -243,7 +243,7 @@ def test_the_task_gives_a_piece_up_after_its_attempts_and_says_so() -> None:
 
 
 def test_every_fragment_is_a_legal_one() -> None:
-    from schemas.check import check
+    from engage_hri.schemas.check import check
 
     for fragment in scripted(Player(wrong=1, idle=1)).values():
         check(fragment)

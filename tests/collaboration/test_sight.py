@@ -8,12 +8,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from msgspec.structs import replace
 
-from schemas.world import Entity, World
-from services.collaboration.placement import has_been_placed
-from services.collaboration.relations import Relation, relation
-from services.collaboration.sight import Sight
-from services.collaboration.task import Instruction, check
-from services.tangram_table import tangram_table
+from engage_hri.schemas.world import Entity, World
+from engage_hri.services.collaboration.placement import has_been_placed
+from engage_hri.services.collaboration.relations import Relation, relation
+from engage_hri.services.collaboration.sight import Sight
+from engage_hri.services.collaboration.task import Instruction, check
+from engage_hri.services.tangram_table import tangram_table
 
 TABLE = tangram_table()
 GOAL = {entity.id: entity for entity in TABLE.figure()}

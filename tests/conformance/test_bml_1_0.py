@@ -4,10 +4,10 @@ from pathlib import Path
 
 import pytest
 
-from schemas.blocks import Block
-from schemas.dialects import core, spelled
-from schemas.json_codec import read
-from schemas.xml_encode import encode_xml
+from engage_hri.schemas.blocks import Block
+from engage_hri.schemas.dialects import core, spelled
+from engage_hri.schemas.json_codec import read
+from engage_hri.schemas.xml_encode import encode_xml
 from tests.conformance.case import Case, cases
 from tests.schemas.grammar import violations
 

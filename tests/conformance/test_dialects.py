@@ -8,15 +8,15 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from msgspec import structs
 
-from schemas import behaviors as of
-from schemas.blocks import Block
-from schemas.dialects import spelled
-from schemas.faults import InputRefused
-from schemas.json_codec import encode_json, read
-from schemas.references import type_name, without_lines
-from schemas.syncref import SYNC_POINTS, SyncRef, dialect_sync
-from schemas.xml_codec import encode_xml
-from services.realizer.planner import Plan, plan_block
+from engage_hri.schemas import behaviors as of
+from engage_hri.schemas.blocks import Block
+from engage_hri.schemas.dialects import spelled
+from engage_hri.schemas.faults import InputRefused
+from engage_hri.schemas.json_codec import encode_json, read
+from engage_hri.schemas.references import type_name, without_lines
+from engage_hri.schemas.syncref import SYNC_POINTS, SyncRef, dialect_sync
+from engage_hri.schemas.xml_codec import encode_xml
+from engage_hri.services.realizer.planner import Plan, plan_block
 from tests.conformance.case import Case, cases
 from tests.schemas.grammar import violations
 

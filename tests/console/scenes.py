@@ -3,13 +3,13 @@
 from collections.abc import Callable, Iterable
 from typing import TypeVar
 
-from schemas.actions import ActionBegan, ActionEnded
-from schemas.attention import Claim, HeadOwner
-from schemas.body import WordSpoken
-from schemas.feedback import BlockProgress, PlannedPoint, PredictionFeedback, SyncPointProgress
-from schemas.messages import Message
-from schemas.recognition import ConnectionEvent, Statistics, WindowStatistics
-from schemas.units import Seconds, Stamp
+from engage_hri.schemas.actions import ActionBegan, ActionEnded
+from engage_hri.schemas.attention import Claim, HeadOwner
+from engage_hri.schemas.body import WordSpoken
+from engage_hri.schemas.feedback import BlockProgress, PlannedPoint, PredictionFeedback, SyncPointProgress
+from engage_hri.schemas.messages import Message
+from engage_hri.schemas.recognition import ConnectionEvent, Statistics, WindowStatistics
+from engage_hri.schemas.units import Seconds, Stamp
 
 Timed = tuple[Message, Seconds]
 

@@ -4,13 +4,13 @@ import msgspec
 import pytest
 from rich.console import Console
 
-from schemas.feedback import WarningFeedback
-from schemas.fragments import FragmentOutcome
-from schemas.messages import Message
-from schemas.recognition import Statistics, WindowStatistics
-from schemas.units import Seconds
-from services.console import log, tally, view
-from services.console.log import Telling
+from engage_hri.schemas.feedback import WarningFeedback
+from engage_hri.schemas.fragments import FragmentOutcome
+from engage_hri.schemas.messages import Message
+from engage_hri.schemas.recognition import Statistics, WindowStatistics
+from engage_hri.schemas.units import Seconds
+from engage_hri.services.console import log, tally, view
+from engage_hri.services.console.log import Telling
 from tests.console.scenes import SCENE, at, event, fed
 
 

@@ -7,11 +7,11 @@ import msgspec
 import pytest
 from rich.console import Console
 
-from schemas.actions import ActionBegan, ActionEnded, ActorLost
-from schemas.attention import Claim
-from schemas.feedback import BlockProgress, PlannedPoint, PredictionFeedback, SyncPointProgress
-from services.console import view
-from services.console.render import render
+from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorLost
+from engage_hri.schemas.attention import Claim
+from engage_hri.schemas.feedback import BlockProgress, PlannedPoint, PredictionFeedback, SyncPointProgress
+from engage_hri.services.console import view
+from engage_hri.services.console.render import render
 from tests.console.scenes import SCENE, at, event, fed
 
 

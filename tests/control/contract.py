@@ -14,7 +14,7 @@ from itertools import pairwise
 import msgspec
 import pytest
 
-from schemas.behaviors import (
+from engage_hri.schemas.behaviors import (
     BlockBehavior,
     FaceLexeme,
     Gaze,
@@ -29,9 +29,9 @@ from schemas.behaviors import (
     Speech,
     Wait,
 )
-from schemas.references import type_name
-from schemas.world import Entity, World
-from services.control.body import (
+from engage_hri.schemas.references import type_name
+from engage_hri.schemas.world import Entity, World
+from engage_hri.services.control.body import (
     Arrived,
     Authority,
     BehaviorRefused,

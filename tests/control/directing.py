@@ -5,17 +5,17 @@ from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from functools import partial
 
-from schemas import keys
-from schemas.actions import ActionBegan, ActionEnded
-from schemas.body import BehaviorOutcome, PerformBehavior, RobotState, SyncPointReached
-from schemas.messages import Message
-from schemas.world import World
-from services.bus import Bus
-from services.control.config import ControlConfig
-from services.control.service import embody
-from services.memory_bus import MemoryHub
-from services.requests import Pending, Requester
-from services.runtime import running
+from engage_hri.schemas import keys
+from engage_hri.schemas.actions import ActionBegan, ActionEnded
+from engage_hri.schemas.body import BehaviorOutcome, PerformBehavior, RobotState, SyncPointReached
+from engage_hri.schemas.messages import Message
+from engage_hri.schemas.world import World
+from engage_hri.services.bus import Bus
+from engage_hri.services.control.config import ControlConfig
+from engage_hri.services.control.service import embody
+from engage_hri.services.memory_bus import MemoryHub
+from engage_hri.services.requests import Pending, Requester
+from engage_hri.services.runtime import running
 from tests.control.contract import WORLD
 
 

@@ -6,8 +6,8 @@ from contextlib import asynccontextmanager
 
 import numpy as np
 
-from schemas.body import JointLimit
-from services.control.body import Body
+from engage_hri.schemas.body import JointLimit
+from engage_hri.services.control.body import Body
 
 STEP = 0.004
 """Seconds between two samples."""

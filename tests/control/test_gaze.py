@@ -6,11 +6,11 @@ import math
 import msgspec
 import pytest
 
-from schemas.behaviors import Gaze, GazeShift, Head, PostureShift
-from schemas.units import Vector
-from schemas.world import World
-from services.control.body import Arrived, Reached, sync_points
-from services.control.simulated import SimulatedBody
+from engage_hri.schemas.behaviors import Gaze, GazeShift, Head, PostureShift
+from engage_hri.schemas.units import Vector
+from engage_hri.schemas.world import World
+from engage_hri.services.control.body import Arrived, Reached, sync_points
+from engage_hri.services.control.simulated import SimulatedBody
 from tests.control.contract import WORLD, Stage, performed, times
 from tests.control.motions import recorded, stops, violations
 

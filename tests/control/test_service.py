@@ -6,10 +6,10 @@ from typing import Any
 
 import pytest
 
-from schemas import keys
-from schemas.actions import ActionBegan
-from schemas.behaviors import Emit, Gaze, GazeShift, Head, Mark, Pointing, Speech, Wait
-from schemas.body import (
+from engage_hri.schemas import keys
+from engage_hri.schemas.actions import ActionBegan
+from engage_hri.schemas.behaviors import Emit, Gaze, GazeShift, Head, Mark, Pointing, Speech, Wait
+from engage_hri.schemas.body import (
     AbortBehavior,
     BehaviorOutcome,
     Capabilities,
@@ -25,13 +25,13 @@ from schemas.body import (
     SyncPointReached,
     WordSpoken,
 )
-from schemas.faults import Fault, InputRefused
-from schemas.requests import Outcome
-from schemas.world import World
-from services.control.config import Displaced, Slow, Variability
-from services.memory_bus import MemoryHub
-from services.requests import RequestRefused
-from services.virtual_time import VirtualTimeLoop
+from engage_hri.schemas.faults import Fault, InputRefused
+from engage_hri.schemas.requests import Outcome
+from engage_hri.schemas.world import World
+from engage_hri.services.control.config import Displaced, Slow, Variability
+from engage_hri.services.memory_bus import MemoryHub
+from engage_hri.services.requests import RequestRefused
+from engage_hri.services.virtual_time import VirtualTimeLoop
 from tests.commanding import command
 from tests.control.contract import WORLD
 from tests.control.directing import robot, tip

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from schemas.behaviors import (
+from engage_hri.schemas.behaviors import (
     BlockBehavior,
     FaceFacs,
     FaceLexeme,
@@ -24,12 +24,12 @@ from schemas.behaviors import (
     Posture,
     Speech,
 )
-from schemas.body import NoPointZone
-from schemas.world import Entity, World
-from services.control.body import Arrived, Authority, BehaviorRefused, sync_points
-from services.control.simulated import SimulatedBody
-from services.control.waiting import Bell
-from services.virtual_time import run_virtual
+from engage_hri.schemas.body import NoPointZone
+from engage_hri.schemas.world import Entity, World
+from engage_hri.services.control.body import Arrived, Authority, BehaviorRefused, sync_points
+from engage_hri.services.control.simulated import SimulatedBody
+from engage_hri.services.control.waiting import Bell
+from engage_hri.services.virtual_time import run_virtual
 from tests.control.contract import WORLD, Stage, default, performed, times
 from tests.control.motions import recorded, stops, violations
 

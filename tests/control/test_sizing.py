@@ -7,13 +7,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from schemas.behaviors import BlockBehavior, Gaze, Gesture, Head, Pointing
-from schemas.body import Estimate
-from services.control.body import Authority, Body, sync_points
-from services.control.config import Slow, Variability
-from services.control.simulated import SimulatedBody
-from services.control.sizing import SIZES
-from services.virtual_time import run_virtual
+from engage_hri.schemas.behaviors import BlockBehavior, Gaze, Gesture, Head, Pointing
+from engage_hri.schemas.body import Estimate
+from engage_hri.services.control.body import Authority, Body, sync_points
+from engage_hri.services.control.config import Slow, Variability
+from engage_hri.services.control.simulated import SimulatedBody
+from engage_hri.services.control.sizing import SIZES
+from engage_hri.services.virtual_time import run_virtual
 from tests.control.contract import WORLD, times
 from tests.control.motions import Recording, recorded, violations
 

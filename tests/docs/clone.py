@@ -13,7 +13,7 @@ from typing import NamedTuple
 ROOT = Path(__file__).parents[2]
 RENDEZVOUS = "tcp/127.0.0.1:7447"
 """Where all that runs on this machine would meet, other runs of these tests too."""
-HOLDS = ("schemas", "services", "examples", "docs", "Makefile", "pyproject.toml", "constraints.txt")
+HOLDS = ("engage_hri", "schemas", "services", "examples", "docs", "Makefile", "pyproject.toml", "constraints.txt")
 PATIENCE = 120.0
 """Seconds. A limit of failure, never waited for."""
 
@@ -34,7 +34,7 @@ class Clone:
         self._copy.mkdir(parents=True)
         for name in HOLDS:
             if (ROOT / name).is_dir():
-                shutil.copytree(ROOT / name, self._copy / name)
+                shutil.copytree(ROOT / name, self._copy / name, symlinks=True)
             else:
                 shutil.copy2(ROOT / name, self._copy / name)
         for path in self._copy.rglob("*.py"):
@@ -46,7 +46,7 @@ class Clone:
         programs = self._copy / ".venv" / "bin"
         programs.mkdir(parents=True)
         python = f'PYTHONPATH="{self._copy}" exec "{sys.executable}"'
-        for name, call in {"python": f'{python} "$@"', "engage": f'{python} -m services "$@"'}.items():
+        for name, call in {"python": f'{python} "$@"', "engage": f'{python} -m engage_hri "$@"'}.items():
             (programs / name).write_text(f"#!/bin/sh\n{call}\n")
             (programs / name).chmod(0o755)
         (programs.parent / ".ready").touch()  # make has nothing to do

@@ -14,8 +14,8 @@ from pathlib import Path
 import msgspec
 import pytest
 
-from schemas.feedback_xml import decode_feedback
-from schemas.summary import Summary
+from engage_hri.schemas.feedback_xml import decode_feedback
+from engage_hri.schemas.summary import Summary
 from tests.bus.places import free_endpoint
 from tests.cli.command import GOOD_BLOCK
 from tests.docs.clone import PATIENCE, ROOT, Clone, Ended, run, run_until_it_prints, start, tell
@@ -61,8 +61,8 @@ ENDLESS = {"up": 0, "run": 0, "watch": 0, "demo": 130}
 the beginning is enough."""
 TALK = """\
 from contextlib import suppress
-from schemas.faults import InputRefused
-from services.client import connect
+from engage_hri.schemas.faults import InputRefused
+from engage_hri.services.client import connect
 
 async with connect() as robot:
     await robot.person()

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from schemas.behaviors import (
+from engage_hri.schemas.behaviors import (
     After,
     Before,
     Behavior,
@@ -11,14 +11,14 @@ from schemas.behaviors import (
     SpeechOption,
     Synchronize,
 )
-from schemas.blocks import Block
-from schemas.check import check
-from schemas.fragments import GestureChoice, ReferenceChoice, TurnFragment
-from services.generation.config import GenerationConfig
-from services.generation.emission import Emission, emit
-from services.generation.permits import Permits
-from services.generation.trail import NOTHING, Trail
-from services.generation.turn_policy import plan_turn
+from engage_hri.schemas.blocks import Block
+from engage_hri.schemas.check import check
+from engage_hri.schemas.fragments import GestureChoice, ReferenceChoice, TurnFragment
+from engage_hri.services.generation.config import GenerationConfig
+from engage_hri.services.generation.emission import Emission, emit
+from engage_hri.services.generation.permits import Permits
+from engage_hri.services.generation.trail import NOTHING, Trail
+from engage_hri.services.generation.turn_policy import plan_turn
 
 POINT: GestureChoice = "directed_gaze_with_pointing"
 LOOK: GestureChoice = "directed_gaze"

@@ -2,15 +2,15 @@
 
 from collections.abc import Callable
 
-from schemas.actions import ActionBegan, ActionEnded
-from schemas.attention import Claim
-from schemas.body import BodyPose, Ray, RobotState
-from schemas.recognition import ConnectionEvent, Statistics, WindowStatistics
-from schemas.units import Seconds, Stamp, Vector
-from schemas.world import Entity, World
-from services.generation.arbiter import Arbiter, Ruling
-from services.generation.config import GenerationConfig
-from services.generation.leases import Inhibition
+from engage_hri.schemas.actions import ActionBegan, ActionEnded
+from engage_hri.schemas.attention import Claim
+from engage_hri.schemas.body import BodyPose, Ray, RobotState
+from engage_hri.schemas.recognition import ConnectionEvent, Statistics, WindowStatistics
+from engage_hri.schemas.units import Seconds, Stamp, Vector
+from engage_hri.schemas.world import Entity, World
+from engage_hri.services.generation.arbiter import Arbiter, Ruling
+from engage_hri.services.generation.config import GenerationConfig
+from engage_hri.services.generation.leases import Inhibition
 
 AT = Stamp("test", 0.0)
 

@@ -11,10 +11,10 @@ from itertools import product
 from math import dist
 from typing import NamedTuple
 
-from schemas.behaviors import Reference
-from services.generation.config import Channel
-from services.generation.motions import HERE, Motions
-from services.generation.reference_policy import Scene
+from engage_hri.schemas.behaviors import Reference
+from engage_hri.services.generation.config import Channel
+from engage_hri.services.generation.motions import HERE, Motions
+from engage_hri.services.generation.reference_policy import Scene
 from tests.generation.tables import body, flat_world, scene
 
 HEAD, ARM, WORD, WAIT = 6, 10, 210, 180

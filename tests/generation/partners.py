@@ -6,12 +6,12 @@ from contextlib import asynccontextmanager
 from functools import partial
 from typing import Any
 
-from schemas import keys
-from schemas.actions import ActionBegan
-from schemas.attention import HeadOwner
-from schemas.behaviors import Gaze, GazeShift, Pointing
-from schemas.blocks import Block, BlockOutcome, PerformBlock
-from schemas.body import (
+from engage_hri.schemas import keys
+from engage_hri.schemas.actions import ActionBegan
+from engage_hri.schemas.attention import HeadOwner
+from engage_hri.schemas.behaviors import Gaze, GazeShift, Pointing
+from engage_hri.schemas.blocks import Block, BlockOutcome, PerformBlock
+from engage_hri.schemas.body import (
     AbortBehavior,
     BehaviorAborted,
     BodyPose,
@@ -23,20 +23,20 @@ from schemas.body import (
     JointAngle,
     Ray,
 )
-from schemas.faults import Fault
-from schemas.feedback import BlockProgress, SyncPointProgress, WarningFeedback
-from schemas.fragments import PerformFragment, TurnFragment
-from schemas.messages import Message
-from schemas.recognition import ConnectionEvent, SignalTurn, TurnOutcome
-from schemas.requests import Cancel
-from schemas.units import Vector
-from schemas.world import Entity, World
-from services.bus import Bus
-from services.generation.config import GenerationConfig
-from services.generation.service import generate
-from services.memory_bus import MemoryHub
-from services.requests import Pending, RequestDesk, Requester
-from services.runtime import Ready, running
+from engage_hri.schemas.faults import Fault
+from engage_hri.schemas.feedback import BlockProgress, SyncPointProgress, WarningFeedback
+from engage_hri.schemas.fragments import PerformFragment, TurnFragment
+from engage_hri.schemas.messages import Message
+from engage_hri.schemas.recognition import ConnectionEvent, SignalTurn, TurnOutcome
+from engage_hri.schemas.requests import Cancel
+from engage_hri.schemas.units import Vector
+from engage_hri.schemas.world import Entity, World
+from engage_hri.services.bus import Bus
+from engage_hri.services.generation.config import GenerationConfig
+from engage_hri.services.generation.service import generate
+from engage_hri.services.memory_bus import MemoryHub
+from engage_hri.services.requests import Pending, RequestDesk, Requester
+from engage_hri.services.runtime import Ready, running
 
 EYES: Vector = (0.0, 0.0, 1.2)
 HUMAN = Entity(id="human", kind="person", position=(1.3, 0.0, 1.2))

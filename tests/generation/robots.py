@@ -5,27 +5,27 @@ from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from functools import partial
 
-from schemas import keys
-from schemas.actions import ActionBegan, ActionEnded, ActorFound
-from schemas.attention import HeadOwner
-from schemas.behaviors import Action, FragmentBehavior, Reference, Speech, SpeechOption
-from schemas.blocks import PerformBlock
-from schemas.feedback import BlockProgress, SyncPointProgress, WarningFeedback
-from schemas.fragments import FragmentOutcome, PerformFragment, TurnClosed, TurnFragment
-from schemas.recognition import ConnectionEvent, SignalTurn
-from schemas.world import World
-from services.control.body import Body
-from services.control.config import ControlConfig, Variability
-from services.control.service import embody
-from services.generation.config import GenerationConfig
-from services.generation.service import generate
-from services.memory_bus import MemoryHub
-from services.realizer.config import RealizerConfig
-from services.realizer.service import realize
-from services.recognition.config import RecognitionConfig
-from services.recognition.service import recognize
-from services.requests import Pending, Requester
-from services.runtime import Service, running
+from engage_hri.schemas import keys
+from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound
+from engage_hri.schemas.attention import HeadOwner
+from engage_hri.schemas.behaviors import Action, FragmentBehavior, Reference, Speech, SpeechOption
+from engage_hri.schemas.blocks import PerformBlock
+from engage_hri.schemas.feedback import BlockProgress, SyncPointProgress, WarningFeedback
+from engage_hri.schemas.fragments import FragmentOutcome, PerformFragment, TurnClosed, TurnFragment
+from engage_hri.schemas.recognition import ConnectionEvent, SignalTurn
+from engage_hri.schemas.world import World
+from engage_hri.services.control.body import Body
+from engage_hri.services.control.config import ControlConfig, Variability
+from engage_hri.services.control.service import embody
+from engage_hri.services.generation.config import GenerationConfig
+from engage_hri.services.generation.service import generate
+from engage_hri.services.memory_bus import MemoryHub
+from engage_hri.services.realizer.config import RealizerConfig
+from engage_hri.services.realizer.service import realize
+from engage_hri.services.recognition.config import RecognitionConfig
+from engage_hri.services.recognition.service import recognize
+from engage_hri.services.requests import Pending, Requester
+from engage_hri.services.runtime import Service, running
 from tests.generation.emitted import lines
 from tests.generation.partners import TABLE
 

@@ -2,13 +2,13 @@
 
 from collections.abc import Callable, Mapping, Sequence
 
-from schemas.behaviors import Reference, SpeechOption
-from schemas.body import Estimate, Ray
-from schemas.faults import Fault
-from schemas.units import Vector
-from schemas.world import Entity, World
-from services.generation.motions import HERE, Motions
-from services.generation.reference_policy import Scene
+from engage_hri.schemas.behaviors import Reference, SpeechOption
+from engage_hri.schemas.body import Estimate, Ray
+from engage_hri.schemas.faults import Fault
+from engage_hri.schemas.units import Vector
+from engage_hri.schemas.world import Entity, World
+from engage_hri.services.generation.motions import HERE, Motions
+from engage_hri.services.generation.reference_policy import Scene
 
 TANGRAMS = (
     "pink-triangle", "purple-triangle", "yellow-triangle", "red-square", "blue-square", "pink-square",

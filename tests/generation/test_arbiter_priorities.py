@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from schemas.world import Entity, World
+from engage_hri.schemas.world import Entity, World
 from tests.generation.heads import (
     INHIBITED,
     Stage,

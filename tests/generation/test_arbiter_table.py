@@ -8,8 +8,8 @@ from typing import NamedTuple
 
 import pytest
 
-from schemas.actions import ActorLost
-from schemas.world import Entity, World
+from engage_hri.schemas.actions import ActorLost
+from engage_hri.schemas.world import Entity, World
 from tests.generation.heads import AT, Stage, act, event, inhibition, on_the_face, statistics, world
 
 Change = Callable[[Stage], None]

@@ -5,9 +5,9 @@ from pathlib import Path
 
 import pytest
 
-from schemas.faults import InputRefused
-from services.config import load
-from services.generation.config import GenerationConfig
+from engage_hri.schemas.faults import InputRefused
+from engage_hri.services.config import load
+from engage_hri.services.generation.config import GenerationConfig
 
 
 @dataclass

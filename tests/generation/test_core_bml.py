@@ -6,31 +6,31 @@ from hypothesis import HealthCheck, assume, given, reject, settings
 from hypothesis import strategies as st
 from msgspec.structs import replace
 
-from schemas import behaviors as of
-from schemas import keys
-from schemas.blocks import Block, BlockOutcome, PerformBlock
-from schemas.dialects import core, spelled
-from schemas.faults import InputRefused
-from schemas.feedback import BlockProgress, Feedback, SyncPointProgress, WarningFeedback
-from schemas.feedback_xml import encode_feedback
-from schemas.fragments import TurnFragment
-from schemas.references import type_name
-from schemas.syncref import SyncRef, dialect_sync
-from schemas.units import Seconds
-from schemas.xml_codec import decode_xml, encode_xml
-from services.commandline.generating import generated
-from services.commandline.plan import estimated
-from services.commandline.roster import service
-from services.commandline.sources import still
-from services.config import Config, load
-from services.memory_bus import MemoryHub
-from services.realizer.planner import Plan, plan_block
-from services.realizer.points import Point, sync_points
-from services.realizer.schedule import EPSILON
-from services.requests import Requester
-from services.runtime import Service, running
-from services.simulation.still import tangram_world
-from services.virtual_time import run_virtual
+from engage_hri.schemas import behaviors as of
+from engage_hri.schemas import keys
+from engage_hri.schemas.blocks import Block, BlockOutcome, PerformBlock
+from engage_hri.schemas.dialects import core, spelled
+from engage_hri.schemas.faults import InputRefused
+from engage_hri.schemas.feedback import BlockProgress, Feedback, SyncPointProgress, WarningFeedback
+from engage_hri.schemas.feedback_xml import encode_feedback
+from engage_hri.schemas.fragments import TurnFragment
+from engage_hri.schemas.references import type_name
+from engage_hri.schemas.syncref import SyncRef, dialect_sync
+from engage_hri.schemas.units import Seconds
+from engage_hri.schemas.xml_codec import decode_xml, encode_xml
+from engage_hri.services.commandline.generating import generated
+from engage_hri.services.commandline.plan import estimated
+from engage_hri.services.commandline.roster import service
+from engage_hri.services.commandline.sources import still
+from engage_hri.services.config import Config, load
+from engage_hri.services.memory_bus import MemoryHub
+from engage_hri.services.realizer.planner import Plan, plan_block
+from engage_hri.services.realizer.points import Point, sync_points
+from engage_hri.services.realizer.schedule import EPSILON
+from engage_hri.services.requests import Requester
+from engage_hri.services.runtime import Service, running
+from engage_hri.services.simulation.still import tangram_world
+from engage_hri.services.virtual_time import run_virtual
 from tests.schemas.grammar import violations
 
 WORLD = tangram_world()

@@ -2,7 +2,7 @@
 
 import pytest
 
-from schemas.behaviors import (
+from engage_hri.schemas.behaviors import (
     After,
     Before,
     Constraint,
@@ -15,7 +15,7 @@ from schemas.behaviors import (
     Synchronize,
     Timing,
 )
-from schemas.fragments import TurnFragment
+from engage_hri.schemas.fragments import TurnFragment
 from tests.generation.emitted import LOOK, POINT, Made, block, by_id, lines, reference, speech
 
 # -- profile check-back -----------------------------------------------------------------------------------------

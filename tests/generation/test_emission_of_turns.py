@@ -2,7 +2,7 @@
 
 import pytest
 
-from schemas.behaviors import (
+from engage_hri.schemas.behaviors import (
     After,
     Constraint,
     Event,
@@ -14,8 +14,8 @@ from schemas.behaviors import (
     Timing,
     TurnSignal,
 )
-from schemas.fragments import TurnFragment
-from services.generation.permits import Permits
+from engage_hri.schemas.fragments import TurnFragment
+from engage_hri.services.generation.permits import Permits
 from tests.generation.emitted import LOOK, POINT, Made, block, by_id, emission, lines, reference, speech, start_of
 
 # -- the turn ----------------------------------------------------------------------------------------------------

@@ -2,12 +2,22 @@
 
 import pytest
 
-from schemas.behaviors import After, Constraint, Gaze, Pointing, Reference, Speech, SpeechOption, Synchronize, Timing
-from schemas.faults import InputRefused
-from schemas.fragments import TurnFragment
-from schemas.tool_call import from_tool, in_call
-from schemas.world import Entity, World
-from services.generation.fragment_check import checked
+from engage_hri.schemas.behaviors import (
+    After,
+    Constraint,
+    Gaze,
+    Pointing,
+    Reference,
+    Speech,
+    SpeechOption,
+    Synchronize,
+    Timing,
+)
+from engage_hri.schemas.faults import InputRefused
+from engage_hri.schemas.fragments import TurnFragment
+from engage_hri.schemas.tool_call import from_tool, in_call
+from engage_hri.schemas.world import Entity, World
+from engage_hri.services.generation.fragment_check import checked
 from tests.generation.partners import TABLE
 
 

@@ -6,9 +6,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from schemas.body import NoPointZone, Ray
-from schemas.world import Entity
-from services.generation.geometry import (
+from engage_hri.schemas.body import NoPointZone, Ray
+from engage_hri.schemas.world import Entity
+from engage_hri.services.generation.geometry import (
     angle_off_axis,
     extent,
     in_gaze_cone,

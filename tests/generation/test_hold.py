@@ -6,11 +6,11 @@ import math
 import numpy as np
 import pytest
 
-from schemas import keys
-from schemas.attention import Inhibit
-from schemas.behaviors import Gaze
-from services.control.simulated import SimulatedBody
-from services.memory_bus import MemoryHub
+from engage_hri.schemas import keys
+from engage_hri.schemas.attention import Inhibit
+from engage_hri.schemas.behaviors import Gaze
+from engage_hri.services.control.simulated import SimulatedBody
+from engage_hri.services.memory_bus import MemoryHub
 from tests.commanding import command
 from tests.generation.robots import robot, says
 

@@ -2,12 +2,12 @@
 
 import pytest
 
-from schemas.attention import Claim, Inhibit
-from schemas.behaviors import Gaze, Gesture, Pointing, Speech
-from schemas.faults import InputRefused
-from services.generation.config import GenerationConfig
-from services.generation.leases import Inhibition, Leases
-from services.generation.permits import Permits
+from engage_hri.schemas.attention import Claim, Inhibit
+from engage_hri.schemas.behaviors import Gaze, Gesture, Pointing, Speech
+from engage_hri.schemas.faults import InputRefused
+from engage_hri.services.generation.config import GenerationConfig
+from engage_hri.services.generation.leases import Inhibition, Leases
+from engage_hri.services.generation.permits import Permits
 
 
 def lease(id: str = "l", **fields: object) -> Inhibit:

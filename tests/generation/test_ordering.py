@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from schemas.behaviors import (
+from engage_hri.schemas.behaviors import (
     After,
     Before,
     Constraint,
@@ -16,7 +16,7 @@ from schemas.behaviors import (
     Synchronize,
     Timing,
 )
-from services.generation.ordering import ordered
+from engage_hri.services.generation.ordering import ordered
 from tests.generation.tables import option, refer
 
 

@@ -7,15 +7,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from msgspec.structs import replace
 
-from schemas.behaviors import Reference, SpeechOption
-from schemas.fragments import TurnFragment
-from schemas.world import Entity, World
-from services.generation.config import GenerationConfig
-from services.generation.permits import Permits
-from services.generation.phrases import Proposals, proposed
-from services.generation.planning import plan
-from services.generation.turn_policy import plan_turn
-from services.tangram_table import tangram_table
+from engage_hri.schemas.behaviors import Reference, SpeechOption
+from engage_hri.schemas.fragments import TurnFragment
+from engage_hri.schemas.world import Entity, World
+from engage_hri.services.generation.config import GenerationConfig
+from engage_hri.services.generation.permits import Permits
+from engage_hri.services.generation.phrases import Proposals, proposed
+from engage_hri.services.generation.planning import plan
+from engage_hri.services.generation.turn_policy import plan_turn
+from engage_hri.services.tangram_table import tangram_table
 from tests.generation.tables import body
 
 SMALL, BIG = 0.02, 0.04

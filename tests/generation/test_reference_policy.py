@@ -4,13 +4,13 @@ from collections.abc import Sequence
 
 import pytest
 
-from schemas.behaviors import Gaze, Pointing, Reference, SpeechOption
-from schemas.body import Estimate, NoPointZone
-from schemas.faults import RunFailed
-from schemas.fragments import ReferenceChoice
-from services.generation.config import GenerationConfig
-from services.generation.motions import HERE, Motions, collect, from_each_other, from_here
-from services.generation.reference_policy import Pair, Posture, choose
+from engage_hri.schemas.behaviors import Gaze, Pointing, Reference, SpeechOption
+from engage_hri.schemas.body import Estimate, NoPointZone
+from engage_hri.schemas.faults import RunFailed
+from engage_hri.schemas.fragments import ReferenceChoice
+from engage_hri.services.generation.config import GenerationConfig
+from engage_hri.services.generation.motions import HERE, Motions, collect, from_each_other, from_here
+from engage_hri.services.generation.reference_policy import Pair, Posture, choose
 from tests.generation.tables import apart, body, flat_world, option, refer, scene
 
 CONFIG = GenerationConfig()

@@ -4,9 +4,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from schemas.fragments import GestureChoice
-from services.generation.config import GenerationConfig
-from services.generation.reliability import channel_reliability, reliability
+from engage_hri.schemas.fragments import GestureChoice
+from engage_hri.services.generation.config import GenerationConfig
+from engage_hri.services.generation.reliability import channel_reliability, reliability
 
 
 @pytest.mark.parametrize(

@@ -5,17 +5,17 @@ import asyncio
 import pytest
 from msgspec.structs import replace
 
-from schemas import keys
-from schemas.behaviors import Event, Gaze, Pointing, Reference, Speech, SpeechOption, TurnSignal
-from schemas.blocks import SpokenText
-from schemas.faults import Fault
-from schemas.fragments import FragmentOutcome, TurnFragment
-from schemas.messages import encode
-from schemas.world import World
-from services.generation.config import GenerationConfig
-from services.memory_bus import MemoryHub
-from services.requests import RequestRefused
-from services.serving import GRACE
+from engage_hri.schemas import keys
+from engage_hri.schemas.behaviors import Event, Gaze, Pointing, Reference, Speech, SpeechOption, TurnSignal
+from engage_hri.schemas.blocks import SpokenText
+from engage_hri.schemas.faults import Fault
+from engage_hri.schemas.fragments import FragmentOutcome, TurnFragment
+from engage_hri.schemas.messages import encode
+from engage_hri.schemas.world import World
+from engage_hri.services.generation.config import GenerationConfig
+from engage_hri.services.memory_bus import MemoryHub
+from engage_hri.services.requests import RequestRefused
+from engage_hri.services.serving import GRACE
 from tests.generation.partners import TABLE, stage
 
 HELLO = Speech(id="s", text="Hello")

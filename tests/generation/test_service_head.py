@@ -4,17 +4,17 @@ import asyncio
 
 import pytest
 
-from schemas import keys
-from schemas.attention import Inhibit, InhibitionEnded
-from schemas.behaviors import Gaze, GazeShift, Pointing, Speech
-from schemas.faults import Fault
-from schemas.fragments import FragmentOutcome, TurnFragment
-from schemas.recognition import Statistics, WindowStatistics
-from schemas.world import Entity, World
-from services.generation.config import GenerationConfig
-from services.memory_bus import MemoryHub
-from services.requests import RequestRefused
-from services.serving import GRACE
+from engage_hri.schemas import keys
+from engage_hri.schemas.attention import Inhibit, InhibitionEnded
+from engage_hri.schemas.behaviors import Gaze, GazeShift, Pointing, Speech
+from engage_hri.schemas.faults import Fault
+from engage_hri.schemas.fragments import FragmentOutcome, TurnFragment
+from engage_hri.schemas.recognition import Statistics, WindowStatistics
+from engage_hri.schemas.world import Entity, World
+from engage_hri.services.generation.config import GenerationConfig
+from engage_hri.services.memory_bus import MemoryHub
+from engage_hri.services.requests import RequestRefused
+from engage_hri.services.serving import GRACE
 from tests.commanding import command
 from tests.generation.partners import TABLE, Partners, gaze_targets, stage
 

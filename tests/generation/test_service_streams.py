@@ -6,14 +6,14 @@ from contextlib import asynccontextmanager
 
 import pytest
 
-from schemas import keys
-from schemas.behaviors import Reference, Speech, SpeechOption
-from schemas.blocks import Block, SpokenText
-from schemas.faults import Fault
-from schemas.fragments import FragmentOutcome, TurnClosed, TurnFragment
-from services.generation.config import GenerationConfig
-from services.memory_bus import MemoryHub
-from services.requests import RequestRefused
+from engage_hri.schemas import keys
+from engage_hri.schemas.behaviors import Reference, Speech, SpeechOption
+from engage_hri.schemas.blocks import Block, SpokenText
+from engage_hri.schemas.faults import Fault
+from engage_hri.schemas.fragments import FragmentOutcome, TurnClosed, TurnFragment
+from engage_hri.services.generation.config import GenerationConfig
+from engage_hri.services.memory_bus import MemoryHub
+from engage_hri.services.requests import RequestRefused
 from tests.generation.emitted import lines
 from tests.generation.partners import Partners, stage
 

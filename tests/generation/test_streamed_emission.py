@@ -2,10 +2,10 @@
 
 import pytest
 
-from schemas.behaviors import After, Before, Constraint, Gesture, Hand, Head, Pointing, Synchronize, Timing
-from schemas.fragments import TurnFragment
-from services.generation.permits import Permits
-from services.generation.trail import NOTHING, Stroke, Trail
+from engage_hri.schemas.behaviors import After, Before, Constraint, Gesture, Hand, Head, Pointing, Synchronize, Timing
+from engage_hri.schemas.fragments import TurnFragment
+from engage_hri.services.generation.permits import Permits
+from engage_hri.services.generation.trail import NOTHING, Stroke, Trail
 from tests.generation.emitted import LOOK, POINT, by_id, emission, lines, reference, speech, start_of
 
 BUSY = Trail(speech="a:s", glance="a:r-glance", strokes=(Stroke("a:r-point", "LEFT_HAND"),))

@@ -6,13 +6,13 @@ from itertools import pairwise
 
 import pytest
 
-from schemas import keys
-from schemas.behaviors import Gesture, Head, Speech, Timing
-from schemas.body import AbortBehavior
-from schemas.fragments import TurnFragment
-from services.generation.config import GenerationConfig
-from services.memory_bus import MemoryHub
-from services.requests import RequestRefused
+from engage_hri.schemas import keys
+from engage_hri.schemas.behaviors import Gesture, Head, Speech, Timing
+from engage_hri.schemas.body import AbortBehavior
+from engage_hri.schemas.fragments import TurnFragment
+from engage_hri.services.generation.config import GenerationConfig
+from engage_hri.services.memory_bus import MemoryHub
+from engage_hri.services.requests import RequestRefused
 from tests.commanding import command
 from tests.generation.robots import Robot, robot, says, shows
 

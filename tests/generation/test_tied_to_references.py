@@ -2,7 +2,7 @@
 
 import pytest
 
-from schemas.behaviors import (
+from engage_hri.schemas.behaviors import (
     After,
     Before,
     Constraint,
@@ -16,14 +16,14 @@ from schemas.behaviors import (
     Synchronize,
     Timing,
 )
-from schemas.fragments import TurnFragment
-from services.commandline.generating import generated
-from services.commandline.plan import estimated
-from services.config import load
-from services.generation.rewriting import Operator
-from services.realizer.planner import plan_block
-from services.simulation.still import tangram_world
-from services.virtual_time import run_virtual
+from engage_hri.schemas.fragments import TurnFragment
+from engage_hri.services.commandline.generating import generated
+from engage_hri.services.commandline.plan import estimated
+from engage_hri.services.config import load
+from engage_hri.services.generation.rewriting import Operator
+from engage_hri.services.realizer.planner import plan_block
+from engage_hri.services.simulation.still import tangram_world
+from engage_hri.services.virtual_time import run_virtual
 from tests.generation.emitted import LOOK, POINT, Made, block, by_id, lines, reference, speech
 
 PROFILES = ("check-back", "figure-3.3")

@@ -2,12 +2,12 @@
 
 import pytest
 
-from schemas.actions import ActionBegan, ActionEnded
-from schemas.faults import InputRefused
-from schemas.fragments import TurnFragment, TurnStatus
-from schemas.units import Stamp
-from services.generation.config import GenerationConfig
-from services.generation.turn_policy import Aborted, TurnPlan, TurnPolicy, plan_turn
+from engage_hri.schemas.actions import ActionBegan, ActionEnded
+from engage_hri.schemas.faults import InputRefused
+from engage_hri.schemas.fragments import TurnFragment, TurnStatus
+from engage_hri.schemas.units import Stamp
+from engage_hri.services.generation.config import GenerationConfig
+from engage_hri.services.generation.turn_policy import Aborted, TurnPlan, TurnPolicy, plan_turn
 
 AT = Stamp("test", 0.0)
 

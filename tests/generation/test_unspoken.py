@@ -5,16 +5,16 @@ from collections.abc import AsyncIterator
 
 import pytest
 
-from schemas.behaviors import BlockBehavior, Gaze, Speech
-from schemas.blocks import SpokenText
-from schemas.body import BodyPose, Estimate
-from schemas.faults import Fault
-from schemas.fragments import FragmentOutcome, TurnFragment
-from schemas.world import World
-from services.control.estimates import infeasible
-from services.control.simulated import SimulatedBody
-from services.memory_bus import MemoryHub
-from services.requests import RequestRefused
+from engage_hri.schemas.behaviors import BlockBehavior, Gaze, Speech
+from engage_hri.schemas.blocks import SpokenText
+from engage_hri.schemas.body import BodyPose, Estimate
+from engage_hri.schemas.faults import Fault
+from engage_hri.schemas.fragments import FragmentOutcome, TurnFragment
+from engage_hri.schemas.world import World
+from engage_hri.services.control.estimates import infeasible
+from engage_hri.services.control.simulated import SimulatedBody
+from engage_hri.services.memory_bus import MemoryHub
+from engage_hri.services.requests import RequestRefused
 from tests.generation.partners import Partners, stage
 from tests.generation.robots import Robot, robot, says, shows
 

@@ -2,8 +2,8 @@
 
 import pytest
 
-from schemas.behaviors import Constraint, Head, Mark, Synchronize
-from schemas.fragments import TurnFragment
+from engage_hri.schemas.behaviors import Constraint, Head, Mark, Synchronize
+from engage_hri.schemas.fragments import TurnFragment
 from tests.generation.emitted import LOOK, block, lines, reference, speech
 
 

@@ -12,13 +12,13 @@ from typing import NamedTuple
 
 import zenoh
 
-from schemas import keys
-from schemas.status import AskStatus, Status
-from services.bus import Bus
-from services.commandline.roster import ROBOT
-from services.hostile.payloads import Payloads
-from services.hostile.typed import Typed, Words
-from services.zenoh_bus import open_hub
+from engage_hri.schemas import keys
+from engage_hri.schemas.status import AskStatus, Status
+from engage_hri.services.bus import Bus
+from engage_hri.services.commandline.roster import ROBOT
+from engage_hri.services.hostile.payloads import Payloads
+from engage_hri.services.hostile.typed import Typed, Words
+from engage_hri.services.zenoh_bus import open_hub
 from tests.bus.places import free_endpoint
 from tests.cli.command import start
 

@@ -3,12 +3,12 @@
 import asyncio
 from collections.abc import AsyncGenerator
 
-from schemas.behaviors import BlockBehavior, Gaze, Speech
-from schemas.blocks import Block
-from services.bus import Hub
-from services.client import connect
-from services.control.body import Authority, Progress, Reached
-from services.control.simulated import SimulatedBody
+from engage_hri.schemas.behaviors import BlockBehavior, Gaze, Speech
+from engage_hri.schemas.blocks import Block
+from engage_hri.services.bus import Hub
+from engage_hri.services.client import connect
+from engage_hri.services.control.body import Authority, Progress, Reached
+from engage_hri.services.control.simulated import SimulatedBody
 
 
 class CarelessBody(SimulatedBody):

@@ -2,9 +2,9 @@
 
 import pytest
 
-from services.commandline.hostile import attack
-from services.control.simulated import SimulatedBody
-from services.hostile.trial import Kind, Report
+from engage_hri.services.commandline.hostile import attack
+from engage_hri.services.control.simulated import SimulatedBody
+from engage_hri.services.hostile.trial import Kind, Report
 from tests.hostile.own import CarelessBody, broken_client, deaf_client, good_client
 
 

@@ -1,11 +1,11 @@
 """The book of requests notices what it is there for."""
 
-from schemas import keys
-from schemas.blocks import Block, BlockOutcome, PerformBlock
-from schemas.faults import Fault
-from schemas.messages import Message
-from schemas.requests import Accepted, Refused
-from services.hostile.audit import Book
+from engage_hri.schemas import keys
+from engage_hri.schemas.blocks import Block, BlockOutcome, PerformBlock
+from engage_hri.schemas.faults import Fault
+from engage_hri.schemas.messages import Message
+from engage_hri.schemas.requests import Accepted, Refused
+from engage_hri.services.hostile.audit import Book
 
 KEY = keys.command(keys.BLOCK, "manager", "ann")
 ASK = PerformBlock(id="1", life="a", block=Block(id="b"))

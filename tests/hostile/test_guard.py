@@ -2,11 +2,11 @@
 
 import pytest
 
-from schemas.faults import InputRefused
-from services.bus import Bus, Hub
-from services.commandline.hostile import whole_robot
-from services.hostile.trial import Attack, insist_on_memory, trial
-from services.memory_bus import MemoryHub
+from engage_hri.schemas.faults import InputRefused
+from engage_hri.services.bus import Bus, Hub
+from engage_hri.services.commandline.hostile import whole_robot
+from engage_hri.services.hostile.trial import Attack, insist_on_memory, trial
+from engage_hri.services.memory_bus import MemoryHub
 
 
 class Wire(Hub):

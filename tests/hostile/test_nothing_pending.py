@@ -4,9 +4,9 @@ from typing import Any
 
 import pytest
 
-from services.commandline.hostile import whole_robot
-from services.hostile.trial import Attack, _Trial, run
-from services.requests import RequestDesk, Requester
+from engage_hri.services.commandline.hostile import whole_robot
+from engage_hri.services.hostile.trial import Attack, _Trial, run
+from engage_hri.services.requests import RequestDesk, Requester
 
 
 class Ends:

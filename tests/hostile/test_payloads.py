@@ -6,15 +6,15 @@ from random import Random
 import msgspec
 import pytest
 
-from schemas import keys
-from schemas.faults import InputRefused
-from schemas.messages import Message, encode
-from schemas.requests import Cancel
-from schemas.xml_codec import decode_xml
-from services.bus import read_payload
-from services.hostile.markup import document
-from services.hostile.payloads import Payloads
-from services.hostile.typed import KINDS, Typed, Words, distorted
+from engage_hri.schemas import keys
+from engage_hri.schemas.faults import InputRefused
+from engage_hri.schemas.messages import Message, encode
+from engage_hri.schemas.requests import Cancel
+from engage_hri.schemas.xml_codec import decode_xml
+from engage_hri.services.bus import read_payload
+from engage_hri.services.hostile.markup import document
+from engage_hri.services.hostile.payloads import Payloads
+from engage_hri.services.hostile.typed import KINDS, Typed, Words, distorted
 
 ENTITIES = ("cup", "ann")
 

@@ -11,9 +11,9 @@ from itertools import pairwise
 
 from msgspec import Struct, field
 
-from schemas import keys
-from schemas.behaviors import BlockBehavior, Gesture, Pointing, Speech
-from schemas.body import (
+from engage_hri.schemas import keys
+from engage_hri.schemas.behaviors import BlockBehavior, Gesture, Pointing, Speech
+from engage_hri.schemas.body import (
     AbortBehavior,
     BehaviorAborted,
     BehaviorOutcome,
@@ -27,13 +27,13 @@ from schemas.body import (
     SyncPointArrived,
     SyncPointReached,
 )
-from schemas.faults import Fault
-from schemas.messages import Message
-from schemas.requests import Cancel
-from schemas.units import Seconds
-from services.bus import Bus
-from services.requests import RequestDesk
-from services.runtime import Ready
+from engage_hri.schemas.faults import Fault
+from engage_hri.schemas.messages import Message
+from engage_hri.schemas.requests import Cancel
+from engage_hri.schemas.units import Seconds
+from engage_hri.services.bus import Bus
+from engage_hri.services.requests import RequestDesk
+from engage_hri.services.runtime import Ready
 
 SEVEN = ("start", "ready", "stroke_start", "stroke", "stroke_end", "relax", "end")
 HOLDS = {

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from msgspec import Struct
 from msgspec.structs import replace
 
-from schemas.behaviors import (
+from engage_hri.schemas.behaviors import (
     After,
     Before,
     Behavior,
@@ -28,11 +28,11 @@ from schemas.behaviors import (
     Timing,
     Wait,
 )
-from schemas.blocks import Block
-from schemas.body import Estimate, Phase
-from schemas.syncref import SyncRef
-from services.realizer.planner import Plan, plan_block
-from services.realizer.relations import BlockRefused
+from engage_hri.schemas.blocks import Block
+from engage_hri.schemas.body import Estimate, Phase
+from engage_hri.schemas.syncref import SyncRef
+from engage_hri.services.realizer.planner import Plan, plan_block
+from engage_hri.services.realizer.relations import BlockRefused
 
 SEVEN = ("start", "ready", "stroke_start", "stroke", "stroke_end", "relax", "end")
 HOLDS = {

@@ -4,11 +4,11 @@ from itertools import pairwise
 
 from msgspec.structs import replace
 
-from schemas.behaviors import BlockBehavior, Gaze, Pointing, Speech, Timing, Wait
-from schemas.blocks import Block
-from schemas.body import Estimate, Phase
-from services.realizer.planner import Plan, plan_block
-from services.realizer.points import Point
+from engage_hri.schemas.behaviors import BlockBehavior, Gaze, Pointing, Speech, Timing, Wait
+from engage_hri.schemas.blocks import Block
+from engage_hri.schemas.body import Estimate, Phase
+from engage_hri.services.realizer.planner import Plan, plan_block
+from engage_hri.services.realizer.points import Point
 from tests.realizer.fake_body import FakeBody, Script
 
 GAZE = Gaze(id="g", target="can")

@@ -6,10 +6,10 @@ from contextlib import asynccontextmanager
 from functools import partial
 from typing import Any
 
-from schemas import keys
-from schemas.behaviors import BlockBehavior
-from schemas.blocks import Block, BlockOutcome, PerformBlock
-from schemas.body import (
+from engage_hri.schemas import keys
+from engage_hri.schemas.behaviors import BlockBehavior
+from engage_hri.schemas.blocks import Block, BlockOutcome, PerformBlock
+from engage_hri.schemas.body import (
     BehaviorOutcome,
     Estimate,
     EstimateBehaviors,
@@ -20,23 +20,23 @@ from schemas.body import (
     SyncPointArrived,
     SyncPointReached,
 )
-from schemas.faults import Fault
-from schemas.feedback import (
+from engage_hri.schemas.faults import Fault
+from engage_hri.schemas.feedback import (
     BlockProgress,
     PredictionFeedback,
     SyncPointProgress,
     WarningFeedback,
 )
-from schemas.messages import Message
-from schemas.requests import Accepted, Answer, Cancel, Refused, Request, answering
-from schemas.units import Seconds, Stamp
-from schemas.xml_codec import decode_xml
-from services.bus import Bus, Hub
-from services.memory_bus import MemoryHub
-from services.realizer.config import RealizerConfig
-from services.realizer.service import realize
-from services.requests import Pending, Requester
-from services.runtime import running
+from engage_hri.schemas.messages import Message
+from engage_hri.schemas.requests import Accepted, Answer, Cancel, Refused, Request, answering
+from engage_hri.schemas.units import Seconds, Stamp
+from engage_hri.schemas.xml_codec import decode_xml
+from engage_hri.services.bus import Bus, Hub
+from engage_hri.services.memory_bus import MemoryHub
+from engage_hri.services.realizer.config import RealizerConfig
+from engage_hri.services.realizer.service import realize
+from engage_hri.services.requests import Pending, Requester
+from engage_hri.services.runtime import running
 from tests.realizer.fake_body import FakeBody
 
 DRAFT = "org.mindmakers.bml"

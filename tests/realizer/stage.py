@@ -7,19 +7,19 @@ from functools import partial
 
 from msgspec import Struct, field
 
-from schemas import keys
-from schemas.behaviors import After, Before, BlockBehavior, Constraint, Synchronize
-from schemas.blocks import Block, BlockOutcome, PerformBlock
-from schemas.faults import Fault
-from schemas.feedback import BlockProgress, SyncPointProgress, WarningFeedback
-from schemas.recognition import EventOutcome, RequestEvent, SignalTurn, TurnOutcome
-from schemas.units import Seconds
-from services.bus import Bus
-from services.memory_bus import MemoryHub
-from services.realizer.config import RealizerConfig
-from services.realizer.service import realize
-from services.requests import Pending, RequestDesk, Requester
-from services.runtime import Ready, Service, running
+from engage_hri.schemas import keys
+from engage_hri.schemas.behaviors import After, Before, BlockBehavior, Constraint, Synchronize
+from engage_hri.schemas.blocks import Block, BlockOutcome, PerformBlock
+from engage_hri.schemas.faults import Fault
+from engage_hri.schemas.feedback import BlockProgress, SyncPointProgress, WarningFeedback
+from engage_hri.schemas.recognition import EventOutcome, RequestEvent, SignalTurn, TurnOutcome
+from engage_hri.schemas.units import Seconds
+from engage_hri.services.bus import Bus
+from engage_hri.services.memory_bus import MemoryHub
+from engage_hri.services.realizer.config import RealizerConfig
+from engage_hri.services.realizer.service import realize
+from engage_hri.services.requests import Pending, RequestDesk, Requester
+from engage_hri.services.runtime import Ready, Service, running
 from tests.realizer.fake_body import FakeBody
 
 

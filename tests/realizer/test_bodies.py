@@ -4,12 +4,12 @@ import asyncio
 
 import pytest
 
-from schemas import keys
-from schemas.body import Estimate, Estimates, HomeReached, Phase, SyncPointReached, WordSpoken
-from schemas.messages import Message
-from schemas.units import Stamp
-from services.realizer.config import RealizerConfig
-from services.requests import RequestRefused
+from engage_hri.schemas import keys
+from engage_hri.schemas.body import Estimate, Estimates, HomeReached, Phase, SyncPointReached, WordSpoken
+from engage_hri.schemas.messages import Message
+from engage_hri.schemas.units import Stamp
+from engage_hri.services.realizer.config import RealizerConfig
+from engage_hri.services.requests import RequestRefused
 from tests.realizer.puppet import BML_1_0, Puppet, bml, puppet
 
 SEVEN = ("start", "ready", "stroke_start", "stroke", "stroke_end", "relax", "end")

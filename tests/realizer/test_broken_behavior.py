@@ -4,10 +4,10 @@ import asyncio
 
 import pytest
 
-from schemas.behaviors import Gesture, Wait
-from schemas.blocks import Block, BlockOutcome
-from schemas.body import BehaviorOutcome
-from services.realizer.spoken import Spoken
+from engage_hri.schemas.behaviors import Gesture, Wait
+from engage_hri.schemas.blocks import Block, BlockOutcome
+from engage_hri.schemas.body import BehaviorOutcome
+from engage_hri.services.realizer.spoken import Spoken
 from tests.realizer.stage import stage
 
 

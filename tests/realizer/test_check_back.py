@@ -2,8 +2,8 @@
 
 import pytest
 
-from schemas.behaviors import BlockBehavior, Event, Gaze, Pointing, Speech, TurnSignal
-from schemas.blocks import Block
+from engage_hri.schemas.behaviors import BlockBehavior, Event, Gaze, Pointing, Speech, TurnSignal
+from engage_hri.schemas.blocks import Block
 from tests.realizer.fake_body import FakeBody
 from tests.realizer.stage import FakeRecognition, after, block, stage, together
 

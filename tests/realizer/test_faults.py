@@ -6,12 +6,12 @@ from typing import Any
 import pytest
 from msgspec.structs import replace
 
-from schemas.behaviors import Gaze, GazeShift, Mark, Pointing, Speech
-from schemas.blocks import BlockOutcome
-from services.realizer import executor
-from services.realizer.config import RealizerConfig
-from services.realizer.planner import Plan, plan_block
-from services.requests import RequestRefused
+from engage_hri.schemas.behaviors import Gaze, GazeShift, Mark, Pointing, Speech
+from engage_hri.schemas.blocks import BlockOutcome
+from engage_hri.services.realizer import executor
+from engage_hri.services.realizer.config import RealizerConfig
+from engage_hri.services.realizer.planner import Plan, plan_block
+from engage_hri.services.requests import RequestRefused
 from tests.realizer.fake_body import FakeBody, Script
 from tests.realizer.stage import block, stage, together
 

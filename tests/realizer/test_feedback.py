@@ -1,9 +1,9 @@
 """What the realizer says of a block: predictions while they are worth telling, and who it is about."""
 
-from schemas.behaviors import Head, Pointing, Speech
-from schemas.feedback import BlockProgress, PredictionFeedback, SyncPointProgress, WarningFeedback
-from services.realizer.points import Point
-from services.realizer.reporting import NOTICEABLE, moved_noticeably
+from engage_hri.schemas.behaviors import Head, Pointing, Speech
+from engage_hri.schemas.feedback import BlockProgress, PredictionFeedback, SyncPointProgress, WarningFeedback
+from engage_hri.services.realizer.points import Point
+from engage_hri.services.realizer.reporting import NOTICEABLE, moved_noticeably
 from tests.realizer.fake_body import FakeBody, Script
 from tests.realizer.stage import block, stage, together
 

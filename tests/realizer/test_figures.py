@@ -2,10 +2,10 @@
 
 import pytest
 
-from schemas.behaviors import Gaze, Pointing, Speech
-from schemas.blocks import Block
-from services.realizer.net import is_live, is_safe
-from services.realizer.planner import plan_block
+from engage_hri.schemas.behaviors import Gaze, Pointing, Speech
+from engage_hri.schemas.blocks import Block
+from engage_hri.services.realizer.net import is_live, is_safe
+from engage_hri.services.realizer.planner import plan_block
 from tests.realizer.fake_body import FakeBody
 from tests.realizer.stage import after, block, together
 

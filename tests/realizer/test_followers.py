@@ -6,11 +6,11 @@ from contextlib import asynccontextmanager
 
 import pytest
 
-from schemas import keys
-from schemas.behaviors import Gesture, Mark, Speech
-from schemas.blocks import Block, BlockOutcome, PerformBlock
-from schemas.body import AbortBehavior
-from services.requests import Pending, RequestRefused
+from engage_hri.schemas import keys
+from engage_hri.schemas.behaviors import Gesture, Mark, Speech
+from engage_hri.schemas.blocks import Block, BlockOutcome, PerformBlock
+from engage_hri.schemas.body import AbortBehavior
+from engage_hri.services.requests import Pending, RequestRefused
 from tests.realizer.fake_body import FakeBody, Script
 from tests.realizer.stage import Stage, after, block, stage, together
 

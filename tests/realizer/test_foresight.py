@@ -5,10 +5,10 @@ from contextlib import ExitStack
 
 import pytest
 
-from schemas.behaviors import Gaze, Gesture, Mark, Pointing, Speech, Wait
-from schemas.blocks import Block
-from services.realizer.ledger import Ledger
-from services.realizer.points import Point
+from engage_hri.schemas.behaviors import Gaze, Gesture, Mark, Pointing, Speech, Wait
+from engage_hri.schemas.blocks import Block
+from engage_hri.services.realizer.ledger import Ledger
+from engage_hri.services.realizer.points import Point
 from tests.realizer.fake_body import FakeBody, Script
 from tests.realizer.stage import Stage, after, block, stage, together
 

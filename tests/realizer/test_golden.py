@@ -1,6 +1,6 @@
 """The figures of the thesis' chapter 4, with exact times: what each constraint means, on a body that varies."""
 
-from schemas.behaviors import Gaze, Pointing, Speech
+from engage_hri.schemas.behaviors import Gaze, Pointing, Speech
 from tests.realizer.fake_body import FakeBody, Script
 from tests.realizer.stage import after, before, block, stage, together
 

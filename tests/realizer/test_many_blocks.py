@@ -13,8 +13,8 @@ from hypothesis import strategies as st
 from msgspec import Struct
 from msgspec.structs import replace
 
-from schemas import keys
-from schemas.behaviors import (
+from engage_hri.schemas import keys
+from engage_hri.schemas.behaviors import (
     After,
     Before,
     BlockBehavior,
@@ -31,12 +31,12 @@ from schemas.behaviors import (
     Synchronize,
     Wait,
 )
-from schemas.blocks import BehaviorInterrupted, Block, BlockOutcome, InterruptBehavior
-from schemas.feedback import BlockProgress, SyncPointProgress
-from schemas.syncref import SyncRef
-from services.realizer.points import sync_points
-from services.requests import Pending, Requester, RequestRefused
-from services.virtual_time import run_virtual
+from engage_hri.schemas.blocks import BehaviorInterrupted, Block, BlockOutcome, InterruptBehavior
+from engage_hri.schemas.feedback import BlockProgress, SyncPointProgress
+from engage_hri.schemas.syncref import SyncRef
+from engage_hri.services.realizer.points import sync_points
+from engage_hri.services.requests import Pending, Requester, RequestRefused
+from engage_hri.services.virtual_time import run_virtual
 from tests.realizer.fake_body import FakeBody, Script, parts_of
 from tests.realizer.stage import Stage, stage
 from tests.realizer.test_simulated_body import FAULTS, robot

@@ -3,7 +3,7 @@
 import pytest
 from msgspec.structs import replace
 
-from schemas.behaviors import (
+from engage_hri.schemas.behaviors import (
     After,
     Constraint,
     FaceLexeme,
@@ -14,11 +14,11 @@ from schemas.behaviors import (
     Unknown,
     Wait,
 )
-from schemas.blocks import Block
-from services.realizer.net import is_live, is_safe
-from services.realizer.planner import plan_block
-from services.realizer.points import sync_points
-from services.realizer.relations import BlockRefused
+from engage_hri.schemas.blocks import Block
+from engage_hri.services.realizer.net import is_live, is_safe
+from engage_hri.services.realizer.planner import plan_block
+from engage_hri.services.realizer.points import sync_points
+from engage_hri.services.realizer.relations import BlockRefused
 from tests.realizer.fake_body import FakeBody, Script
 from tests.realizer.planning import GAZE, LEFT, OTHER, SPEECH, at, elastic, plan, timed, warnings
 from tests.realizer.stage import after, before, block, together

@@ -4,9 +4,9 @@ import asyncio
 
 import pytest
 
-from schemas.behaviors import Event, Pointing, Speech, Wait
-from services.realizer.ledger import Ledger
-from services.realizer.points import Point
+from engage_hri.schemas.behaviors import Event, Pointing, Speech, Wait
+from engage_hri.services.realizer.ledger import Ledger
+from engage_hri.services.realizer.points import Point
 from tests.realizer.fake_body import FakeBody, Script
 from tests.realizer.puppet import BML_1_0, bml, puppet
 from tests.realizer.stage import FakeRecognition, after, block, stage

@@ -7,14 +7,24 @@ import pytest
 from hypothesis import given, settings
 from lxml import etree
 
-from schemas.behaviors import Event, Gaze, Pointing, Speech, Timing
-from schemas.blocks import Block
-from schemas.faults import InputRefused
-from services.realizer import pnml
-from services.realizer.export import as_dot, as_json, as_pnml, as_text
-from services.realizer.net import Bound, PetriNet, Place, Transition, enabled, fire, fire_once_each, is_live, is_safe
-from services.realizer.planner import Plan, plan_block
-from services.realizer.pnml import read_pnml
+from engage_hri.schemas.behaviors import Event, Gaze, Pointing, Speech, Timing
+from engage_hri.schemas.blocks import Block
+from engage_hri.schemas.faults import InputRefused
+from engage_hri.services.realizer import pnml
+from engage_hri.services.realizer.export import as_dot, as_json, as_pnml, as_text
+from engage_hri.services.realizer.net import (
+    Bound,
+    PetriNet,
+    Place,
+    Transition,
+    enabled,
+    fire,
+    fire_once_each,
+    is_live,
+    is_safe,
+)
+from engage_hri.services.realizer.planner import Plan, plan_block
+from engage_hri.services.realizer.pnml import read_pnml
 from tests.realizer.fake_body import FakeBody
 from tests.realizer.oracle import estimated, random_blocks
 from tests.realizer.stage import after, before, block, together

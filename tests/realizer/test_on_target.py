@@ -2,9 +2,9 @@
 
 import pytest
 
-from schemas.behaviors import BlockBehavior, FaceLexeme, Gaze, Mark, Pointing, Posture, Speech, Wait
-from schemas.body import PerformBehavior
-from services.control.config import Displaced, Slow, Stall, Variability
+from engage_hri.schemas.behaviors import BlockBehavior, FaceLexeme, Gaze, Mark, Pointing, Posture, Speech, Wait
+from engage_hri.schemas.body import PerformBehavior
+from engage_hri.services.control.config import Displaced, Slow, Stall, Variability
 from tests.realizer.fake_body import FakeBody, Script
 from tests.realizer.planning import at, plan, timed
 from tests.realizer.puppet import BML_1_0, bml

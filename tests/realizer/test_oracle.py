@@ -5,9 +5,9 @@ import random
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from schemas.behaviors import Pointing, Speech, Synchronize, Timing
-from schemas.blocks import Block
-from services.realizer.planner import Plan
+from engage_hri.schemas.behaviors import Pointing, Speech, Synchronize, Timing
+from engage_hri.schemas.blocks import Block
+from engage_hri.services.realizer.planner import Plan
 from tests.realizer.oracle import (
     consult,
     estimated,

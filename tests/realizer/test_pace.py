@@ -2,13 +2,13 @@
 
 import pytest
 
-from schemas.behaviors import Gaze, GazeShift, Gesture, Mark, Pointing, Speech
-from schemas.feedback import PredictionFeedback
-from services.realizer.authority import Authority
-from services.realizer.config import RealizerConfig
-from services.realizer.effects import Extend
-from services.realizer.planner import plan_block
-from services.realizer.points import Point
+from engage_hri.schemas.behaviors import Gaze, GazeShift, Gesture, Mark, Pointing, Speech
+from engage_hri.schemas.feedback import PredictionFeedback
+from engage_hri.services.realizer.authority import Authority
+from engage_hri.services.realizer.config import RealizerConfig
+from engage_hri.services.realizer.effects import Extend
+from engage_hri.services.realizer.planner import plan_block
+from engage_hri.services.realizer.points import Point
 from tests.realizer.fake_body import FakeBody, Script
 from tests.realizer.stage import after, block, stage, together
 

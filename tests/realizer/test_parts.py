@@ -2,7 +2,7 @@
 
 from msgspec.structs import replace
 
-from schemas.behaviors import Gaze, Gesture, Head
+from engage_hri.schemas.behaviors import Gaze, Gesture, Head
 from tests.realizer.planning import GAZE, LEFT, LEFT_TOO, SPEECH, at, plan, timed, warnings
 from tests.realizer.stage import after, block, together
 

@@ -1,12 +1,12 @@
 """Who is late, once, and who is given up, once: each at its instant."""
 
-from schemas.behaviors import Gesture
-from services.realizer.authority import Authority
-from services.realizer.config import RealizerConfig
-from services.realizer.effects import Extend
-from services.realizer.patience import Late, Patience, Stalled
-from services.realizer.planner import plan_block
-from services.realizer.points import Point
+from engage_hri.schemas.behaviors import Gesture
+from engage_hri.services.realizer.authority import Authority
+from engage_hri.services.realizer.config import RealizerConfig
+from engage_hri.services.realizer.effects import Extend
+from engage_hri.services.realizer.patience import Late, Patience, Stalled
+from engage_hri.services.realizer.planner import plan_block
+from engage_hri.services.realizer.points import Point
 from tests.realizer.fake_body import FakeBody
 from tests.realizer.stage import block
 

@@ -6,7 +6,7 @@ from types import FrameType
 
 import pytest
 
-from schemas.behaviors import (
+from engage_hri.schemas.behaviors import (
     After,
     BlockBehavior,
     Constraint,
@@ -17,9 +17,9 @@ from schemas.behaviors import (
     Synchronize,
     Timing,
 )
-from schemas.blocks import Block
-from services.realizer.net import fire_once_each, is_live, is_safe
-from services.realizer.planner import plan_block
+from engage_hri.schemas.blocks import Block
+from engage_hri.services.realizer.net import fire_once_each, is_live, is_safe
+from engage_hri.services.realizer.planner import plan_block
 
 Parts = tuple[list[BlockBehavior], list[Synchronize | After]]
 

@@ -10,7 +10,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from msgspec import Struct
 
-from schemas.behaviors import (
+from engage_hri.schemas.behaviors import (
     After,
     Before,
     BlockBehavior,
@@ -24,15 +24,15 @@ from schemas.behaviors import (
     Synchronize,
     Wait,
 )
-from schemas.blocks import Block, BlockOutcome
-from schemas.syncref import SyncRef
-from services.realizer.config import RealizerConfig
-from services.realizer.net import enabled, fire, is_live
-from services.realizer.planner import Plan, plan_block
-from services.realizer.points import Point, sync_points
-from services.realizer.relations import BlockRefused
-from services.requests import RequestRefused
-from services.virtual_time import run_virtual
+from engage_hri.schemas.blocks import Block, BlockOutcome
+from engage_hri.schemas.syncref import SyncRef
+from engage_hri.services.realizer.config import RealizerConfig
+from engage_hri.services.realizer.net import enabled, fire, is_live
+from engage_hri.services.realizer.planner import Plan, plan_block
+from engage_hri.services.realizer.points import Point, sync_points
+from engage_hri.services.realizer.relations import BlockRefused
+from engage_hri.services.requests import RequestRefused
+from engage_hri.services.virtual_time import run_virtual
 from tests.realizer.fake_body import HOLDS, FakeBody, Script, natural_durations, type_of
 from tests.realizer.stage import stage
 

@@ -4,9 +4,9 @@ from collections.abc import Sequence
 
 import pytest
 
-from schemas.behaviors import BlockBehavior, Gaze, GazeShift, HeadDirectionShift, Mark, Speech
-from schemas.body import Estimate, Phase
-from services.control.config import Variability
+from engage_hri.schemas.behaviors import BlockBehavior, Gaze, GazeShift, HeadDirectionShift, Mark, Speech
+from engage_hri.schemas.body import Estimate, Phase
+from engage_hri.services.control.config import Variability
 from tests.realizer.planning import at, plan, timed, warnings
 from tests.realizer.stage import after, block, together
 from tests.realizer.test_simulated_body import robot

@@ -15,21 +15,21 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from msgspec import Struct, field
 
-from schemas import keys
-from schemas.behaviors import Gaze, Gesture, Mark, Pointing, Speech
-from schemas.blocks import Block, BlockOutcome, PerformBlock
-from schemas.feedback import BlockProgress, SyncPointProgress, WarningFeedback
-from schemas.world import Entity, World
-from services.bus import Bus
-from services.control.config import ControlConfig, Displaced, Slow, Stall, Variability
-from services.control.service import embody
-from services.control.simulated import SimulatedBody
-from services.memory_bus import MemoryHub
-from services.realizer.config import RealizerConfig
-from services.realizer.service import realize
-from services.requests import Pending, Requester, RequestRefused
-from services.runtime import running
-from services.virtual_time import run_virtual
+from engage_hri.schemas import keys
+from engage_hri.schemas.behaviors import Gaze, Gesture, Mark, Pointing, Speech
+from engage_hri.schemas.blocks import Block, BlockOutcome, PerformBlock
+from engage_hri.schemas.feedback import BlockProgress, SyncPointProgress, WarningFeedback
+from engage_hri.schemas.world import Entity, World
+from engage_hri.services.bus import Bus
+from engage_hri.services.control.config import ControlConfig, Displaced, Slow, Stall, Variability
+from engage_hri.services.control.service import embody
+from engage_hri.services.control.simulated import SimulatedBody
+from engage_hri.services.memory_bus import MemoryHub
+from engage_hri.services.realizer.config import RealizerConfig
+from engage_hri.services.realizer.service import realize
+from engage_hri.services.requests import Pending, Requester, RequestRefused
+from engage_hri.services.runtime import running
+from engage_hri.services.virtual_time import run_virtual
 from tests.realizer.stage import block, together
 from tests.realizer.test_properties import blocks
 

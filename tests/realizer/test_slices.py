@@ -10,16 +10,16 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from schemas import keys
-from schemas.behaviors import Constraint, Gaze, Speech
-from schemas.blocks import Block, BlockOutcome
-from schemas.body import SyncPointReached
-from schemas.feedback import BlockProgress
-from services.realizer.config import RealizerConfig
-from services.realizer.planner import Plan, plan_block, plan_steps
-from services.realizer.relations import BlockRefused
-from services.realizer.steps import Steps, finished, portions
-from services.realizer.unhurried import SLICE, unhurried
+from engage_hri.schemas import keys
+from engage_hri.schemas.behaviors import Constraint, Gaze, Speech
+from engage_hri.schemas.blocks import Block, BlockOutcome
+from engage_hri.schemas.body import SyncPointReached
+from engage_hri.schemas.feedback import BlockProgress
+from engage_hri.services.realizer.config import RealizerConfig
+from engage_hri.services.realizer.planner import Plan, plan_block, plan_steps
+from engage_hri.services.realizer.relations import BlockRefused
+from engage_hri.services.realizer.steps import Steps, finished, portions
+from engage_hri.services.realizer.unhurried import SLICE, unhurried
 from tests.realizer.fake_body import FakeBody, Script
 from tests.realizer.oracle import estimate, possible_blocks, random_blocks
 from tests.realizer.stage import Stage, block, stage, together

@@ -1,9 +1,9 @@
 """What has been said of the speeches of a block."""
 
-from schemas.behaviors import Mark, Speech
-from schemas.blocks import SpokenText
-from services.realizer.points import Point
-from services.realizer.spoken import Spoken
+from engage_hri.schemas.behaviors import Mark, Speech
+from engage_hri.schemas.blocks import SpokenText
+from engage_hri.services.realizer.points import Point
+from engage_hri.services.realizer.spoken import Spoken
 
 STORY = Speech(id="s", text="one two three", marks=(Mark("m", 4),))
 

@@ -2,10 +2,10 @@
 
 import pytest
 
-from schemas.behaviors import Head, Wait
-from schemas.blocks import BlockOutcome
-from schemas.syncref import SYNC_POINTS
-from services.control.config import Slow, Variability
+from engage_hri.schemas.behaviors import Head, Wait
+from engage_hri.schemas.blocks import BlockOutcome
+from engage_hri.schemas.syncref import SYNC_POINTS
+from engage_hri.services.control.config import Slow, Variability
 from tests.realizer.fake_body import FakeBody, Script
 from tests.realizer.stage import after, block, stage
 from tests.realizer.test_simulated_body import robot

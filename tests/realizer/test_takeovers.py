@@ -2,12 +2,12 @@
 
 from itertools import pairwise
 
-from schemas.behaviors import After, BlockBehavior, Constraint, Gaze, Gesture, Pointing, Speech, Timing
-from schemas.blocks import Block
-from schemas.body import BodyPose, Estimate, JointAngle, Phase
-from schemas.faults import Fault
-from services.realizer.planner import plan_block
-from services.realizer.poses import poses_before
+from engage_hri.schemas.behaviors import After, BlockBehavior, Constraint, Gaze, Gesture, Pointing, Speech, Timing
+from engage_hri.schemas.blocks import Block
+from engage_hri.schemas.body import BodyPose, Estimate, JointAngle, Phase
+from engage_hri.schemas.faults import Fault
+from engage_hri.services.realizer.planner import plan_block
+from engage_hri.services.realizer.poses import poses_before
 from tests.realizer.fake_body import FakeBody
 from tests.realizer.stage import after, block, stage
 

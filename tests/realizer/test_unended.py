@@ -4,10 +4,10 @@ import asyncio
 
 import pytest
 
-from schemas import keys
-from schemas.behaviors import Gesture
-from schemas.blocks import Block
-from schemas.requests import Cancel, KeepAlive
+from engage_hri.schemas import keys
+from engage_hri.schemas.behaviors import Gesture
+from engage_hri.schemas.blocks import Block
+from engage_hri.schemas.requests import Cancel, KeepAlive
 from tests.realizer.fake_body import FakeBody
 from tests.realizer.stage import stage
 

@@ -5,13 +5,13 @@ import asyncio
 import msgspec
 import pytest
 
-from schemas import keys
-from schemas.feedback import WarningFeedback
-from schemas.requests import Refused
-from services.commandline.roster import service
-from services.config import Config
-from services.memory_bus import MemoryHub
-from services.runtime import running
+from engage_hri.schemas import keys
+from engage_hri.schemas.feedback import WarningFeedback
+from engage_hri.schemas.requests import Refused
+from engage_hri.services.commandline.roster import service
+from engage_hri.services.config import Config
+from engage_hri.services.memory_bus import MemoryHub
+from engage_hri.services.runtime import running
 from tests.realizer.stage import stage
 
 

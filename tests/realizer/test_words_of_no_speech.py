@@ -2,8 +2,8 @@
 
 import pytest
 
-from schemas.behaviors import Gaze, Speech
-from services.realizer.spoken import Spoken
+from engage_hri.schemas.behaviors import Gaze, Speech
+from engage_hri.services.realizer.spoken import Spoken
 
 
 @pytest.mark.parametrize("id", ["look", "nobody"])

@@ -9,13 +9,13 @@ from collections.abc import Iterator
 from heapq import merge
 from itertools import count
 
-from schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost
-from schemas.attention import Claim, HeadOwner
-from schemas.behaviors import Action, TurnSignal
-from schemas.feedback import BlockProgress, SyncPointProgress
-from schemas.recognition import SignalTurn
-from schemas.units import Seconds
-from services.recognition.session import Observation
+from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost
+from engage_hri.schemas.attention import Claim, HeadOwner
+from engage_hri.schemas.behaviors import Action, TurnSignal
+from engage_hri.schemas.feedback import BlockProgress, SyncPointProgress
+from engage_hri.schemas.recognition import SignalTurn
+from engage_hri.schemas.units import Seconds
+from engage_hri.services.recognition.session import Observation
 from tests.recognition.observations import PIECES, ROBOT, request_event, stamp, world
 
 Observed = Iterator[tuple[Seconds, Observation]]

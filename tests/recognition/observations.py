@@ -2,17 +2,17 @@
 
 from typing import Any
 
-from schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost
-from schemas.attention import Claim, ClaimKind, HeadOwner
-from schemas.behaviors import Action, Event, EventKind, TurnSignal
-from schemas.feedback import BlockProgress, SyncPointProgress
-from schemas.recognition import ConnectionEvent, EventOutcome, RequestEvent, SignalTurn
-from schemas.requests import Cancel
-from schemas.units import Stamp
-from schemas.world import Entity, World
-from services.recognition.config import RecognitionConfig
-from services.recognition.machine import Effect
-from services.recognition.session import Observation, Session
+from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost
+from engage_hri.schemas.attention import Claim, ClaimKind, HeadOwner
+from engage_hri.schemas.behaviors import Action, Event, EventKind, TurnSignal
+from engage_hri.schemas.feedback import BlockProgress, SyncPointProgress
+from engage_hri.schemas.recognition import ConnectionEvent, EventOutcome, RequestEvent, SignalTurn
+from engage_hri.schemas.requests import Cancel
+from engage_hri.schemas.units import Stamp
+from engage_hri.schemas.world import Entity, World
+from engage_hri.services.recognition.config import RecognitionConfig
+from engage_hri.services.recognition.machine import Effect
+from engage_hri.services.recognition.session import Observation, Session
 
 ROBOT, HUMAN = "robot", "human"
 PIECES = ("blue-square", "rectangle", "purple-triangle", "pink-square", "trapezoid", "green-square")

@@ -4,17 +4,17 @@ from collections.abc import Iterator
 
 from msgspec import Struct, field
 
-from schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost
-from schemas.perception import HeadPose, VoiceActivity
-from schemas.recognition import ConnectionEvent
-from schemas.units import Seconds
-from schemas.world import Entity, World
-from services.recognition.config import RecognitionConfig
-from services.recognition.machine import Forgotten
-from services.recognition.open_events import OpenBook
-from services.recognition.recognizer import Perceived, Recognizer, Result
-from services.recognition.standings import Standings
-from services.recognition.witnesses import Witnesses
+from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost
+from engage_hri.schemas.perception import HeadPose, VoiceActivity
+from engage_hri.schemas.recognition import ConnectionEvent
+from engage_hri.schemas.units import Seconds
+from engage_hri.schemas.world import Entity, World
+from engage_hri.services.recognition.config import RecognitionConfig
+from engage_hri.services.recognition.machine import Forgotten
+from engage_hri.services.recognition.open_events import OpenBook
+from engage_hri.services.recognition.recognizer import Perceived, Recognizer, Result
+from engage_hri.services.recognition.standings import Standings
+from engage_hri.services.recognition.witnesses import Witnesses
 from tests.recognition.observations import PIECES, ROBOT, stamp, world
 from tests.recognition.raw import EYES
 

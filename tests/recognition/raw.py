@@ -3,12 +3,12 @@
 import math
 from typing import Any
 
-from schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost
-from schemas.perception import HeadPose, VoiceActivity
-from schemas.units import Vector
-from schemas.world import Entity, World
-from services.recognition.attention import Attention, Symbolic
-from services.recognition.config import RecognitionConfig, Sensing
+from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost
+from engage_hri.schemas.perception import HeadPose, VoiceActivity
+from engage_hri.schemas.units import Vector
+from engage_hri.schemas.world import Entity, World
+from engage_hri.services.recognition.attention import Attention, Symbolic
+from engage_hri.services.recognition.config import RecognitionConfig, Sensing
 from tests.recognition.observations import HUMAN, ROBOT, stamp
 
 EYES: Vector = (1.3, 0.0, 1.2)

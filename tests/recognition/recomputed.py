@@ -10,10 +10,10 @@ from typing import Any
 
 import msgspec
 
-from schemas.recognition import ConnectionEvent, KindStatistics, WindowStatistics
-from schemas.units import Seconds, Stamp
-from services.recognition.config import RecognitionConfig
-from services.recognition.statistics import KINDS
+from engage_hri.schemas.recognition import ConnectionEvent, KindStatistics, WindowStatistics
+from engage_hri.schemas.units import Seconds, Stamp
+from engage_hri.services.recognition.config import RecognitionConfig
+from engage_hri.services.recognition.statistics import KINDS
 
 Life = list[ConnectionEvent]
 

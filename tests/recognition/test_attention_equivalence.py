@@ -6,11 +6,11 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from schemas.actions import ActionBegan, ActionEnded, ActorFound
-from schemas.recognition import ConnectionEvent, EventOutcome
-from schemas.requests import Accepted
-from services.recognition.config import RecognitionConfig
-from services.recognition.recognizer import Recognizer
+from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound
+from engage_hri.schemas.recognition import ConnectionEvent, EventOutcome
+from engage_hri.schemas.requests import Accepted
+from engage_hri.services.recognition.config import RecognitionConfig
+from engage_hri.services.recognition.recognizer import Recognizer
 from tests.recognition.observations import HUMAN, ROBOT, request_event, stamp
 from tests.recognition.raw import PLACES, TABLE, face, hand, piece, pose, table, voice
 

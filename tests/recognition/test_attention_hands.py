@@ -5,8 +5,8 @@ from random import Random
 
 import pytest
 
-from schemas.actions import ActionBegan, ActionEnded
-from schemas.units import Vector
+from engage_hri.schemas.actions import ActionBegan, ActionEnded
+from engage_hri.schemas.units import Vector
 from tests.recognition.observations import HUMAN, ROBOT
 from tests.recognition.raw import PLACES, Watch, frames, hand
 

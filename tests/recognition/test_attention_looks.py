@@ -7,11 +7,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost
-from schemas.perception import HeadPose
-from schemas.world import Entity, World
-from services.recognition.attention import Attention
-from services.recognition.config import RecognitionConfig
+from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost
+from engage_hri.schemas.perception import HeadPose
+from engage_hri.schemas.world import Entity, World
+from engage_hri.services.recognition.attention import Attention
+from engage_hri.services.recognition.config import RecognitionConfig
 from tests.recognition.observations import HUMAN, ROBOT, stamp
 from tests.recognition.raw import EMPTY, EYES, PLACES, Watch, face, frames, piece, pose, table, turned
 

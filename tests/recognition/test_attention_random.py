@@ -5,12 +5,12 @@ from random import Random
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from schemas.actions import ActorFound, ActorLost
-from schemas.recognition import ENDINGS, ConnectionEvent, EventOutcome, SignalTurn
-from schemas.requests import Accepted, Refused
-from services.recognition.config import RecognitionConfig
-from services.recognition.machine import DECISIONS
-from services.recognition.recognizer import Recognizer
+from engage_hri.schemas.actions import ActorFound, ActorLost
+from engage_hri.schemas.recognition import ENDINGS, ConnectionEvent, EventOutcome, SignalTurn
+from engage_hri.schemas.requests import Accepted, Refused
+from engage_hri.services.recognition.config import RecognitionConfig
+from engage_hri.services.recognition.machine import DECISIONS
+from engage_hri.services.recognition.recognizer import Recognizer
 from tests.recognition.observations import ROBOT, stamp
 from tests.recognition.raw import EYES, PLACES, face, hand, pose, table, voice
 from tests.recognition.test_random_streams import ACTORS, Chance

@@ -6,18 +6,18 @@ from contextlib import asynccontextmanager
 
 import pytest
 
-from schemas import keys
-from schemas.actions import ActionBegan
-from schemas.behaviors import TurnSignal
-from schemas.body import BodyPose, Ray, RobotState
-from schemas.messages import encode
-from schemas.perception import HeadPose
-from schemas.recognition import EventOutcome, SignalTurn
-from schemas.units import Vector
-from services.bus import Bus
-from services.memory_bus import MemoryHub
-from services.requests import Requester
-from services.runtime import running
+from engage_hri.schemas import keys
+from engage_hri.schemas.actions import ActionBegan
+from engage_hri.schemas.behaviors import TurnSignal
+from engage_hri.schemas.body import BodyPose, Ray, RobotState
+from engage_hri.schemas.messages import encode
+from engage_hri.schemas.perception import HeadPose
+from engage_hri.schemas.recognition import EventOutcome, SignalTurn
+from engage_hri.schemas.units import Vector
+from engage_hri.services.bus import Bus
+from engage_hri.services.memory_bus import MemoryHub
+from engage_hri.services.requests import Requester
+from engage_hri.services.runtime import running
 from tests.recognition.observations import HUMAN, ROBOT
 from tests.recognition.raw import face, hand, place_of, pose, table, voice
 from tests.recognition.test_service import recognition, request

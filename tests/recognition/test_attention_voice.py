@@ -6,9 +6,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from schemas.actions import ActionBegan
-from services.recognition.attention import Attention
-from services.recognition.config import RecognitionConfig
+from engage_hri.schemas.actions import ActionBegan
+from engage_hri.services.recognition.attention import Attention
+from engage_hri.services.recognition.config import RecognitionConfig
 from tests.recognition.observations import HUMAN, ROBOT
 from tests.recognition.raw import Watch, voice
 

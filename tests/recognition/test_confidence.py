@@ -2,8 +2,8 @@
 
 import pytest
 
-from schemas.actions import ActionBegan
-from schemas.recognition import ConnectionEvent
+from engage_hri.schemas.actions import ActionBegan
+from engage_hri.schemas.recognition import ConnectionEvent
 from tests.recognition.observations import HUMAN, ROBOT, Log, asked, stamp
 
 BLUE = "blue-square"

@@ -2,9 +2,9 @@
 
 import pytest
 
-from schemas.recognition import ConnectionEvent
-from services.recognition.config import RecognitionConfig
-from services.recognition.recognizer import Recognizer
+from engage_hri.schemas.recognition import ConnectionEvent
+from engage_hri.services.recognition.config import RecognitionConfig
+from engage_hri.services.recognition.recognizer import Recognizer
 from tests.recognition.observations import HUMAN, ROBOT
 from tests.recognition.raw import PLACES, face, frames, hand, pose, table
 

@@ -8,16 +8,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from msgspec.structs import replace
 
-from schemas.actions import ActionBegan, ActorFound, ActorLost
-from schemas.recognition import ConnectionEvent, EventOutcome, Statistics
-from schemas.requests import Accepted, Refused
-from services.recognition.agenda import SLACK, Agenda
-from services.recognition.config import RecognitionConfig
-from services.recognition.machine import Forgotten
-from services.recognition.open_events import OpenBook
-from services.recognition.person import Person
-from services.recognition.session import Session
-from services.recognition.standings import Standings
+from engage_hri.schemas.actions import ActionBegan, ActorFound, ActorLost
+from engage_hri.schemas.recognition import ConnectionEvent, EventOutcome, Statistics
+from engage_hri.schemas.requests import Accepted, Refused
+from engage_hri.services.recognition.agenda import SLACK, Agenda
+from engage_hri.services.recognition.config import RecognitionConfig
+from engage_hri.services.recognition.machine import Forgotten
+from engage_hri.services.recognition.open_events import OpenBook
+from engage_hri.services.recognition.person import Person
+from engage_hri.services.recognition.session import Session
+from engage_hri.services.recognition.standings import Standings
 from tests.recognition.kept import kinds
 from tests.recognition.observations import HUMAN, ROBOT, Log, stamp, world
 from tests.recognition.passers import Lobby, visit

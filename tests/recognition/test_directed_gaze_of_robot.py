@@ -2,7 +2,7 @@
 
 import pytest
 
-from schemas.requests import Refused
+from engage_hri.schemas.requests import Refused
 from tests.recognition.observations import HUMAN, ROBOT, Log, world
 
 BLUE, PINK = "blue-square", "pink-square"

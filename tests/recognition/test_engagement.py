@@ -4,10 +4,10 @@ from itertools import pairwise
 
 import pytest
 
-from schemas.recognition import ConnectionEvent, Statistics
-from schemas.units import Seconds
-from services.recognition.config import RecognitionConfig
-from services.recognition.standings import Standings
+from engage_hri.schemas.recognition import ConnectionEvent, Statistics
+from engage_hri.schemas.units import Seconds
+from engage_hri.services.recognition.config import RecognitionConfig
+from engage_hri.services.recognition.standings import Standings
 from tests.recognition.test_statistics import event, table_2_1
 
 PAUSE: Seconds = 70.0

@@ -8,19 +8,19 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from schemas import keys
-from schemas.actions import ActionBegan, ActionEnded
-from schemas.presence import PeerAlive, PeerGone
-from schemas.recognition import ENDINGS, ConnectionEvent, EventOutcome, OpenEvents, RequestEvent
-from schemas.units import Stamp
-from services.bus import Bus
-from services.client import Robot, connect
-from services.event_stream import EventStream
-from services.feeds import EventFeed
-from services.memory_bus import MemoryHub
-from services.recognition.open_events import OpenBook
-from services.requests import Requester
-from services.runtime import running
+from engage_hri.schemas import keys
+from engage_hri.schemas.actions import ActionBegan, ActionEnded
+from engage_hri.schemas.presence import PeerAlive, PeerGone
+from engage_hri.schemas.recognition import ENDINGS, ConnectionEvent, EventOutcome, OpenEvents, RequestEvent
+from engage_hri.schemas.units import Stamp
+from engage_hri.services.bus import Bus
+from engage_hri.services.client import Robot, connect
+from engage_hri.services.event_stream import EventStream
+from engage_hri.services.feeds import EventFeed
+from engage_hri.services.memory_bus import MemoryHub
+from engage_hri.services.recognition.open_events import OpenBook
+from engage_hri.services.requests import Requester
+from engage_hri.services.runtime import running
 from tests.recognition.observations import ROBOT, world
 from tests.recognition.test_service import recognition, request
 

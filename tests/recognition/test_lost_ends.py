@@ -2,7 +2,7 @@
 
 import pytest
 
-from services.recognition.config import RecognitionConfig
+from engage_hri.services.recognition.config import RecognitionConfig
 from tests.recognition.observations import HUMAN, ROBOT, Log, asked
 
 WORDS = "block-2:speech-1"

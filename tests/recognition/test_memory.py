@@ -6,13 +6,13 @@ from itertools import islice
 
 import pytest
 
-from schemas.actions import ActionBegan
-from schemas.recognition import ConnectionEvent
-from schemas.units import Seconds
-from services.recognition.config import RecognitionConfig
-from services.recognition.latest import Latest
-from services.recognition.session import Observation, Session
-from services.recognition.standings import Standings
+from engage_hri.schemas.actions import ActionBegan
+from engage_hri.schemas.recognition import ConnectionEvent
+from engage_hri.schemas.units import Seconds
+from engage_hri.services.recognition.config import RecognitionConfig
+from engage_hri.services.recognition.latest import Latest
+from engage_hri.services.recognition.session import Observation, Session
+from engage_hri.services.recognition.standings import Standings
 from tests.recognition.kept import kinds
 from tests.recognition.meeting import meeting
 from tests.recognition.observations import ROBOT, Log, stamp

@@ -10,12 +10,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from msgspec import Struct
 
-from schemas.actions import ActionBegan, ActionEnded
-from schemas.behaviors import Action, TurnSignal
-from schemas.recognition import ConnectionEvent, SignalTurn
-from schemas.units import Seconds
-from services.recognition.config import RecognitionConfig
-from services.recognition.session import Session
+from engage_hri.schemas.actions import ActionBegan, ActionEnded
+from engage_hri.schemas.behaviors import Action, TurnSignal
+from engage_hri.schemas.recognition import ConnectionEvent, SignalTurn
+from engage_hri.schemas.units import Seconds
+from engage_hri.services.recognition.config import RecognitionConfig
+from engage_hri.services.recognition.session import Session
 from tests.recognition.observations import ROBOT, request_event, stamp, world
 from tests.recognition.test_random_streams import Chance, Stream
 

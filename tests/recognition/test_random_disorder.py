@@ -7,11 +7,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from msgspec.structs import replace
 
-from schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost
-from schemas.recognition import ConnectionEvent, RequestEvent, SignalTurn
-from services.recognition.config import RecognitionConfig
-from services.recognition.machine import Effect
-from services.recognition.session import Observation, Session
+from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost
+from engage_hri.schemas.recognition import ConnectionEvent, RequestEvent, SignalTurn
+from engage_hri.services.recognition.config import RecognitionConfig
+from engage_hri.services.recognition.machine import Effect
+from engage_hri.services.recognition.session import Observation, Session
 from tests.recognition.observations import ROBOT, world
 from tests.recognition.test_random_streams import Chance, Stream, streams
 

@@ -5,13 +5,13 @@ from collections.abc import Iterator
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from schemas.recognition import ConnectionEvent, Statistics
-from schemas.units import Seconds
-from services.recognition.config import RecognitionConfig
-from services.recognition.engagement import JUST_AFTER, next_level
-from services.recognition.machine import Effect
-from services.recognition.session import Session
-from services.recognition.standings import Standings
+from engage_hri.schemas.recognition import ConnectionEvent, Statistics
+from engage_hri.schemas.units import Seconds
+from engage_hri.services.recognition.config import RecognitionConfig
+from engage_hri.services.recognition.engagement import JUST_AFTER, next_level
+from engage_hri.services.recognition.machine import Effect
+from engage_hri.services.recognition.session import Session
+from engage_hri.services.recognition.standings import Standings
 from tests.recognition import recomputed
 from tests.recognition.observations import ROBOT, world
 from tests.recognition.test_random_streams import ACTORS, Stream, streams

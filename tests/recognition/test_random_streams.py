@@ -7,16 +7,16 @@ from typing import Any
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost
-from schemas.attention import Claim, HeadOwner
-from schemas.behaviors import TurnSignal
-from schemas.feedback import BlockProgress, SyncPointProgress
-from schemas.recognition import ENDINGS, ConnectionEvent, EventOutcome, SignalTurn, TurnOutcome
-from schemas.requests import Accepted, Cancel, Refused
-from services.recognition.config import RecognitionConfig
-from services.recognition.machine import DECISIONS
-from services.recognition.session import Observation, Session
-from services.recognition.statistics import KINDS
+from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost
+from engage_hri.schemas.attention import Claim, HeadOwner
+from engage_hri.schemas.behaviors import TurnSignal
+from engage_hri.schemas.feedback import BlockProgress, SyncPointProgress
+from engage_hri.schemas.recognition import ENDINGS, ConnectionEvent, EventOutcome, SignalTurn, TurnOutcome
+from engage_hri.schemas.requests import Accepted, Cancel, Refused
+from engage_hri.services.recognition.config import RecognitionConfig
+from engage_hri.services.recognition.machine import DECISIONS
+from engage_hri.services.recognition.session import Observation, Session
+from engage_hri.services.recognition.statistics import KINDS
 from tests.recognition.observations import ROBOT, request_event, stamp, world
 
 Stream = list[tuple[float, Observation]]

@@ -2,7 +2,7 @@
 
 import pytest
 
-from schemas.presence import PeerGone
+from engage_hri.schemas.presence import PeerGone
 from tests.recognition.observations import HUMAN, ROBOT, Log
 
 CONTROL_GONE = PeerGone(participant="control")

@@ -4,18 +4,18 @@ from functools import partial
 
 import pytest
 
-from schemas import keys
-from schemas.actions import ActionBegan, ActionEnded
-from schemas.behaviors import Event, TurnSignal
-from schemas.feedback import BlockProgress, SyncPointProgress
-from schemas.recognition import ConnectionEvent, EventOutcome, RequestEvent, SignalTurn, Statistics
-from schemas.units import Stamp
-from services.bus import Bus
-from services.memory_bus import MemoryHub
-from services.recognition.config import RecognitionConfig
-from services.recognition.service import recognize
-from services.requests import Requester, RequestRefused
-from services.runtime import Service, running
+from engage_hri.schemas import keys
+from engage_hri.schemas.actions import ActionBegan, ActionEnded
+from engage_hri.schemas.behaviors import Event, TurnSignal
+from engage_hri.schemas.feedback import BlockProgress, SyncPointProgress
+from engage_hri.schemas.recognition import ConnectionEvent, EventOutcome, RequestEvent, SignalTurn, Statistics
+from engage_hri.schemas.units import Stamp
+from engage_hri.services.bus import Bus
+from engage_hri.services.memory_bus import MemoryHub
+from engage_hri.services.recognition.config import RecognitionConfig
+from engage_hri.services.recognition.service import recognize
+from engage_hri.services.requests import Requester, RequestRefused
+from engage_hri.services.runtime import Service, running
 from tests.commanding import command
 from tests.recognition.observations import HUMAN, ROBOT, world
 

@@ -2,12 +2,12 @@
 
 import pytest
 
-from schemas.recognition import ConnectionEvent
-from schemas.units import Stamp
-from services.recognition.config import RecognitionConfig
-from services.recognition.engagement import Engagement, next_level, pace
-from services.recognition.standings import Standings
-from services.recognition.statistics import Tally
+from engage_hri.schemas.recognition import ConnectionEvent
+from engage_hri.schemas.units import Stamp
+from engage_hri.services.recognition.config import RecognitionConfig
+from engage_hri.services.recognition.engagement import Engagement, next_level, pace
+from engage_hri.services.recognition.standings import Standings
+from engage_hri.services.recognition.statistics import Tally
 
 KIND = {
     "dg": "directed_gaze", "mfg": "mutual_facial_gaze", "ap": "adjacency_pair", "bc": "backchannel",

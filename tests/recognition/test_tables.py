@@ -4,11 +4,11 @@ from pathlib import Path
 
 import pytest
 
-from schemas.behaviors import EventKind
-from schemas.recognition import ENDINGS
-from services.recognition import adjacency_pair, backchannel, directed_gaze, mutual_facial_gaze
-from services.recognition.config import RecognitionConfig, Sensing
-from services.recognition.machine import (
+from engage_hri.schemas.behaviors import EventKind
+from engage_hri.schemas.recognition import ENDINGS
+from engage_hri.services.recognition import adjacency_pair, backchannel, directed_gaze, mutual_facial_gaze
+from engage_hri.services.recognition.config import RecognitionConfig, Sensing
+from engage_hri.services.recognition.machine import (
     DECISIONS,
     IDLE,
     Ledger,
@@ -18,7 +18,7 @@ from services.recognition.machine import (
     diagram,
     table,
 )
-from services.recognition.shared_gaze import SharedGaze
+from engage_hri.services.recognition.shared_gaze import SharedGaze
 
 TABLES = {
     "directed gaze": directed_gaze.TABLE, "mutual facial gaze": mutual_facial_gaze.TABLE,

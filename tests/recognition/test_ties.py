@@ -4,14 +4,14 @@ import math
 
 import pytest
 
-from schemas.actions import ActionBegan
-from schemas.recognition import ConnectionEvent
-from services.recognition.attention import Attention
-from services.recognition.config import RecognitionConfig
-from services.recognition.limits import in_time
-from services.recognition.presence import Presence
-from services.recognition.recognizer import Recognizer
-from services.recognition.statistics import Starts
+from engage_hri.schemas.actions import ActionBegan
+from engage_hri.schemas.recognition import ConnectionEvent
+from engage_hri.services.recognition.attention import Attention
+from engage_hri.services.recognition.config import RecognitionConfig
+from engage_hri.services.recognition.limits import in_time
+from engage_hri.services.recognition.presence import Presence
+from engage_hri.services.recognition.recognizer import Recognizer
+from engage_hri.services.recognition.statistics import Starts
 from tests.recognition.observations import HUMAN, ROBOT, Log, asked, stamp, world
 from tests.recognition.raw import pose, table
 

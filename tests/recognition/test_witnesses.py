@@ -1,8 +1,8 @@
 """People are lost with the perception that reports them."""
 
-from schemas.actions import ActionBegan, ActorFound, ActorLost
-from schemas.presence import PeerAlive, PeerGone
-from services.recognition.witnesses import Witnesses
+from engage_hri.schemas.actions import ActionBegan, ActorFound, ActorLost
+from engage_hri.schemas.presence import PeerAlive, PeerGone
+from engage_hri.services.recognition.witnesses import Witnesses
 from tests.recognition.observations import stamp
 
 ALIVE, GONE = PeerAlive(participant="cameras", run="one"), PeerGone(participant="cameras")

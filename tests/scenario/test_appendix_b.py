@@ -10,16 +10,16 @@ from typing import Any
 
 import pytest
 
-from schemas.actions import ActionBegan, ActionEnded, ActorLost
-from schemas.attention import HeadOwner
-from schemas.body import WordSpoken
-from schemas.faults import Fault
-from schemas.feedback import BlockProgress, SyncPointProgress, WarningFeedback
-from schemas.recognition import ConnectionEvent
-from schemas.world import World
-from services.collaboration.relations import Relation, relation
-from services.memory_bus import Faults
-from services.virtual_time import run_virtual
+from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorLost
+from engage_hri.schemas.attention import HeadOwner
+from engage_hri.schemas.body import WordSpoken
+from engage_hri.schemas.faults import Fault
+from engage_hri.schemas.feedback import BlockProgress, SyncPointProgress, WarningFeedback
+from engage_hri.schemas.recognition import ConnectionEvent
+from engage_hri.schemas.world import World
+from engage_hri.services.collaboration.relations import Relation, relation
+from engage_hri.services.memory_bus import Faults
+from engage_hri.services.virtual_time import run_virtual
 from tests.scenario.playing import Record, play
 
 PERSON_LOOKS = {

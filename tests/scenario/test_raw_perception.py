@@ -8,10 +8,10 @@ from functools import cache
 
 import pytest
 
-from schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost
-from schemas.faults import Fault
-from services.simulation.config import PerceptionFaults, SimulationConfig
-from services.virtual_time import run_virtual
+from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost
+from engage_hri.schemas.faults import Fault
+from engage_hri.services.simulation.config import PerceptionFaults, SimulationConfig
+from engage_hri.services.virtual_time import run_virtual
 from tests.scenario.playing import Record, play
 from tests.scenario.test_appendix_b import ENDINGS, EXPECTED, by_step
 

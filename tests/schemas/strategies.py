@@ -1,14 +1,14 @@
-"""Random valid blocks and turn fragments: whatever the structs can hold and `schemas.check` accepts."""
+"""Random valid blocks and turn fragments: whatever the structs can hold and `schemas/check.py` accepts."""
 
 from typing import get_args
 
 from hypothesis import strategies as st
 from msgspec.structs import replace
 
-from schemas import behaviors as of
-from schemas.blocks import Block, Composition, Dialect
-from schemas.fragments import TurnFragment, TurnStatus
-from schemas.syncref import SYNC_POINTS, SyncRef
+from engage_hri.schemas import behaviors as of
+from engage_hri.schemas.blocks import Block, Composition, Dialect
+from engage_hri.schemas.fragments import TurnFragment, TurnStatus
+from engage_hri.schemas.syncref import SYNC_POINTS, SyncRef
 
 # Letters that XML must escape, white space that it would collapse, and some beyond ASCII.
 LETTERS = "ab cXYZ09<>&\"'\t\n-:é€😀"

@@ -9,16 +9,16 @@ import pytest
 from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
 
-from schemas import json_codec
-from schemas.faults import InputRefused
-from schemas.feedback_xml import decode_feedback
-from schemas.messages import Message, decode, encode, encode_json
-from schemas.requests import Cancel
-from schemas.syncref import is_id
-from schemas.utf8 import utf8
-from schemas.xml_codec import decode_xml
-from services.config import load
-from services.simulation.still import EXAMPLE, load_world
+from engage_hri.schemas import json_codec
+from engage_hri.schemas.faults import InputRefused
+from engage_hri.schemas.feedback_xml import decode_feedback
+from engage_hri.schemas.messages import Message, decode, encode, encode_json
+from engage_hri.schemas.requests import Cancel
+from engage_hri.schemas.syncref import is_id
+from engage_hri.schemas.utf8 import utf8
+from engage_hri.schemas.xml_codec import decode_xml
+from engage_hri.services.config import load
+from engage_hri.services.simulation.still import EXAMPLE, load_world
 
 FORMS: dict[str, Callable[[Message], bytes]] = {"application/json": encode_json, "application/msgpack": encode}
 XML = b'<bml id="b">\n<speech id="s">caf\xc3\xa9 <sync id="m"/></speech><gaze id="g" target="cup" start="s:m"/></bml>'

@@ -4,14 +4,14 @@ from pathlib import Path
 
 import pytest
 
-from schemas.blocks import Block
-from schemas.export import exported_types, files, main, schema, stale, write
-from schemas.feedback import SyncPointProgress
-from schemas.fragments import TurnFragment
+from engage_hri.schemas.blocks import Block
+from engage_hri.schemas.export import exported_types, files, main, schema, stale, write
+from engage_hri.schemas.feedback import SyncPointProgress
+from engage_hri.schemas.fragments import TurnFragment
 
 
 def test_the_exported_schemas_are_not_stale() -> None:
-    assert stale() == [], "run python -m schemas.export"
+    assert stale() == [], "run python -m engage_hri.schemas.export"
 
 
 def test_every_message_and_both_inputs_are_exported() -> None:
@@ -57,7 +57,7 @@ def test_a_stale_file_is_noticed_and_put_right(tmp_path: Path) -> None:
 
 
 def test_check_fails_when_stale(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
-    monkeypatch.setattr("schemas.export.stale", lambda: ["Block.json"])
+    monkeypatch.setattr("engage_hri.schemas.export.stale", lambda: ["Block.json"])
 
     assert main(["--check"]) == 1
     assert "Block.json" in capsys.readouterr().err

@@ -6,8 +6,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from schemas.faults import InputRefused
-from schemas.feedback import (
+from engage_hri.schemas.faults import InputRefused
+from engage_hri.schemas.feedback import (
     BlockProgress,
     Feedback,
     PlannedPoint,
@@ -16,8 +16,8 @@ from schemas.feedback import (
     WarningFeedback,
     WarningKind,
 )
-from schemas.feedback_xml import HEAD, TAIL, decode_feedback, encode_feedback
-from schemas.units import Stamp
+from engage_hri.schemas.feedback_xml import HEAD, TAIL, decode_feedback, encode_feedback
+from engage_hri.schemas.units import Stamp
 from tests.schemas.strategies import ids
 
 BML = 'xmlns="http://www.bml-initiative.org/bml/bml-1.0"'

@@ -5,12 +5,12 @@ from typing import Any
 
 import pytest
 
-from schemas.behaviors import Gaze, Mark, Speech, Timing
-from schemas.blocks import Block
-from schemas.faults import Fault, InputRefused
-from schemas.fragments import TurnFragment
-from schemas.json_codec import decode_json, encode_json, read
-from schemas.xml_codec import decode_xml
+from engage_hri.schemas.behaviors import Gaze, Mark, Speech, Timing
+from engage_hri.schemas.blocks import Block
+from engage_hri.schemas.faults import Fault, InputRefused
+from engage_hri.schemas.fragments import TurnFragment
+from engage_hri.schemas.json_codec import decode_json, encode_json, read
+from engage_hri.schemas.xml_codec import decode_xml
 
 SAY = {"type": "speech", "id": "s", "text": "Hello"}
 CUP: dict[str, Any] = {

@@ -2,13 +2,19 @@
 
 import json
 
-from schemas.faults import Fault
-from schemas.feedback import BlockProgress, PlannedPoint, PredictionFeedback, SyncPointProgress, WarningFeedback
-from schemas.lines import line
-from schemas.messages import published
-from schemas.presence import PeerGone
-from schemas.recognition import ConnectionEvent, KindStatistics, OpenEvents, Statistics, WindowStatistics
-from schemas.units import Stamp
+from engage_hri.schemas.faults import Fault
+from engage_hri.schemas.feedback import (
+    BlockProgress,
+    PlannedPoint,
+    PredictionFeedback,
+    SyncPointProgress,
+    WarningFeedback,
+)
+from engage_hri.schemas.lines import line
+from engage_hri.schemas.messages import published
+from engage_hri.schemas.presence import PeerGone
+from engage_hri.schemas.recognition import ConnectionEvent, KindStatistics, OpenEvents, Statistics, WindowStatistics
+from engage_hri.schemas.units import Stamp
 
 
 def at(seconds: float) -> Stamp:

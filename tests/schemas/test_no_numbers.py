@@ -5,10 +5,10 @@ from math import inf, nan
 import msgspec
 import pytest
 
-from schemas.body import Estimates, SyncPointReached
-from schemas.faults import InputRefused
-from schemas.messages import decode
-from schemas.units import Stamp
+from engage_hri.schemas.body import Estimates, SyncPointReached
+from engage_hri.schemas.faults import InputRefused
+from engage_hri.schemas.messages import decode
+from engage_hri.schemas.units import Stamp
 
 
 @pytest.mark.parametrize("form", ["json", "msgpack"])

@@ -12,11 +12,11 @@ from typing import get_args
 import msgspec
 import pytest
 
-from schemas import keys, lines
-from schemas.fragments import PerformFragment
-from schemas.messages import Message
-from schemas.requests import Accepted
-from services.zenoh_bus import open_hub
+from engage_hri.schemas import keys, lines
+from engage_hri.schemas.fragments import PerformFragment
+from engage_hri.schemas.messages import Message
+from engage_hri.schemas.requests import Accepted
+from engage_hri.services.zenoh_bus import open_hub
 from tests.bus.places import free_endpoint
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"

@@ -2,11 +2,11 @@
 
 from hypothesis import HealthCheck, given, settings
 
-from schemas.blocks import Block
-from schemas.fragments import TurnFragment
-from schemas.json_codec import decode_json, encode_json, read
-from schemas.references import disambiguated, without_lines
-from schemas.xml_codec import decode_xml, encode_xml
+from engage_hri.schemas.blocks import Block
+from engage_hri.schemas.fragments import TurnFragment
+from engage_hri.schemas.json_codec import decode_json, encode_json, read
+from engage_hri.schemas.references import disambiguated, without_lines
+from engage_hri.schemas.xml_codec import decode_xml, encode_xml
 from tests.schemas.strategies import blocks, fragments
 
 quick = settings(max_examples=40, suppress_health_check=[HealthCheck.too_slow], deadline=None)

@@ -4,7 +4,7 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from schemas.speakable import has_words, joined, tokens, word_count
+from engage_hri.schemas.speakable import has_words, joined, tokens, word_count
 
 MIXED = st.text(
     st.sampled_from(list("aZé 3.,!(—😊\n世界。，「」ー。かキャぁ한ข้เไมำ‍ြက္กភ្ាា")) | st.characters(), max_size=40

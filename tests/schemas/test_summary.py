@@ -2,12 +2,12 @@
 
 import json
 
-from schemas.blocks import SpokenText
-from schemas.faults import Fault
-from schemas.fragments import FragmentOutcome, GestureChoice, ReferenceChoice
-from schemas.recognition import ConnectionEvent, EventState
-from schemas.summary import LONGEST_PROBLEM, Summary, refusal, summary
-from schemas.units import Stamp
+from engage_hri.schemas.blocks import SpokenText
+from engage_hri.schemas.faults import Fault
+from engage_hri.schemas.fragments import FragmentOutcome, GestureChoice, ReferenceChoice
+from engage_hri.schemas.recognition import ConnectionEvent, EventState
+from engage_hri.schemas.summary import LONGEST_PROBLEM, Summary, refusal, summary
+from engage_hri.schemas.units import Stamp
 
 POINT: GestureChoice = "directed_gaze_with_pointing"
 

@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from schemas.syncref import SyncRef, canonical_sync, dialect_sync
+from engage_hri.schemas.syncref import SyncRef, canonical_sync, dialect_sync
 
 names = st.from_regex(r"[A-Za-z_][A-Za-z0-9_.-]{0,8}", fullmatch=True)
 ids = names.filter(lambda name: name != "bml")

@@ -8,13 +8,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from schemas.check import problems
-from schemas.export import EXPORTED
-from schemas.faults import InputRefused
-from schemas.fragments import TurnFragment, TurnStatus
-from schemas.json_codec import decode_json, encode_json, read
-from schemas.tool import FILE, PARTS, Format, ToolInput, definition, input_schema
-from schemas.world import Entity, World
+from engage_hri.schemas.check import problems
+from engage_hri.schemas.export import EXPORTED
+from engage_hri.schemas.faults import InputRefused
+from engage_hri.schemas.fragments import TurnFragment, TurnStatus
+from engage_hri.schemas.json_codec import decode_json, encode_json, read
+from engage_hri.schemas.tool import FILE, PARTS, Format, ToolInput, input_schema, tool_definition
+from engage_hri.schemas.world import Entity, World
 
 SCENE = World(
     entities=(
@@ -48,7 +48,7 @@ def decoded(call: object) -> TurnFragment:
 
 def function(format: Format, world: World | None = None) -> dict[str, Any]:
     """Name, description and schema, wherever the API has them."""
-    tool = definition(format, world)
+    tool = tool_definition(format, world)
     return tool["function"] if format == "openai-chat" else tool  # type: ignore[no-any-return]
 
 
@@ -123,9 +123,9 @@ def test_openais_strict_functions_require_every_field(format: Format) -> None:
 
 
 def test_each_api_gets_the_form_it_takes() -> None:
-    assert definition("anthropic").keys() == {"name", "description", "input_schema"}
-    assert definition("openai").keys() == {"type", "name", "description", "strict", "parameters"}
-    assert definition("openai-chat").keys() == {"type", "function"}
+    assert tool_definition("anthropic").keys() == {"name", "description", "input_schema"}
+    assert tool_definition("openai").keys() == {"type", "name", "description", "strict", "parameters"}
+    assert tool_definition("openai-chat").keys() == {"type", "function"}
     assert len({function(format)["name"] for format in FORMATS}) == 1
     assert len(function("anthropic")["description"]) < 1024  # what OpenAI takes
 
@@ -149,7 +149,7 @@ def test_the_statuses_and_the_fields_are_those_of_the_code() -> None:
 
 
 def test_the_exported_tool_is_anthropics() -> None:
-    assert json.loads((EXPORTED / FILE).read_bytes()) == definition("anthropic")
+    assert json.loads((EXPORTED / FILE).read_bytes()) == tool_definition("anthropic")
 
 
 def test_a_known_world_leaves_only_its_ids_and_tells_what_they_look_like() -> None:

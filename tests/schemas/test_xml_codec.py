@@ -2,7 +2,7 @@
 
 import pytest
 
-from schemas.behaviors import (
+from engage_hri.schemas.behaviors import (
     After,
     Before,
     Constraint,
@@ -25,11 +25,11 @@ from schemas.behaviors import (
     TurnSignal,
     Wait,
 )
-from schemas.blocks import Block
-from schemas.faults import Fault, InputRefused
-from schemas.fragments import TurnFragment
-from schemas.references import without_lines
-from schemas.xml_codec import decode_xml, encode_xml
+from engage_hri.schemas.blocks import Block
+from engage_hri.schemas.faults import Fault, InputRefused
+from engage_hri.schemas.fragments import TurnFragment
+from engage_hri.schemas.references import without_lines
+from engage_hri.schemas.xml_codec import decode_xml, encode_xml
 
 DRAFT = "org.mindmakers.bml"
 BML_1_0 = "http://www.bml-initiative.org/bml/bml-1.0"

@@ -7,10 +7,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from schemas.behaviors import Speech
-from schemas.faults import InputRefused
-from schemas.json_codec import read
-from schemas.xml_codec import decode_xml
+from engage_hri.schemas.behaviors import Speech
+from engage_hri.schemas.faults import InputRefused
+from engage_hri.schemas.json_codec import read
+from engage_hri.schemas.xml_codec import decode_xml
 from tests.schemas.test_xml_codec import BML_1_0, DRAFT, FRAGMENT, block, refused
 
 LAUGHS = (

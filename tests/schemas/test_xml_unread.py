@@ -3,10 +3,10 @@
 import pytest
 from msgspec.structs import replace
 
-from schemas.behaviors import Gaze, Mark, Speech, Timing, Unknown
-from schemas.blocks import Block, Unread
-from schemas.faults import InputRefused
-from schemas.xml_codec import decode_xml
+from engage_hri.schemas.behaviors import Gaze, Mark, Speech, Timing, Unknown
+from engage_hri.schemas.blocks import Block, Unread
+from engage_hri.schemas.faults import InputRefused
+from engage_hri.schemas.xml_codec import decode_xml
 from tests.schemas.test_xml_codec import BML_1_0, DRAFT, behavior, block
 
 

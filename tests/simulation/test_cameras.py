@@ -11,16 +11,16 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost
-from schemas.body import BodyPose, Ray, RobotState
-from schemas.messages import Message
-from schemas.perception import HeadPose, VoiceActivity
-from schemas.units import Seconds, Stamp, Vector
-from schemas.world import World
-from services.simulation.cameras import Cameras
-from services.simulation.config import PerceptionFaults, SimulationConfig
-from services.simulation.head import Head, Sightlines, angle, unit
-from services.simulation.human import (
+from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost
+from engage_hri.schemas.body import BodyPose, Ray, RobotState
+from engage_hri.schemas.messages import Message
+from engage_hri.schemas.perception import HeadPose, VoiceActivity
+from engage_hri.schemas.units import Seconds, Stamp, Vector
+from engage_hri.schemas.world import World
+from engage_hri.services.simulation.cameras import Cameras
+from engage_hri.services.simulation.config import PerceptionFaults, SimulationConfig
+from engage_hri.services.simulation.head import Head, Sightlines, angle, unit
+from engage_hri.services.simulation.human import (
     AWAY,
     FACE,
     TABLE,
@@ -38,9 +38,9 @@ from services.simulation.human import (
     Stop,
     Withdraw,
 )
-from services.simulation.perception import Scene
-from services.simulation.table import Table
-from services.tangram_table import tangram_table
+from engage_hri.services.simulation.perception import Scene
+from engage_hri.services.simulation.table import Table
+from engage_hri.services.tangram_table import tangram_table
 
 FACE_AT = tangram_table().person.face
 EYES: Vector = (0.05, 0.0, 1.17)

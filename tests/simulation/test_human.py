@@ -2,13 +2,13 @@
 
 import pytest
 
-from schemas.actions import ActionBegan
-from schemas.body import WordSpoken
-from schemas.feedback import BlockProgress
-from schemas.messages import Message
-from schemas.units import Stamp
-from services.simulation.appendix_b import rules
-from services.simulation.human import FACE, Begun, Ended, Human, LookAt, Pause, RobotDoes, Rule, Word
+from engage_hri.schemas.actions import ActionBegan
+from engage_hri.schemas.body import WordSpoken
+from engage_hri.schemas.feedback import BlockProgress
+from engage_hri.schemas.messages import Message
+from engage_hri.schemas.units import Stamp
+from engage_hri.services.simulation.appendix_b import rules
+from engage_hri.services.simulation.human import FACE, Begun, Ended, Human, LookAt, Pause, RobotDoes, Rule, Word
 
 AT = Stamp("loop", 0.0)
 

@@ -7,12 +7,12 @@ from statistics import mean, median
 
 import pytest
 
-from schemas.recognition import ConnectionEvent
-from services.recognition.config import RecognitionConfig
-from services.recognition.session import Session
-from services.recognition.statistics import Tally
-from services.simulation.human_session import Pace, Planned, draw, exactly, observations
-from services.simulation.table_2_1 import EVENTS, LONGEST_GAP, MTBCE, TABLE
+from engage_hri.schemas.recognition import ConnectionEvent
+from engage_hri.services.recognition.config import RecognitionConfig
+from engage_hri.services.recognition.session import Session
+from engage_hri.services.recognition.statistics import Tally
+from engage_hri.services.simulation.human_session import Pace, Planned, draw, exactly, observations
+from engage_hri.services.simulation.table_2_1 import EVENTS, LONGEST_GAP, MTBCE, TABLE
 
 SEEDS = 200
 

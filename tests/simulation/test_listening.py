@@ -2,13 +2,13 @@
 
 import pytest
 
-from schemas.actions import ActionBegan, ActionEnded
-from schemas.body import WordSpoken
-from schemas.feedback import BlockProgress
-from schemas.units import Stamp
-from services.simulation.human import Act, Human, Lay, Leave
-from services.simulation.listening import ListeningHuman
-from services.tangram_table import tangram_table
+from engage_hri.schemas.actions import ActionBegan, ActionEnded
+from engage_hri.schemas.body import WordSpoken
+from engage_hri.schemas.feedback import BlockProgress
+from engage_hri.schemas.units import Stamp
+from engage_hri.services.simulation.human import Act, Human, Lay, Leave
+from engage_hri.services.simulation.listening import ListeningHuman
+from engage_hri.services.tangram_table import tangram_table
 
 AT = Stamp("loop", 0.0)
 

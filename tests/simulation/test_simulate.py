@@ -6,17 +6,17 @@ from functools import partial
 
 import pytest
 
-from schemas import keys
-from schemas.actions import ActionBegan, ActionEnded
-from schemas.body import WordSpoken
-from schemas.feedback import BlockProgress
-from schemas.world import World
-from services.bus import Bus, Keep
-from services.memory_bus import MemoryHub
-from services.runtime import running
-from services.simulation.appendix_b import MOVE
-from services.simulation.config import SimulationConfig
-from services.simulation.service import simulate
+from engage_hri.schemas import keys
+from engage_hri.schemas.actions import ActionBegan, ActionEnded
+from engage_hri.schemas.body import WordSpoken
+from engage_hri.schemas.feedback import BlockProgress
+from engage_hri.schemas.world import World
+from engage_hri.services.bus import Bus, Keep
+from engage_hri.services.memory_bus import MemoryHub
+from engage_hri.services.runtime import running
+from engage_hri.services.simulation.appendix_b import MOVE
+from engage_hri.services.simulation.config import SimulationConfig
+from engage_hri.services.simulation.service import simulate
 
 QUICK = SimulationConfig(await_participants=(), entrance=1.0, jitter=0.0)
 

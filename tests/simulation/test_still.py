@@ -8,14 +8,14 @@ from pathlib import Path
 import msgspec
 import pytest
 
-from schemas import keys
-from schemas.faults import InputRefused
-from schemas.units import Stamp
-from schemas.world import World
-from services.client import connect
-from services.memory_bus import MemoryHub
-from services.runtime import running
-from services.simulation.still import EXAMPLE, load_world, show_world, tangram_world
+from engage_hri.schemas import keys
+from engage_hri.schemas.faults import InputRefused
+from engage_hri.schemas.units import Stamp
+from engage_hri.schemas.world import World
+from engage_hri.services.client import connect
+from engage_hri.services.memory_bus import MemoryHub
+from engage_hri.services.runtime import running
+from engage_hri.services.simulation.still import EXAMPLE, load_world, show_world, tangram_world
 
 COMMANDS = (Path(__file__).parents[2] / "docs/commands.md").read_text()
 CUP = '{"id": "cup", "kind": "object", "position": [0.5, 0.1, 0.8]}'

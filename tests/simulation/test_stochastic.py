@@ -7,18 +7,18 @@ from typing import Any
 
 import pytest
 
-from schemas.actions import ActionBegan, ActionEnded, ActorLost
-from schemas.behaviors import Action
-from schemas.body import WordSpoken
-from schemas.feedback import BlockProgress
-from schemas.messages import Message
-from schemas.units import Stamp
-from schemas.world import World
-from services.simulation.config import Habits
-from services.simulation.perception import Scene
-from services.simulation.stochastic import StochasticHuman
-from services.simulation.table import Table
-from services.tangram_table import tangram_table
+from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorLost
+from engage_hri.schemas.behaviors import Action
+from engage_hri.schemas.body import WordSpoken
+from engage_hri.schemas.feedback import BlockProgress
+from engage_hri.schemas.messages import Message
+from engage_hri.schemas.units import Stamp
+from engage_hri.schemas.world import World
+from engage_hri.services.simulation.config import Habits
+from engage_hri.services.simulation.perception import Scene
+from engage_hri.services.simulation.stochastic import StochasticHuman
+from engage_hri.services.simulation.table import Table
+from engage_hri.services.tangram_table import tangram_table
 
 ROBOT, HUMAN = "robot", "human"
 QUIET = {"looks_up_every": 1e6, "directs_every": 1e6, "backchannels": 0.0, "reports": 0.0}

@@ -1,11 +1,11 @@
 """The whole system with the stochastic person: the task comes to its end, whatever they get wrong."""
 
-from schemas.actions import ActionBegan
-from schemas.world import World
-from services.collaboration.task import Goal
-from services.generation.config import Condition
-from services.simulation.config import Habits
-from services.tangram_table import tangram_table
+from engage_hri.schemas.actions import ActionBegan
+from engage_hri.schemas.world import World
+from engage_hri.services.collaboration.task import Goal
+from engage_hri.services.generation.config import Condition
+from engage_hri.services.simulation.config import Habits
+from engage_hri.services.tangram_table import tangram_table
 from tests.scenario.playing import Record, play
 
 ENDS = {"completed", "failed", "preempted", "withdrawn", "superseded"}

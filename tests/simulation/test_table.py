@@ -6,8 +6,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from services.simulation.table import PieceMoved, Table
-from services.tangram_table import Pose, tangram_table
+from engage_hri.services.simulation.table import PieceMoved, Table
+from engage_hri.services.tangram_table import Pose, tangram_table
 
 
 def table() -> Table:

@@ -1,8 +1,8 @@
 """Records to work with, without playing anything."""
 
-from schemas.behaviors import EventKind
-from schemas.recognition import KindStatistics, WindowStatistics
-from services.study.records import EyeContact, SessionRecord
+from engage_hri.schemas.behaviors import EventKind
+from engage_hri.schemas.recognition import KindStatistics, WindowStatistics
+from engage_hri.services.study.records import EyeContact, SessionRecord
 
 
 def kind(

@@ -3,8 +3,8 @@
 import csv
 import io
 
-from services.study import files
-from services.study.records import EventRecord
+from engage_hri.services.study import files
+from engage_hri.services.study.records import EventRecord
 from tests.study.sessions import kind, session
 
 

@@ -2,9 +2,9 @@
 
 import pytest
 
-from schemas.recognition import KindStatistics
-from services.study.hypotheses import Finding, findings
-from services.study.records import SessionRecord
+from engage_hri.schemas.recognition import KindStatistics
+from engage_hri.services.study.hypotheses import Finding, findings
+from engage_hri.services.study.records import SessionRecord
 from tests.study.sessions import kind, session
 
 WORSE = "degraded-generation"

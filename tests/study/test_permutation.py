@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from services.study.permutation import DRAWS, EXACT, Paired, holm, paired
+from engage_hri.services.study.permutation import DRAWS, EXACT, Paired, holm, paired
 
 
 def test_three_differences_of_one_sign_could_still_be_chance():

@@ -4,8 +4,8 @@ import struct
 
 import pytest
 
-from services.study.plots import draw
-from services.study.records import EventRecord, SessionRecord
+from engage_hri.services.study.plots import draw
+from engage_hri.services.study.records import EventRecord, SessionRecord
 from tests.study.sessions import kind, session
 
 NAMES = {"events.png", "delays.png", "failure_rates.png", "mtbce.png", "completion_time.png"}

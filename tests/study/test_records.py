@@ -4,10 +4,10 @@ from typing import Any
 
 import pytest
 
-from schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost
-from schemas.recognition import ConnectionEvent, Statistics, WindowStatistics
-from schemas.units import Stamp
-from services.study.records import EyeContact, Recording, SessionRecord
+from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost
+from engage_hri.schemas.recognition import ConnectionEvent, Statistics, WindowStatistics
+from engage_hri.schemas.units import Stamp
+from engage_hri.services.study.records import EyeContact, Recording, SessionRecord
 
 
 def at(seconds: float) -> Stamp:

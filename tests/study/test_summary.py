@@ -2,8 +2,8 @@
 
 import pytest
 
-from services.study import summary
-from services.study.hypotheses import findings
+from engage_hri.services.study import summary
+from engage_hri.services.study.hypotheses import findings
 from tests.study.sessions import kind, session
 
 

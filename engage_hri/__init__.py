@@ -1,0 +1,107 @@
+"""Engage: the engagement layer for robots that talk with people.
+
+Start robots with the command `engage`; drive and follow them from a program with what is named here:
+
+    from engage_hri import connect
+
+    async with connect() as robot:                      # a robot of the same name, in any process on any machine
+        outcome = await robot.perform("ask.json")       # one fragment of a turn: words, looks, pointing
+        async for event in robot.connection_events():   # gaze, eye contact, adjacency pairs, backchannels
+            print(event.kind, event.state)
+
+What a name stands for is loaded when it is first used: a service that only drives motors loads no client.
+"""
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from engage_hri.schemas.behaviors import Gaze as Gaze
+    from engage_hri.schemas.behaviors import Pointing as Pointing
+    from engage_hri.schemas.behaviors import Reference as Reference
+    from engage_hri.schemas.behaviors import Speech as Speech
+    from engage_hri.schemas.behaviors import SpeechOption as SpeechOption
+    from engage_hri.schemas.blocks import Block as Block
+    from engage_hri.schemas.faults import EngageError as EngageError
+    from engage_hri.schemas.faults import Fault as Fault
+    from engage_hri.schemas.faults import InputRefused as InputRefused
+    from engage_hri.schemas.faults import RequestRefused as RequestRefused
+    from engage_hri.schemas.faults import RunFailed as RunFailed
+    from engage_hri.schemas.fragments import FragmentOutcome as FragmentOutcome
+    from engage_hri.schemas.fragments import TurnFragment as TurnFragment
+    from engage_hri.schemas.recognition import ConnectionEvent as ConnectionEvent
+    from engage_hri.schemas.recognition import Statistics as Statistics
+    from engage_hri.schemas.summary import Summary as Summary
+    from engage_hri.schemas.summary import summary as summary
+    from engage_hri.schemas.tool import tool_definition as tool_definition
+    from engage_hri.schemas.world import Entity as Entity
+    from engage_hri.schemas.world import World as World
+    from engage_hri.services.client import PerformFailed as PerformFailed
+    from engage_hri.services.client import Robot as Robot
+    from engage_hri.services.client import connect as connect
+    from engage_hri.services.control.body import Arrived as Arrived
+    from engage_hri.services.control.body import Authority as Authority
+    from engage_hri.services.control.body import BehaviorRefused as BehaviorRefused
+    from engage_hri.services.control.body import Body as Body
+    from engage_hri.services.control.body import Reached as Reached
+    from engage_hri.services.streaming import perform_call as perform_call
+    from engage_hri.services.streaming import stream as stream
+
+_PLACES = {
+    "engage_hri.schemas.behaviors": ("Gaze", "Pointing", "Reference", "Speech", "SpeechOption"),
+    "engage_hri.schemas.blocks": ("Block",),
+    "engage_hri.schemas.faults": ("EngageError", "Fault", "InputRefused", "RequestRefused", "RunFailed"),
+    "engage_hri.schemas.fragments": ("FragmentOutcome", "TurnFragment"),
+    "engage_hri.schemas.recognition": ("ConnectionEvent", "Statistics"),
+    "engage_hri.schemas.summary": ("Summary", "summary"),
+    "engage_hri.schemas.tool": ("tool_definition",),
+    "engage_hri.schemas.world": ("Entity", "World"),
+    "engage_hri.services.client": ("PerformFailed", "Robot", "connect"),
+    "engage_hri.services.control.body": ("Arrived", "Authority", "BehaviorRefused", "Body", "Reached"),
+    "engage_hri.services.streaming": ("perform_call", "stream"),
+}
+_MODULES = {name: module for module, names in _PLACES.items() for name in names}
+
+__all__ = [
+    "Arrived",
+    "Authority",
+    "BehaviorRefused",
+    "Block",
+    "Body",
+    "ConnectionEvent",
+    "EngageError",
+    "Entity",
+    "Fault",
+    "FragmentOutcome",
+    "Gaze",
+    "InputRefused",
+    "PerformFailed",
+    "Pointing",
+    "Reached",
+    "Reference",
+    "RequestRefused",
+    "Robot",
+    "RunFailed",
+    "Speech",
+    "SpeechOption",
+    "Statistics",
+    "Summary",
+    "TurnFragment",
+    "World",
+    "connect",
+    "perform_call",
+    "stream",
+    "summary",
+    "tool_definition",
+]
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _MODULES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    value = globals()[name] = getattr(import_module(_MODULES[name]), name)
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

@@ -1,0 +1,25 @@
+"""How long a requester waits, and for what. Pure."""
+
+from msgspec import Struct
+
+from engage_hri.schemas.units import Seconds
+
+
+class Patience(Struct, frozen=True, kw_only=True):
+    """How a requester waits, in seconds.
+
+    first_resend: until what nobody answers is sent again; doubling up to longest_resend.
+    grace: how long the other side may be gone before its requests fail: a router's restart looks like a death.
+    pulse: between two `KeepAlive`. lease: how long a request that is not renewed stays alive at its server.
+    cancel: how long after its cancellation a request may take to end. silence: how long a server that is there may
+    leave a request without any answer. swallow: how long answers to what was given up may still come.
+    """
+
+    first_resend: Seconds = 0.3
+    longest_resend: Seconds = 2.0
+    grace: Seconds = 2.0
+    pulse: Seconds = 1.0
+    lease: Seconds = 5.0
+    cancel: Seconds = 30.0
+    silence: Seconds = 30.0
+    swallow: Seconds = 60.0

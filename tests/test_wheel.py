@@ -1,0 +1,89 @@
+"""The wheel beside hostile neighbours: a package of the index and a folder of the application called as ours are."""
+
+import os
+import shutil
+import subprocess
+import sys
+import zipfile
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[1]
+HOLDS = ("pyproject.toml", "README.md", "LICENSE", "engage_hri", "schemas", "services")
+
+
+@pytest.fixture(scope="module")
+def installed(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with what the wheel installs, and over it what others install under the names of our folders."""
+    place = tmp_path_factory.mktemp("wheel")
+    source, site = place / "source", place / "site"
+    source.mkdir()
+    for name in HOLDS:
+        if (ROOT / name).is_dir():
+            shutil.copytree(ROOT / name, source / name, symlinks=True, ignore=shutil.ignore_patterns("__pycache__"))
+        else:
+            shutil.copy2(ROOT / name, source / name)
+    command = (
+        sys.executable,
+        "-m",
+        "pip",
+        "wheel",
+        "--no-deps",
+        "--no-build-isolation",
+        "--quiet",
+        "-w",
+        place,
+        source,
+    )
+    subprocess.run(command, check=True, capture_output=True, env={**os.environ, "PIP_NO_INDEX": "1"})
+    (wheel,) = place.glob("*.whl")
+    with zipfile.ZipFile(wheel) as archive:
+        archive.extractall(site)
+    for name in ("services", "schemas"):
+        (site / name).mkdir()
+        (site / name / "__init__.py").touch()
+        (site / name / "cli.py").write_text("raise SystemExit('not ours')")
+    return site
+
+
+def run(installed: Path, folder: Path, *arguments: str) -> "subprocess.CompletedProcess[str]":
+    """A Python that finds what is installed, in a folder of an application with a package of the same name."""
+    (folder / "services").mkdir(exist_ok=True)
+    (folder / "services" / "__init__.py").touch()
+    environment = {**os.environ, "PYTHONPATH": str(installed)}
+    return subprocess.run(
+        (sys.executable, *arguments), cwd=folder, env=environment, capture_output=True, text=True, check=False
+    )
+
+
+def test_the_wheel_installs_one_importable_name_and_no_links(installed: Path) -> None:
+    names = {path.name for path in installed.iterdir() if not path.name.endswith(".dist-info")}
+
+    assert names - {"services", "schemas"} == {"engage_hri"}
+    assert not any(path.is_symlink() for path in installed.rglob("*"))
+    assert (installed / "engage_hri/py.typed").is_file()
+    assert list((installed / "engage_hri/schemas/exported").glob("*.json"))
+
+
+def test_programs_find_ours_beside_packages_of_the_same_name(installed: Path, tmp_path: Path) -> None:
+    code = (
+        "import engage_hri, services, schemas; from engage_hri import connect, Body, stream; "
+        "print(engage_hri.__file__, services.__file__, connect.__module__)"
+    )
+    ended = run(installed, tmp_path, "-c", code)
+
+    ours, theirs, module = ended.stdout.split()
+    assert ours == str(installed / "engage_hri/__init__.py")
+    assert theirs == str(tmp_path / "services/__init__.py")
+    assert module.startswith("engage_hri.services.client")
+
+
+def test_a_robot_runs_from_it(installed: Path, tmp_path: Path) -> None:
+    """With nothing of ours beside it that the wheel does not hold."""
+    (tmp_path / "ask.json").write_text('{"id": "b", "behaviors": [{"type": "wait", "id": "w", "duration": 0.1}]}')
+
+    ended = run(installed, tmp_path, "-P", "-m", "engage_hri", "play", "ask.json", "--embedded", "--virtual-time")
+
+    assert ended.returncode == 0, ended.stderr
+    assert "block b: done" in ended.stdout
