@@ -139,6 +139,17 @@ def kind_of(request: Request) -> str:
     return str(request.__struct_config__.tag)
 
 
+def life_of(run: str, number: int) -> str:
+    """The life of one requester, of any number in this run of a participant."""
+    return f"{run[:16]}.{number}"
+
+
+def is_life_of(life: str, run: str) -> bool:
+    """May it be one of that run? False only if it is of this form, and another run's."""
+    before, _, number = life.rpartition(".")
+    return not (before and number.isdecimal()) or before == run[:16]
+
+
 def kind_meant(request: Request) -> str:
     """Of a cancellation the kind of what it ends; empty if it does not say."""
     return request.of if isinstance(request, Cancel) else kind_of(request)

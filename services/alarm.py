@@ -39,12 +39,15 @@ class Timer:
         self._ring = ring
         self._loop = asyncio.get_running_loop()
         self._handle: asyncio.TimerHandle | None = None
+        self._at: Seconds | None = None
+        """Kept here: the handles of uvloop do not tell their time when it has come."""
 
     def set(self, at: Seconds | None) -> None:
         if self._handle is not None:
-            if self._handle.when() == at:
+            if self._at == at:
                 return
             self._handle.cancel()
+        self._at = at
         self._handle = None if at is None else self._loop.call_at(at, self._rings)
 
     def _rings(self) -> None:

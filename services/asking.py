@@ -207,7 +207,7 @@ class Asking:
         if answer.kind != asked.kind or server != asked.server:
             return []
         if isinstance(answer, Accepted):
-            asked.run = self._runs.get(server, "")
+            asked.run = self._runs.get(server, asked.run)
         self._step(asked, _ANSWERS.get(type(answer), _FINISHED), now, answer)
         return self._told()
 
@@ -223,6 +223,7 @@ class Asking:
         for asked in self._of(server):
             is_another = bool(asked.run and run and asked.run != run)
             self._step(asked, Event.REBORN if is_another else Event.BACK, now)
+            asked.run = asked.run or run
         return self._told()
 
     def tick(self, now: Seconds) -> list[Effect]:

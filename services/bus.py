@@ -22,7 +22,7 @@ from engage_hri.schemas.faults import EngageError, Fault, InputRefused
 from engage_hri.schemas.fragments import PerformFragment
 from engage_hri.schemas.messages import Message, decode
 from engage_hri.schemas.presence import PeerAlive, PeerGone
-from engage_hri.schemas.requests import Request, Unreadable, kind_of
+from engage_hri.schemas.requests import Request, Unreadable, kind_of, life_of
 from engage_hri.schemas.status import BusHealth
 from engage_hri.schemas.units import Seconds, Stamp
 from engage_hri.schemas.xml_codec import decode_xml
@@ -86,6 +86,10 @@ class Reading(ABC, Generic[T]):
         self.close()
 
 
+KEYS_KEPT = 4096
+"""How many keys a subscription remembers: clients come and go, each with its own."""
+
+
 class Subscription(Reading[Received]):
     """A bounded queue of received messages, in order across all its keys; read it with `async for` or `next`.
 
@@ -114,6 +118,8 @@ class Subscription(Reading[Received]):
     def carrier(self, key: str) -> str | None:
         """The first pattern that includes the key: each message comes once, however many patterns include it."""
         if key not in self._carriers:
+            if len(self._carriers) >= KEYS_KEPT:
+                self._carriers.clear()
             self._carriers[key] = next((pattern for pattern in self.patterns if keys.matches(pattern, key)), None)
         return self._carriers[key]
 
@@ -138,6 +144,11 @@ class Subscription(Reading[Received]):
 
     def __len__(self) -> int:
         return len(self._queue)
+
+    @property
+    def is_over(self) -> bool:
+        """Closed, and read to its end: `next` has nothing more, and does not wait."""
+        return self._closed and not self._queue
 
     async def next(self, deadline: Seconds | None = None) -> Received | None:
         """The next message, or None once loop time has reached `deadline` with nothing waiting, or after `close`."""
@@ -202,7 +213,7 @@ class Bus(ABC):
 
     def new_life(self) -> str:
         """A life of its own for each of the requesters on this bus, so that their ids need not differ."""
-        return f"{self.run[:16]}.{next(self._life_numbers)}"
+        return life_of(self.run, next(self._life_numbers))
 
     # -- what goes wrong ------------------------------------------------------------------------------------------
 

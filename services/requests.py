@@ -379,9 +379,11 @@ def _misplaced(request: Request, key: str) -> Fault | None:
     """What is wrong with sending this request there."""
     expression = keys.expression_of(key)
     expected = COMMANDS.get(expression, ())
-    if isinstance(request, expected) or (expression and isinstance(request, Cancel)):
+    if request.id and (isinstance(request, expected) or (expression and isinstance(request, Cancel))):
         return None
     server, name = keys.server_of(key), type(request).__name__
+    if not request.id:
+        return Fault(reason=f"{name} without an id", where=key, service=server, advice="make one up: `id`")
     home = next((known for known, kinds in COMMANDS.items() if isinstance(request, kinds)), keys.cancel(server))
     takes = (
         f", which takes {' and '.join(kind.__name__ for kind in expected)}" if expected else ", which is no command"

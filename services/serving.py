@@ -27,10 +27,12 @@ from engage_hri.schemas.requests import (
     Refused,
     Request,
     answering,
+    is_life_of,
     kind_meant,
 )
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.deadlines import Deadlines
+from engage_hri.services.names import Names
 from engage_hri.services.serving_table import TABLE, Do, Event, State
 
 GRACE: Seconds = 2.0
@@ -39,7 +41,6 @@ ENDED_KEPT = 1024
 """How many ended requests are remembered, to answer what comes again."""
 LIFELESS_KEPT: Seconds = 10.0
 """How long those of a requester that names no life are: longer than anything is sent again after."""
-NAMES_KEPT = 4096
 LAPSED = "nobody has renewed it"
 GONE = "requester is gone"
 
@@ -49,21 +50,6 @@ _STOPPED = (State.CANCELLED, State.ENDED)
 _GRACE_OVER, _LEASE_OVER = Event.GRACE_OVER, Event.LEASE_OVER
 _DECISIONS = {Accepted: Event.ACCEPT, Refused: Event.REFUSE}
 """What an answer of the service is; each other one is an end."""
-
-
-class Names:
-    """Names for what ids call alike: `ask`, `ask~2`, `ask~3`."""
-
-    def __init__(self, kept: int = NAMES_KEPT) -> None:
-        self._kept = kept
-        self._used: OrderedDict[str, int] = OrderedDict()
-
-    def unique(self, id: str) -> str:
-        count = self._used.pop(id, 0) + 1
-        self._used[id] = count
-        if len(self._used) > self._kept:
-            self._used.popitem(last=False)
-        return id if count == 1 else self.unique(f"{id}~{count}")
 
 
 class Publish(Struct, frozen=True):
@@ -161,10 +147,11 @@ class Serving:
         key, kind = _key(request), kind_meant(request)
         newest = self._newest.get(key)
         if newest is not None and newest.state is not _ENDED and kind not in ("", newest.kind):
-            self._refuse(request, f"{request.id!r} is the id of a live {newest.kind}", "give it another id")
+            is_cancel = isinstance(request, Cancel)
+            advice = f"`of` is the kind of what it ends: {newest.kind}" if is_cancel else "give it another id"
+            self._refuse(request, f"{request.id!r} is the id of a live {newest.kind}", advice)
         else:
-            unnamed = newest if newest is not None and not (kind and newest.kind) else None
-            record = self._known.get((key, kind), unnamed)
+            record = self._record(key, kind)
             if record is None or self._is_new(record, request, now):
                 record = self._new(request)
             self._step(record, _event(record, request), now, request)
@@ -172,7 +159,7 @@ class Serving:
 
     def refuse(self, request: Request, fault: Fault) -> list[Effect]:
         """It came on a wrong key, or could not be read. The same request, if live here or ended, is as it was."""
-        record = self._known.get((_key(request), kind_meant(request)))
+        record = self._record(_key(request), kind_meant(request))
         if record is not None and record.state is not _ENDED:
             return [Complain(fault, False)]
         if record is not None and record.answer is not None:
@@ -239,8 +226,17 @@ class Serving:
         differs = may_differ and _content(request) != _content(record.request)
         return differs or now - record.ended_at > LIFELESS_KEPT
 
+    def _record(self, key: _Key, kind: str) -> _Record | None:
+        """What is known by these. Who does not say the kind means what is live, or was last."""
+        newest = self._newest.get(key)
+        if newest is not None and (not kind or (not newest.kind and (key, kind) not in self._known)):
+            return newest
+        return self._known.get((key, kind))
+
     def _new(self, request: Request) -> _Record:
         run = self._runs.get(request.requester, "")
+        if not is_life_of(request.life, run):
+            run = ""  # of a new life, whose token is still on its way
         while (name := self._names.unique(request.id)) in self._named:
             pass  # a live one from so long ago that its name is forgotten
         record = _Record(name, request, run)
@@ -314,7 +310,7 @@ class Serving:
         self._effects.append(Publish(answering(asks, record.answer or Heard(id=record.name))))
 
     def _refuse_unheard(self, record: _Record, now: Seconds, cause: _Cause) -> None:
-        reason = f"{self._server} has never heard of it, and refuses it should it come yet"
+        reason = f"cancelled before {self._server} had heard of it; it is refused should it come yet"
         fault = self._fault(record.request.id, reason, "a cancellation names requester and life, too")
         self._answer(record, now, Refused(id=record.name, fault=fault))
 

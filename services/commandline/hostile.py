@@ -100,7 +100,13 @@ def whole_robot(config: Config | None = None, body: Making | None = None) -> Map
 
 
 async def _embody(bus: Bus, ready: Ready, config: Config, make: Making) -> None:
-    await embody(bus, ready, config.control, make())
+    try:
+        body = make()
+    except Exception as error:
+        name = getattr(make, "__name__", str(make))
+        reason = f"the body {name} could not be made: {type(error).__name__}: {error}"
+        raise InputRefused(Fault(reason=reason, advice="it is made without arguments, on a simulated SDK")) from error
+    await embody(bus, ready, config.control, body)
 
 
 def body_class(name: str) -> Making:

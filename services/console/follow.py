@@ -60,8 +60,8 @@ async def following(
     with bus.subscribe(*patterns) as inbox:
 
         async def listen() -> None:
-            while (received := await inbox.next(events.deadline)) or events.deadline is not None:
-                if received is not None:
+            while not inbox.is_over:
+                if (received := await inbox.next(events.deadline)) is not None:
                     take(received)
                 else:
                     for event in events.expire(bus.now()):

@@ -10,12 +10,13 @@ the rate: |q''| rate^2 + |q'| |rate'| <= limit.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from math import inf, sqrt
 from typing import Any
 
 import numpy as np
 from msgspec import Struct
+from msgspec.structs import replace
 from numpy.typing import NDArray
 
 from engage_hri.schemas.body import JointLimit
@@ -113,8 +114,8 @@ class Path:
         segment = self._segment(s)
         return _evaluate(segment.coefficients, min(max(s - segment.start, 0.0), segment.seconds))
 
-    def after(self, s: Seconds) -> tuple[Leg, ...]:
-        """What is left at s, as legs, with the sync points that lie beyond s."""
+    def after(self, s: Seconds, untold: Collection[str] = ()) -> tuple[Leg, ...]:
+        """What is left at s, as legs, with the sync points beyond s; those `untold` that lie at s come at once."""
         index = max((i for i, start in enumerate(self._leg_starts) if start <= s + 1e-12), default=0)
         ends = [*self._leg_starts[1:], self.length]
         legs = []
@@ -129,6 +130,10 @@ class Path:
                 if self.marks[sync] > s + 1e-12
             )
             legs.append(Leg(goal=leg.goal, velocity=leg.velocity, seconds=left, marks=marks))
+        missed = tuple([(sync, 0.0) for sync in self.marks if sync in untold and self.marks[sync] <= s + 1e-12])
+        if missed:
+            first = legs[0] if legs else Leg(goal=self.legs[-1].goal, seconds=0.0)
+            legs[:1] = [replace(first, marks=(*missed, *first.marks))]
         return tuple(legs)
 
     @property

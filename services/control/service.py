@@ -239,7 +239,12 @@ class _Control:
             live.status, fault = "failed", self._bus.failed(error, f"behavior {live.label}")
             self._take_home(f"after {live.label} broke")
         del self._live[request.id]
-        at = self._bus.now()
+        with self.desk.serving(request):
+            self._end(live, fault)
+        self._end_aborts(live)
+
+    def _end(self, live: _Performance, fault: Fault | None) -> None:
+        request, at = live.request, self._bus.now()
         self._publish(self._deeds.ended(request.id, at))
         self.note_look()
         self._keep_publishing()
@@ -254,11 +259,13 @@ class _Control:
                 fault=fault,
             )
         )
-        self._end_aborts(live)
 
     def _end_aborts(self, live: _Performance) -> None:
+        """Of several behaviors that one request means, the last to end ends it."""
+        awaited = {id for other in self._live.values() for id in other.aborts}
         for id in live.aborts:
-            self.desk.end(BehaviorAborted(id=id))
+            if id not in awaited:
+                self.desk.end(BehaviorAborted(id=id))
 
     async def _go_home(self, request: GoHome) -> None:
         with self.desk.serving(request):
@@ -304,7 +311,7 @@ class _Control:
                 self._publish(self._deeds.reached(request.id, live.label, request.behavior, progress))
                 self.note_look(live, at)
             case Spoke(word=word, position=position, at=at):
-                live.position = position
+                live.position = int(position)  # a driver's number, of whatever type
                 stamp = self._bus.stamp(at)
                 self._tell(WordSpoken(block=block, behavior=behavior, word=word, position=position, at=stamp))
         self._keep_publishing()

@@ -240,7 +240,7 @@ class SimulatedBody(Body):
         now = self._loop.time()
         stood, passed = run.stands, run.leave(hold, now)
         if stood and not run.holding:
-            legs = run.motion.path.after(run.motion.s(now))
+            legs = run.motion.path.after(run.motion.s(now), [point.sync for point in run.pending])
             if run.course.parts == ("head",):
                 legs = (head.way_back(self._tracks["head"].angles(now), self._attention.angles),)
             start = tracks.joined([self._tracks[part].at(now) for part in run.course.parts])

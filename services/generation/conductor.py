@@ -21,7 +21,7 @@ from engage_hri.services.generation.arbiter import Arbiter
 from engage_hri.services.generation.body_link import BodyLink
 from engage_hri.services.generation.config import GenerationConfig
 from engage_hri.services.generation.discourse import SILENCE, Discourse
-from engage_hri.services.generation.fragment_check import checked
+from engage_hri.services.generation.fragment_check import check_world, checked
 from engage_hri.services.generation.leases import Leases
 from engage_hri.services.generation.performance import GazesOfFragments, Performance
 from engage_hri.services.generation.planning import glance, plan, targets
@@ -224,6 +224,7 @@ class Conductor:
                 if performance.is_over:  # cancelled meanwhile
                     return None
                 assert self._world is not None
+                check_world(fragment, self._world, self._bus.robot)  # it may have changed while the fragment waited
                 body = self._body.capabilities
                 if body is not None:
                     self._arbiter.gaze_perceived_within(body.gaze_half_angle)

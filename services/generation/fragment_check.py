@@ -2,6 +2,7 @@
 
 import sys
 from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from difflib import get_close_matches
 
 from msgspec.structs import replace
@@ -21,8 +22,21 @@ def checked(fragment: TurnFragment, world: World, robot: str, longest: int = sys
     robot: its actor id, which may be a target too. longest: characters of one speech. Raises InputRefused with JSON
     path and XML line of the first thing that is wrong, by itself or with regard to the world.
     """
-    try:
+    with _places_as_written(fragment):
         return _checked(fragment, world, robot, longest)
+
+
+def check_world(fragment: TurnFragment, world: World, robot: str) -> None:
+    """Is all that a checked fragment names still there? Raises InputRefused, as `checked`."""
+    with _places_as_written(fragment):
+        _check_targets(fragment, world, robot)
+
+
+@contextmanager
+def _places_as_written(fragment: TurnFragment) -> Iterator[None]:
+    """Faults name the parts of a tool call, where the fragment was made from one."""
+    try:
+        yield
     except InputRefused as error:
         fault = replace(error.fault, where=in_call(error.fault.where, fragment))
         raise InputRefused(fault, error.block) from error
@@ -35,6 +49,14 @@ def _checked(fragment: TurnFragment, world: World, robot: str, longest: int) -> 
             reason = f"{len(behavior.text)} characters of speech, at most {longest} can be said in one go"
             advice = "say it in several fragments; `generation.utterance` is the limit"
             raise _refused(fragment, f"$.behaviors[{index}].text", reason, behavior.line, advice)
+    _check_targets(fragment, world, robot)
+    for index, behavior in enumerate(fragment.behaviors):
+        if isinstance(behavior, Reference):
+            _check_timing(fragment, index, behavior)
+    return replace(fragment, addressee=addressee(fragment, world), delay_target=_away(fragment, world))
+
+
+def _check_targets(fragment: TurnFragment, world: World, robot: str) -> None:
     known = {entity.id: entity for entity in world.entities}
     for path, target, line in _targets(fragment):
         if target not in known and target != robot:
@@ -42,8 +64,6 @@ def _checked(fragment: TurnFragment, world: World, robot: str, longest: int) -> 
     for index, behavior in enumerate(fragment.behaviors):
         if isinstance(behavior, Reference):
             _check_objects(fragment, index, behavior, known)
-            _check_timing(fragment, index, behavior)
-    return replace(fragment, addressee=addressee(fragment, world), delay_target=_away(fragment, world))
 
 
 def lacks_people(fragment: TurnFragment, world: World) -> bool:

@@ -16,6 +16,9 @@ from engage_hri.schemas.units import Seconds
 PATIENCE: Seconds = 3.0
 """How long a requester may go on about what has ended: its last words may have been on their way."""
 
+REFUSED = b"refused"
+"""Stands for every refusal."""
+
 
 class Name(Struct, frozen=True):
     """By what a request is known."""
@@ -37,7 +40,7 @@ class Entry(Struct):
     is_foreign: bool
     is_cancelled: bool = False
     ends: list[bytes] = field(default_factory=list)
-    """Each different terminal answer of its server."""
+    """Each different terminal answer of its server, in this life of it."""
     ended_at: Seconds | None = None
     mentioned_at: Seconds = 0.0
     """When it last was sent again, renewed, or cancelled."""
@@ -62,10 +65,11 @@ class Book:
                 self._answer(sender, message, now)
 
     def restarted(self, server: str) -> None:
-        """It owes nothing any more of what it was asked for in its former life."""
+        """It owes nothing any more of what it was asked for in its former life, nor knows what has ended in it."""
         for entry in self.entries.values():
             if entry.name.server == server:
                 entry.is_owed = False
+                entry.ends.clear()
 
     def _ask(
         self, key: str, message: Request | KeepAlive, life: str, now: Seconds, arrives: bool, is_foreign: bool
@@ -95,7 +99,7 @@ class Book:
         if entry is None or not isinstance(answer, Refused | Outcome):
             return
         # Nothing was done, for whatever reason: sent on two wrong keys, it is refused in two ways.
-        told = b"refused" if isinstance(answer, Refused) else encode(answer)  # type: ignore[arg-type]
+        told = REFUSED if isinstance(answer, Refused) else encode(answer)  # type: ignore[arg-type]
         if told not in entry.ends:
             entry.ends.append(told)
         entry.ended_at = entry.ended_at if entry.ended_at is not None else now

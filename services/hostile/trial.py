@@ -19,13 +19,13 @@ from msgspec import Struct
 
 from engage_hri.schemas import keys
 from engage_hri.schemas.faults import EngageError, Fault, InputRefused
-from engage_hri.schemas.messages import encode
+from engage_hri.schemas.messages import decode, encode, encode_json
 from engage_hri.schemas.requests import Cancel
 from engage_hri.schemas.status import AskStatus, Status
 from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.world import World
 from engage_hri.services.bus import LOG, Hub, Received, read_payload
-from engage_hri.services.hostile.audit import Book, Entry
+from engage_hri.services.hostile.audit import REFUSED, Book, Entry
 from engage_hri.services.hostile.payloads import SERVERS, Payload, Payloads
 from engage_hri.services.hostile.schemes import Deed, Schemer
 from engage_hri.services.hostile.service import NAME as BODY
@@ -192,7 +192,7 @@ class _Trial:
             await asyncio.sleep(SETTLE - QUIET)
             quiet_since = bus.now()
             for client in clients:
-                self._note("clients that failed", list(filter(None, [await guest(client, QUIET)])))
+                self._note("clients that failed", list(filter(None, [await guest(client, QUIET, SETTLE)])))
             await asyncio.sleep(QUIET)
             await self._judge(bus, visitor, quiet_since)
         await bus.leave()
@@ -378,8 +378,12 @@ class _Trial:
 
 def _told(entry: Entry) -> str:
     name = entry.name
-    ends = ", ".join(end.decode(errors="replace")[:60] for end in entry.ends)
+    ends = ", then ".join(_readable(end) for end in entry.ends)
     return f"{name.kind} {name.id!r} of {name.requester!r} ({name.life!r}) at {name.server} {ends}".strip()
+
+
+def _readable(end: bytes) -> str:
+    return "refused" if end == REFUSED else encode_json(decode(end)).decode()[:300]
 
 
 def _why(task: "asyncio.Task[None]") -> str:

@@ -75,13 +75,16 @@ class Visitor:
                 self.asked.append(requests.send(keys.BLOCK, interrupt))
 
 
-async def guest(client: asyncio.Task[None], patience: Seconds) -> str:
-    """What became of somebody's own client; empty: it has ended well, or with an error made for that."""
+async def guest(client: asyncio.Task[None], patience: Seconds, since: Seconds) -> str:
+    """What became of somebody's own client; empty: it has ended well, or with an error made for that.
+
+    patience: how long it may still take. since: how long ago the attack will have ended by then.
+    """
     done, _ = await asyncio.wait([client], timeout=patience)
     if not done:
         client.cancel()
         await asyncio.wait([client])
-        return f"the client has not ended {patience:g} s after the attack"
+        return f"the client has not ended {since:g} s after the attack"
     if client.cancelled():
         return "the client was cancelled"
     error = client.exception()

@@ -191,7 +191,8 @@ class _Realizer:
                 )
         if (held := extent(block)) > self.config.most:
             reason = f"{held} behaviors, marks and sync references; at most {self.config.most} can be planned in time"
-            raise BlockRefused(Fault(reason=reason, where=block.id, advice="send several, each with APPEND"))
+            advice = "send several (blocks with APPEND, fragments of one turn); `realizer.most` is the limit"
+            raise BlockRefused(Fault(reason=reason, where=block.id, advice=advice))
         await unhurried(relation_steps(block, elsewhere))  # A bad reference is seen without asking the body.
         block = sound(block)
         barred: set[tuple[str, Hand]] = set()

@@ -70,6 +70,8 @@ class Recognizer:
                     derived = self._attend(lambda attention: attention.feed(observation, at), at)
             case RobotState():
                 derived = self._attend(lambda attention: attention.feed(observation, at), at)
+                if self.session.scene.robot_speaks_since is not None:
+                    self._wait(observation, at)
             case World():
                 derived = self._attend(lambda attention: attention.feed(observation, at), at)
                 self._wait(observation, at)

@@ -47,7 +47,7 @@ async def recognize(bus: Bus, ready: Ready, config: RecognitionConfig) -> None:
         ready()
         recognition.begin()
         try:
-            while True:
+            while not inbox.is_over:
                 received = await inbox.next(recognition.deadline)
                 with bus.containing(received or "what is due by now"):
                     if received is None:

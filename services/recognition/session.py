@@ -13,6 +13,7 @@ from collections.abc import Callable, Set
 from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost
 from engage_hri.schemas.attention import HeadOwner
 from engage_hri.schemas.behaviors import Action, Event
+from engage_hri.schemas.body import RobotState
 from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.feedback import BlockProgress, SyncPointProgress
 from engage_hri.schemas.presence import PeerGone
@@ -31,10 +32,12 @@ from engage_hri.services.recognition.scene import Covered, Scene
 
 Observation = (
     ActionBegan | ActionEnded | ActorFound | ActorLost | RequestEvent | SignalTurn | Cancel
-    | SyncPointProgress | BlockProgress | HeadOwner | World | PeerGone
+    | SyncPointProgress | BlockProgress | HeadOwner | World | PeerGone | RobotState
 )  # fmt: skip
 TURNS_KEPT = 64
-"""Ended turns that are remembered, for an adjacency pair that is announced after its turn's end."""
+"""Ended turns that are remembered, for an adjacency pair that is announced after its turn's end; aborted ones too."""
+SILENCE: Seconds = 3.0
+"""How long a body shows that it does not speak before a speech of its is over whose end was not told."""
 ACTIONS_KEPT = 256
 """Of the robot; of those it is known when they last began and ended."""
 
@@ -56,8 +59,11 @@ class Session:
         self._ledger = Ledger(clock, name)
         self._company = Company(self.scene, config, self._ledger, strict=strict)
         self._ended_turns: Latest[str, Seconds] = Latest(TURNS_KEPT)
+        self._aborted_turns: Latest[str, Seconds] = Latest(TURNS_KEPT)
         self._robot_does: dict[tuple[str, Action], ActionBegan] = {}
         """Its speech and gestures, by behavior."""
+        self._heard_at: Seconds | None = None
+        """When its body last showed that it speaks."""
         self._live: dict[str, UnderWay] = {}
         """Undecided requests."""
         self._answering_blocks: Latest[str, str] = Latest(BLOCKS_KEPT)
@@ -133,6 +139,8 @@ class Session:
                 self._let_all(at, lambda person: person.point_realised(block, name, at))
             case BlockProgress(block=str() as block, progress="end"):
                 self._block_ended(block, at, aborted=observation.status in ("failed", "interrupted"))
+            case RobotState(speaking=said):
+                self._robot_is_heard(bool(said), at)
             case PeerGone(participant="control"):
                 self._robot_stops(at)
                 self.scene.gaze.end((), at)
@@ -170,6 +178,7 @@ class Session:
                     self._robot_gaze_changed(at)
             case "speak":
                 self._robot_does[began.behavior, "speak"] = began
+                self._heard_at = None
                 if self.scene.robot_speaks_since is None:
                     self.scene.robot_speaks_since = at
                     self.scene.speaks(self.robot)
@@ -193,6 +202,17 @@ class Session:
                     self._let_all(at, lambda person: person.conversation.robot_falls_silent(at))
             case "nod" | "shake" | "point":
                 self._let_all(at, lambda person: person.conversation.robot_gesture_ends(ended.action, at))
+
+    def _robot_is_heard(self, is_speaking: bool, at: Seconds) -> None:
+        """A body that shows when it speaks is believed that it has stopped: the end itself may have been lost."""
+        if is_speaking:
+            self._heard_at = at
+        elif self._heard_at is not None and at > self._heard_at + SILENCE:
+            self._heard_at = None
+            for began in [began for (_, action), began in self._robot_does.items() if action == "speak"]:
+                self._robot_ends(
+                    ActionEnded(actor=self.robot, action="speak", at=began.at, behavior=began.behavior), at
+                )
 
     def _robot_stops(self, at: Seconds, behaviors: str = "") -> None:
         """Whatever ends have been lost: what the robot says and does with its hands and head is over.
@@ -257,6 +277,8 @@ class Session:
         if event.kind == "directed_gaze" and not event.objects:
             return Fault(reason="directed gaze without objects", where=where)
         unknown = [name for name in event.objects if not self.scene.knows(name)]
+        if event.turn and event.turn in self._aborted_turns:
+            return Fault(reason=f"turn {event.turn!r} has been cut off", where=where)
         if unknown:
             return Fault(reason=f"unknown object {', '.join(map(repr, unknown))}", where=where)
         if event.limit is not None and not event.limit > 0:
@@ -318,6 +340,7 @@ class Session:
                 if request.block and self.blocks.ended(request.block) is None:
                     self._answering_blocks[request.block] = signal.actor
             case "aborted":
+                self._aborted_turns[signal.turn] = at
                 self._let_addressees(signal.actor, at, lambda person: person.abort(at, turn=signal.turn))
         self._ledger.effects.append(TurnOutcome(id=request.id, at=self._ledger.stamp(at)))
 

@@ -38,7 +38,7 @@ async def simulate(bus: Bus, ready: Ready, config: SimulationConfig) -> None:
         await _wait_for(set(config.await_participants), inbox)
         if config.human != "none":
             cameras.enter(bus.now() + config.entrance)
-        while True:
+        while not inbox.is_over:
             received = await inbox.next(cameras.deadline)
             now = bus.now()
             if received is not None:

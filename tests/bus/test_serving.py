@@ -19,8 +19,9 @@ from engage_hri.services.asking import Asking, RequestRefused, TellEnd
 from engage_hri.services.asking import Publish as AskedToPublish
 from engage_hri.services.bus import read_payload
 from engage_hri.services.memory_bus import MemoryHub
+from engage_hri.services.names import Names
 from engage_hri.services.patience import Patience
-from engage_hri.services.serving import LIFELESS_KEPT, Complain, Hand, Names, Publish, Serving
+from engage_hri.services.serving import LIFELESS_KEPT, Complain, Hand, Publish, Serving
 from tests.bus.performer import Server
 from tests.commanding import key_of
 
@@ -88,6 +89,7 @@ def test_a_live_id_for_another_kind_is_refused_by_name_and_the_live_one_goes_on(
     assert serving.is_live("a")
     (refusal,) = told(serving.take(Cancel(id="a", requester="me", life="1", of="interrupt_behavior"), 0.0))
     assert refusal.kind == "interrupt_behavior"
+    assert refusal.fault.advice == "`of` is the kind of what it ends: perform_block"
     assert serving.is_live("a")
 
 
@@ -266,4 +268,55 @@ async def test_a_damaged_repetition_of_a_request_changes_nothing_of_what_became_
         told = [type((await states.next()).message).__name__ for _ in range(len(states))]  # type: ignore[union-attr]
 
     assert told == ["Refused", "Accepted", "BlockOutcome", "BlockOutcome"]
+    await server.die(hub)
+
+
+def test_a_cancellation_without_a_kind_means_what_is_live_not_what_was_stopped_long_ago() -> None:
+    serving = Serving("realizer")
+    stop = Cancel(id="a", requester="me")
+    lifeless = replace(BLOCK, life="")
+    serving.take(stop, 0.0)
+    serving.take(lifeless, 20.0)
+    serving.answer("a~2", Accepted(id="a~2"), 20.0)
+
+    (cancel,) = handed(serving.take(stop, 40.0))
+
+    assert (type(cancel), cancel.id) == (Cancel, "a~2")
+
+
+def test_the_first_request_of_a_new_life_may_come_before_its_token() -> None:
+    serving = Serving("realizer")
+    serving.requester_there("me", "1", 0.0)
+    serving.take(replace(BLOCK, id="old", life="1.1"), 1.0)
+    serving.take(replace(BLOCK, life="2.1"), 2.0)
+
+    ended = handed(serving.requester_there("me", "2", 2.1))
+
+    assert [each.id for each in ended] == ["old"]
+    assert serving.is_live("a")
+
+
+def test_many_names_that_look_like_ours_are_no_trouble() -> None:
+    names = Names()
+    taken, id = set(), "x"
+    for _ in range(1500):
+        taken.add(names.unique(id))
+        id += "~2"
+
+    assert names.unique("x") not in taken
+
+
+async def test_damaged_xml_says_nothing_else_of_a_live_request_than_what_became_of_it(hub: MemoryHub) -> None:
+    server = Server(hub)
+    await asyncio.sleep(0)
+    key, xml = keys.command(keys.BLOCK, "manager", "me"), '<bml id="b"/>'
+    with hub.join("ear").subscribe(keys.ANY_REQUEST_STATE) as states:
+        for content in (xml, '<bml id="b"><gaze/></gaze></bml>', xml):
+            hub.inject(key, content.encode(), "application/xml")
+            await asyncio.sleep(0.1)
+        await asyncio.sleep(1.0)
+        told = [type((await states.next()).message).__name__ for _ in range(len(states))]  # type: ignore[union-attr]
+
+    assert "Refused" not in told
+    assert told[-1] == "BlockOutcome"
     await server.die(hub)

@@ -18,6 +18,13 @@ class Fainting(SimulatedBody):
         return super().state()
 
 
+class Unplugged(SimulatedBody):
+    """Its SDK finds no robot."""
+
+    def __init__(self) -> None:
+        raise OSError("no serial port")
+
+
 def test_it_prints_what_was_sent_and_what_came_of_it(engage: Engage) -> None:
     result = engage("hostile", "--only", "body", "--runs", 1, "--seconds", 5)
 
@@ -42,6 +49,7 @@ def test_what_goes_wrong_is_told_with_the_command_that_does_it_again(engage: Eng
     [
         ("--only", "kindness", "no attack 'kindness' (one of messages, requests, body)"),
         ("--body", "nowhere:Body", "no body 'nowhere:Body'"),
+        ("--body", f"{__name__}:Unplugged", "the body Unplugged could not be made: OSError: no serial port"),
         ("--body", "engage_hri.services.control.body:sync_points", "is no class of a Body"),
     ],
 )

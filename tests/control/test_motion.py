@@ -183,3 +183,15 @@ def test_a_new_path_takes_over_without_a_jump(
 def test_a_state_knows_whether_it_rests():
     assert resting(HOME).at_rest
     assert not State(np.zeros(3), np.array([0.0, 0.1, 0.0]), np.zeros(3)).at_rest
+
+
+@pytest.mark.parametrize("at", [0.0, 0.4, 1.0])
+def test_what_is_left_has_every_sync_point_that_was_not_told_yet(at: float):
+    """Also one at the very place where it stands, as the end of a way home that is no way at all."""
+    here = path((0.2, 0.3, 1.2))
+    still = Path(here.at(here.length), [Leg(goal=HOME, seconds=0.0, marks=(("relax", 1.0), ("end", 1.0)))], LIMITS)
+
+    for whole, untold in ((here, ("ready", "end")), (still, ("end",))):
+        left = Path(whole.at(at * whole.length), whole.after(at * whole.length, untold), LIMITS)
+        assert set(untold) <= left.marks.keys()
+        assert all(0.0 <= left.marks[sync] <= left.length for sync in untold)

@@ -2,8 +2,10 @@
 
 import pytest
 
+from engage_hri.schemas.body import BodyPose, Ray, RobotState
+from engage_hri.schemas.requests import Accepted, Refused
 from engage_hri.services.recognition.config import RecognitionConfig
-from tests.recognition.observations import HUMAN, ROBOT, Log, asked
+from tests.recognition.observations import HUMAN, ROBOT, Log, asked, stamp
 
 WORDS = "block-2:speech-1"
 
@@ -153,3 +155,34 @@ def test_the_third_turn_at_the_very_limit_is_one_whatever_the_rounding(end):
     log.begins(HUMAN, "speak", round(end + 1.5, 9))
 
     assert {event.id for event in log.events} == {"ap-1"}
+
+
+def robot_state(at: float, speaking: str = "") -> RobotState:
+    ray = Ray(origin=(0.0, 0.0, 1.1), axis=(1.0, 0.0, 0.0))
+    return RobotState(at=stamp(at), pose=BodyPose(), gaze=ray, left_arm=ray, right_arm=ray, speaking=speaking)
+
+
+@pytest.mark.parametrize("shows", [True, False])
+def test_a_speech_of_the_robot_whose_end_was_lost_is_over_once_its_body_is_silent(shows):
+    """Not of a body that never shows whether it speaks."""
+    log = Log()
+    log.begins(ROBOT, "speak", 1.0, behavior="s")
+    for second in range(2, 5):
+        log.feed(robot_state(second, "s" if shows else ""), second)
+    speaks = log.session.scene.robot_speaks_since
+    for second in range(5, 9):
+        log.feed(robot_state(second), second)
+
+    assert speaks == 1.0
+    assert (log.session.scene.robot_speaks_since is None) is shows
+
+
+def test_what_is_asked_for_a_turn_that_was_cut_off_is_refused():
+    """The message that it was may be quicker than the request: both were held up by a cut."""
+    log = Log()
+    log.signals("aborted", 1.0, turn="t")
+    late = log.requests_event("adjacency_pair", 1.1, turn="t")
+    other = log.requests_event("adjacency_pair", 1.2, turn="u")
+
+    answers = {each.id: type(each) for each in log.effects if isinstance(each, Accepted | Refused)}
+    assert answers == {late: Refused, other: Accepted}

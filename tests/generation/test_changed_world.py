@@ -1,0 +1,33 @@
+"""A fragment that waits for its turn while the world changes."""
+
+import asyncio
+
+from msgspec.structs import replace
+
+from engage_hri.schemas.fragments import FragmentOutcome
+from engage_hri.services.generation.config import GenerationConfig
+from engage_hri.services.memory_bus import MemoryHub
+from tests.generation.partners import TABLE, stage
+from tests.generation.test_service import refers, says
+
+
+async def test_what_has_left_the_world_while_the_fragment_waited_ends_it_with_its_name(hub: MemoryHub) -> None:
+    """It was there when the fragment was admitted, and is not any more when its turn has come."""
+    less = replace(TABLE, entities=tuple(each for each in TABLE.entities if each.id != "middle"))
+    async with stage(hub) as partners:
+        first = partners.send(says("first"))
+        await partners.fragment_block("first")
+        second = partners.send(refers("second"))
+        await second.accepted
+        partners.see(less)
+        await asyncio.sleep(GenerationConfig().covered_for + 1.0)
+        partners.see(less)
+        await asyncio.sleep(0.1)
+        partners.end(partners.request("first"))
+        outcome = await second.outcome
+
+    assert isinstance(outcome, FragmentOutcome)
+    assert outcome.status == "failed"
+    assert outcome.fault is not None
+    assert outcome.fault.reason == "the world does not know the object 'middle'"
+    assert first.outcome.done()
