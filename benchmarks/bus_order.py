@@ -30,8 +30,8 @@ from msgspec import Struct
 from engage_hri.schemas import keys
 from engage_hri.schemas.requests import Accepted
 from engage_hri.schemas.units import Seconds
-from engage_hri.services.zenoh_bus import ZenohHub, open_hub
-from engage_hri.services.zenoh_session import QOS, open_session
+from engage_hri.services.bus.zenoh.hub import ZenohHub, open_hub
+from engage_hri.services.bus.zenoh.session import QOS, open_session
 from tests.bus.cable import Cable
 from tests.bus.places import acquainted, free_endpoint
 

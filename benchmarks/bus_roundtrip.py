@@ -23,10 +23,10 @@ from engage_hri.schemas import keys
 from engage_hri.schemas.body import SyncPointReached
 from engage_hri.schemas.messages import encode
 from engage_hri.schemas.units import Seconds, Stamp
-from engage_hri.services.bus import Bus
+from engage_hri.services.bus.interface import Bus
+from engage_hri.services.bus.zenoh.hub import open_hub
+from engage_hri.services.bus.zenoh.session import QOS, open_session
 from engage_hri.services.commandline.process import run, run_until_signal
-from engage_hri.services.zenoh_bus import open_hub
-from engage_hri.services.zenoh_session import QOS, open_session
 
 ROBOT = "benchmark"
 PING, PONG = "raw/ping", "raw/pong"

@@ -38,18 +38,18 @@ from engage_hri.schemas.blocks import Block, BlockOutcome, PerformBlock
 from engage_hri.schemas.body import EstimateBehaviors, EstimateItem, Estimates, PerformBehavior, SyncPointReached
 from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.world import Entity, World
-from engage_hri.services.bus import Bus
+from engage_hri.services.bus.interface import Bus
+from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.control.config import ControlConfig, Displaced, Slow, Stall, Variability
 from engage_hri.services.control.service import embody
-from engage_hri.services.memory_bus import MemoryHub
 from engage_hri.services.realizer.config import RealizerConfig
-from engage_hri.services.realizer.planner import Plan, plan_block
+from engage_hri.services.realizer.plan.planner import Plan, plan_block
+from engage_hri.services.realizer.plan.poses import poses_before
 from engage_hri.services.realizer.points import Point
-from engage_hri.services.realizer.poses import poses_before
 from engage_hri.services.realizer.service import realize
-from engage_hri.services.requests import Requester
-from engage_hri.services.runtime import running
-from engage_hri.services.virtual_time import run_virtual
+from engage_hri.services.requests.ends import Requester
+from engage_hri.services.runtime.service import running
+from engage_hri.services.runtime.virtual_time import run_virtual
 
 WORLD = World(
     entities=(

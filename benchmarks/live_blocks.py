@@ -43,12 +43,12 @@ from engage_hri.schemas.body import (
 )
 from engage_hri.schemas.messages import Message
 from engage_hri.schemas.units import Seconds
-from engage_hri.services.bus import Bus
-from engage_hri.services.memory_bus import MemoryHub
+from engage_hri.services.bus.interface import Bus
+from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.realizer.config import RealizerConfig
 from engage_hri.services.realizer.service import realize
-from engage_hri.services.requests import RequestDesk, Requester
-from engage_hri.services.runtime import running
+from engage_hri.services.requests.ends import RequestDesk, Requester
+from engage_hri.services.runtime.service import running
 
 NATURAL: Seconds = 1.0
 SPEECHES = 3

@@ -32,9 +32,9 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from engage_hri.schemas.recognition import ConnectionEvent
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.recognition.config import RecognitionConfig
-from engage_hri.services.recognition.machine import Effect
-from engage_hri.services.recognition.session import Observation, Session
-from engage_hri.services.recognition.standings import Standings
+from engage_hri.services.recognition.events.machine import Effect
+from engage_hri.services.recognition.events.session import Observation, Session
+from engage_hri.services.recognition.statistics.standings import Standings
 from tests.recognition import recomputed
 from tests.recognition.kept import reachable
 from tests.recognition.meeting import meeting

@@ -32,16 +32,16 @@ from engage_hri.schemas.fragments import PerformFragment, TurnFragment
 from engage_hri.schemas.messages import Message
 from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.world import Entity, World
-from engage_hri.services.bus import Bus
+from engage_hri.services.bus.interface import Bus
+from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.commandline.process import run
-from engage_hri.services.control.simulated import SimulatedBody
+from engage_hri.services.control.torso.body import SimulatedBody
 from engage_hri.services.generation.config import GenerationConfig
-from engage_hri.services.generation.motions import Motions, collect, distinct, from_each_other, from_here
-from engage_hri.services.generation.reference_policy import Posture, Scene, choose, considered, cost
+from engage_hri.services.generation.references.motions import Motions, collect, distinct, from_each_other, from_here
+from engage_hri.services.generation.references.policy import Posture, Scene, choose, considered, cost
 from engage_hri.services.generation.service import generate
-from engage_hri.services.memory_bus import MemoryHub
-from engage_hri.services.requests import RequestDesk, Requester
-from engage_hri.services.runtime import running
+from engage_hri.services.requests.ends import RequestDesk, Requester
+from engage_hri.services.runtime.service import running
 
 OBJECTS, PHRASES = 100, 10
 SIZES = (1, 2, 5, 10)

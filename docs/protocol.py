@@ -32,8 +32,8 @@ from engage_hri.schemas import (
     world,
 )
 from engage_hri.schemas.messages import COMMANDS, OUTWARD
-from engage_hri.services.serving import LIFELESS_KEPT
-from engage_hri.services.zenoh_order import KEPT
+from engage_hri.services.bus.zenoh.order import KEPT
+from engage_hri.services.requests.serving import LIFELESS_KEPT
 
 ROLES = ", ".join(f"`{role}`" for role in keys.ROLES)
 PAGE = Path(__file__).parent / "protocol.md"
@@ -267,7 +267,7 @@ with zenoh.open(config) as session:
 
 ## Blocks and fragments in files
 
-`engage play` and `read` of `schemas/json_codec.py` take XML or JSON; a JSON file may hold an array of several. An object with
+`engage play` and `read` of `schemas/documents/json_codec.py` take XML or JSON; a JSON file may hold an array of several. An object with
 `parts` is what a language model writes (docs/language-models.md, `perform_turn_fragment.tool.json`). In JSON else the
 form is that of `TurnFragment` and `Block` below; `type` may be left out where the content makes it plain, and an
 unknown key is refused. In XML:

@@ -36,16 +36,16 @@ if TYPE_CHECKING:
     from engage_hri.schemas.tool import tool_definition as tool_definition
     from engage_hri.schemas.world import Entity as Entity
     from engage_hri.schemas.world import World as World
-    from engage_hri.services.client import PerformFailed as PerformFailed
-    from engage_hri.services.client import Robot as Robot
-    from engage_hri.services.client import connect as connect
+    from engage_hri.services.client.language_models import perform_call as perform_call
+    from engage_hri.services.client.language_models import stream as stream
+    from engage_hri.services.client.robot import PerformFailed as PerformFailed
+    from engage_hri.services.client.robot import Robot as Robot
+    from engage_hri.services.client.robot import connect as connect
     from engage_hri.services.control.body import Arrived as Arrived
     from engage_hri.services.control.body import Authority as Authority
     from engage_hri.services.control.body import BehaviorRefused as BehaviorRefused
     from engage_hri.services.control.body import Body as Body
     from engage_hri.services.control.body import Reached as Reached
-    from engage_hri.services.streaming import perform_call as perform_call
-    from engage_hri.services.streaming import stream as stream
 
 _PLACES = {
     "engage_hri.schemas.behaviors": ("Gaze", "Pointing", "Reference", "Speech", "SpeechOption"),
@@ -56,9 +56,9 @@ _PLACES = {
     "engage_hri.schemas.summary": ("Summary", "summary"),
     "engage_hri.schemas.tool": ("tool_definition",),
     "engage_hri.schemas.world": ("Entity", "World"),
-    "engage_hri.services.client": ("PerformFailed", "Robot", "connect"),
+    "engage_hri.services.client.robot": ("PerformFailed", "Robot", "connect"),
     "engage_hri.services.control.body": ("Arrived", "Authority", "BehaviorRefused", "Body", "Reached"),
-    "engage_hri.services.streaming": ("perform_call", "stream"),
+    "engage_hri.services.client.language_models": ("perform_call", "stream"),
 }
 _MODULES = {name: module for module, names in _PLACES.items() for name in names}
 

@@ -17,13 +17,13 @@ from contextlib import AbstractAsyncContextManager, asynccontextmanager
 
 from engage_hri.schemas.summary import Summary, summary
 from engage_hri.schemas.tool import ToolInput
-from engage_hri.services.client import Robot, connect
+from engage_hri.services.bus.memory import MemoryHub
+from engage_hri.services.client.language_models import stream
+from engage_hri.services.client.robot import Robot, connect
 from engage_hri.services.commandline import roster
-from engage_hri.services.config import load
-from engage_hri.services.memory_bus import MemoryHub
-from engage_hri.services.runtime import running
-from engage_hri.services.streaming import stream
-from engage_hri.services.virtual_time import VirtualTimeLoop
+from engage_hri.services.commandline.config import load
+from engage_hri.services.runtime.service import running
+from engage_hri.services.runtime.virtual_time import VirtualTimeLoop
 
 GREETING = (
     "Hello! I could use your help with this puzzle, if you have a moment. First of all: do you see [red-square]?"

@@ -2,8 +2,8 @@
 
 A request is known by its requester, the requester's life, its kind and its id; an answer names all four. It is sent
 again until it is accepted, refused or ended; the server repeats its last state. What is accepted is kept alive by
-`KeepAlive`. The states and what moves them are the tables in services/asking_table.py and
-services/serving_table.py.
+`KeepAlive`. The states and what moves them are the tables in services/requests/asking_table.py and
+services/requests/serving_table.py.
 """
 
 from typing import ClassVar, Self, TypeVar

@@ -6,12 +6,12 @@ import sys
 
 
 def main(arguments: list[str] | None = None) -> None:
-    """Run a command of `services/cli.py`."""
+    """Run a command of `services/commandline/app.py`."""
     # Loading takes half a second. A KeyboardInterrupt in it is a traceback, or lost in somebody's callback; nothing
     # has begun yet, so leaving at once is orderly. `services/commandline/process.py` takes over when something runs.
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda number, frame: os._exit(128 + number))
-    from engage_hri.services import cli
+    from engage_hri.services.commandline import app as cli
 
     cli.main(arguments)
 

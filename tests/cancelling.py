@@ -12,13 +12,13 @@ from contextlib import asynccontextmanager
 
 from engage_hri.schemas.behaviors import Gaze, Speech, Wait
 from engage_hri.schemas.fragments import TurnFragment
-from engage_hri.services.client import Robot, connect
+from engage_hri.services.bus.memory import MemoryHub
+from engage_hri.services.client.language_models import stream
+from engage_hri.services.client.robot import Robot, connect
 from engage_hri.services.commandline import roster
-from engage_hri.services.config import load
-from engage_hri.services.memory_bus import MemoryHub
-from engage_hri.services.runtime import running
-from engage_hri.services.streaming import stream
-from engage_hri.services.virtual_time import run_virtual
+from engage_hri.services.commandline.config import load
+from engage_hri.services.runtime.service import running
+from engage_hri.services.runtime.virtual_time import run_virtual
 
 PATIENCE = 30.0
 """Seconds for one request, at the most."""

@@ -3,7 +3,7 @@
 from typing import Any
 
 from engage_hri.schemas import keys
-from engage_hri.services.bus import Bus
+from engage_hri.services.bus.interface import Bus
 
 
 def command(bus: Bus, expression: str, message: Any) -> None:

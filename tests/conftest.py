@@ -11,8 +11,8 @@ import pytest
 import pytest_asyncio
 from hypothesis import settings
 
-from engage_hri.services.memory_bus import MemoryHub
-from engage_hri.services.virtual_time import VirtualTimeLoop
+from engage_hri.services.bus.memory import MemoryHub
+from engage_hri.services.runtime.virtual_time import VirtualTimeLoop
 
 settings.register_profile("same", derandomize=True, database=None)
 settings.register_profile("search", parent=settings.get_profile("default"))

@@ -8,6 +8,7 @@ import ast
 import re
 import subprocess
 from collections.abc import Iterator
+from math import inf
 from pathlib import Path, PurePosixPath
 
 import pytest
@@ -19,19 +20,26 @@ CODE = ("engage_hri", "schemas", "services", "examples", "benchmarks", "tests")
 
 IMPURE = {"asyncio", "zenoh", "time", "random", "logging", "datetime", "socket", "subprocess"}
 """What values-in-values-out code has no use for: the loop, the wire, the clock, chance, talking to the console."""
-MACHINERY = {"bus", "memory_bus", "requests", "runtime", "virtual_time", "client", "cli", "commandline"}
-"""Modules of `services` that pure files don't know either; `zenoh_*` too."""
+MACHINERY = {"bus", "requests", "runtime", "client", "commandline"}
+"""Packages of `services` that pure files don't know either; their own pure files aside."""
+PURE_MACHINERY = {
+    "services/requests/asking.py", "services/requests/asking_table.py", "services/requests/deadlines.py",
+    "services/requests/names.py", "services/requests/patience.py", "services/requests/serving.py",
+    "services/requests/serving_table.py", "services/requests/transitions.py", "services/client/chunking.py",
+    "services/client/event_stream.py",
+}  # fmt: skip
+"""Files of these packages that are pure themselves."""
 SHELLS = {
-    "services/realizer/executor.py",  # awaits bodies
-    "services/realizer/body_link.py",  # asks the body
-    "services/realizer/recognition_link.py",  # asks recognition
-    "services/realizer/reporting.py",  # publishes feedback
-    "services/realizer/surroundings.py",  # what the executor is given
-    "services/realizer/unhurried.py",  # lets the loop go on between slices of planning
+    "services/realizer/perform/performance.py",  # awaits bodies
+    "services/realizer/perform/control_link.py",  # asks the body
+    "services/realizer/perform/recognition_link.py",  # asks recognition
+    "services/realizer/perform/feedback.py",  # publishes feedback
+    "services/realizer/perform/surroundings.py",  # what the executor is given
+    "services/realizer/perform/unhurried.py",  # lets the loop go on between slices of planning
     "services/generation/body_link.py",  # asks the body
     "services/generation/conductor.py",  # awaits the blocks of fragments
     "services/control/body.py",  # the interface of bodies: coroutines
-    "services/control/simulated.py",  # a body that moves on the loop's clock
+    "services/control/torso/body.py",  # a body that moves on the loop's clock
     "services/control/waiting.py",  # waits for a moment or a change of authority
     "services/simulation/still.py",  # a world, published once
     "services/hostile/trial.py",  # runs services in virtual time, and is the hostile peer
@@ -44,6 +52,21 @@ VISITOR = "examples/plain_zenoh_events.py"
 """Shows how to do without Engage: it may import nothing of it."""
 COMPOSERS = {"commandline"}
 """Packages of `services` that are no service: they put services together and may import all of them."""
+SHARED = {"bus", "requests", "runtime", "client", "tangram"}
+"""Packages of `services` that are no service, and that services may import."""
+LAYERS = {
+    "schemas": "documents > *",
+    "services": "commandline > collaboration console control generation hostile realizer recognition simulation study"
+    " > client > requests > runtime > bus > tangram",
+    "services/bus": "memory zenoh > interface",
+    "services/control": "service > torso > voice > actions waiting > body > variability > config",
+    "services/generation": "service > conductor > performance > body_link fragment_check pipeline > block head"
+    " > references turns > permits > config",
+    "services/realizer": "export service > perform > decide > plan > net > config points",
+    "services/recognition": "service > recognizer > perceive statistics > events > config",
+}
+"""What lies above what within a folder: its files and folders by name, `*` for all others. Each may import what
+stands further right, and nothing beside it or further left."""
 ON_A_ROBOT = {"realizer", "generation", "recognition", "control"}
 THREADS = {"threading", "_thread", "concurrent", "multiprocessing"}
 THREAD_CALLS = {"to_thread", "run_in_executor", "Thread", "ThreadPoolExecutor"}
@@ -103,29 +126,54 @@ def _import(place: PurePosixPath, module: str) -> Iterator[str]:
     first, second = [*module.split("."), ""][:2]
     measures = top in ("tests", "benchmarks")
     visits = measures or str(place) == VISITOR
-    if first == "zenoh" and not visits and not re.fullmatch(r"services/zenoh_\w+\.py", str(place)):
-        yield "only services/zenoh_*.py may"
+    if first == "zenoh" and not visits and place.parts[:3] != ("services", "bus", "zenoh"):
+        yield "only services/bus/zenoh may"
     if first in THREADS and not measures:
         yield "this code starts no threads"
     if top == "schemas" and first == "services":
         yield "the vocabulary knows no service"
-    machinery = first == "services" and (second in MACHINERY or second.startswith("zenoh"))
+    machinery = first == "services" and second in MACHINERY and not _is_in(module, PURE_MACHINERY)
     if _is_pure(place) and (first in IMPURE or machinery):
         yield "this file is pure"
     elsewhere = first == "services" and second not in ("", package) and (ROOT / "services" / second).is_dir()
-    if package and package not in COMPOSERS and elsewhere:
+    if package and package not in COMPOSERS | SHARED and elsewhere and second not in SHARED:
         yield "services do not import one another"
+    if place.name != "__main__.py":  # ways in: they start at the top
+        yield from _layering(place, module)
     if package in ON_A_ROBOT and module.startswith("services.simulation"):
         yield "simulation has no business on a robot"
 
 
+def _layering(place: PurePosixPath, module: str) -> Iterator[str]:
+    """Where that goes up, or beside, in the folder that holds both."""
+    here, there = place.with_suffix("").parts, tuple(module.split("."))
+    for folder, picture in LAYERS.items():
+        root = tuple(folder.split("/"))
+        if here[: len(root)] != root or here[len(root)] in ("__init__", "__main__"):
+            continue
+        rank = {name: number for number, layer in enumerate(picture.split(">")) for name in layer.split()}
+        ours = here[len(root)] if "*" not in rank or here[len(root)] in rank else "*"
+        if ours not in rank:
+            yield f"{ours} has no place in the layers of {folder}"
+        elif there[: len(root)] == root and len(there) > len(root) and there[len(root)] != ours:
+            theirs = there[len(root)] if there[len(root)] in rank else "*"
+            if theirs != ours and rank.get(theirs, inf) <= rank[ours]:
+                yield f"{theirs} is not below {ours} in {folder}"
+
+
+def _is_in(module: str, files: set[str]) -> bool:
+    """Is it one of these files, or something of one?"""
+    parts = module.split(".")
+    return any("/".join(parts[:end]) + ".py" in files for end in (len(parts), len(parts) - 1))
+
+
 def _is_pure(place: PurePosixPath) -> bool:
-    if place.parts[0] == "schemas":
+    if place.parts[0] == "schemas" or str(place) in PURE_MACHINERY:
         return True
     return (
         place.parts[0] == "services"
         and len(place.parts) > 2
-        and place.parts[1] not in COMPOSERS
+        and place.parts[1] not in COMPOSERS | SHARED
         and place.name not in ("service.py", "__main__.py")
         and str(place) not in SHELLS
     )
@@ -203,42 +251,57 @@ def test_the_list_of_shells_holds_only_files_that_need_it() -> None:
         path = ROOT / name
         assert path.is_file(), f"{name} is gone: take it off the list"
         modules = set(_imports(PurePosixPath(name), ast.parse(path.read_text())))
-        needs = {module for module in modules if module.split(".")[0] in IMPURE or module.split(".")[-1] in MACHINERY}
+        needs = {
+            each
+            for each in modules
+            if each.split(".")[0] in IMPURE or each.split(".")[1:2] in ([m] for m in MACHINERY)
+        }
         assert needs, f"{name} is pure: take it off the list"
 
 
 @pytest.mark.parametrize(
     ("path", "text", "reason"),
     [
-        ("services/cli.py", "from services.bus import Bus", "its name is engage_hri.services.bus"),
+        ("services/commandline/app.py", "from services.bus import Bus", "its name is engage_hri.services.bus"),
         ("tests/test_x.py", "import schemas.keys", "its name is engage_hri.schemas.keys"),
         ("schemas/x.py", "import asyncio", "pure"),
         ("schemas/x.py", "from engage_hri.services import bus", "knows no service"),
-        ("services/realizer/net.py", "from engage_hri.services.bus import Bus", "pure"),
+        ("services/realizer/plan/x.py", "from engage_hri.services.bus.interface import Bus", "pure"),
         ("services/control/service.py", "from engage_hri.services.simulation import table", "no business on a robot"),
         ("schemas/x.py", "from services import bus", "knows no service"),
         ("schemas/x.py", "def f():\n    from time import monotonic", "pure"),
-        ("services/realizer/net.py", "import random", "pure"),
-        ("services/realizer/net.py", "import logging.handlers", "pure"),
-        ("services/realizer/net.py", "from services.bus import Bus", "pure"),
-        ("services/realizer/net.py", "from services import zenoh_bus", "pure"),
-        ("services/realizer/net.py", "from ..requests import Requester", "pure"),
+        ("services/realizer/plan/x.py", "import random", "pure"),
+        ("services/realizer/plan/x.py", "import logging.handlers", "pure"),
+        ("services/realizer/plan/x.py", "from engage_hri.services.requests.ends import Requester", "pure"),
+        ("services/realizer/plan/x.py", "from engage_hri.services.bus import zenoh", "pure"),
+        ("services/realizer/plan/x.py", "from ...requests import Requester", "pure"),
         ("services/realizer/service.py", "from services.generation.config import X", "one another"),
         ("services/realizer/service.py", "from services import generation", "one another"),
         ("services/collaboration/task.py", "import services.simulation.table", "one another"),
         ("services/control/service.py", "from services.simulation import table", "no business on a robot"),
         ("services/control/service.py", "import zenoh", "imports zenoh"),
-        ("services/cli.py", "from zenoh import Config", "imports zenoh"),
-        ("services/control/zenoh_arm.py", "import zenoh", "imports zenoh"),
-        ("services/cli.py", "import threading", "no threads"),
-        ("services/zenoh_bus.py", "from concurrent.futures import ThreadPoolExecutor", "no threads"),
-        ("services/cli.py", "async def f():\n    await asyncio.to_thread(g)", "no threads"),
-        ("services/cli.py", "loop.run_in_executor(None, f)", "no threads"),
-        ("services/cli.py", "key = 'engage/v1/cmd/realizer/block'", "spells a key"),
+        ("services/commandline/app.py", "from zenoh import Config", "imports zenoh"),
+        ("services/control/arm.py", "import zenoh", "imports zenoh"),
+        ("services/realizer/plan/x.py", "from engage_hri.services.realizer.decide.facts import Facts", "not below"),
+        (
+            "services/realizer/decide/x.py",
+            "from engage_hri.services.realizer.perform import performance",
+            "not below",
+        ),
+        ("services/recognition/events/x.py", "import engage_hri.services.recognition.service", "not below"),
+        ("services/generation/block/x.py", "from engage_hri.services.generation.head import arbiter", "not below"),
+        ("services/bus/x.py", "from engage_hri.services.requests.ends import Requester", "not below"),
+        ("services/control/x.py", "import math", "no place in the layers"),
+        ("schemas/x.py", "from engage_hri.schemas.documents.xml_names import NAMES", "not below"),
+        ("services/commandline/app.py", "import threading", "no threads"),
+        ("services/bus/zenoh/hub.py", "from concurrent.futures import ThreadPoolExecutor", "no threads"),
+        ("services/commandline/app.py", "async def f():\n    await asyncio.to_thread(g)", "no threads"),
+        ("services/commandline/app.py", "loop.run_in_executor(None, f)", "no threads"),
+        ("services/commandline/app.py", "key = 'engage/v1/cmd/realizer/block'", "spells a key"),
         ("examples/x.py", "import zenoh", "imports zenoh"),
         ("examples/plain_zenoh_events.py", "from schemas import keys", "do without"),
         ("examples/x.py", "key = f'robot/engage/v1/{x}'", "spells a key"),
-        ("services/cli.py", "x = 1\n" * 401, "401 lines"),
+        ("services/commandline/app.py", "x = 1\n" * 401, "401 lines"),
         ("tests/test_x.py", "import time\ntime.sleep(1)", "sleeps"),
         ("tests/test_x.py", "from time import sleep", "time.sleep"),
         ("tests/test_x.py", "@pytest.mark.real_time\nasync def test_x():\n    await asyncio.sleep(1)", "sleeps"),
@@ -263,12 +326,15 @@ def test_a_broken_rule_is_caught(path: str, text: str, reason: str) -> None:
             "services/realizer/service.py",
             "import asyncio\nfrom engage_hri.services.bus import Bus\nfrom engage_hri.services.realizer import net",
         ),
-        ("services/realizer/net.py", "import numpy\nfrom engage_hri.services.realizer.config import RealizerConfig"),
-        ("services/realizer/net.py", "from engage_hri.services.tangram_table import TangramTable"),
-        ("services/realizer/executor.py", "import asyncio"),
-        ("services/zenoh_bus.py", "import time\nimport zenoh"),
+        (
+            "services/realizer/plan/x.py",
+            "import numpy\nfrom engage_hri.services.realizer.config import RealizerConfig",
+        ),
+        ("services/realizer/plan/x.py", "from engage_hri.services.tangram.table import TangramTable"),
+        ("services/realizer/perform/performance.py", "import asyncio"),
+        ("services/bus/zenoh/hub.py", "import time\nimport zenoh"),
         ("services/commandline/demo.py", "from engage_hri.services.simulation import service\nimport asyncio"),
-        ("services/cli.py", "from engage_hri.services.realizer.service import realize"),
+        ("services/commandline/app.py", "from engage_hri.services.realizer.service import realize"),
         ("schemas/keys.py", "PREFIX = 'engage/v1'"),
         ("tests/test_x.py", "async def test_x():\n    await asyncio.sleep(5)  # virtual"),
         ("tests/test_x.py", "@pytest.mark.real_time\nasync def test_x():\n    await asyncio.sleep(0)"),

@@ -15,12 +15,12 @@ from engage_hri.schemas.faults import InputRefused
 from engage_hri.schemas.fragments import TurnFragment
 from engage_hri.schemas.messages import Message
 from engage_hri.schemas.presence import PeerGone
-from engage_hri.services.client import PerformFailed, Robot, connect
+from engage_hri.services.bus.memory import MemoryHub
+from engage_hri.services.client.robot import PerformFailed, Robot, connect
 from engage_hri.services.commandline import roster
-from engage_hri.services.config import load
+from engage_hri.services.commandline.config import load
 from engage_hri.services.control.body import Authority
-from engage_hri.services.memory_bus import MemoryHub
-from engage_hri.services.runtime import running
+from engage_hri.services.runtime.service import running
 from tests.cancelling import whole_robot
 from tests.test_lives_and_late_answers import HOME, _serve_until, everything, says
 
@@ -39,20 +39,20 @@ def breaking(attribute: str) -> Callable[..., Any]:
     ("place", "what"),
     [
         ("engage_hri.services.generation.conductor.Conductor.admit", "perform"),
-        ("engage_hri.services.generation.planning.plan", "perform"),
+        ("engage_hri.services.generation.pipeline.plan", "perform"),
         ("engage_hri.services.generation.conductor.plan", "perform"),
         ("engage_hri.services.realizer.service.plan_steps", "realize"),
-        ("engage_hri.services.realizer.executor.Authority", "realize"),
-        ("engage_hri.services.realizer.authority.Authority.advance", "realize"),
-        ("engage_hri.services.realizer.authority.Authority.reach", "realize"),
-        ("engage_hri.services.realizer.reporting.Reporter.reached", "realize"),
-        ("engage_hri.services.realizer.executor.Performance._by_body", "realize"),
+        ("engage_hri.services.realizer.perform.performance.Authority", "realize"),
+        ("engage_hri.services.realizer.decide.authority.Authority.advance", "realize"),
+        ("engage_hri.services.realizer.decide.authority.Authority.reach", "realize"),
+        ("engage_hri.services.realizer.perform.feedback.Reporter.reached", "realize"),
+        ("engage_hri.services.realizer.perform.performance.Performance._by_body", "realize"),
         ("engage_hri.services.control.service._Control._begin", "realize"),
         ("engage_hri.services.control.service._Control._report", "realize"),
-        ("engage_hri.services.control.simulated.SimulatedBody.perform", "realize"),
-        ("engage_hri.services.control.simulated.SimulatedBody.estimate", "realize"),
-        ("engage_hri.services.control.simulated.SimulatedBody.state", "realize"),
-        ("engage_hri.services.recognition.session.Session._request", "perform"),
+        ("engage_hri.services.control.torso.body.SimulatedBody.perform", "realize"),
+        ("engage_hri.services.control.torso.body.SimulatedBody.estimate", "realize"),
+        ("engage_hri.services.control.torso.body.SimulatedBody.state", "realize"),
+        ("engage_hri.services.recognition.events.session.Session._request", "perform"),
         ("engage_hri.services.recognition.recognizer.Recognizer.feed", "perform"),
     ],
 )
@@ -132,7 +132,7 @@ async def test_a_driver_that_is_cancelled_by_itself_ends_one_behavior(
     behaviors = [Gaze(id="g", target="human"), Speech(id="s", text="one two")]
     async with whole_robot(hub) as robot:
         with monkeypatch.context() as patch:
-            patch.setattr(f"engage_hri.services.control.simulated.SimulatedBody.{method}", cancelled_by_itself)
+            patch.setattr(f"engage_hri.services.control.torso.body.SimulatedBody.{method}", cancelled_by_itself)
             for number in range(2):
                 began = robot.now()
                 with suppress(InputRefused, PerformFailed):
@@ -149,7 +149,7 @@ async def test_a_way_home_that_never_ends_is_not_asked_for_for_ever(
     async def never(*arguments: object) -> None:
         await asyncio.Event().wait()
 
-    monkeypatch.setattr("engage_hri.services.control.simulated.SimulatedBody.home", never)
+    monkeypatch.setattr("engage_hri.services.control.torso.body.SimulatedBody.home", never)
     with hub.join("ear").subscribe(keys.keep_alive("control")) as pulses:
         async with whole_robot(hub) as robot:
             for number in range(3):
@@ -195,7 +195,7 @@ async def test_an_error_of_a_driver_that_cannot_even_be_written_down_ends_one_be
     monkeypatch.setattr(logging.getLogger("engage"), "disabled", True)  # pytest can't write it down, either
     async with whole_robot(hub) as robot:
         with monkeypatch.context() as patch:
-            patch.setattr("engage_hri.services.control.simulated.SimulatedBody.perform", broken)
+            patch.setattr("engage_hri.services.control.torso.body.SimulatedBody.perform", broken)
             await asyncio.wait_for(robot.realize("b", [Speech(id="s", text="one")]), 60.0)
         await asyncio.sleep(5.0)
         assert (await robot.realize("c", [Speech(id="s", text="one")])).spoken[0].text == "one"

@@ -8,7 +8,7 @@ from types import ModuleType
 import msgspec
 import pytest
 
-from engage_hri.schemas.json_codec import decode_json
+from engage_hri.schemas.documents.json_codec import decode_json
 from engage_hri.schemas.summary import Summary
 from engage_hri.schemas.tool import ToolInput
 

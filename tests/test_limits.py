@@ -10,14 +10,14 @@ from engage_hri.schemas.blocks import Block, BlockOutcome
 from engage_hri.schemas.faults import InputRefused
 from engage_hri.schemas.fragments import FragmentOutcome, TurnFragment
 from engage_hri.schemas.world import Entity, World
-from engage_hri.services.client import connect
+from engage_hri.services.bus.memory import MemoryHub
+from engage_hri.services.client.robot import connect
 from engage_hri.services.commandline import roster
-from engage_hri.services.config import load
+from engage_hri.services.commandline.config import load
 from engage_hri.services.generation.config import GenerationConfig
-from engage_hri.services.memory_bus import MemoryHub
 from engage_hri.services.realizer.config import RealizerConfig
-from engage_hri.services.requests import RequestRefused
-from engage_hri.services.runtime import running
+from engage_hri.services.requests.ends import RequestRefused
+from engage_hri.services.runtime.service import running
 from engage_hri.services.simulation.still import show_world
 from tests.cancelling import whole_robot
 from tests.realizer.stage import stage

@@ -15,12 +15,12 @@ from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.fragments import FragmentOutcome, PerformFragment, TurnFragment
 from engage_hri.schemas.messages import encode_json
 from engage_hri.schemas.requests import Refused, Request
-from engage_hri.services.client import Robot, connect
+from engage_hri.services.bus.memory import MemoryHub
+from engage_hri.services.client.robot import Robot, connect
 from engage_hri.services.commandline import roster
-from engage_hri.services.config import load
-from engage_hri.services.memory_bus import MemoryHub
-from engage_hri.services.requests import Requester
-from engage_hri.services.runtime import running
+from engage_hri.services.commandline.config import load
+from engage_hri.services.requests.ends import Requester
+from engage_hri.services.runtime.service import running
 from tests.cancelling import change_mind_often, whole_robot
 from tests.commanding import command
 from tests.realizer.fake_body import FakeBody, Script

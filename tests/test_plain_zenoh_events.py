@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 from engage_hri.schemas.presence import PeerAlive, PeerGone
 from engage_hri.schemas.recognition import ENDINGS, ConnectionEvent, OpenEvents
 from engage_hri.schemas.units import Stamp
-from engage_hri.services.event_stream import EventStream
-from engage_hri.services.recognition.open_events import OpenBook
+from engage_hri.services.client.event_stream import EventStream
+from engage_hri.services.recognition.events.open_events import OpenBook
 from tests.test_examples import example
 
 plain = example("plain_zenoh_events")

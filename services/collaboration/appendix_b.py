@@ -6,7 +6,7 @@ The id of a fragment is its step, and ends in `ours` where the source has none: 
 from engage_hri.services.collaboration.plans import Manager, Turn
 from engage_hri.services.collaboration.relations import Relation
 from engage_hri.services.collaboration.task import Instruction
-from engage_hri.services.tangram_table import Side
+from engage_hri.services.tangram.table import Side
 
 AS_IN_STEP_19 = Relation("purple-triangle", "top right", "trapezoid")
 """Where the human puts it, against step 18; the robot of step 20 says "good" all the same."""

@@ -21,7 +21,7 @@ from engage_hri.schemas.behaviors import (
 )
 from engage_hri.schemas.fragments import TurnFragment, TurnStatus
 from engage_hri.services.collaboration.relations import Relation
-from engage_hri.services.tangram_table import Side, TangramTable
+from engage_hri.services.tangram.table import Side, TangramTable
 
 MANIPULATION: tuple[Action, ...] = ("act", "speak", "nod", "shake")
 """What answers a request to move a piece."""

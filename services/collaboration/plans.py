@@ -14,7 +14,7 @@ from engage_hri.schemas.world import Entity
 from engage_hri.services.collaboration.config import CollaborationConfig
 from engage_hri.services.collaboration.fragments import MANIPULATION, Mention, Sentence, fragment, request
 from engage_hri.services.collaboration.task import Goal, Instruction, check
-from engage_hri.services.tangram_table import TangramTable
+from engage_hri.services.tangram.table import TangramTable
 
 # -- what a plan may wish for -----------------------------------------------------------------------------------
 

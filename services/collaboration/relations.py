@@ -10,7 +10,7 @@ from itertools import permutations
 from msgspec import Struct
 
 from engage_hri.schemas.world import Entity
-from engage_hri.services.tangram_table import Side, edges, touches
+from engage_hri.services.tangram.table import Side, edges, touches
 
 
 class Relation(Struct, frozen=True):

@@ -9,16 +9,16 @@ from engage_hri.schemas import keys
 from engage_hri.schemas.faults import EngageError
 from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.world import World
-from engage_hri.services.bus import Bus
-from engage_hri.services.client import Robot
+from engage_hri.services.bus.interface import Bus
+from engage_hri.services.client.feeds import Feed
+from engage_hri.services.client.robot import Robot
 from engage_hri.services.collaboration import plans
 from engage_hri.services.collaboration.appendix_b import turns
 from engage_hri.services.collaboration.config import CollaborationConfig
 from engage_hri.services.collaboration.placement import has_been_placed
 from engage_hri.services.collaboration.sight import Sight
-from engage_hri.services.feeds import Feed
-from engage_hri.services.runtime import Ready
-from engage_hri.services.tangram_table import tangram_table
+from engage_hri.services.runtime.service import Ready
+from engage_hri.services.tangram.table import tangram_table
 
 
 async def collaborate(bus: Bus, ready: Ready, config: CollaborationConfig) -> None:

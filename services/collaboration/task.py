@@ -11,7 +11,7 @@ from msgspec import Struct
 from engage_hri.schemas.world import Entity
 from engage_hri.services.collaboration.placement import TRUSTED
 from engage_hri.services.collaboration.relations import Relation, relation, relations
-from engage_hri.services.tangram_table import TangramTable
+from engage_hri.services.tangram.table import TangramTable
 
 
 class Instruction(Struct, frozen=True, kw_only=True):

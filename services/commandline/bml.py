@@ -6,8 +6,8 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from engage_hri.schemas.blocks import Block, Dialect
-from engage_hri.schemas.dialects import core, spelled
-from engage_hri.schemas.xml_codec import encode_xml
+from engage_hri.schemas.documents.dialects import core, spelled
+from engage_hri.schemas.documents.xml_decode import encode_xml
 from engage_hri.services.commandline.generating import generated
 from engage_hri.services.commandline.process import DONE
 from engage_hri.services.commandline.run import Where

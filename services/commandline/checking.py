@@ -29,8 +29,8 @@ def read_all(files: Sequence[Path], outputs: Outputs) -> tuple[Source, ...]:
 def check(sources: Sequence[Source], world: World | None, robot: str, outputs: Outputs) -> None:
     """Contradictions in blocks; in fragments what the world does not know, if it is known. Raises InputRefused."""
     from engage_hri.services.generation.fragment_check import checked
-    from engage_hri.services.realizer.planner import plan_block
-    from engage_hri.services.realizer.relations import BlockRefused
+    from engage_hri.services.realizer.plan.planner import plan_block
+    from engage_hri.services.realizer.plan.relations import BlockRefused
 
     for source in sources:
         for thing in source.things:

@@ -16,7 +16,7 @@ from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.messages import Message
 from engage_hri.schemas.presence import PeerAlive, PeerGone
 from engage_hri.schemas.units import Seconds
-from engage_hri.services.bus import Bus, Hub, Subscription
+from engage_hri.services.bus.interface import Bus, Hub, Subscription
 
 PATIENCE: Seconds = 4.0
 """How long one that was killed may still seem to be there."""

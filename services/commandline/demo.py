@@ -8,11 +8,11 @@ from rich.console import Console
 
 from engage_hri.schemas.messages import Message
 from engage_hri.schemas.units import Seconds
+from engage_hri.services.commandline.config import Config
 from engage_hri.services.commandline.outputs import Outputs
 from engage_hri.services.commandline.process import DONE, run
 from engage_hri.services.commandline.run import Where
 from engage_hri.services.commandline.tangram import play_tangram
-from engage_hri.services.config import Config
 from engage_hri.services.console import tally
 from engage_hri.services.console.follow import Sink
 from engage_hri.services.console.live import LiveView, Log

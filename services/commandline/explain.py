@@ -17,7 +17,7 @@ from engage_hri.services.commandline.outputs import Terminal
 from engage_hri.services.commandline.process import DONE
 from engage_hri.services.commandline.run import Where
 from engage_hri.services.commandline.sources import read_source, read_world
-from engage_hri.services.generation.planning import Plan
+from engage_hri.services.generation.pipeline import Plan
 
 GESTURES: dict[GestureChoice, str] = {
     "none": "none",

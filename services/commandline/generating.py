@@ -9,10 +9,10 @@ from engage_hri.schemas.body import Estimate, EstimateItem
 from engage_hri.schemas.faults import Fault, RunFailed
 from engage_hri.schemas.fragments import ReferenceChoice, TurnFragment
 from engage_hri.schemas.world import World
+from engage_hri.services.commandline.config import Config
 from engage_hri.services.commandline.sources import Thing
-from engage_hri.services.config import Config
-from engage_hri.services.generation.planning import Plan
-from engage_hri.services.virtual_time import run_virtual
+from engage_hri.services.generation.pipeline import Plan
+from engage_hri.services.runtime.virtual_time import run_virtual
 
 
 class Unplanned(RunFailed):
@@ -33,14 +33,14 @@ def generated(things: Sequence[Thing], world: World, config: Config, source: str
 
 
 async def _generated(things: Sequence[Thing], world: World, config: Config, source: str) -> list[Plan]:
-    from engage_hri.services.control.simulated import SimulatedBody
-    from engage_hri.services.generation.discourse import SILENCE
+    from engage_hri.services.control.torso.body import SimulatedBody
     from engage_hri.services.generation.fragment_check import checked
-    from engage_hri.services.generation.leases import Leases
-    from engage_hri.services.generation.motions import collect, distinct, from_each_other, from_here
-    from engage_hri.services.generation.planning import glance, plan, targets
-    from engage_hri.services.generation.reference_policy import Unreferable
-    from engage_hri.services.generation.turn_policy import TurnPolicy
+    from engage_hri.services.generation.head.inhibitions import Leases
+    from engage_hri.services.generation.pipeline import glance, plan, targets
+    from engage_hri.services.generation.references.discourse import SILENCE
+    from engage_hri.services.generation.references.motions import collect, distinct, from_each_other, from_here
+    from engage_hri.services.generation.references.policy import Unreferable
+    from engage_hri.services.generation.turns.policy import TurnPolicy
 
     body = SimulatedBody(config.control.no_point_zones, config.control.variability)
     permits = Leases(config.generation).permits()

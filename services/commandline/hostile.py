@@ -12,16 +12,16 @@ from rich.table import Table
 
 from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.units import Seconds
-from engage_hri.services.bus import Bus
+from engage_hri.services.bus.interface import Bus
 from engage_hri.services.commandline import roster
+from engage_hri.services.commandline.config import Config
 from engage_hri.services.commandline.process import DONE
 from engage_hri.services.commandline.run import Where
 from engage_hri.services.commandline.sources import still
-from engage_hri.services.config import Config
 from engage_hri.services.control.body import Body
 from engage_hri.services.control.service import embody
 from engage_hri.services.hostile.trial import KINDS, Attack, Client, Kind, Report, run
-from engage_hri.services.runtime import Ready, Service
+from engage_hri.services.runtime.service import Ready, Service
 from engage_hri.services.simulation.still import tangram_world
 
 WRONG = 1

@@ -13,9 +13,9 @@ import msgspec
 from rich.console import Console
 
 from engage_hri.schemas import lines
+from engage_hri.schemas.documents.xml_feedback import HEAD, TAIL, encode_feedback
 from engage_hri.schemas.faults import Fault, InputRefused, RunFailed
 from engage_hri.schemas.feedback import BlockProgress, PredictionFeedback, SyncPointProgress, WarningFeedback
-from engage_hri.schemas.feedback_xml import HEAD, TAIL, encode_feedback
 from engage_hri.schemas.messages import Message
 from engage_hri.schemas.recognition import ConnectionEvent
 from engage_hri.schemas.summary import Summary
@@ -26,7 +26,7 @@ FeedbackFormat = Literal["json", "xml"]
 
 
 class Terminal(Console):
-    """Rich's console, but it leaves it to `services/cli.py` what becomes of us when nobody reads on.
+    """Rich's console, but it leaves it to `services/commandline/app.py` what becomes of us when nobody reads on.
 
     And an id between colons is no emoji: `b:x:start`.
     """

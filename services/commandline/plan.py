@@ -5,12 +5,12 @@ from pathlib import Path
 from engage_hri.schemas.blocks import Block
 from engage_hri.schemas.body import Estimate
 from engage_hri.schemas.world import World
+from engage_hri.services.commandline.config import Config
 from engage_hri.services.commandline.generating import generated
 from engage_hri.services.commandline.process import DONE
 from engage_hri.services.commandline.run import Where
 from engage_hri.services.commandline.sources import read_source, read_world
-from engage_hri.services.config import Config
-from engage_hri.services.virtual_time import run_virtual
+from engage_hri.services.runtime.virtual_time import run_virtual
 
 
 def main(path: Path, format: str, world: Path | None, where: Where) -> int:
@@ -31,7 +31,7 @@ def main(path: Path, format: str, world: Path | None, where: Where) -> int:
 
 async def estimated(block: Block, world: World, config: Config) -> tuple[Estimate, ...]:
     """What the simulated body expects of the block in that world, from its home position."""
-    from engage_hri.services.control.simulated import SimulatedBody
+    from engage_hri.services.control.torso.body import SimulatedBody
     from engage_hri.services.realizer.points import performer
 
     body = SimulatedBody(config.control.no_point_zones, config.control.variability)

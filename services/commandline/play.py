@@ -18,22 +18,22 @@ from engage_hri.schemas.status import AskStatus
 from engage_hri.schemas.summary import summary
 from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.world import World
-from engage_hri.services.bus import Hub
-from engage_hri.services.client import Robot, connect
+from engage_hri.services.bus.interface import Hub
+from engage_hri.services.bus.memory import MemoryHub
+from engage_hri.services.client.language_models import summary_of
+from engage_hri.services.client.robot import Robot, connect
 from engage_hri.services.commandline import checking, roster
+from engage_hri.services.commandline.config import Config
 from engage_hri.services.commandline.errors import readable
 from engage_hri.services.commandline.outputs import FeedbackFormat, Outputs
 from engage_hri.services.commandline.played import Played
 from engage_hri.services.commandline.process import DONE, FAILED, REFUSED, run
 from engage_hri.services.commandline.run import Where, unique
 from engage_hri.services.commandline.sources import Source, Thing, read_world, still
-from engage_hri.services.config import Config
 from engage_hri.services.console.follow import Sink, following
 from engage_hri.services.console.live import Log
 from engage_hri.services.console.log import Telling
-from engage_hri.services.memory_bus import MemoryHub
-from engage_hri.services.runtime import Service, running
-from engage_hri.services.streaming import summary_of
+from engage_hri.services.runtime.service import Service, running
 
 PATIENCE: Seconds = 5.0
 """How long a running system may take to answer at all."""

@@ -8,7 +8,7 @@ from collections.abc import Coroutine
 from importlib import import_module
 from typing import Any, TypeVar
 
-from engage_hri.services.virtual_time import VirtualTimeLoop
+from engage_hri.services.runtime.virtual_time import VirtualTimeLoop
 
 T = TypeVar("T")
 DONE, REFUSED, FAILED, UNREAD = 0, 2, 3, 128 + signal.SIGPIPE

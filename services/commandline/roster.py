@@ -4,8 +4,8 @@ from functools import partial
 from typing import Literal, get_args
 
 from engage_hri.schemas.faults import Fault, InputRefused
-from engage_hri.services.config import Config
-from engage_hri.services.runtime import Service
+from engage_hri.services.commandline.config import Config
+from engage_hri.services.runtime.service import Service
 
 ServiceName = Literal["generation", "realizer", "recognition", "control", "simulation", "collaboration"]
 NAMES: tuple[str, ...] = get_args(ServiceName)

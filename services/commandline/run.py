@@ -11,11 +11,11 @@ from msgspec import json
 
 from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.utf8 import is_utf8
-from engage_hri.services.bus import Hub
+from engage_hri.services.bus.interface import Hub
 from engage_hri.services.commandline import roster
+from engage_hri.services.commandline.config import Config, load
 from engage_hri.services.commandline.process import DONE, run_until_signal
-from engage_hri.services.config import Config, load
-from engage_hri.services.runtime import serve
+from engage_hri.services.runtime.service import serve
 
 
 class Where(NamedTuple):
@@ -40,7 +40,7 @@ class Where(NamedTuple):
 
     async def open(self, robot: str) -> Hub:
         """The Zenoh hub. Raises EngageError when an endpoint is bad or taken."""
-        from engage_hri.services.zenoh_bus import open_hub
+        from engage_hri.services.bus.zenoh.hub import open_hub
 
         return await open_hub(robot, connect=self.connect, listen=self.listen)
 

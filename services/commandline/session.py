@@ -14,14 +14,14 @@ from msgspec import Struct
 
 from engage_hri.schemas.recognition import ConnectionEvent, Statistics, WindowStatistics
 from engage_hri.schemas.units import Seconds, Stamp
+from engage_hri.services.commandline.config import Config
 from engage_hri.services.commandline.process import DONE
 from engage_hri.services.commandline.tangram import play_tangram
-from engage_hri.services.config import Config
-from engage_hri.services.recognition.session import Session
-from engage_hri.services.recognition.statistics import Tally
+from engage_hri.services.recognition.events.session import Session
+from engage_hri.services.recognition.statistics.tally import Tally
+from engage_hri.services.runtime.virtual_time import run_virtual
 from engage_hri.services.simulation import human_session
 from engage_hri.services.study.records import EventRecord, Recording, SessionRecord
-from engage_hri.services.virtual_time import run_virtual
 
 A_WHILE: Seconds = 120.0
 """After the last event that was drawn: all that is open has ended by then."""

@@ -18,6 +18,7 @@ from rich.text import Text
 from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.commandline import demo
+from engage_hri.services.commandline.config import Config
 from engage_hri.services.commandline.folder import Folder
 from engage_hri.services.commandline.outputs import Terminal
 from engage_hri.services.commandline.process import DONE, FAILED, interrupted, run
@@ -26,8 +27,7 @@ from engage_hri.services.commandline.run import Where
 from engage_hri.services.commandline.session import Order, Played
 from engage_hri.services.commandline.validation import beside_table_2_1
 from engage_hri.services.commandline.workers import play_all
-from engage_hri.services.config import Config
-from engage_hri.services.runtime import installed_version
+from engage_hri.services.runtime.service import installed_version
 from engage_hri.services.study import files, summary
 from engage_hri.services.study.conditions import CONDITIONS, WORSE
 from engage_hri.services.study.hypotheses import Finding, findings

@@ -8,13 +8,13 @@ from pathlib import Path
 import msgspec
 from msgspec import Struct
 
-from engage_hri.schemas import json_codec
 from engage_hri.schemas.blocks import Block
+from engage_hri.schemas.documents import json_codec
 from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.fragments import TurnFragment
 from engage_hri.schemas.syncref import is_id
 from engage_hri.schemas.world import World
-from engage_hri.services.runtime import Service
+from engage_hri.services.runtime.service import Service
 
 Thing = Block | TurnFragment
 

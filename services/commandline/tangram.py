@@ -3,12 +3,12 @@
 import asyncio
 from collections.abc import Iterable
 
-from engage_hri.services.bus import Bus
+from engage_hri.services.bus.interface import Bus
+from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.commandline import roster
-from engage_hri.services.config import Config
+from engage_hri.services.commandline.config import Config
 from engage_hri.services.console.follow import Sink, following
-from engage_hri.services.memory_bus import MemoryHub
-from engage_hri.services.runtime import Ready, Service, running
+from engage_hri.services.runtime.service import Ready, Service, running
 
 
 async def play_tangram(config: Config, sinks: Iterable[Sink]) -> None:

@@ -10,13 +10,13 @@ from rich.console import Console
 from rich.text import Text
 
 from engage_hri.services.commandline.claim import claiming
+from engage_hri.services.commandline.config import Config
 from engage_hri.services.commandline.demo import DEFAULTS, Tallying, shown
 from engage_hri.services.commandline.outputs import Outputs
 from engage_hri.services.commandline.process import DONE, run_until_signal
 from engage_hri.services.commandline.roster import ROBOT
 from engage_hri.services.commandline.run import Where, forever, is_ready
 from engage_hri.services.commandline.supervisor import Child, supervised
-from engage_hri.services.config import Config
 from engage_hri.services.console import tally
 from engage_hri.services.console.follow import following
 

@@ -11,10 +11,10 @@ from engage_hri.schemas.feedback import BlockProgress, SyncPointProgress, Warnin
 from engage_hri.schemas.messages import Message
 from engage_hri.schemas.recognition import ConnectionEvent, Statistics
 from engage_hri.schemas.units import Seconds
+from engage_hri.services.commandline.config import Config
 from engage_hri.services.commandline.outputs import Terminal
 from engage_hri.services.commandline.process import DONE, run_until_signal
 from engage_hri.services.commandline.run import Where, forever, unique
-from engage_hri.services.config import Config
 from engage_hri.services.console.follow import FOLLOWED, Sink, following
 from engage_hri.services.console.live import Log
 from engage_hri.services.console.log import Telling

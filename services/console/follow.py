@@ -9,8 +9,8 @@ from engage_hri.schemas.attention import HeadOwner
 from engage_hri.schemas.messages import Message
 from engage_hri.schemas.recognition import ConnectionEvent, OpenEvents
 from engage_hri.schemas.units import Seconds, Stamp
-from engage_hri.services.bus import Bus, Received
-from engage_hri.services.event_stream import EventStream
+from engage_hri.services.bus.interface import Bus, Received
+from engage_hri.services.client.event_stream import EventStream
 
 Sink = Callable[[Message, Seconds], None]
 FOLLOWED = (

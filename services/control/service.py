@@ -25,12 +25,13 @@ from engage_hri.schemas.body import (
     WordSpoken,
 )
 from engage_hri.schemas.check import check_behavior
+from engage_hri.schemas.covered import CoveredObjects
 from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.messages import Message
 from engage_hri.schemas.requests import Cancel, Request
 from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.world import World
-from engage_hri.services.bus import Bus, Received, is_asked_to_stop
+from engage_hri.services.bus.interface import Bus, Received, is_asked_to_stop
 from engage_hri.services.control import variability
 from engage_hri.services.control.actions import ActionMessage, Deeds
 from engage_hri.services.control.body import (
@@ -45,10 +46,9 @@ from engage_hri.services.control.body import (
     Spoke,
 )
 from engage_hri.services.control.config import ControlConfig
-from engage_hri.services.control.simulated import SimulatedBody
-from engage_hri.services.covered import CoveredObjects
-from engage_hri.services.requests import RequestDesk
-from engage_hri.services.runtime import Ready
+from engage_hri.services.control.torso.body import SimulatedBody
+from engage_hri.services.requests.ends import RequestDesk
+from engage_hri.services.runtime.service import Ready
 
 IDLE: Seconds = 1.0
 """Between two `RobotState` while nothing moves."""

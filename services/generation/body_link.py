@@ -8,8 +8,8 @@ from engage_hri.schemas.body import Capabilities, DescribeBody, Estimate, Estima
 from engage_hri.schemas.faults import Fault, NoReply, RunFailed
 from engage_hri.schemas.messages import Message
 from engage_hri.schemas.units import Seconds
-from engage_hri.services.bus import Bus
-from engage_hri.services.generation.motions import (
+from engage_hri.services.bus.interface import Bus
+from engage_hri.services.generation.references.motions import (
     Motions,
     collect,
     distinct,

@@ -16,20 +16,20 @@ from engage_hri.schemas.fragments import PerformFragment
 from engage_hri.schemas.recognition import ConnectionEvent, SignalTurn
 from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.world import World
-from engage_hri.services.bus import Bus, is_asked_to_stop
-from engage_hri.services.generation.arbiter import Arbiter
+from engage_hri.services.bus.interface import Bus, is_asked_to_stop
 from engage_hri.services.generation.body_link import BodyLink
 from engage_hri.services.generation.config import GenerationConfig
-from engage_hri.services.generation.discourse import SILENCE, Discourse
 from engage_hri.services.generation.fragment_check import check_world, checked
-from engage_hri.services.generation.leases import Leases
+from engage_hri.services.generation.head.arbiter import Arbiter
+from engage_hri.services.generation.head.inhibitions import Leases
 from engage_hri.services.generation.performance import GazesOfFragments, Performance
-from engage_hri.services.generation.planning import glance, plan, targets
-from engage_hri.services.generation.trail import NOTHING, Trail
-from engage_hri.services.generation.turn_events import TurnEvents, TurnOutcomes
-from engage_hri.services.generation.turn_policy import Aborted, TurnPlan, TurnPolicy
-from engage_hri.services.requests import Pending, RequestDesk, Requester, RequestRefused
-from engage_hri.services.serving import GRACE
+from engage_hri.services.generation.pipeline import glance, plan, targets
+from engage_hri.services.generation.references.discourse import SILENCE, Discourse
+from engage_hri.services.generation.turns.events import TurnEvents, TurnOutcomes
+from engage_hri.services.generation.turns.policy import Aborted, TurnPlan, TurnPolicy
+from engage_hri.services.generation.turns.trail import NOTHING, Trail
+from engage_hri.services.requests.ends import Pending, RequestDesk, Requester, RequestRefused
+from engage_hri.services.requests.serving import GRACE
 
 
 class Conductor:

@@ -55,7 +55,7 @@ class GenerationConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=
     figure_lead: Seconds = 2.0
     """From gaze on target to the stroke of the point in profile figure-3.3: the figure's own."""
 
-    # Phrases for references that come without any: services/generation/phrases.py.
+    # Phrases for references that come without any: services/generation/references/phrases.py.
     phrase_attributes: tuple[PhraseAttribute, ...] = ("color", "shape", "feature", "size")
     """What proposed phrases may say beside the noun, the most preferred first: absolute before relative, as people
     do (Dale and Reiter 1995, after Pechmann 1989). `shape` only where the noun is something else."""

@@ -23,11 +23,11 @@ from engage_hri.schemas.fragments import FragmentOutcome, PerformFragment, Refer
 from engage_hri.schemas.speakable import has_words
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.generation.permits import Permits
-from engage_hri.services.generation.planning import Plan
-from engage_hri.services.generation.reference_policy import Unreferable
-from engage_hri.services.generation.trail import NOTHING, Trail
-from engage_hri.services.generation.turn_events import TurnEvents
-from engage_hri.services.generation.turn_policy import TurnPlan
+from engage_hri.services.generation.pipeline import Plan
+from engage_hri.services.generation.references.policy import Unreferable
+from engage_hri.services.generation.turns.events import TurnEvents
+from engage_hri.services.generation.turns.policy import TurnPlan
+from engage_hri.services.generation.turns.trail import NOTHING, Trail
 
 AWAITED = ("directed_gaze", "mutual_facial_gaze")
 """Events that must be decided before the outcome. An adjacency pair may take as long as its answer."""

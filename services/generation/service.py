@@ -7,6 +7,7 @@ from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound, Act
 from engage_hri.schemas.attention import HeadOwner, Inhibit, InhibitionEnded
 from engage_hri.schemas.blocks import BlockOutcome, PerformBlock
 from engage_hri.schemas.body import RobotState
+from engage_hri.schemas.covered import CoveredObjects
 from engage_hri.schemas.faults import EngageError, Fault, InputRefused
 from engage_hri.schemas.feedback import SyncPointProgress, WarningFeedback, WarningKind
 from engage_hri.schemas.fragments import PerformFragment
@@ -15,16 +16,15 @@ from engage_hri.schemas.recognition import ConnectionEvent, Statistics, session_
 from engage_hri.schemas.requests import Cancel, Request, Unreadable
 from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.world import World
-from engage_hri.services.bus import Bus, Received
-from engage_hri.services.covered import CoveredObjects
-from engage_hri.services.generation.arbiter import Arbiter, Shift
+from engage_hri.services.bus.interface import Bus, Received
 from engage_hri.services.generation.conductor import Conductor
 from engage_hri.services.generation.config import GenerationConfig
 from engage_hri.services.generation.fragment_check import lacks_people
-from engage_hri.services.generation.leases import Leases
-from engage_hri.services.requests import RequestDesk, Requester
-from engage_hri.services.runtime import Ready
-from engage_hri.services.serving import GONE, LAPSED
+from engage_hri.services.generation.head.arbiter import Arbiter, Shift
+from engage_hri.services.generation.head.inhibitions import Leases
+from engage_hri.services.requests.ends import RequestDesk, Requester
+from engage_hri.services.requests.serving import GONE, LAPSED
+from engage_hri.services.runtime.service import Ready
 
 NAME = "generation"
 PATTERNS = (

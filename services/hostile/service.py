@@ -22,10 +22,10 @@ from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.messages import Message
 from engage_hri.schemas.requests import Cancel, Request
 from engage_hri.schemas.units import Seconds
-from engage_hri.services.bus import Bus
+from engage_hri.services.bus.interface import Bus
 from engage_hri.services.hostile.lies import Lie, Status, Step, estimate, lie, points_of
-from engage_hri.services.requests import RequestDesk
-from engage_hri.services.runtime import Ready
+from engage_hri.services.requests.ends import RequestDesk
+from engage_hri.services.runtime.service import Ready
 
 NAME = "control"
 TERM: Seconds = 2.0

@@ -24,7 +24,8 @@ from engage_hri.schemas.requests import Cancel
 from engage_hri.schemas.status import AskStatus, Status
 from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.world import World
-from engage_hri.services.bus import LOG, Hub, Received, read_payload
+from engage_hri.services.bus.interface import LOG, Hub, Received, read_payload
+from engage_hri.services.bus.memory import MemoryBus, MemoryHub
 from engage_hri.services.hostile.audit import REFUSED, Book, Entry
 from engage_hri.services.hostile.payloads import SERVERS, Payload, Payloads
 from engage_hri.services.hostile.schemes import Deed, Schemer
@@ -33,10 +34,9 @@ from engage_hri.services.hostile.service import LyingBody
 from engage_hri.services.hostile.typed import Typed, Words
 from engage_hri.services.hostile.visitor import NAME as VISITOR
 from engage_hri.services.hostile.visitor import Visitor, guest
-from engage_hri.services.memory_bus import MemoryBus, MemoryHub
-from engage_hri.services.requests import Requester
-from engage_hri.services.runtime import Service, serve
-from engage_hri.services.virtual_time import Deadlock, TimeRanOut, VirtualTimeLoop
+from engage_hri.services.requests.ends import Requester
+from engage_hri.services.runtime.service import Service, serve
+from engage_hri.services.runtime.virtual_time import Deadlock, TimeRanOut, VirtualTimeLoop
 
 Kind = Literal["messages", "requests", "body"]
 KINDS: tuple[Kind, ...] = get_args(Kind)

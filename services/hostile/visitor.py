@@ -9,9 +9,9 @@ from engage_hri.schemas.faults import EngageError
 from engage_hri.schemas.fragments import PerformFragment
 from engage_hri.schemas.requests import Request
 from engage_hri.schemas.units import Seconds
-from engage_hri.services.bus import Bus
+from engage_hri.services.bus.interface import Bus
 from engage_hri.services.hostile import plausible
-from engage_hri.services.requests import Pending, Requester
+from engage_hri.services.requests.ends import Pending, Requester
 
 NAME = "visitor"
 MOST = 5

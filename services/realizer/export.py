@@ -2,9 +2,9 @@
 
 import json
 
-from engage_hri.services.realizer import pnml
-from engage_hri.services.realizer.net import Bound, Place, is_live, is_safe
-from engage_hri.services.realizer.planner import Plan, plan_block
+from engage_hri.services.realizer.net import pnml
+from engage_hri.services.realizer.net.petri_net import Bound, Place, is_live, is_safe
+from engage_hri.services.realizer.plan.planner import Plan, plan_block
 from engage_hri.services.realizer.points import Point
 
 __all__ = ["as_dot", "as_json", "as_pnml", "as_text", "plan_block"]

@@ -25,19 +25,19 @@ from engage_hri.schemas.faults import EngageError, Fault, NoReply
 from engage_hri.schemas.feedback import WarningFeedback
 from engage_hri.schemas.presence import PeerAlive, PeerGone
 from engage_hri.schemas.requests import Cancel, Outcome, Request, Unreadable
-from engage_hri.services.bus import Bus, Received
-from engage_hri.services.realizer.body_link import LONGEST_WAY
+from engage_hri.services.bus.interface import Bus, Received
 from engage_hri.services.realizer.config import RealizerConfig
-from engage_hri.services.realizer.executor import Performance
-from engage_hri.services.realizer.ledger import Ledger
-from engage_hri.services.realizer.planner import Plan, plan_steps
+from engage_hri.services.realizer.perform.control_link import LONGEST_WAY
+from engage_hri.services.realizer.perform.ledger import Ledger
+from engage_hri.services.realizer.perform.performance import Performance
+from engage_hri.services.realizer.perform.surroundings import Ending, Live, Presence, Surroundings
+from engage_hri.services.realizer.perform.unhurried import unhurried
+from engage_hri.services.realizer.plan.planner import Plan, plan_steps
+from engage_hri.services.realizer.plan.poses import poses_before, poses_left
+from engage_hri.services.realizer.plan.relations import BlockRefused, extent, relation_steps
 from engage_hri.services.realizer.points import Point, performer
-from engage_hri.services.realizer.poses import poses_before, poses_left
-from engage_hri.services.realizer.relations import BlockRefused, extent, relation_steps
-from engage_hri.services.realizer.surroundings import Ending, Live, Presence, Surroundings
-from engage_hri.services.realizer.unhurried import unhurried
-from engage_hri.services.requests import Patience, RequestDesk, Requester
-from engage_hri.services.runtime import Ready
+from engage_hri.services.requests.ends import Patience, RequestDesk, Requester
+from engage_hri.services.runtime.service import Ready
 
 Result = TypeVar("Result")
 

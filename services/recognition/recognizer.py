@@ -15,12 +15,12 @@ from engage_hri.schemas.body import RobotState
 from engage_hri.schemas.perception import HeadPose, VoiceActivity
 from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.world import World
-from engage_hri.services.recognition.attention import Attention, Symbolic
-from engage_hri.services.recognition.breaks import Breaks
 from engage_hri.services.recognition.config import RecognitionConfig
-from engage_hri.services.recognition.machine import Effect, Forgotten, Mishap
-from engage_hri.services.recognition.scene import Covered
-from engage_hri.services.recognition.session import Observation, Session
+from engage_hri.services.recognition.events.breaks import Breaks
+from engage_hri.services.recognition.events.machine import Effect, Forgotten, Mishap
+from engage_hri.services.recognition.events.scene import Covered
+from engage_hri.services.recognition.events.session import Observation, Session
+from engage_hri.services.recognition.perceive.attention import Attention, Symbolic
 
 Perceived = Observation | HeadPose | VoiceActivity | RobotState
 Result = Effect | Symbolic

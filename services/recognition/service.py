@@ -19,15 +19,15 @@ from engage_hri.schemas.recognition import (
 from engage_hri.schemas.requests import Accepted, Cancel, Refused
 from engage_hri.schemas.units import Seconds, Stamp
 from engage_hri.schemas.world import World
-from engage_hri.services.bus import Bus, Received
+from engage_hri.services.bus.interface import Bus, Received
 from engage_hri.services.recognition.config import RecognitionConfig
-from engage_hri.services.recognition.machine import Forgotten, Mishap
-from engage_hri.services.recognition.open_events import OpenBook
+from engage_hri.services.recognition.events.machine import Forgotten, Mishap
+from engage_hri.services.recognition.events.open_events import OpenBook
+from engage_hri.services.recognition.perceive.reporters import Witnesses
 from engage_hri.services.recognition.recognizer import Perceived, Recognizer, Result
-from engage_hri.services.recognition.standings import Standings
-from engage_hri.services.recognition.witnesses import Witnesses
-from engage_hri.services.requests import RequestDesk
-from engage_hri.services.runtime import Ready
+from engage_hri.services.recognition.statistics.standings import Standings
+from engage_hri.services.requests.ends import RequestDesk
+from engage_hri.services.runtime.service import Ready
 
 OLDEST: Seconds = 60.0
 """How long ago anything may have happened of which we hear now. What is counted in windows would count for ever."""

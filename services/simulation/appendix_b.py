@@ -24,7 +24,7 @@ from engage_hri.services.simulation.human import (
     Withdraw,
     Word,
 )
-from engage_hri.services.tangram_table import Side
+from engage_hri.services.tangram.table import Side
 
 GLANCE = 0.2
 """From a word to the gaze it causes."""

@@ -13,7 +13,7 @@ from engage_hri.schemas.body import WordSpoken
 from engage_hri.schemas.feedback import BlockProgress
 from engage_hri.schemas.messages import Message
 from engage_hri.services.simulation.human import Lay
-from engage_hri.services.tangram_table import SIDES, Side, TangramTable
+from engage_hri.services.tangram.table import SIDES, Side, TangramTable
 
 REQUEST = re.compile(
     r"(?:move|fix|put) (?P<piece>.+?) so that it is touching the (?P<side>[a-z ]+?) of (?P<landmark>.+)"

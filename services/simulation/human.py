@@ -19,7 +19,7 @@ from engage_hri.schemas.feedback import BlockProgress
 from engage_hri.schemas.messages import Message
 from engage_hri.schemas.recognition import ConnectionEvent, EventState
 from engage_hri.schemas.units import Seconds
-from engage_hri.services.tangram_table import Side
+from engage_hri.services.tangram.table import Side
 
 FACE = "@robot"
 """Stands for the robot's face, whose id the script does not know."""

@@ -22,7 +22,7 @@ from engage_hri.services.simulation.human import (
     Sit,
     Withdraw,
 )
-from engage_hri.services.tangram_table import TangramTable
+from engage_hri.services.tangram.table import TangramTable
 
 COMES: tuple[Act, ...] = (LookAt(TABLE), Pause(0.8), Sit(), Pause(0.8), LookAt(FACE))
 GOES: tuple[Act, ...] = (LookAt(TABLE), Pause(1.0), LookAt(FACE), Pause(1.0), Leave())

@@ -26,7 +26,7 @@ from engage_hri.services.simulation.human import (
     Withdraw,
 )
 from engage_hri.services.simulation.table import Table
-from engage_hri.services.tangram_table import Pose, overlap, poses_touching
+from engage_hri.services.tangram.table import Pose, overlap, poses_touching
 
 Stamper = Callable[[Seconds], Stamp]
 

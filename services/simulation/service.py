@@ -9,8 +9,8 @@ from engage_hri.schemas.perception import HeadPose, VoiceActivity
 from engage_hri.schemas.presence import PeerAlive
 from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.world import World
-from engage_hri.services.bus import Bus, Subscription
-from engage_hri.services.runtime import Ready
+from engage_hri.services.bus.interface import Bus, Subscription
+from engage_hri.services.runtime.service import Ready
 from engage_hri.services.simulation.appendix_b import misplacing_rules, rules
 from engage_hri.services.simulation.cameras import Cameras
 from engage_hri.services.simulation.config import SimulationConfig
@@ -20,7 +20,7 @@ from engage_hri.services.simulation.listening import ListeningHuman
 from engage_hri.services.simulation.perception import Scene
 from engage_hri.services.simulation.stochastic import StochasticHuman
 from engage_hri.services.simulation.table import Table
-from engage_hri.services.tangram_table import tangram_table
+from engage_hri.services.tangram.table import tangram_table
 
 
 async def simulate(bus: Bus, ready: Ready, config: SimulationConfig) -> None:

@@ -13,11 +13,11 @@ from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.units import FARTHEST, Stamp
 from engage_hri.schemas.utf8 import utf8
 from engage_hri.schemas.world import Entity, World
-from engage_hri.services.bus import Bus
-from engage_hri.services.runtime import Ready
+from engage_hri.services.bus.interface import Bus
+from engage_hri.services.runtime.service import Ready
 from engage_hri.services.simulation.config import SimulationConfig
 from engage_hri.services.simulation.table import Table
-from engage_hri.services.tangram_table import tangram_table
+from engage_hri.services.tangram.table import tangram_table
 
 EXAMPLE = '{"entities": [{"id": "cup", "kind": "object", "position": [0.5, 0.1, 0.8], "category": "cup"}]}'
 ADVICE = f"for example {EXAMPLE}; places are in metres, at most {FARTHEST:.0e}"

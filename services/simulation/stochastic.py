@@ -32,7 +32,7 @@ from engage_hri.services.simulation.human import (
     Withdraw,
 )
 from engage_hri.services.simulation.listening import COMES, GOES, moves
-from engage_hri.services.tangram_table import SIDES, TangramTable, poses_touching
+from engage_hri.services.tangram.table import SIDES, TangramTable, poses_touching
 
 NOD: Seconds = 0.5
 WORD: Seconds = 0.5

@@ -12,7 +12,7 @@ from msgspec import Struct
 
 from engage_hri.schemas.units import Meters, Seconds, Vector
 from engage_hri.schemas.world import Entity
-from engage_hri.services.tangram_table import Pose, TangramTable
+from engage_hri.services.tangram.table import Pose, TangramTable
 
 HandSide = Literal["left", "right"]
 LIFT: Meters = 0.03

@@ -5,7 +5,7 @@ from collections.abc import AsyncIterator
 
 import pytest_asyncio
 
-from engage_hri.services.virtual_time import VirtualTimeLoop
+from engage_hri.services.runtime.virtual_time import VirtualTimeLoop
 from tests.bus.places import MemoryPlace, Place, ZenohPlace
 
 

@@ -10,9 +10,9 @@ from engage_hri.schemas.blocks import Block, BlockOutcome, PerformBlock
 from engage_hri.schemas.faults import EngageError
 from engage_hri.schemas.feedback import BlockProgress
 from engage_hri.schemas.requests import Cancel
-from engage_hri.services.bus import Bus
-from engage_hri.services.requests import RequestDesk, Requester
-from engage_hri.services.zenoh_bus import open_hub
+from engage_hri.services.bus.interface import Bus
+from engage_hri.services.bus.zenoh.hub import open_hub
+from engage_hri.services.requests.ends import RequestDesk, Requester
 
 
 def say(*words: object) -> None:

@@ -9,8 +9,8 @@ from engage_hri.schemas.behaviors import Wait
 from engage_hri.schemas.blocks import Block, BlockOutcome, PerformBlock
 from engage_hri.schemas.body import PerformBehavior
 from engage_hri.schemas.requests import A, Cancel, Request, answering
-from engage_hri.services.memory_bus import MemoryHub
-from engage_hri.services.requests import Pending, RequestDesk
+from engage_hri.services.bus.memory import MemoryHub
+from engage_hri.services.requests.ends import Pending, RequestDesk
 
 
 def block(id: str = "b", requester: str = "client", of: str = "") -> PerformBlock:

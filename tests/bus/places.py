@@ -10,9 +10,9 @@ import zenoh
 from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.messages import Message
 from engage_hri.schemas.requests import Accepted
-from engage_hri.services.bus import Bus, Hub, Received, Subscription
-from engage_hri.services.memory_bus import MemoryHub
-from engage_hri.services.zenoh_bus import ZenohHub, open_hub
+from engage_hri.services.bus.interface import Bus, Hub, Received, Subscription
+from engage_hri.services.bus.memory import MemoryHub
+from engage_hri.services.bus.zenoh.hub import ZenohHub, open_hub
 
 PATIENCE = 60.0
 """Seconds until something that must come counts as lost. A limit of failure, never waited for."""

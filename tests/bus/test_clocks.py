@@ -3,7 +3,7 @@ from math import inf
 import pytest
 
 from engage_hri.schemas.units import Stamp
-from engage_hri.services.zenoh_clocks import REFRESH, Clocks
+from engage_hri.services.bus.zenoh.clocks import REFRESH, Clocks
 
 
 def test_the_own_clock_needs_no_estimate():

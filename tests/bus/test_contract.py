@@ -11,7 +11,7 @@ from engage_hri.schemas.faults import NoReply
 from engage_hri.schemas.presence import PeerAlive, PeerGone
 from engage_hri.schemas.requests import Accepted
 from engage_hri.schemas.units import Stamp
-from engage_hri.services.bus import Keep
+from engage_hri.services.bus.interface import Keep
 from tests.bus.places import Place, echo, heard, messages, numbers, state, take
 from tests.commanding import command
 

@@ -4,7 +4,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from engage_hri.schemas import keys
-from engage_hri.services.zenoh_order import Follower, Ledger, Missing, Pulse, Written
+from engage_hri.services.bus.zenoh.order import Follower, Ledger, Missing, Pulse, Written
 
 KEYS = (keys.BLOCK, keys.FEEDBACK, keys.SYNC_POINT, keys.INHIBIT)
 HEARD = (keys.BLOCK, "engage/v1/evt/**")

@@ -15,8 +15,8 @@ from engage_hri.schemas import keys
 from engage_hri.schemas.blocks import Block, BlockOutcome, PerformBlock
 from engage_hri.schemas.faults import RunFailed
 from engage_hri.schemas.presence import PeerAlive, PeerGone
-from engage_hri.services.requests import Requester
-from engage_hri.services.zenoh_bus import ZenohHub, open_hub
+from engage_hri.services.bus.zenoh.hub import ZenohHub, open_hub
+from engage_hri.services.requests.ends import Requester
 from tests.bus.peer import FAR
 from tests.bus.places import PATIENCE, free_endpoint, messages, take
 

@@ -8,9 +8,9 @@ import pytest
 import pytest_asyncio
 
 from engage_hri.schemas import keys
-from engage_hri.services.zenoh_bus import ZenohHub, open_hub
-from engage_hri.services.zenoh_order import Missing, Past
-from engage_hri.services.zenoh_readers import TRIES
+from engage_hri.services.bus.zenoh.hub import ZenohHub, open_hub
+from engage_hri.services.bus.zenoh.order import Missing, Past
+from engage_hri.services.bus.zenoh.readers import TRIES
 from tests.bus.places import acquainted, free_endpoint, messages, numbers, state
 
 pytestmark = pytest.mark.real_time

@@ -15,10 +15,10 @@ from engage_hri.schemas.messages import decode, encode, encode_json
 from engage_hri.schemas.recognition import OpenEvents
 from engage_hri.schemas.requests import Accepted
 from engage_hri.schemas.status import AskStatus
-from engage_hri.services.bus import Bus
-from engage_hri.services.runtime import Ready, running
-from engage_hri.services.zenoh_bus import ZenohHub, open_hub
-from engage_hri.services.zenoh_visitors import BATCH
+from engage_hri.services.bus.interface import Bus
+from engage_hri.services.bus.zenoh.hub import ZenohHub, open_hub
+from engage_hri.services.bus.zenoh.visitors import BATCH
+from engage_hri.services.runtime.service import Ready, running
 from tests.bus.places import PATIENCE, acquainted, echo, free_endpoint, state
 
 pytestmark = pytest.mark.real_time

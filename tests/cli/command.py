@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import pytest
 
-from engage_hri.services.cli import main
+from engage_hri.services.commandline.app import main
 
 GOOD_BLOCK = """\
 <bml id="hello">

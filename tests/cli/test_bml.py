@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 from engage_hri.schemas.blocks import Block
-from engage_hri.schemas.feedback_xml import decode_feedback
-from engage_hri.schemas.json_codec import read
+from engage_hri.schemas.documents.json_codec import read
+from engage_hri.schemas.documents.xml_feedback import decode_feedback
 from tests.cli.command import FRAGMENT, GOOD_BLOCK, Engage
 from tests.schemas.grammar import violations
 

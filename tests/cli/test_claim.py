@@ -8,8 +8,8 @@ import pytest
 
 from engage_hri.schemas.faults import InputRefused
 from engage_hri.schemas.presence import PeerAlive, PeerGone
+from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.commandline.claim import PATIENCE, Claim, claiming
-from engage_hri.services.memory_bus import MemoryHub
 
 EARLY, LATE = "00000000", "ffffffff"
 

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from engage_hri.schemas.faults import InputRefused
-from engage_hri.services.config import Config, load
+from engage_hri.services.commandline.config import Config, load
 
 ROOT = Path(__file__).parents[2]
 

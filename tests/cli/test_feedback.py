@@ -4,8 +4,8 @@ from pathlib import Path
 
 import pytest
 
+from engage_hri.schemas.documents.xml_feedback import decode_feedback
 from engage_hri.schemas.feedback import BlockProgress, PredictionFeedback, SyncPointProgress, WarningFeedback
-from engage_hri.schemas.feedback_xml import decode_feedback
 from tests.cli.command import Engage
 from tests.cli.test_play import lines
 

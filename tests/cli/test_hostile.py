@@ -5,7 +5,7 @@ import asyncio
 import pytest
 
 from engage_hri.services.control.body import BodyState
-from engage_hri.services.control.simulated import SimulatedBody
+from engage_hri.services.control.torso.body import SimulatedBody
 from tests.cli.command import Engage
 
 

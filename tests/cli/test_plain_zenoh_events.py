@@ -7,10 +7,10 @@ from collections.abc import Iterable
 
 import pytest
 
-from engage_hri.services.client import connect
-from engage_hri.services.feeds import EventFeed
-from engage_hri.services.zenoh_bus import ZenohHub
-from engage_hri.services.zenoh_session import open_session
+from engage_hri.services.bus.zenoh.hub import ZenohHub
+from engage_hri.services.bus.zenoh.session import open_session
+from engage_hri.services.client.feeds import EventFeed
+from engage_hri.services.client.robot import connect
 from tests.bus.cable import Cable
 from tests.bus.places import free_endpoint
 from tests.cli.test_processes import PATIENCE, line, stopped

@@ -12,13 +12,13 @@ from rich.console import Console
 
 from engage_hri.services.commandline import session as playing
 from engage_hri.services.commandline import simulate, workers
+from engage_hri.services.commandline.config import Config
 from engage_hri.services.commandline.session import Order, Played, play
 from engage_hri.services.commandline.workers import play_all
-from engage_hri.services.config import Config
+from engage_hri.services.runtime.virtual_time import Deadlock
 from engage_hri.services.study import summary
 from engage_hri.services.study.hypotheses import Finding
 from engage_hri.services.study.records import SessionRecord
-from engage_hri.services.virtual_time import Deadlock
 from tests.cli.command import Engage, start, threads
 
 PEOPLE = ("--human", "table-2-1")

@@ -18,10 +18,10 @@ import pytest
 from engage_hri.schemas import keys, lines
 from engage_hri.schemas.actions import ActionBegan, ActionEnded
 from engage_hri.schemas.recognition import ConnectionEvent
-from engage_hri.services.bus import Bus
-from engage_hri.services.client import Robot, connect
-from engage_hri.services.feeds import EventFeed
-from engage_hri.services.zenoh_bus import open_hub
+from engage_hri.services.bus.interface import Bus
+from engage_hri.services.bus.zenoh.hub import open_hub
+from engage_hri.services.client.feeds import EventFeed
+from engage_hri.services.client.robot import Robot, connect
 from tests.bus.places import free_endpoint
 from tests.cli.command import engage, start
 from tests.cli.test_processes import PATIENCE, line, stopped

@@ -22,7 +22,7 @@ from engage_hri.services.collaboration.plans import (
     script,
     task,
 )
-from engage_hri.services.tangram_table import poses_touching, tangram_table
+from engage_hri.services.tangram.table import poses_touching, tangram_table
 
 TABLE = tangram_table()
 UNIVERSE = {piece.id for piece in TABLE.pieces}

@@ -11,7 +11,7 @@ from engage_hri.schemas.world import Entity
 from engage_hri.services.collaboration.placement import has_been_placed
 from engage_hri.services.collaboration.relations import Relation, relation, relations
 from engage_hri.services.collaboration.task import Goal, Instruction, check
-from engage_hri.services.tangram_table import Pose, poses_touching, tangram_table
+from engage_hri.services.tangram.table import Pose, poses_touching, tangram_table
 
 TABLE = tangram_table()
 GOAL = {entity.id: entity for entity in TABLE.figure()}

@@ -13,7 +13,7 @@ from engage_hri.services.collaboration.placement import has_been_placed
 from engage_hri.services.collaboration.relations import Relation, relation
 from engage_hri.services.collaboration.sight import Sight
 from engage_hri.services.collaboration.task import Instruction, check
-from engage_hri.services.tangram_table import tangram_table
+from engage_hri.services.tangram.table import tangram_table
 
 TABLE = tangram_table()
 GOAL = {entity.id: entity for entity in TABLE.figure()}

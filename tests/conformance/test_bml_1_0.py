@@ -5,9 +5,9 @@ from pathlib import Path
 import pytest
 
 from engage_hri.schemas.blocks import Block
-from engage_hri.schemas.dialects import core, spelled
-from engage_hri.schemas.json_codec import read
-from engage_hri.schemas.xml_encode import encode_xml
+from engage_hri.schemas.documents.dialects import core, spelled
+from engage_hri.schemas.documents.json_codec import read
+from engage_hri.schemas.documents.xml_encode import encode_xml
 from tests.conformance.case import Case, cases
 from tests.schemas.grammar import violations
 

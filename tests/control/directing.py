@@ -10,12 +10,12 @@ from engage_hri.schemas.actions import ActionBegan, ActionEnded
 from engage_hri.schemas.body import BehaviorOutcome, PerformBehavior, RobotState, SyncPointReached
 from engage_hri.schemas.messages import Message
 from engage_hri.schemas.world import World
-from engage_hri.services.bus import Bus
+from engage_hri.services.bus.interface import Bus
+from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.control.config import ControlConfig
 from engage_hri.services.control.service import embody
-from engage_hri.services.memory_bus import MemoryHub
-from engage_hri.services.requests import Pending, Requester
-from engage_hri.services.runtime import running
+from engage_hri.services.requests.ends import Pending, Requester
+from engage_hri.services.runtime.service import running
 from tests.control.contract import WORLD
 
 

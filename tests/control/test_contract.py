@@ -1,7 +1,7 @@
 """Every body we ship, held to the contract."""
 
 from engage_hri.services.control.body import Body
-from engage_hri.services.control.simulated import SimulatedBody
+from engage_hri.services.control.torso.body import SimulatedBody
 from tests.control.contract import BodyContract
 
 

@@ -7,8 +7,8 @@ from collections.abc import AsyncIterator
 from pathlib import Path
 
 from engage_hri.services.control.body import Body
-from engage_hri.services.control.motion import Leg, Motion, resting
-from engage_hri.services.control.motion import Path as Way
+from engage_hri.services.control.torso.motion import Leg, Motion, resting
+from engage_hri.services.control.torso.motion import Path as Way
 from tests.control.contract import BodyContract
 
 PAGE = Path(__file__).parents[2] / "docs" / "control.md"

@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from engage_hri.services.control import tracks
-from engage_hri.services.control.motion import Leg, Motion, Path, State, resting
+from engage_hri.services.control.torso import tracks
+from engage_hri.services.control.torso.motion import Leg, Motion, Path, State, resting
 
 LIMITS = tracks.LIMITS["right_arm"]
 HOME = tracks.HOME["right_arm"]

@@ -28,10 +28,10 @@ from engage_hri.schemas.body import (
 from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.requests import Outcome
 from engage_hri.schemas.world import World
+from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.control.config import Displaced, Slow, Variability
-from engage_hri.services.memory_bus import MemoryHub
-from engage_hri.services.requests import RequestRefused
-from engage_hri.services.virtual_time import VirtualTimeLoop
+from engage_hri.services.requests.ends import RequestRefused
+from engage_hri.services.runtime.virtual_time import VirtualTimeLoop
 from tests.commanding import command
 from tests.control.contract import WORLD
 from tests.control.directing import robot, tip

@@ -11,13 +11,13 @@ from msgspec.structs import replace
 from engage_hri.schemas import keys
 from engage_hri.schemas.behaviors import Pointing, Speech
 from engage_hri.schemas.body import AbortBehavior, BehaviorOutcome, PerformBehavior
+from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.control.body import Spoke
 from engage_hri.services.control.config import ControlConfig
 from engage_hri.services.control.service import embody
-from engage_hri.services.control.simulated import SimulatedBody
-from engage_hri.services.memory_bus import MemoryHub
-from engage_hri.services.requests import Requester
-from engage_hri.services.runtime import running
+from engage_hri.services.control.torso.body import SimulatedBody
+from engage_hri.services.requests.ends import Requester
+from engage_hri.services.runtime.service import running
 from tests.control.directing import robot
 
 POINT = Pointing(id="point-1", target="near-right")

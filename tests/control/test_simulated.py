@@ -27,9 +27,9 @@ from engage_hri.schemas.behaviors import (
 from engage_hri.schemas.body import NoPointZone
 from engage_hri.schemas.world import Entity, World
 from engage_hri.services.control.body import Arrived, Authority, BehaviorRefused, sync_points
-from engage_hri.services.control.simulated import SimulatedBody
+from engage_hri.services.control.torso.body import SimulatedBody
 from engage_hri.services.control.waiting import Bell
-from engage_hri.services.virtual_time import run_virtual
+from engage_hri.services.runtime.virtual_time import run_virtual
 from tests.control.contract import WORLD, Stage, default, performed, times
 from tests.control.motions import recorded, stops, violations
 

@@ -11,9 +11,9 @@ from engage_hri.schemas.behaviors import BlockBehavior, Gaze, Gesture, Head, Poi
 from engage_hri.schemas.body import Estimate
 from engage_hri.services.control.body import Authority, Body, sync_points
 from engage_hri.services.control.config import Slow, Variability
-from engage_hri.services.control.simulated import SimulatedBody
-from engage_hri.services.control.sizing import SIZES
-from engage_hri.services.virtual_time import run_virtual
+from engage_hri.services.control.torso.body import SimulatedBody
+from engage_hri.services.control.torso.sizing import SIZES
+from engage_hri.services.runtime.virtual_time import run_virtual
 from tests.control.contract import WORLD, times
 from tests.control.motions import Recording, recorded, violations
 

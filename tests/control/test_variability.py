@@ -7,7 +7,7 @@ import pytest
 from engage_hri.schemas.behaviors import Gaze, Pointing, Speech
 from engage_hri.services.control.body import BehaviorRefused, BodyFailed, Reached, Spoke
 from engage_hri.services.control.config import ControlConfig, Displaced, Slow, Stall, Variability
-from engage_hri.services.control.simulated import SimulatedBody
+from engage_hri.services.control.torso.body import SimulatedBody
 from engage_hri.services.control.variability import is_lost, normal
 from tests.control.contract import WORLD, Stage, performed, poses_agree, times
 

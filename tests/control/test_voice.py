@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from engage_hri.services.control.voice import utter
+from engage_hri.services.control.voice.timeline import utter
 
 
 def test_words_take_time_by_their_letters_and_pauses_by_their_punctuation():

@@ -14,7 +14,7 @@ from pathlib import Path
 import msgspec
 import pytest
 
-from engage_hri.schemas.feedback_xml import decode_feedback
+from engage_hri.schemas.documents.xml_feedback import decode_feedback
 from engage_hri.schemas.summary import Summary
 from tests.bus.places import free_endpoint
 from tests.cli.command import GOOD_BLOCK
@@ -46,7 +46,7 @@ EXCUSED = {
 ELSEWHERE = {
     ("docs/control.md", "python"): "tests/control/test_docs.py",
     ("docs/recognition.md", "mermaid"): "tests/recognition/test_tables.py",
-    ("docs/bus.md", "mermaid"): "tests/bus/test_request_model.py",
+    ("docs/bus.md", "mermaid"): "tests/requests/test_request_model.py",
     ("docs/hostile.md", "sh"): "tests/cli/test_hostile.py",
     ("docs/hostile.md", "python"): "tests/hostile/test_docs.py",
 }
@@ -62,7 +62,7 @@ the beginning is enough."""
 TALK = """\
 from contextlib import suppress
 from engage_hri.schemas.faults import InputRefused
-from engage_hri.services.client import connect
+from engage_hri.services.client.robot import connect
 
 async with connect() as robot:
     await robot.person()

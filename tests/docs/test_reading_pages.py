@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 import typer
 
-from engage_hri.services.cli import app
+from engage_hri.services.commandline.app import app
 from tests.docs.clone import ROOT
 from tests.docs.pages import (
     Shown,

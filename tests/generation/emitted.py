@@ -14,11 +14,11 @@ from engage_hri.schemas.behaviors import (
 from engage_hri.schemas.blocks import Block
 from engage_hri.schemas.check import check
 from engage_hri.schemas.fragments import GestureChoice, ReferenceChoice, TurnFragment
+from engage_hri.services.generation.block.emission import Emission, emit
 from engage_hri.services.generation.config import GenerationConfig
-from engage_hri.services.generation.emission import Emission, emit
 from engage_hri.services.generation.permits import Permits
-from engage_hri.services.generation.trail import NOTHING, Trail
-from engage_hri.services.generation.turn_policy import plan_turn
+from engage_hri.services.generation.turns.policy import plan_turn
+from engage_hri.services.generation.turns.trail import NOTHING, Trail
 
 POINT: GestureChoice = "directed_gaze_with_pointing"
 LOOK: GestureChoice = "directed_gaze"

@@ -8,9 +8,9 @@ from engage_hri.schemas.body import BodyPose, Ray, RobotState
 from engage_hri.schemas.recognition import ConnectionEvent, Statistics, WindowStatistics
 from engage_hri.schemas.units import Seconds, Stamp, Vector
 from engage_hri.schemas.world import Entity, World
-from engage_hri.services.generation.arbiter import Arbiter, Ruling
 from engage_hri.services.generation.config import GenerationConfig
-from engage_hri.services.generation.leases import Inhibition
+from engage_hri.services.generation.head.arbiter import Arbiter, Ruling
+from engage_hri.services.generation.head.inhibitions import Inhibition
 
 AT = Stamp("test", 0.0)
 

@@ -13,8 +13,8 @@ from typing import NamedTuple
 
 from engage_hri.schemas.behaviors import Reference
 from engage_hri.services.generation.config import Channel
-from engage_hri.services.generation.motions import HERE, Motions
-from engage_hri.services.generation.reference_policy import Scene
+from engage_hri.services.generation.references.motions import HERE, Motions
+from engage_hri.services.generation.references.policy import Scene
 from tests.generation.tables import body, flat_world, scene
 
 HEAD, ARM, WORD, WAIT = 6, 10, 210, 180

@@ -31,12 +31,12 @@ from engage_hri.schemas.recognition import ConnectionEvent, SignalTurn, TurnOutc
 from engage_hri.schemas.requests import Cancel
 from engage_hri.schemas.units import Vector
 from engage_hri.schemas.world import Entity, World
-from engage_hri.services.bus import Bus
+from engage_hri.services.bus.interface import Bus
+from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.generation.config import GenerationConfig
 from engage_hri.services.generation.service import generate
-from engage_hri.services.memory_bus import MemoryHub
-from engage_hri.services.requests import Pending, RequestDesk, Requester
-from engage_hri.services.runtime import Ready, running
+from engage_hri.services.requests.ends import Pending, RequestDesk, Requester
+from engage_hri.services.runtime.service import Ready, running
 
 EYES: Vector = (0.0, 0.0, 1.2)
 HUMAN = Entity(id="human", kind="person", position=(1.3, 0.0, 1.2))

@@ -14,18 +14,18 @@ from engage_hri.schemas.feedback import BlockProgress, SyncPointProgress, Warnin
 from engage_hri.schemas.fragments import FragmentOutcome, PerformFragment, TurnClosed, TurnFragment
 from engage_hri.schemas.recognition import ConnectionEvent, SignalTurn
 from engage_hri.schemas.world import World
+from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.control.body import Body
 from engage_hri.services.control.config import ControlConfig, Variability
 from engage_hri.services.control.service import embody
 from engage_hri.services.generation.config import GenerationConfig
 from engage_hri.services.generation.service import generate
-from engage_hri.services.memory_bus import MemoryHub
 from engage_hri.services.realizer.config import RealizerConfig
 from engage_hri.services.realizer.service import realize
 from engage_hri.services.recognition.config import RecognitionConfig
 from engage_hri.services.recognition.service import recognize
-from engage_hri.services.requests import Pending, Requester
-from engage_hri.services.runtime import Service, running
+from engage_hri.services.requests.ends import Pending, Requester
+from engage_hri.services.runtime.service import Service, running
 from tests.generation.emitted import lines
 from tests.generation.partners import TABLE
 

@@ -7,8 +7,8 @@ from engage_hri.schemas.body import Estimate, Ray
 from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.units import Vector
 from engage_hri.schemas.world import Entity, World
-from engage_hri.services.generation.motions import HERE, Motions
-from engage_hri.services.generation.reference_policy import Scene
+from engage_hri.services.generation.references.motions import HERE, Motions
+from engage_hri.services.generation.references.policy import Scene
 
 TANGRAMS = (
     "pink-triangle", "purple-triangle", "yellow-triangle", "red-square", "blue-square", "pink-square",

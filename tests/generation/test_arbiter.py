@@ -7,7 +7,7 @@ import pytest
 from engage_hri.schemas.actions import ActorFound, ActorLost
 from engage_hri.schemas.body import Ray
 from engage_hri.schemas.world import Entity, World
-from engage_hri.services.generation.response_policy import viewing_order
+from engage_hri.services.generation.head.response_policy import viewing_order
 from tests.generation.heads import AT, Stage, act, event, looking_at, on_the_face, statistics, world
 
 # -- each claim, alone against the face -------------------------------------------------------------------------

@@ -5,8 +5,8 @@ import asyncio
 from msgspec.structs import replace
 
 from engage_hri.schemas.fragments import FragmentOutcome
+from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.generation.config import GenerationConfig
-from engage_hri.services.memory_bus import MemoryHub
 from tests.generation.partners import TABLE, stage
 from tests.generation.test_service import refers, says
 

@@ -9,28 +9,28 @@ from msgspec.structs import replace
 from engage_hri.schemas import behaviors as of
 from engage_hri.schemas import keys
 from engage_hri.schemas.blocks import Block, BlockOutcome, PerformBlock
-from engage_hri.schemas.dialects import core, spelled
+from engage_hri.schemas.documents.dialects import core, spelled
+from engage_hri.schemas.documents.xml_decode import decode_xml, encode_xml
+from engage_hri.schemas.documents.xml_feedback import encode_feedback
 from engage_hri.schemas.faults import InputRefused
 from engage_hri.schemas.feedback import BlockProgress, Feedback, SyncPointProgress, WarningFeedback
-from engage_hri.schemas.feedback_xml import encode_feedback
 from engage_hri.schemas.fragments import TurnFragment
 from engage_hri.schemas.references import type_name
 from engage_hri.schemas.syncref import SyncRef, dialect_sync
 from engage_hri.schemas.units import Seconds
-from engage_hri.schemas.xml_codec import decode_xml, encode_xml
+from engage_hri.services.bus.memory import MemoryHub
+from engage_hri.services.commandline.config import Config, load
 from engage_hri.services.commandline.generating import generated
 from engage_hri.services.commandline.plan import estimated
 from engage_hri.services.commandline.roster import service
 from engage_hri.services.commandline.sources import still
-from engage_hri.services.config import Config, load
-from engage_hri.services.memory_bus import MemoryHub
-from engage_hri.services.realizer.planner import Plan, plan_block
+from engage_hri.services.realizer.plan.planner import Plan, plan_block
+from engage_hri.services.realizer.plan.schedule import EPSILON
 from engage_hri.services.realizer.points import Point, sync_points
-from engage_hri.services.realizer.schedule import EPSILON
-from engage_hri.services.requests import Requester
-from engage_hri.services.runtime import Service, running
+from engage_hri.services.requests.ends import Requester
+from engage_hri.services.runtime.service import Service, running
+from engage_hri.services.runtime.virtual_time import run_virtual
 from engage_hri.services.simulation.still import tangram_world
-from engage_hri.services.virtual_time import run_virtual
 from tests.schemas.grammar import violations
 
 WORLD = tangram_world()

@@ -10,10 +10,10 @@ from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.fragments import FragmentOutcome, TurnFragment
 from engage_hri.schemas.recognition import ConnectionEvent
 from engage_hri.schemas.units import Stamp
+from engage_hri.services.bus.memory import MemoryHub
+from engage_hri.services.commandline.config import Config
 from engage_hri.services.commandline.generating import generated
-from engage_hri.services.config import Config
-from engage_hri.services.generation.discourse import SILENCE, Discourse
-from engage_hri.services.memory_bus import MemoryHub
+from engage_hri.services.generation.references.discourse import SILENCE, Discourse
 from engage_hri.services.simulation.still import tangram_world
 from tests.generation.partners import Partners, stage
 from tests.generation.test_service_streams import says

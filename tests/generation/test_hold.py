@@ -9,8 +9,8 @@ import pytest
 from engage_hri.schemas import keys
 from engage_hri.schemas.attention import Inhibit
 from engage_hri.schemas.behaviors import Gaze
-from engage_hri.services.control.simulated import SimulatedBody
-from engage_hri.services.memory_bus import MemoryHub
+from engage_hri.services.bus.memory import MemoryHub
+from engage_hri.services.control.torso.body import SimulatedBody
 from tests.commanding import command
 from tests.generation.robots import robot, says
 

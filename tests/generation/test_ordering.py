@@ -16,7 +16,7 @@ from engage_hri.schemas.behaviors import (
     Synchronize,
     Timing,
 )
-from engage_hri.services.generation.ordering import ordered
+from engage_hri.services.generation.block.ordering import ordered
 from tests.generation.tables import option, refer
 
 

@@ -6,11 +6,11 @@ import pytest
 
 from engage_hri.schemas.behaviors import After, Constraint, Mark, Speech, Synchronize
 from engage_hri.schemas.blocks import Block
+from engage_hri.schemas.documents.json_codec import encode_json, read
+from engage_hri.schemas.documents.xml_decode import decode_xml, encode_xml
 from engage_hri.schemas.fragments import TurnFragment
-from engage_hri.schemas.json_codec import encode_json, read
-from engage_hri.schemas.xml_codec import decode_xml, encode_xml
+from engage_hri.services.commandline.config import Config
 from engage_hri.services.commandline.generating import generated
-from engage_hri.services.config import Config
 from engage_hri.services.simulation.still import tangram_world
 from tests.generation.emitted import LOOK, Made, block, by_id, lines, reference, speech
 

@@ -8,8 +8,8 @@ from engage_hri.schemas.behaviors import Reference, SpeechOption
 from engage_hri.schemas.faults import RunFailed
 from engage_hri.schemas.fragments import ReferenceChoice
 from engage_hri.services.generation.config import GenerationConfig
-from engage_hri.services.generation.motions import HERE
-from engage_hri.services.generation.reference_policy import GESTURES, Choices, choose
+from engage_hri.services.generation.references.motions import HERE
+from engage_hri.services.generation.references.policy import GESTURES, Choices, choose
 from tests.generation.oracle import Best, Problem, optimum, optimum_by_gestures
 from tests.generation.tables import option, refer
 

@@ -9,8 +9,8 @@ from engage_hri.schemas.body import Estimate, NoPointZone
 from engage_hri.schemas.faults import RunFailed
 from engage_hri.schemas.fragments import ReferenceChoice
 from engage_hri.services.generation.config import GenerationConfig
-from engage_hri.services.generation.motions import HERE, Motions, collect, from_each_other, from_here
-from engage_hri.services.generation.reference_policy import Pair, Posture, choose
+from engage_hri.services.generation.references.motions import HERE, Motions, collect, from_each_other, from_here
+from engage_hri.services.generation.references.policy import Pair, Posture, choose
 from tests.generation.tables import apart, body, flat_world, option, refer, scene
 
 CONFIG = GenerationConfig()

@@ -12,10 +12,10 @@ from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.fragments import FragmentOutcome, TurnFragment
 from engage_hri.schemas.messages import encode
 from engage_hri.schemas.world import World
+from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.generation.config import GenerationConfig
-from engage_hri.services.memory_bus import MemoryHub
-from engage_hri.services.requests import RequestRefused
-from engage_hri.services.serving import GRACE
+from engage_hri.services.requests.ends import RequestRefused
+from engage_hri.services.requests.serving import GRACE
 from tests.generation.partners import TABLE, stage
 
 HELLO = Speech(id="s", text="Hello")

@@ -11,9 +11,9 @@ from engage_hri.schemas.behaviors import Reference, Speech, SpeechOption
 from engage_hri.schemas.blocks import Block, SpokenText
 from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.fragments import FragmentOutcome, TurnClosed, TurnFragment
+from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.generation.config import GenerationConfig
-from engage_hri.services.memory_bus import MemoryHub
-from engage_hri.services.requests import RequestRefused
+from engage_hri.services.requests.ends import RequestRefused
 from tests.generation.emitted import lines
 from tests.generation.partners import Partners, stage
 

@@ -5,7 +5,7 @@ import pytest
 from engage_hri.schemas.behaviors import After, Before, Constraint, Gesture, Hand, Head, Pointing, Synchronize, Timing
 from engage_hri.schemas.fragments import TurnFragment
 from engage_hri.services.generation.permits import Permits
-from engage_hri.services.generation.trail import NOTHING, Stroke, Trail
+from engage_hri.services.generation.turns.trail import NOTHING, Stroke, Trail
 from tests.generation.emitted import LOOK, POINT, by_id, emission, lines, reference, speech, start_of
 
 BUSY = Trail(speech="a:s", glance="a:r-glance", strokes=(Stroke("a:r-point", "LEFT_HAND"),))

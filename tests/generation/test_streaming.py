@@ -10,9 +10,9 @@ from engage_hri.schemas import keys
 from engage_hri.schemas.behaviors import Gesture, Head, Speech, Timing
 from engage_hri.schemas.body import AbortBehavior
 from engage_hri.schemas.fragments import TurnFragment
+from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.generation.config import GenerationConfig
-from engage_hri.services.memory_bus import MemoryHub
-from engage_hri.services.requests import RequestRefused
+from engage_hri.services.requests.ends import RequestRefused
 from tests.commanding import command
 from tests.generation.robots import Robot, robot, says, shows
 

@@ -17,13 +17,13 @@ from engage_hri.schemas.behaviors import (
     Timing,
 )
 from engage_hri.schemas.fragments import TurnFragment
+from engage_hri.services.commandline.config import load
 from engage_hri.services.commandline.generating import generated
 from engage_hri.services.commandline.plan import estimated
-from engage_hri.services.config import load
-from engage_hri.services.generation.rewriting import Operator
-from engage_hri.services.realizer.planner import plan_block
+from engage_hri.services.generation.block.rewriting import Operator
+from engage_hri.services.realizer.plan.planner import plan_block
+from engage_hri.services.runtime.virtual_time import run_virtual
 from engage_hri.services.simulation.still import tangram_world
-from engage_hri.services.virtual_time import run_virtual
 from tests.generation.emitted import LOOK, POINT, Made, block, by_id, lines, reference, speech
 
 PROFILES = ("check-back", "figure-3.3")

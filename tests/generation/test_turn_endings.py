@@ -3,7 +3,7 @@
 import pytest
 
 from engage_hri.schemas.fragments import TurnStatus
-from engage_hri.services.generation.turn_policy import Aborted, TurnPolicy
+from engage_hri.services.generation.turns.policy import Aborted, TurnPolicy
 from tests.generation.test_turn_policy import fragment, policy, says
 
 # -- a fragment that the realizer refuses -------------------------------------------------------------------------

@@ -7,7 +7,7 @@ from engage_hri.schemas.faults import InputRefused
 from engage_hri.schemas.fragments import TurnFragment, TurnStatus
 from engage_hri.schemas.units import Stamp
 from engage_hri.services.generation.config import GenerationConfig
-from engage_hri.services.generation.turn_policy import Aborted, TurnPlan, TurnPolicy, plan_turn
+from engage_hri.services.generation.turns.policy import Aborted, TurnPlan, TurnPolicy, plan_turn
 
 AT = Stamp("test", 0.0)
 

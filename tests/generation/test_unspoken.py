@@ -11,10 +11,10 @@ from engage_hri.schemas.body import BodyPose, Estimate
 from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.fragments import FragmentOutcome, TurnFragment
 from engage_hri.schemas.world import World
-from engage_hri.services.control.estimates import infeasible
-from engage_hri.services.control.simulated import SimulatedBody
-from engage_hri.services.memory_bus import MemoryHub
-from engage_hri.services.requests import RequestRefused
+from engage_hri.services.bus.memory import MemoryHub
+from engage_hri.services.control.torso.body import SimulatedBody
+from engage_hri.services.control.torso.estimates import infeasible
+from engage_hri.services.requests.ends import RequestRefused
 from tests.generation.partners import Partners, stage
 from tests.generation.robots import Robot, robot, says, shows
 

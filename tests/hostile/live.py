@@ -14,11 +14,11 @@ import zenoh
 
 from engage_hri.schemas import keys
 from engage_hri.schemas.status import AskStatus, Status
-from engage_hri.services.bus import Bus
+from engage_hri.services.bus.interface import Bus
+from engage_hri.services.bus.zenoh.hub import open_hub
 from engage_hri.services.commandline.roster import ROBOT
 from engage_hri.services.hostile.payloads import Payloads
 from engage_hri.services.hostile.typed import Typed, Words
-from engage_hri.services.zenoh_bus import open_hub
 from tests.bus.places import free_endpoint
 from tests.cli.command import start
 

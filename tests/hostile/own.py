@@ -5,10 +5,10 @@ from collections.abc import AsyncGenerator
 
 from engage_hri.schemas.behaviors import BlockBehavior, Gaze, Speech
 from engage_hri.schemas.blocks import Block
-from engage_hri.services.bus import Hub
-from engage_hri.services.client import connect
+from engage_hri.services.bus.interface import Hub
+from engage_hri.services.client.robot import connect
 from engage_hri.services.control.body import Authority, Progress, Reached
-from engage_hri.services.control.simulated import SimulatedBody
+from engage_hri.services.control.torso.body import SimulatedBody
 
 
 class CarelessBody(SimulatedBody):

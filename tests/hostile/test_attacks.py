@@ -3,7 +3,7 @@
 import pytest
 
 from engage_hri.services.commandline.hostile import attack
-from engage_hri.services.control.simulated import SimulatedBody
+from engage_hri.services.control.torso.body import SimulatedBody
 from engage_hri.services.hostile.trial import Kind, Report
 from tests.hostile.own import CarelessBody, broken_client, deaf_client, good_client
 

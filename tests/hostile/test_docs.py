@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from engage_hri.services.control.simulated import SimulatedBody
+from engage_hri.services.control.torso.body import SimulatedBody
 
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "hostile.md"
 

@@ -3,10 +3,10 @@
 import pytest
 
 from engage_hri.schemas.faults import InputRefused
-from engage_hri.services.bus import Bus, Hub
+from engage_hri.services.bus.interface import Bus, Hub
+from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.commandline.hostile import whole_robot
 from engage_hri.services.hostile.trial import Attack, insist_on_memory, trial
-from engage_hri.services.memory_bus import MemoryHub
 
 
 class Wire(Hub):

@@ -6,7 +6,7 @@ import pytest
 
 from engage_hri.services.commandline.hostile import whole_robot
 from engage_hri.services.hostile.trial import Attack, _Trial, run
-from engage_hri.services.requests import RequestDesk, Requester
+from engage_hri.services.requests.ends import RequestDesk, Requester
 
 
 class Ends:

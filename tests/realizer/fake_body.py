@@ -31,9 +31,9 @@ from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.messages import Message
 from engage_hri.schemas.requests import Cancel
 from engage_hri.schemas.units import Seconds
-from engage_hri.services.bus import Bus
-from engage_hri.services.requests import RequestDesk
-from engage_hri.services.runtime import Ready
+from engage_hri.services.bus.interface import Bus
+from engage_hri.services.requests.ends import RequestDesk
+from engage_hri.services.runtime.service import Ready
 
 SEVEN = ("start", "ready", "stroke_start", "stroke", "stroke_end", "relax", "end")
 HOLDS = {

@@ -3,10 +3,10 @@
 import heapq
 from collections.abc import Callable
 
-from engage_hri.services.realizer.authority import Authority
 from engage_hri.services.realizer.config import RealizerConfig
-from engage_hri.services.realizer.effects import Begin, Extend
-from engage_hri.services.realizer.planner import Plan
+from engage_hri.services.realizer.decide.authority import Authority
+from engage_hri.services.realizer.decide.effects import Begin, Extend
+from engage_hri.services.realizer.plan.planner import Plan
 
 
 class Player:

@@ -20,6 +20,7 @@ from engage_hri.schemas.body import (
     SyncPointArrived,
     SyncPointReached,
 )
+from engage_hri.schemas.documents.xml_decode import decode_xml
 from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.feedback import (
     BlockProgress,
@@ -30,13 +31,12 @@ from engage_hri.schemas.feedback import (
 from engage_hri.schemas.messages import Message
 from engage_hri.schemas.requests import Accepted, Answer, Cancel, Refused, Request, answering
 from engage_hri.schemas.units import Seconds, Stamp
-from engage_hri.schemas.xml_codec import decode_xml
-from engage_hri.services.bus import Bus, Hub
-from engage_hri.services.memory_bus import MemoryHub
+from engage_hri.services.bus.interface import Bus, Hub
+from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.realizer.config import RealizerConfig
 from engage_hri.services.realizer.service import realize
-from engage_hri.services.requests import Pending, Requester
-from engage_hri.services.runtime import running
+from engage_hri.services.requests.ends import Pending, Requester
+from engage_hri.services.runtime.service import running
 from tests.realizer.fake_body import FakeBody
 
 DRAFT = "org.mindmakers.bml"

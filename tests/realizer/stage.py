@@ -14,12 +14,12 @@ from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.feedback import BlockProgress, SyncPointProgress, WarningFeedback
 from engage_hri.schemas.recognition import EventOutcome, RequestEvent, SignalTurn, TurnOutcome
 from engage_hri.schemas.units import Seconds
-from engage_hri.services.bus import Bus
-from engage_hri.services.memory_bus import MemoryHub
+from engage_hri.services.bus.interface import Bus
+from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.realizer.config import RealizerConfig
 from engage_hri.services.realizer.service import realize
-from engage_hri.services.requests import Pending, RequestDesk, Requester
-from engage_hri.services.runtime import Ready, Service, running
+from engage_hri.services.requests.ends import Pending, RequestDesk, Requester
+from engage_hri.services.runtime.service import Ready, Service, running
 from tests.realizer.fake_body import FakeBody
 
 

@@ -9,7 +9,7 @@ from engage_hri.schemas.body import Estimate, Estimates, HomeReached, Phase, Syn
 from engage_hri.schemas.messages import Message
 from engage_hri.schemas.units import Stamp
 from engage_hri.services.realizer.config import RealizerConfig
-from engage_hri.services.requests import RequestRefused
+from engage_hri.services.requests.ends import RequestRefused
 from tests.realizer.puppet import BML_1_0, Puppet, bml, puppet
 
 SEVEN = ("start", "ready", "stroke_start", "stroke", "stroke_end", "relax", "end")

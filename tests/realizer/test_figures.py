@@ -4,8 +4,8 @@ import pytest
 
 from engage_hri.schemas.behaviors import Gaze, Pointing, Speech
 from engage_hri.schemas.blocks import Block
-from engage_hri.services.realizer.net import is_live, is_safe
-from engage_hri.services.realizer.planner import plan_block
+from engage_hri.services.realizer.net.petri_net import is_live, is_safe
+from engage_hri.services.realizer.plan.planner import plan_block
 from tests.realizer.fake_body import FakeBody
 from tests.realizer.stage import after, block, together
 

@@ -10,7 +10,7 @@ from engage_hri.schemas import keys
 from engage_hri.schemas.behaviors import Gesture, Mark, Speech
 from engage_hri.schemas.blocks import Block, BlockOutcome, PerformBlock
 from engage_hri.schemas.body import AbortBehavior
-from engage_hri.services.requests import Pending, RequestRefused
+from engage_hri.services.requests.ends import Pending, RequestRefused
 from tests.realizer.fake_body import FakeBody, Script
 from tests.realizer.stage import Stage, after, block, stage, together
 

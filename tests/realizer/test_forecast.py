@@ -9,10 +9,10 @@ from hypothesis import strategies as st
 
 from engage_hri.schemas.behaviors import After, Constraint, Mark, Pointing, Speech, Synchronize
 from engage_hri.schemas.blocks import Block
-from engage_hri.services.realizer.authority import Authority
-from engage_hri.services.realizer.experience import Experience
-from engage_hri.services.realizer.planner import Plan, plan_block
-from engage_hri.services.realizer.relations import BlockRefused
+from engage_hri.services.realizer.decide.authority import Authority
+from engage_hri.services.realizer.decide.experience import Experience
+from engage_hri.services.realizer.plan.planner import Plan, plan_block
+from engage_hri.services.realizer.plan.relations import BlockRefused
 from tests.realizer.fake_body import FakeBody
 from tests.realizer.player import Player
 from tests.realizer.test_properties import blocks

@@ -7,7 +7,7 @@ import pytest
 
 from engage_hri.schemas.behaviors import Gaze, Gesture, Mark, Pointing, Speech, Wait
 from engage_hri.schemas.blocks import Block
-from engage_hri.services.realizer.ledger import Ledger
+from engage_hri.services.realizer.perform.ledger import Ledger
 from engage_hri.services.realizer.points import Point
 from tests.realizer.fake_body import FakeBody, Script
 from tests.realizer.stage import Stage, after, block, stage, together

@@ -6,7 +6,7 @@ from engage_hri.schemas import keys
 from engage_hri.schemas.behaviors import Speech, Wait
 from engage_hri.schemas.blocks import BlockOutcome, Composition, PerformBlock
 from engage_hri.schemas.feedback import BlockProgress
-from engage_hri.services.requests import Pending, RequestRefused
+from engage_hri.services.requests.ends import Pending, RequestRefused
 from tests.realizer.stage import Stage, after, block, stage
 
 STORY = Speech(id="s", text="one")

@@ -12,13 +12,13 @@ from engage_hri.schemas.behaviors import Event, Gaze, GazeShift, Gesture, Head, 
 from engage_hri.schemas.blocks import BehaviorInterrupted, Block, BlockOutcome, InterruptBehavior
 from engage_hri.schemas.body import GoHome, RobotState
 from engage_hri.schemas.world import World
+from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.control.config import ControlConfig
 from engage_hri.services.control.service import embody
-from engage_hri.services.memory_bus import MemoryHub
 from engage_hri.services.realizer.config import RealizerConfig
 from engage_hri.services.realizer.service import realize
-from engage_hri.services.requests import Pending, Requester, RequestRefused
-from engage_hri.services.runtime import running
+from engage_hri.services.requests.ends import Pending, Requester, RequestRefused
+from engage_hri.services.runtime.service import running
 from tests.control.contract import WORLD
 from tests.realizer.fake_body import FakeBody, Script
 from tests.realizer.stage import FakeRecognition, Stage, after, block, stage

@@ -35,8 +35,8 @@ from engage_hri.schemas.blocks import BehaviorInterrupted, Block, BlockOutcome, 
 from engage_hri.schemas.feedback import BlockProgress, SyncPointProgress
 from engage_hri.schemas.syncref import SyncRef
 from engage_hri.services.realizer.points import sync_points
-from engage_hri.services.requests import Pending, Requester, RequestRefused
-from engage_hri.services.virtual_time import run_virtual
+from engage_hri.services.requests.ends import Pending, Requester, RequestRefused
+from engage_hri.services.runtime.virtual_time import run_virtual
 from tests.realizer.fake_body import FakeBody, Script, parts_of
 from tests.realizer.stage import Stage, stage
 from tests.realizer.test_simulated_body import FAULTS, robot

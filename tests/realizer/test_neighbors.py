@@ -5,7 +5,7 @@ import asyncio
 import pytest
 
 from engage_hri.schemas.behaviors import Event, Pointing, Speech, Wait
-from engage_hri.services.realizer.ledger import Ledger
+from engage_hri.services.realizer.perform.ledger import Ledger
 from engage_hri.services.realizer.points import Point
 from tests.realizer.fake_body import FakeBody, Script
 from tests.realizer.puppet import BML_1_0, bml, puppet

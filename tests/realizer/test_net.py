@@ -10,9 +10,9 @@ from lxml import etree
 from engage_hri.schemas.behaviors import Event, Gaze, Pointing, Speech, Timing
 from engage_hri.schemas.blocks import Block
 from engage_hri.schemas.faults import InputRefused
-from engage_hri.services.realizer import pnml
 from engage_hri.services.realizer.export import as_dot, as_json, as_pnml, as_text
-from engage_hri.services.realizer.net import (
+from engage_hri.services.realizer.net import pnml
+from engage_hri.services.realizer.net.petri_net import (
     Bound,
     PetriNet,
     Place,
@@ -23,8 +23,8 @@ from engage_hri.services.realizer.net import (
     is_live,
     is_safe,
 )
-from engage_hri.services.realizer.planner import Plan, plan_block
-from engage_hri.services.realizer.pnml import read_pnml
+from engage_hri.services.realizer.net.pnml import read_pnml
+from engage_hri.services.realizer.plan.planner import Plan, plan_block
 from tests.realizer.fake_body import FakeBody
 from tests.realizer.oracle import estimated, random_blocks
 from tests.realizer.stage import after, before, block, together

@@ -4,10 +4,10 @@ import pytest
 
 from engage_hri.schemas.behaviors import Gaze, GazeShift, Gesture, Mark, Pointing, Speech
 from engage_hri.schemas.feedback import PredictionFeedback
-from engage_hri.services.realizer.authority import Authority
 from engage_hri.services.realizer.config import RealizerConfig
-from engage_hri.services.realizer.effects import Extend
-from engage_hri.services.realizer.planner import plan_block
+from engage_hri.services.realizer.decide.authority import Authority
+from engage_hri.services.realizer.decide.effects import Extend
+from engage_hri.services.realizer.plan.planner import plan_block
 from engage_hri.services.realizer.points import Point
 from tests.realizer.fake_body import FakeBody, Script
 from tests.realizer.stage import after, block, stage, together

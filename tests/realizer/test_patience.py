@@ -1,11 +1,11 @@
 """Who is late, once, and who is given up, once: each at its instant."""
 
 from engage_hri.schemas.behaviors import Gesture
-from engage_hri.services.realizer.authority import Authority
 from engage_hri.services.realizer.config import RealizerConfig
-from engage_hri.services.realizer.effects import Extend
-from engage_hri.services.realizer.patience import Late, Patience, Stalled
-from engage_hri.services.realizer.planner import plan_block
+from engage_hri.services.realizer.decide.authority import Authority
+from engage_hri.services.realizer.decide.effects import Extend
+from engage_hri.services.realizer.decide.patience import Late, Patience, Stalled
+from engage_hri.services.realizer.plan.planner import plan_block
 from engage_hri.services.realizer.points import Point
 from tests.realizer.fake_body import FakeBody
 from tests.realizer.stage import block

@@ -18,8 +18,8 @@ from engage_hri.schemas.behaviors import (
     Timing,
 )
 from engage_hri.schemas.blocks import Block
-from engage_hri.services.realizer.net import fire_once_each, is_live, is_safe
-from engage_hri.services.realizer.planner import plan_block
+from engage_hri.services.realizer.net.petri_net import fire_once_each, is_live, is_safe
+from engage_hri.services.realizer.plan.planner import plan_block
 
 Parts = tuple[list[BlockBehavior], list[Synchronize | After]]
 

@@ -27,12 +27,12 @@ from engage_hri.schemas.behaviors import (
 from engage_hri.schemas.blocks import Block, BlockOutcome
 from engage_hri.schemas.syncref import SyncRef
 from engage_hri.services.realizer.config import RealizerConfig
-from engage_hri.services.realizer.net import enabled, fire, is_live
-from engage_hri.services.realizer.planner import Plan, plan_block
+from engage_hri.services.realizer.net.petri_net import enabled, fire, is_live
+from engage_hri.services.realizer.plan.planner import Plan, plan_block
+from engage_hri.services.realizer.plan.relations import BlockRefused
 from engage_hri.services.realizer.points import Point, sync_points
-from engage_hri.services.realizer.relations import BlockRefused
-from engage_hri.services.requests import RequestRefused
-from engage_hri.services.virtual_time import run_virtual
+from engage_hri.services.requests.ends import RequestRefused
+from engage_hri.services.runtime.virtual_time import run_virtual
 from tests.realizer.fake_body import HOLDS, FakeBody, Script, natural_durations, type_of
 from tests.realizer.stage import stage
 

@@ -13,11 +13,11 @@ from engage_hri.schemas.behaviors import Gaze, Wait
 from engage_hri.schemas.blocks import BlockOutcome
 from engage_hri.schemas.body import SyncPointArrived, SyncPointReached
 from engage_hri.schemas.feedback import BlockProgress, SyncPointProgress, WarningFeedback
-from engage_hri.services.realizer.authority import Authority
 from engage_hri.services.realizer.config import RealizerConfig
-from engage_hri.services.realizer.planner import plan_block
+from engage_hri.services.realizer.decide.authority import Authority
+from engage_hri.services.realizer.plan.planner import plan_block
 from engage_hri.services.realizer.points import ORIGIN, Point
-from engage_hri.services.virtual_time import run_virtual
+from engage_hri.services.runtime.virtual_time import run_virtual
 from tests.realizer.fake_body import Act, FakeBody
 from tests.realizer.oracle import estimate, possible_blocks
 from tests.realizer.stage import after, block, stage

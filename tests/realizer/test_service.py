@@ -8,9 +8,9 @@ from engage_hri.schemas import keys
 from engage_hri.schemas.behaviors import Gaze, GazeShift, Mark, Pointing, Speech, Timing, Wait
 from engage_hri.schemas.blocks import PerformBlock
 from engage_hri.schemas.feedback import BlockProgress, PredictionFeedback
-from engage_hri.services.memory_bus import Faults, MemoryHub
+from engage_hri.services.bus.memory import Faults, MemoryHub
 from engage_hri.services.realizer.config import RealizerConfig
-from engage_hri.services.requests import RequestRefused
+from engage_hri.services.requests.ends import RequestRefused
 from tests.realizer.fake_body import FakeBody, Script
 from tests.realizer.stage import after, block, stage, together
 

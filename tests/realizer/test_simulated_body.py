@@ -20,16 +20,16 @@ from engage_hri.schemas.behaviors import Gaze, Gesture, Mark, Pointing, Speech
 from engage_hri.schemas.blocks import Block, BlockOutcome, PerformBlock
 from engage_hri.schemas.feedback import BlockProgress, SyncPointProgress, WarningFeedback
 from engage_hri.schemas.world import Entity, World
-from engage_hri.services.bus import Bus
+from engage_hri.services.bus.interface import Bus
+from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.control.config import ControlConfig, Displaced, Slow, Stall, Variability
 from engage_hri.services.control.service import embody
-from engage_hri.services.control.simulated import SimulatedBody
-from engage_hri.services.memory_bus import MemoryHub
+from engage_hri.services.control.torso.body import SimulatedBody
 from engage_hri.services.realizer.config import RealizerConfig
 from engage_hri.services.realizer.service import realize
-from engage_hri.services.requests import Pending, Requester, RequestRefused
-from engage_hri.services.runtime import running
-from engage_hri.services.virtual_time import run_virtual
+from engage_hri.services.requests.ends import Pending, Requester, RequestRefused
+from engage_hri.services.runtime.service import running
+from engage_hri.services.runtime.virtual_time import run_virtual
 from tests.realizer.stage import block, together
 from tests.realizer.test_properties import blocks
 

@@ -8,10 +8,10 @@ import pytest
 from engage_hri.schemas import keys
 from engage_hri.schemas.feedback import WarningFeedback
 from engage_hri.schemas.requests import Refused
+from engage_hri.services.bus.memory import MemoryHub
+from engage_hri.services.commandline.config import Config
 from engage_hri.services.commandline.roster import service
-from engage_hri.services.config import Config
-from engage_hri.services.memory_bus import MemoryHub
-from engage_hri.services.runtime import running
+from engage_hri.services.runtime.service import running
 from tests.realizer.stage import stage
 
 

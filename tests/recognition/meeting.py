@@ -15,7 +15,7 @@ from engage_hri.schemas.behaviors import Action, TurnSignal
 from engage_hri.schemas.feedback import BlockProgress, SyncPointProgress
 from engage_hri.schemas.recognition import SignalTurn
 from engage_hri.schemas.units import Seconds
-from engage_hri.services.recognition.session import Observation
+from engage_hri.services.recognition.events.session import Observation
 from tests.recognition.observations import PIECES, ROBOT, request_event, stamp, world
 
 Observed = Iterator[tuple[Seconds, Observation]]

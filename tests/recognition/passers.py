@@ -10,11 +10,11 @@ from engage_hri.schemas.recognition import ConnectionEvent
 from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.world import Entity, World
 from engage_hri.services.recognition.config import RecognitionConfig
-from engage_hri.services.recognition.machine import Forgotten
-from engage_hri.services.recognition.open_events import OpenBook
+from engage_hri.services.recognition.events.machine import Forgotten
+from engage_hri.services.recognition.events.open_events import OpenBook
+from engage_hri.services.recognition.perceive.reporters import Witnesses
 from engage_hri.services.recognition.recognizer import Perceived, Recognizer, Result
-from engage_hri.services.recognition.standings import Standings
-from engage_hri.services.recognition.witnesses import Witnesses
+from engage_hri.services.recognition.statistics.standings import Standings
 from tests.recognition.observations import PIECES, ROBOT, stamp, world
 from tests.recognition.raw import EYES
 

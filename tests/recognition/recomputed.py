@@ -13,7 +13,7 @@ import msgspec
 from engage_hri.schemas.recognition import ConnectionEvent, KindStatistics, WindowStatistics
 from engage_hri.schemas.units import Seconds, Stamp
 from engage_hri.services.recognition.config import RecognitionConfig
-from engage_hri.services.recognition.statistics import KINDS
+from engage_hri.services.recognition.statistics.tally import KINDS
 
 Life = list[ConnectionEvent]
 

@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost
 from engage_hri.schemas.perception import HeadPose
 from engage_hri.schemas.world import Entity, World
-from engage_hri.services.recognition.attention import Attention
 from engage_hri.services.recognition.config import RecognitionConfig
+from engage_hri.services.recognition.perceive.attention import Attention
 from tests.recognition.observations import HUMAN, ROBOT, stamp
 from tests.recognition.raw import EMPTY, EYES, PLACES, Watch, face, frames, piece, pose, table, turned
 

@@ -9,7 +9,7 @@ from engage_hri.schemas.actions import ActorFound, ActorLost
 from engage_hri.schemas.recognition import ENDINGS, ConnectionEvent, EventOutcome, SignalTurn
 from engage_hri.schemas.requests import Accepted, Refused
 from engage_hri.services.recognition.config import RecognitionConfig
-from engage_hri.services.recognition.machine import DECISIONS
+from engage_hri.services.recognition.events.machine import DECISIONS
 from engage_hri.services.recognition.recognizer import Recognizer
 from tests.recognition.observations import ROBOT, stamp
 from tests.recognition.raw import EYES, PLACES, face, hand, pose, table, voice

@@ -14,10 +14,10 @@ from engage_hri.schemas.messages import encode
 from engage_hri.schemas.perception import HeadPose
 from engage_hri.schemas.recognition import EventOutcome, SignalTurn
 from engage_hri.schemas.units import Vector
-from engage_hri.services.bus import Bus
-from engage_hri.services.memory_bus import MemoryHub
-from engage_hri.services.requests import Requester
-from engage_hri.services.runtime import running
+from engage_hri.services.bus.interface import Bus
+from engage_hri.services.bus.memory import MemoryHub
+from engage_hri.services.requests.ends import Requester
+from engage_hri.services.runtime.service import running
 from tests.recognition.observations import HUMAN, ROBOT
 from tests.recognition.raw import face, hand, place_of, pose, table, voice
 from tests.recognition.test_service import recognition, request

@@ -7,8 +7,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from engage_hri.schemas.actions import ActionBegan
-from engage_hri.services.recognition.attention import Attention
 from engage_hri.services.recognition.config import RecognitionConfig
+from engage_hri.services.recognition.perceive.attention import Attention
 from tests.recognition.observations import HUMAN, ROBOT
 from tests.recognition.raw import Watch, voice
 

@@ -5,8 +5,8 @@ import pytest
 from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost
 from engage_hri.schemas.recognition import ConnectionEvent
 from engage_hri.services.recognition.config import RecognitionConfig
+from engage_hri.services.recognition.events.session import Observation
 from engage_hri.services.recognition.recognizer import Recognizer
-from engage_hri.services.recognition.session import Observation
 from tests.recognition.observations import HUMAN, ROBOT, stamp, world
 
 BLUE = "blue-square"

@@ -11,13 +11,13 @@ from msgspec.structs import replace
 from engage_hri.schemas.actions import ActionBegan, ActorFound, ActorLost
 from engage_hri.schemas.recognition import ConnectionEvent, EventOutcome, Statistics
 from engage_hri.schemas.requests import Accepted, Refused
-from engage_hri.services.recognition.agenda import SLACK, Agenda
 from engage_hri.services.recognition.config import RecognitionConfig
-from engage_hri.services.recognition.machine import Forgotten
-from engage_hri.services.recognition.open_events import OpenBook
-from engage_hri.services.recognition.person import Person
-from engage_hri.services.recognition.session import Session
-from engage_hri.services.recognition.standings import Standings
+from engage_hri.services.recognition.events.agenda import SLACK, Agenda
+from engage_hri.services.recognition.events.machine import Forgotten
+from engage_hri.services.recognition.events.open_events import OpenBook
+from engage_hri.services.recognition.events.person import Person
+from engage_hri.services.recognition.events.session import Session
+from engage_hri.services.recognition.statistics.standings import Standings
 from tests.recognition.kept import kinds
 from tests.recognition.observations import HUMAN, ROBOT, Log, stamp, world
 from tests.recognition.passers import Lobby, visit

@@ -7,7 +7,7 @@ import pytest
 from engage_hri.schemas.recognition import ConnectionEvent, Statistics
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.recognition.config import RecognitionConfig
-from engage_hri.services.recognition.standings import Standings
+from engage_hri.services.recognition.statistics.standings import Standings
 from tests.recognition.test_statistics import event, table_2_1
 
 PAUSE: Seconds = 70.0

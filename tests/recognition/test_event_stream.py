@@ -13,14 +13,14 @@ from engage_hri.schemas.actions import ActionBegan, ActionEnded
 from engage_hri.schemas.presence import PeerAlive, PeerGone
 from engage_hri.schemas.recognition import ENDINGS, ConnectionEvent, EventOutcome, OpenEvents, RequestEvent
 from engage_hri.schemas.units import Stamp
-from engage_hri.services.bus import Bus
-from engage_hri.services.client import Robot, connect
-from engage_hri.services.event_stream import EventStream
-from engage_hri.services.feeds import EventFeed
-from engage_hri.services.memory_bus import MemoryHub
-from engage_hri.services.recognition.open_events import OpenBook
-from engage_hri.services.requests import Requester
-from engage_hri.services.runtime import running
+from engage_hri.services.bus.interface import Bus
+from engage_hri.services.bus.memory import MemoryHub
+from engage_hri.services.client.event_stream import EventStream
+from engage_hri.services.client.feeds import EventFeed
+from engage_hri.services.client.robot import Robot, connect
+from engage_hri.services.recognition.events.open_events import OpenBook
+from engage_hri.services.requests.ends import Requester
+from engage_hri.services.runtime.service import running
 from tests.recognition.observations import ROBOT, world
 from tests.recognition.test_service import recognition, request
 

@@ -10,9 +10,9 @@ from engage_hri.schemas.actions import ActionBegan
 from engage_hri.schemas.recognition import ConnectionEvent
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.recognition.config import RecognitionConfig
-from engage_hri.services.recognition.latest import Latest
-from engage_hri.services.recognition.session import Observation, Session
-from engage_hri.services.recognition.standings import Standings
+from engage_hri.services.recognition.events.latest import Latest
+from engage_hri.services.recognition.events.session import Observation, Session
+from engage_hri.services.recognition.statistics.standings import Standings
 from tests.recognition.kept import kinds
 from tests.recognition.meeting import meeting
 from tests.recognition.observations import ROBOT, Log, stamp

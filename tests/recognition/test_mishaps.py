@@ -10,13 +10,13 @@ from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorLost
 from engage_hri.schemas.recognition import ConnectionEvent, EventOutcome
 from engage_hri.schemas.requests import Accepted
 from engage_hri.services.recognition.config import RecognitionConfig
-from engage_hri.services.recognition.looking import Looking
-from engage_hri.services.recognition.machine import Mishap, UndefinedTransition
-from engage_hri.services.recognition.manipulation import Manipulation
-from engage_hri.services.recognition.mutual_facial_gaze import MutualFacialGaze
-from engage_hri.services.recognition.person import Person
+from engage_hri.services.recognition.events.machine import Mishap, UndefinedTransition
+from engage_hri.services.recognition.events.mutual_facial_gaze import MutualFacialGaze
+from engage_hri.services.recognition.events.person import Person
+from engage_hri.services.recognition.events.session import Session
+from engage_hri.services.recognition.perceive.looks import Looking
+from engage_hri.services.recognition.perceive.manipulation import Manipulation
 from engage_hri.services.recognition.recognizer import Recognizer
-from engage_hri.services.recognition.session import Session
 from tests.recognition.observations import ROBOT, request_event, stamp, world
 from tests.recognition.raw import pose, table, voice
 from tests.recognition.test_random_streams import Chance

@@ -15,7 +15,7 @@ from engage_hri.schemas.behaviors import Action, TurnSignal
 from engage_hri.schemas.recognition import ConnectionEvent, SignalTurn
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.recognition.config import RecognitionConfig
-from engage_hri.services.recognition.session import Session
+from engage_hri.services.recognition.events.session import Session
 from tests.recognition.observations import ROBOT, request_event, stamp, world
 from tests.recognition.test_random_streams import Chance, Stream
 

@@ -10,8 +10,8 @@ from msgspec.structs import replace
 from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost
 from engage_hri.schemas.recognition import ConnectionEvent, RequestEvent, SignalTurn
 from engage_hri.services.recognition.config import RecognitionConfig
-from engage_hri.services.recognition.machine import Effect
-from engage_hri.services.recognition.session import Observation, Session
+from engage_hri.services.recognition.events.machine import Effect
+from engage_hri.services.recognition.events.session import Observation, Session
 from tests.recognition.observations import ROBOT, world
 from tests.recognition.test_random_streams import Chance, Stream, streams
 

@@ -8,10 +8,10 @@ from hypothesis import strategies as st
 from engage_hri.schemas.recognition import ConnectionEvent, Statistics
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.recognition.config import RecognitionConfig
-from engage_hri.services.recognition.engagement import JUST_AFTER, next_level
-from engage_hri.services.recognition.machine import Effect
-from engage_hri.services.recognition.session import Session
-from engage_hri.services.recognition.standings import Standings
+from engage_hri.services.recognition.events.machine import Effect
+from engage_hri.services.recognition.events.session import Session
+from engage_hri.services.recognition.statistics.engagement import JUST_AFTER, next_level
+from engage_hri.services.recognition.statistics.standings import Standings
 from tests.recognition import recomputed
 from tests.recognition.observations import ROBOT, world
 from tests.recognition.test_random_streams import ACTORS, Stream, streams

@@ -14,9 +14,9 @@ from engage_hri.schemas.feedback import BlockProgress, SyncPointProgress
 from engage_hri.schemas.recognition import ENDINGS, ConnectionEvent, EventOutcome, SignalTurn, TurnOutcome
 from engage_hri.schemas.requests import Accepted, Cancel, Refused
 from engage_hri.services.recognition.config import RecognitionConfig
-from engage_hri.services.recognition.machine import DECISIONS
-from engage_hri.services.recognition.session import Observation, Session
-from engage_hri.services.recognition.statistics import KINDS
+from engage_hri.services.recognition.events.machine import DECISIONS
+from engage_hri.services.recognition.events.session import Observation, Session
+from engage_hri.services.recognition.statistics.tally import KINDS
 from tests.recognition.observations import ROBOT, request_event, stamp, world
 
 Stream = list[tuple[float, Observation]]

@@ -10,12 +10,12 @@ from engage_hri.schemas.behaviors import Event, TurnSignal
 from engage_hri.schemas.feedback import BlockProgress, SyncPointProgress
 from engage_hri.schemas.recognition import ConnectionEvent, EventOutcome, RequestEvent, SignalTurn, Statistics
 from engage_hri.schemas.units import Stamp
-from engage_hri.services.bus import Bus
-from engage_hri.services.memory_bus import MemoryHub
+from engage_hri.services.bus.interface import Bus
+from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.recognition.config import RecognitionConfig
 from engage_hri.services.recognition.service import recognize
-from engage_hri.services.requests import Requester, RequestRefused
-from engage_hri.services.runtime import Service, running
+from engage_hri.services.requests.ends import Requester, RequestRefused
+from engage_hri.services.runtime.service import Service, running
 from tests.commanding import command
 from tests.recognition.observations import HUMAN, ROBOT, world
 

@@ -5,9 +5,9 @@ import pytest
 from engage_hri.schemas.recognition import ConnectionEvent
 from engage_hri.schemas.units import Stamp
 from engage_hri.services.recognition.config import RecognitionConfig
-from engage_hri.services.recognition.engagement import Engagement, next_level, pace
-from engage_hri.services.recognition.standings import Standings
-from engage_hri.services.recognition.statistics import Tally
+from engage_hri.services.recognition.statistics.engagement import Engagement, next_level, pace
+from engage_hri.services.recognition.statistics.standings import Standings
+from engage_hri.services.recognition.statistics.tally import Tally
 
 KIND = {
     "dg": "directed_gaze", "mfg": "mutual_facial_gaze", "ap": "adjacency_pair", "bc": "backchannel",

@@ -6,9 +6,9 @@ import pytest
 
 from engage_hri.schemas.behaviors import EventKind
 from engage_hri.schemas.recognition import ENDINGS
-from engage_hri.services.recognition import adjacency_pair, backchannel, directed_gaze, mutual_facial_gaze
 from engage_hri.services.recognition.config import RecognitionConfig, Sensing
-from engage_hri.services.recognition.machine import (
+from engage_hri.services.recognition.events import adjacency_pair, backchannel, directed_gaze, mutual_facial_gaze
+from engage_hri.services.recognition.events.machine import (
     DECISIONS,
     IDLE,
     Ledger,
@@ -18,7 +18,7 @@ from engage_hri.services.recognition.machine import (
     diagram,
     table,
 )
-from engage_hri.services.recognition.shared_gaze import SharedGaze
+from engage_hri.services.recognition.events.shared_gaze import SharedGaze
 
 TABLES = {
     "directed gaze": directed_gaze.TABLE, "mutual facial gaze": mutual_facial_gaze.TABLE,

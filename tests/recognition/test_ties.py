@@ -6,12 +6,12 @@ import pytest
 
 from engage_hri.schemas.actions import ActionBegan
 from engage_hri.schemas.recognition import ConnectionEvent
-from engage_hri.services.recognition.attention import Attention
 from engage_hri.services.recognition.config import RecognitionConfig
-from engage_hri.services.recognition.limits import in_time
-from engage_hri.services.recognition.presence import Presence
+from engage_hri.services.recognition.events.limits import in_time
+from engage_hri.services.recognition.events.presence import Presence
+from engage_hri.services.recognition.perceive.attention import Attention
 from engage_hri.services.recognition.recognizer import Recognizer
-from engage_hri.services.recognition.statistics import Starts
+from engage_hri.services.recognition.statistics.tally import Starts
 from tests.recognition.observations import HUMAN, ROBOT, Log, asked, stamp, world
 from tests.recognition.raw import pose, table
 

@@ -2,7 +2,7 @@
 
 from engage_hri.schemas.actions import ActionBegan, ActorFound, ActorLost
 from engage_hri.schemas.presence import PeerAlive, PeerGone
-from engage_hri.services.recognition.witnesses import Witnesses
+from engage_hri.services.recognition.perceive.reporters import Witnesses
 from tests.recognition.observations import stamp
 
 ALIVE, GONE = PeerAlive(participant="cameras", run="one"), PeerGone(participant="cameras")

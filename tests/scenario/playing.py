@@ -9,19 +9,19 @@ from msgspec.structs import replace
 from engage_hri.schemas import keys
 from engage_hri.schemas.fragments import FragmentOutcome
 from engage_hri.schemas.recognition import ConnectionEvent
-from engage_hri.services.bus import Bus, Received
+from engage_hri.services.bus.interface import Bus, Received
+from engage_hri.services.bus.memory import Faults, MemoryHub
 from engage_hri.services.collaboration.config import CollaborationConfig
 from engage_hri.services.collaboration.service import collaborate
 from engage_hri.services.control.config import ControlConfig, Variability
 from engage_hri.services.control.service import embody
 from engage_hri.services.generation.config import Condition, GenerationConfig
 from engage_hri.services.generation.service import generate
-from engage_hri.services.memory_bus import Faults, MemoryHub
 from engage_hri.services.realizer.config import RealizerConfig
 from engage_hri.services.realizer.service import realize
 from engage_hri.services.recognition.config import RecognitionConfig
 from engage_hri.services.recognition.service import recognize
-from engage_hri.services.runtime import Ready, Service, running
+from engage_hri.services.runtime.service import Ready, Service, running
 from engage_hri.services.simulation.config import Habits, SimulationConfig
 from engage_hri.services.simulation.service import simulate
 

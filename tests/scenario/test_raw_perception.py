@@ -10,8 +10,8 @@ import pytest
 
 from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost
 from engage_hri.schemas.faults import Fault
+from engage_hri.services.runtime.virtual_time import run_virtual
 from engage_hri.services.simulation.config import PerceptionFaults, SimulationConfig
-from engage_hri.services.virtual_time import run_virtual
 from tests.scenario.playing import Record, play
 from tests.scenario.test_appendix_b import ENDINGS, EXPECTED, by_step
 

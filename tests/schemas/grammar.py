@@ -5,7 +5,7 @@ from pathlib import Path
 
 from lxml import etree
 
-from engage_hri.schemas.xml_source import EBML
+from engage_hri.schemas.documents.xml_source import EBML
 
 HERE = Path(__file__).parent
 

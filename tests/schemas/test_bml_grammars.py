@@ -6,10 +6,10 @@ import pytest
 
 from engage_hri.schemas.behaviors import FaceShift, Mark, Speech, Timing
 from engage_hri.schemas.blocks import Block
+from engage_hri.schemas.documents.xml_decode import decode_xml, encode_xml
+from engage_hri.schemas.documents.xml_feedback import decode_feedback, encode_feedback
 from engage_hri.schemas.feedback import PlannedPoint, PredictionFeedback, WarningFeedback
-from engage_hri.schemas.feedback_xml import decode_feedback, encode_feedback
 from engage_hri.schemas.units import Stamp
-from engage_hri.schemas.xml_codec import decode_xml, encode_xml
 from tests.schemas.grammar import violations
 from tests.schemas.test_feedback_xml import FORMS
 

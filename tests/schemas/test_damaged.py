@@ -9,15 +9,15 @@ import pytest
 from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
 
-from engage_hri.schemas import json_codec
+from engage_hri.schemas.documents import json_codec
+from engage_hri.schemas.documents.xml_decode import decode_xml
+from engage_hri.schemas.documents.xml_feedback import decode_feedback
 from engage_hri.schemas.faults import InputRefused
-from engage_hri.schemas.feedback_xml import decode_feedback
 from engage_hri.schemas.messages import Message, decode, encode, encode_json
 from engage_hri.schemas.requests import Cancel
 from engage_hri.schemas.syncref import is_id
 from engage_hri.schemas.utf8 import utf8
-from engage_hri.schemas.xml_codec import decode_xml
-from engage_hri.services.config import load
+from engage_hri.services.commandline.config import load
 from engage_hri.services.simulation.still import EXAMPLE, load_world
 
 FORMS: dict[str, Callable[[Message], bytes]] = {"application/json": encode_json, "application/msgpack": encode}

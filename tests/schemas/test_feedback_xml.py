@@ -6,6 +6,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from engage_hri.schemas.documents.xml_feedback import HEAD, TAIL, decode_feedback, encode_feedback
 from engage_hri.schemas.faults import InputRefused
 from engage_hri.schemas.feedback import (
     BlockProgress,
@@ -16,7 +17,6 @@ from engage_hri.schemas.feedback import (
     WarningFeedback,
     WarningKind,
 )
-from engage_hri.schemas.feedback_xml import HEAD, TAIL, decode_feedback, encode_feedback
 from engage_hri.schemas.units import Stamp
 from tests.schemas.strategies import ids
 

@@ -7,10 +7,10 @@ import pytest
 
 from engage_hri.schemas.behaviors import Gaze, Mark, Speech, Timing
 from engage_hri.schemas.blocks import Block
+from engage_hri.schemas.documents.json_codec import decode_json, encode_json, read
+from engage_hri.schemas.documents.xml_decode import decode_xml
 from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.fragments import TurnFragment
-from engage_hri.schemas.json_codec import decode_json, encode_json, read
-from engage_hri.schemas.xml_codec import decode_xml
 
 SAY = {"type": "speech", "id": "s", "text": "Hello"}
 CUP: dict[str, Any] = {

@@ -16,7 +16,7 @@ from engage_hri.schemas import keys, lines
 from engage_hri.schemas.fragments import PerformFragment
 from engage_hri.schemas.messages import Message
 from engage_hri.schemas.requests import Accepted
-from engage_hri.services.zenoh_bus import open_hub
+from engage_hri.services.bus.zenoh.hub import open_hub
 from tests.bus.places import free_endpoint
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"

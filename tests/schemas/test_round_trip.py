@@ -3,10 +3,10 @@
 from hypothesis import HealthCheck, given, settings
 
 from engage_hri.schemas.blocks import Block
+from engage_hri.schemas.documents.json_codec import decode_json, encode_json, read
+from engage_hri.schemas.documents.xml_decode import decode_xml, encode_xml
 from engage_hri.schemas.fragments import TurnFragment
-from engage_hri.schemas.json_codec import decode_json, encode_json, read
 from engage_hri.schemas.references import disambiguated, without_lines
-from engage_hri.schemas.xml_codec import decode_xml, encode_xml
 from tests.schemas.strategies import blocks, fragments
 
 quick = settings(max_examples=40, suppress_health_check=[HealthCheck.too_slow], deadline=None)

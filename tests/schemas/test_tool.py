@@ -9,10 +9,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from engage_hri.schemas.check import problems
+from engage_hri.schemas.documents.json_codec import decode_json, encode_json, read
 from engage_hri.schemas.export import EXPORTED
 from engage_hri.schemas.faults import InputRefused
 from engage_hri.schemas.fragments import TurnFragment, TurnStatus
-from engage_hri.schemas.json_codec import decode_json, encode_json, read
 from engage_hri.schemas.tool import FILE, PARTS, Format, ToolInput, input_schema, tool_definition
 from engage_hri.schemas.world import Entity, World
 

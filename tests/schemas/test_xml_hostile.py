@@ -8,9 +8,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from engage_hri.schemas.behaviors import Speech
+from engage_hri.schemas.documents.json_codec import read
+from engage_hri.schemas.documents.xml_decode import decode_xml
 from engage_hri.schemas.faults import InputRefused
-from engage_hri.schemas.json_codec import read
-from engage_hri.schemas.xml_codec import decode_xml
 from tests.schemas.test_xml_codec import BML_1_0, DRAFT, FRAGMENT, block, refused
 
 LAUGHS = (

@@ -40,7 +40,7 @@ from engage_hri.services.simulation.human import (
 )
 from engage_hri.services.simulation.perception import Scene
 from engage_hri.services.simulation.table import Table
-from engage_hri.services.tangram_table import tangram_table
+from engage_hri.services.tangram.table import tangram_table
 
 FACE_AT = tangram_table().person.face
 EYES: Vector = (0.05, 0.0, 1.17)

@@ -9,8 +9,8 @@ import pytest
 
 from engage_hri.schemas.recognition import ConnectionEvent
 from engage_hri.services.recognition.config import RecognitionConfig
-from engage_hri.services.recognition.session import Session
-from engage_hri.services.recognition.statistics import Tally
+from engage_hri.services.recognition.events.session import Session
+from engage_hri.services.recognition.statistics.tally import Tally
 from engage_hri.services.simulation.human_session import Pace, Planned, draw, exactly, observations
 from engage_hri.services.simulation.table_2_1 import EVENTS, LONGEST_GAP, MTBCE, TABLE
 

@@ -8,7 +8,7 @@ from engage_hri.schemas.feedback import BlockProgress
 from engage_hri.schemas.units import Stamp
 from engage_hri.services.simulation.human import Act, Human, Lay, Leave
 from engage_hri.services.simulation.listening import ListeningHuman
-from engage_hri.services.tangram_table import tangram_table
+from engage_hri.services.tangram.table import tangram_table
 
 AT = Stamp("loop", 0.0)
 

@@ -11,9 +11,9 @@ from engage_hri.schemas.actions import ActionBegan, ActionEnded
 from engage_hri.schemas.body import WordSpoken
 from engage_hri.schemas.feedback import BlockProgress
 from engage_hri.schemas.world import World
-from engage_hri.services.bus import Bus, Keep
-from engage_hri.services.memory_bus import MemoryHub
-from engage_hri.services.runtime import running
+from engage_hri.services.bus.interface import Bus, Keep
+from engage_hri.services.bus.memory import MemoryHub
+from engage_hri.services.runtime.service import running
 from engage_hri.services.simulation.appendix_b import MOVE
 from engage_hri.services.simulation.config import SimulationConfig
 from engage_hri.services.simulation.service import simulate

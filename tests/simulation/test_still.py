@@ -12,9 +12,9 @@ from engage_hri.schemas import keys
 from engage_hri.schemas.faults import InputRefused
 from engage_hri.schemas.units import Stamp
 from engage_hri.schemas.world import World
-from engage_hri.services.client import connect
-from engage_hri.services.memory_bus import MemoryHub
-from engage_hri.services.runtime import running
+from engage_hri.services.bus.memory import MemoryHub
+from engage_hri.services.client.robot import connect
+from engage_hri.services.runtime.service import running
 from engage_hri.services.simulation.still import EXAMPLE, load_world, show_world, tangram_world
 
 COMMANDS = (Path(__file__).parents[2] / "docs/commands.md").read_text()

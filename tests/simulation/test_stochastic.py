@@ -18,7 +18,7 @@ from engage_hri.services.simulation.config import Habits
 from engage_hri.services.simulation.perception import Scene
 from engage_hri.services.simulation.stochastic import StochasticHuman
 from engage_hri.services.simulation.table import Table
-from engage_hri.services.tangram_table import tangram_table
+from engage_hri.services.tangram.table import tangram_table
 
 ROBOT, HUMAN = "robot", "human"
 QUIET = {"looks_up_every": 1e6, "directs_every": 1e6, "backchannels": 0.0, "reports": 0.0}

@@ -5,7 +5,7 @@ from engage_hri.schemas.world import World
 from engage_hri.services.collaboration.task import Goal
 from engage_hri.services.generation.config import Condition
 from engage_hri.services.simulation.config import Habits
-from engage_hri.services.tangram_table import tangram_table
+from engage_hri.services.tangram.table import tangram_table
 from tests.scenario.playing import Record, play
 
 ENDS = {"completed", "failed", "preempted", "withdrawn", "superseded"}

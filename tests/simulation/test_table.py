@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from engage_hri.services.simulation.table import PieceMoved, Table
-from engage_hri.services.tangram_table import Pose, tangram_table
+from engage_hri.services.tangram.table import Pose, tangram_table
 
 
 def table() -> Table:

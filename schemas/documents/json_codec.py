@@ -1,0 +1,163 @@
+"""Blocks and fragments from JSON, and back; and `read`, which takes XML, too. Errors carry the JSON path.
+
+The form is that of the structs, as in the exported schemas, or what a language model writes (schemas/tool.py).
+Unknown keys are refused: a misspelled `turn_status` must not silently become a full turn.
+"""
+
+import json
+from collections import Counter
+from typing import Any, TypeVar
+
+import msgspec
+from msgspec import Struct
+
+from engage_hri.schemas.blocks import Block
+from engage_hri.schemas.check import sound
+from engage_hri.schemas.documents.xml_decode import decode_xml
+from engage_hri.schemas.documents.xml_names import snake
+from engage_hri.schemas.documents.xml_source import LARGEST
+from engage_hri.schemas.faults import Fault, InputRefused
+from engage_hri.schemas.fragments import TurnFragment
+from engage_hri.schemas.tool_call import from_tool, is_tool_input
+from engage_hri.schemas.utf8 import BYTE_ORDER_MARK, is_utf8, utf8
+
+T = TypeVar("T", Block, TurnFragment)
+
+UNNAMED = "fragment"
+_FRAGMENT_ONLY = frozenset(TurnFragment.__struct_fields__) - frozenset(Block.__struct_fields__)
+_UTF_16 = (b"\xff\xfe", b"\xfe\xff")
+
+
+def encode_json(thing: Block | TurnFragment) -> bytes:
+    return msgspec.json.format(msgspec.json.encode(thing), indent=2)
+
+
+def decode_json(data: bytes | str, source: str = "", unnamed: str = UNNAMED) -> Block | TurnFragment:
+    """One block or fragment. Raises InputRefused with source, JSON path, reason and advice.
+
+    Without `type` it is a fragment if it has a field that only fragments have, or holds a reference.
+    unnamed: the id of a language model's, which has none.
+    """
+    return _thing(_parsed(data, source), source, "$", unnamed)
+
+
+def read(data: bytes, source: str = "", unnamed: str = UNNAMED) -> tuple[Block | TurnFragment, ...]:
+    """Everything in a file: one XML document, one JSON object, or a JSON array of several. Raises InputRefused.
+
+    unnamed: the id of a language model's fragment, which has none; of several `<unnamed>-1`, `<unnamed>-2`...
+    """
+    start = data[:64].removeprefix(BYTE_ORDER_MARK).lstrip()
+    if start.startswith((b"<", b"\0<", *_UTF_16)):
+        return (decode_xml(data, source),)
+    if not start.startswith((b"{", b"[")):
+        advice = "BML or EBML (XML), or the same as JSON"
+        raise InputRefused(Fault(reason="neither XML nor JSON" if start else "empty", where=source, advice=advice))
+    parsed = _parsed(data, source)
+    if not isinstance(parsed, list):
+        return (_thing(parsed, source, "$", unnamed),)
+    return tuple(_thing(item, source, f"$[{index}]", f"{unnamed}-{index + 1}") for index, item in enumerate(parsed))
+
+
+def _parsed(data: bytes | str, source: str) -> Any:
+    if len(data) > LARGEST:
+        reason = f"{len(data)} bytes; at most {LARGEST} are read"
+        raise InputRefused(Fault(reason=reason, where=source, advice="split it into several blocks"))
+    # msgspec, too, refuses what is not UTF-8, but as another error, and it does not say where.
+    text = utf8(data, source) if isinstance(data, bytes) else data.removeprefix("\ufeff")
+    if not is_utf8(text):
+        raise InputRefused(Fault(reason="half a character (a surrogate without its other half)", where=source))
+    raw = text.encode()
+    try:
+        parsed = msgspec.json.decode(raw)
+        # Of a key that stands twice msgspec silently keeps the last: half of what was meant would be performed.
+        json.loads(raw, object_pairs_hook=_each_once, parse_int=str, parse_float=str)
+        return parsed
+    except RecursionError as error:
+        raise InputRefused(Fault(reason="nested too deep", where=source)) from error
+    except _Doubled as error:
+        raise InputRefused(Fault(reason=str(error), where=source, advice="an object has each key once")) from error
+    except msgspec.DecodeError as error:
+        line = _line(raw, error)
+        raise InputRefused(Fault(reason=str(error), where=source, line=line, advice="a JSON object")) from error
+
+
+class _Doubled(Exception):
+    pass
+
+
+def _each_once(pairs: list[tuple[str, Any]]) -> None:
+    for key, times in Counter(key for key, _ in pairs).items():
+        if times > 1:
+            raise _Doubled(f"key {key!r} stands {times} times in one object")
+
+
+def _line(raw: bytes, error: msgspec.DecodeError) -> int:
+    """Where it is: by its byte, or at the end where the document just stops; 0 where msgspec doesn't say."""
+    if "truncated" in str(error):
+        end = len(raw)
+    else:
+        byte = str(error).rpartition("(byte ")[2].rstrip(")")
+        if not byte.isdigit():
+            return 0
+        end = int(byte)
+    return raw.count(b"\n", 0, end) + 1
+
+
+def _thing(parsed: Any, source: str, path: str, unnamed: str) -> Block | TurnFragment:
+    if not isinstance(parsed, dict):
+        raise _refusal(f"expected an object, found {type(parsed).__name__}", path, source)
+    if is_tool_input(parsed):
+        return from_tool(parsed, unnamed, source, path)
+    kind = parsed.get("type") or ("fragment" if _looks_like_fragment(parsed) else "block")
+    if kind == "fragment":
+        return _blamed(parsed, TurnFragment, source, path)
+    if kind == "block":
+        return _blamed(parsed, Block, source, path)
+    raise _refusal(f"unknown type {kind!r}", f"{path}.type", source, 'use "fragment" or "block"')
+
+
+def _looks_like_fragment(parsed: dict[str, Any]) -> bool:
+    behaviors = parsed.get("behaviors")
+    refers = isinstance(behaviors, list) and any(
+        isinstance(each, dict) and each.get("type") == "reference" for each in behaviors
+    )
+    return refers or not _FRAGMENT_ONLY.isdisjoint(map(snake, parsed))
+
+
+def _blamed(parsed: dict[str, Any], kind: type[T], source: str, path: str) -> T:
+    """A refusal knows whose it is."""
+    try:
+        return _converted(parsed, kind, source, path)
+    except InputRefused as error:
+        id = parsed.get("id")
+        raise InputRefused(error.fault, id if isinstance(id, str) and id else None) from error
+
+
+def _converted(parsed: dict[str, Any], kind: type[T], source: str, path: str) -> T:
+    try:
+        thing = msgspec.convert({**parsed, "type": kind.__struct_config__.tag}, kind)
+    except msgspec.ValidationError as error:
+        reason, _, where = str(error).partition(" - at `$")
+        raise _refusal(reason, f"{path}{where.rstrip('`')}", source, "see docs/protocol.md") from error
+    except RecursionError as error:
+        raise _refusal("nested too deep", path, source) from error
+    _refuse_unknown_keys(parsed, thing, path, source)
+    return sound(thing, source, prefix=path, paths=True)
+
+
+def _refuse_unknown_keys(parsed: Any, decoded: Any, path: str, source: str) -> None:
+    if isinstance(decoded, Struct) and isinstance(parsed, dict):
+        fields = dict(zip(decoded.__struct_encode_fields__, decoded.__struct_fields__, strict=True))
+        for key, value in parsed.items():
+            if key in fields:
+                _refuse_unknown_keys(value, getattr(decoded, fields[key]), f"{path}.{key}", source)
+            elif key != decoded.__struct_config__.tag_field:
+                advice = f"did you mean {snake(key)!r}?" if snake(key) in fields else f"known: {', '.join(fields)}"
+                raise _refusal(f"unknown key {key!r}", f"{path}.{key}", source, advice)
+    elif isinstance(decoded, tuple) and isinstance(parsed, list):
+        for index, (value, item) in enumerate(zip(parsed, decoded, strict=True)):
+            _refuse_unknown_keys(value, item, f"{path}[{index}]", source)
+
+
+def _refusal(reason: str, path: str, source: str, advice: str = "") -> InputRefused:
+    return InputRefused(Fault(reason=reason, where=f"{source}: {path}" if source else path, advice=advice))

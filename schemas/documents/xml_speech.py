@@ -1,0 +1,220 @@
+"""Speech in XML: text, the marks inside it, and prosodic markup around it.
+
+White space is collapsed as a voice would; a mark's position counts the characters of the collapsed text before
+it. `xml:space="preserve"` keeps the text as it stands.
+"""
+
+import re
+from collections.abc import Callable
+from typing import NamedTuple
+from xml.sax.saxutils import escape, quoteattr
+
+from lxml import etree
+
+from engage_hri.schemas.behaviors import Mark, Speech, Timing
+from engage_hri.schemas.documents.xml_source import BML_1_0, CORE, EBML, Source, split
+from engage_hri.schemas.faults import InputRefused
+
+SSML = "http://www.w3.org/2001/10/synthesis"
+XML = "http://www.w3.org/XML/1998/namespace"
+MARKS = ("sync", "tm", "mark")
+_WHITE = re.compile("[ \t\r\n]+")
+
+
+class Spoken(NamedTuple):
+    text: str
+    marks: tuple[Mark, ...]
+    markup: str
+    timing: tuple[Timing, ...]
+    """Of marks that are tied to another sync point where they stand: `<sync ref="gaze-1:stroke"/>`."""
+
+
+def spoken(source: Source, speech: etree._Element, id: str) -> Spoken:
+    """What a <speech> says. Raises InputRefused for speech without text."""
+    texts = [child for child in speech if _kind(child) == "text"]
+    if len(texts) > 1:
+        raise source.refusal("more than one <text>", texts[1], advice="one <speech> for each")
+    content = texts[0] if texts else speech
+    reading = _Reading(source, id, preserve=content.get(f"{{{XML}}}space") == "preserve")
+    reading.content(content)
+    if not texts and not (said := reading.result("")).text and not said.marks:
+        if (description := _ssml(speech)) is None:
+            raise source.refusal(f"speech {id!r} says nothing", speech, advice="write <text>…</text> into it")
+        reading.content(description)
+    if texts and any(part.strip() for part in [speech.text or "", *(child.tail or "" for child in speech)]):
+        raise source.refusal("words beside <text>", speech, advice="put all words inside <text>")
+    return reading.result(_described(speech))
+
+
+def _described(speech: etree._Element) -> str:
+    """Prosodic markup from a BML 1.0 `<description type="application/ssml+xml">`, empty without one."""
+    description = _ssml(speech)
+    return "" if description is None else serialized(description)
+
+
+def _ssml(speech: etree._Element) -> etree._Element | None:
+    for child in speech:
+        if _kind(child) == "description" and child.get("type") == "application/ssml+xml":
+            return child[0] if len(child) and split(str(child[0].tag))[1] == "speak" else child
+    return None
+
+
+def _kind(element: etree._Element) -> str:
+    """Local name of a core element; empty for anybody else's."""
+    namespace, local = split(str(element.tag))
+    return local if namespace in CORE else ""
+
+
+class _Reading:
+    """Collects text and marks in one walk."""
+
+    def __init__(self, source: Source, id: str, *, preserve: bool) -> None:
+        self._said: list[str] = []
+        self._length = 0
+        self._source = source
+        self._id = id
+        self._preserve = preserve
+        self._marks: list[Mark] = []
+        self._timing: list[Timing] = []
+        self._prosodic: etree._Element | None = None
+
+    def content(self, element: etree._Element, *, nested: bool = False) -> None:
+        self._say(element.text or "")
+        for child in element:
+            namespace, local = split(str(child.tag))
+            known = namespace in CORE or namespace == SSML
+            if known and local in MARKS:
+                self._mark(child)
+            elif known and local != "description":
+                self._prosodic = element if self._prosodic is None and not nested else self._prosodic
+                self.content(child, nested=True)
+            self._say(child.tail or "")
+
+    def _say(self, words: str) -> None:
+        if not self._preserve:
+            words = _WHITE.sub(" ", words)
+            if not self._length or self._said[-1].endswith(" "):
+                words = words.removeprefix(" ")
+        if words:
+            self._said.append(words)
+            self._length += len(words)
+
+    def _mark(self, element: etree._Element) -> None:
+        id, ref = element.get("id") or element.get("name") or "", element.get("ref") or ""
+        is_tied = ":" in ref or (id and ref and ref != id)
+        if not id and ":" not in ref:
+            id = ref
+        if not id and ref.partition(":")[0].strip() == self._id:
+            id, ref = ref.partition(":")[2].strip(), ""
+        if not id and not ref:
+            raise self._source.refusal("a mark without a name", element, advice='<sync id="m1"/>')
+        id = id or f"sync-{len(self._marks) + 1}"
+        if is_tied and ref:
+            self._timing.append(Timing(id, ref))
+        self._marks.append(Mark(id, self._length))
+
+    def result(self, described: str) -> Spoken:
+        text = "".join(self._said)
+        if not self._preserve:
+            text = text.removesuffix(" ")
+        marks = tuple(Mark(mark.id, min(mark.position, len(text))) for mark in self._marks)
+        markup = described or ("" if self._prosodic is None else serialized(self._prosodic))
+        return Spoken(text, marks, markup, tuple(self._timing))
+
+
+def serialized(element: etree._Element) -> str:
+    """The inner XML without namespaces, as a voice takes it; marks as SSML's `<mark name>`."""
+    parts = [escape(element.text or "")]
+    for child in element:
+        local = split(str(child.tag))[1]
+        if local in MARKS:
+            parts.append(f"<mark name={quoteattr(child.get('id') or child.get('name') or child.get('ref') or '')}/>")
+        elif local != "description":
+            inner = serialized(child)
+            opening = f"{local}{''.join(_attribute(str(name), str(value)) for name, value in child.items())}"
+            parts.append(f"<{opening}>{inner}</{local}>" if inner else f"<{opening}/>")
+        parts.append(escape(child.tail or ""))
+    return "".join(parts)
+
+
+def _attribute(name: str, value: str) -> str:
+    namespace, local = split(name)
+    prefix = "xml:" if namespace == XML else ""
+    return f" {prefix}{local}={quoteattr(value)}" if prefix or not namespace else ""
+
+
+def fill(element: etree._Element, speech: Speech, namespace: str) -> None:
+    """Write text, marks and markup into an empty <speech>, so that `spoken` reads the same.
+
+    BML 1.0 has markup in a description beside the text, the drafts in it. What is not XML is an attribute of ours.
+    """
+    content = etree.SubElement(element, f"{{{namespace}}}text")
+    if namespace == BML_1_0 and (description := _description(speech)) is not None:
+        element.append(description)
+    elif namespace != BML_1_0 and (inline := _inline(speech, namespace)) is not None:
+        element.replace(content, inline)
+        return
+    elif speech.markup:
+        element.set(f"{{{EBML}}}markup", speech.markup)
+    if speech.text != " ".join(
+        filter(None, speech.text.translate(dict.fromkeys(map(ord, "\t\r\n"), " ")).split(" "))
+    ):
+        content.set(f"{{{XML}}}space", "preserve")
+    say = _append_text(content)
+    position = 0
+    tied = ties(speech, namespace)
+    for mark in speech.marks:
+        say(speech.text[position : mark.position])
+        position = mark.position
+        etree.SubElement(content, f"{{{namespace}}}sync", {"id": mark.id, **tied.get(mark.id, {})})
+    say(speech.text[position:])
+
+
+def ties(speech: Speech, namespace: str) -> dict[str, dict[str, str]]:
+    """The timing of marks that can stand where they do, so that it is read again in the same order."""
+    order = [mark.id for mark in speech.marks]
+    timed = [timing.sync for timing in speech.timing if timing.sync in order]
+    ahead = [timing.sync for timing in speech.timing[: len(speech.timing) - len(timed)]]
+    is_last = not set(order).intersection(ahead) and timed == [id for id in order if id in timed]
+    if namespace != BML_1_0 or not is_last or any(timing.sync == timing.ref for timing in speech.timing):
+        return {}
+    return {timing.sync: {"ref": timing.ref} for timing in speech.timing if timing.sync in order}
+
+
+def _append_text(content: etree._Element) -> Callable[[str], None]:
+    def say(words: str) -> None:
+        if len(content):
+            content[-1].tail = words or None
+        else:
+            content.text = words or None
+
+    return say
+
+
+def _description(speech: Speech) -> etree._Element | None:
+    """The markup as SSML, if reading it back gives exactly this markup."""
+    if not speech.markup:
+        return None
+    raw = (
+        f'<description xmlns="{BML_1_0}" priority="1" type="application/ssml+xml">'
+        f'<speak xmlns="{SSML}">{speech.markup}</speak></description>'
+    )
+    try:
+        description = Source(raw).root
+    except InputRefused:
+        return None
+    return description if len(description) == 1 and serialized(description[0]) == speech.markup else None
+
+
+def _inline(speech: Speech, namespace: str) -> etree._Element | None:
+    """The markup as content of <text>, if reading it back gives exactly this speech."""
+    if not speech.markup:
+        return None
+    raw = f'<speech xmlns="{namespace}"><text>{speech.markup}</text></speech>'
+    try:
+        source = Source(raw)
+        read = spoken(source, source.root, speech.id)
+    except InputRefused:
+        return None  # not XML, or not the words of the text: it travels as an attribute
+    same = (read.text, read.marks, read.markup) == (speech.text, speech.marks, speech.markup)
+    return source.root[0] if same and not read.timing else None

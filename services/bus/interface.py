@@ -1,0 +1,397 @@
+"""The bus, as services see it: one interface, two implementations (`memory_bus`, `zenoh_bus`), one contract suite.
+
+A `Hub` is what a process opens once; each service joins it under its own name and gets a `Bus`. Delivery is by
+the class of the key (`schemas/keys.py`). Messages are frozen structs. Nothing here starts a thread.
+"""
+
+import asyncio
+import logging
+from abc import ABC, abstractmethod
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator
+from enum import Enum, auto
+from types import TracebackType
+from typing import Generic, Self, TypeVar
+
+import msgspec
+from msgspec import Struct
+
+from engage_hri.schemas import keys
+from engage_hri.schemas.blocks import Block, PerformBlock
+from engage_hri.schemas.documents.xml_decode import decode_xml
+from engage_hri.schemas.faults import EngageError, Fault, InputRefused
+from engage_hri.schemas.fragments import PerformFragment
+from engage_hri.schemas.messages import Message, decode
+from engage_hri.schemas.presence import PeerAlive, PeerGone
+from engage_hri.schemas.requests import Request, Unreadable, kind_of, life_of
+from engage_hri.schemas.status import BusHealth
+from engage_hri.schemas.units import Seconds, Stamp
+
+LOG = logging.getLogger("engage")
+"""What is written here at level ERROR is a bug, and fails a test that did not expect it."""
+
+
+class Keep(Enum):
+    """What a subscription keeps while its reader is busy."""
+
+    EVERY = auto()
+    LATEST = auto()
+    """Only the newest of each key."""
+
+
+class Received(Struct, frozen=True):
+    """A message as it arrived. source: the participant that published it. at: local time of arrival.
+
+    life: of the process or connection that it came from, where that is known. past: from before the subscription,
+    given to a late subscriber as the class of its key says.
+    """
+
+    key: str
+    message: Message
+    source: str
+    at: Seconds
+    past: bool = False
+    life: str = ""
+
+
+T = TypeVar("T")
+
+
+class Reading(ABC, Generic[T]):
+    """What comes one by one: `next`, or `async for` until that has no more; `with` closes it."""
+
+    @abstractmethod
+    async def next(self, until: Seconds | None = None, /) -> T | None:
+        """The next one; None if there is none by then, or none any more."""
+
+    @abstractmethod
+    def close(self) -> None:
+        """Nothing comes any more."""
+
+    def __aiter__(self) -> Self:
+        return self
+
+    async def __anext__(self) -> T:
+        one = await self.next()
+        if one is None:
+            raise StopAsyncIteration
+        return one
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+
+KEYS_KEPT = 4096
+"""How many keys a subscription remembers: clients come and go, each with its own."""
+
+
+class Subscription(Reading[Received]):
+    """A bounded queue of received messages, in order across all its keys; read it with `async for` or `next`.
+
+    Used by one task at a time. When full the oldest message is dropped and counted in `overflowed`.
+    """
+
+    def __init__(
+        self, patterns: Iterable[str], keep: Keep, capacity: int, on_close: Callable[["Subscription"], None]
+    ) -> None:
+        self.patterns = tuple(patterns)
+        self.keep = keep
+        self.capacity = capacity
+        self.overflowed = 0
+        self._queue: deque[Received] = deque()
+        self._waiting: asyncio.Future[None] | None = None
+        self._on_close = on_close
+        self._closed = False
+        self._carriers: dict[str, str | None] = {}
+
+    def wants(self, key: str) -> bool:
+        try:  # asked for every message and subscription
+            return self._carriers[key] is not None
+        except KeyError:
+            return self.carrier(key) is not None
+
+    def carrier(self, key: str) -> str | None:
+        """The first pattern that includes the key: each message comes once, however many patterns include it."""
+        if key not in self._carriers:
+            if len(self._carriers) >= KEYS_KEPT:
+                self._carriers.clear()
+            self._carriers[key] = next((pattern for pattern in self.patterns if keys.matches(pattern, key)), None)
+        return self._carriers[key]
+
+    def offer(self, received: Received) -> None:
+        """For the bus: put a message in the queue."""
+        if self._closed:
+            return
+        if self.keep is Keep.LATEST:
+            for index, queued in enumerate(self._queue):
+                if queued.key == received.key:
+                    del self._queue[index]
+                    break
+        elif len(self._queue) >= self.capacity:
+            self._queue.popleft()
+            self.overflowed += 1
+        self._queue.append(received)
+        self._wake()
+
+    def _wake(self) -> None:
+        if self._waiting is not None and not self._waiting.done():
+            self._waiting.set_result(None)
+
+    def __len__(self) -> int:
+        return len(self._queue)
+
+    @property
+    def is_over(self) -> bool:
+        """Closed, and read to its end: `next` has nothing more, and does not wait."""
+        return self._closed and not self._queue
+
+    async def next(self, deadline: Seconds | None = None) -> Received | None:
+        """The next message, or None once loop time has reached `deadline` with nothing waiting, or after `close`."""
+        loop = asyncio.get_running_loop()
+        while not self._queue and not self._closed:
+            if deadline is not None and loop.time() >= deadline:
+                return None
+            self._waiting = waiting = loop.create_future()
+            timer = None if deadline is None else loop.call_at(deadline, self._wake)
+            try:
+                await waiting
+            finally:
+                self._waiting = None
+                if timer is not None:
+                    timer.cancel()
+        return self._queue.popleft() if self._queue else None
+
+    def close(self) -> None:
+        if not self._closed:
+            self._closed = True
+            self._on_close(self)
+            self._wake()
+
+
+Answer = Callable[[Message], Message]
+
+
+class Bus(ABC):
+    """One participant's view of the bus.
+
+    robot: the namespace. name: who this is; appears as `Received.source` and on its liveliness token.
+    role: what it may be to the others, one of `keys.ROLES`; stands in the keys of its commands.
+    clock: the clock that `now` reads, the same for all processes that can compare their times directly.
+    run: which life of the participant this is. failures: how often something went wrong here that was contained.
+    """
+
+    robot: str
+    name: str
+    role: str
+    clock: str
+    run: str
+    failures: int = 0
+    _life_numbers: Iterator[int]
+    """What no former participant of this name in this run has used."""
+
+    @property
+    @abstractmethod
+    def health(self) -> BusHealth:
+        """How the connection is doing."""
+
+    @abstractmethod
+    def now(self) -> Seconds:
+        """Loop time."""
+
+    def stamp(self, at: Seconds | None = None) -> Stamp:
+        """Now, or `at`, on this clock."""
+        return Stamp(self.clock, self.now() if at is None else at)
+
+    @abstractmethod
+    def local(self, stamp: Stamp) -> Seconds:
+        """The stamp as local loop time, through the estimated offset of its clock."""
+
+    def new_life(self) -> str:
+        """A life of its own for each of the requesters on this bus, so that their ids need not differ."""
+        return life_of(self.run, next(self._life_numbers))
+
+    # -- what goes wrong ------------------------------------------------------------------------------------------
+
+    def containing(self, what: object, then: Callable[[Fault], None] | None = None) -> "Containing":
+        """An exception in the body of `with` ends nothing else: it is logged, counted and told as a fault.
+
+        what: is being done, for the reader of the fault: text, or the message that is being taken. then: ends what
+        the exception makes impossible.
+        """
+        return Containing(self, what, then)
+
+    def failed(self, error: BaseException, what: object) -> Fault:
+        """Log, count and tell an exception that nobody has foreseen."""
+        reason = error.fault.reason if isinstance(error, EngageError) else _text(error)
+        fault = Fault(
+            reason=reason, where=_told(what), advice="this is a bug: the log has its traceback", service=self.name
+        )
+        self.failures += 1
+        LOG.error("%s: %s", self.name, fault, exc_info=error)
+        self._complain(fault)
+        return fault
+
+    def report(self, fault: Fault) -> None:
+        """Log, count and tell a mistake of this participant."""
+        self.failures += 1
+        LOG.error("%s: %s", self.name, fault)
+        self._complain(fault)
+
+    def _complain(self, fault: Fault) -> None:
+        try:
+            self.publish(keys.fault(self.name), fault)
+        except Exception:
+            LOG.exception("%s: the fault could not be told", self.name)
+
+    @abstractmethod
+    def publish(self, key: str, message: Message) -> None:
+        """Send to all subscribers of `key`, this process' own included. Never raises for want of a listener."""
+
+    @abstractmethod
+    def subscribe(self, *patterns: str, keep: Keep = Keep.EVERY, capacity: int = 4096) -> Subscription:
+        """Key expressions to one queue. Past messages come first as the class of each key says.
+
+        A pattern of class `alive` delivers `PeerAlive` for all who are there, then every change.
+        """
+
+    @abstractmethod
+    async def query(self, key: str, message: Message, timeout: Seconds = 1.0) -> Message:
+        """Ask the server of an `rpc` key. Raises NoReply (absent, late) or InputRefused (it answered a Fault)."""
+
+    @abstractmethod
+    def answer(self, key: str, answer: Answer, *, empty: Message | None = None) -> None:
+        """Serve an `rpc` key for the life of this bus. `answer` is quick and pure; an EngageError becomes a Fault.
+
+        empty: the question that a query without payload is, as programs that know only Zenoh send it.
+        """
+
+    @abstractmethod
+    def declare_alive(self) -> None:
+        """Show this participant's liveliness token: to be called once its subscribers stand."""
+
+    @abstractmethod
+    async def leave(self) -> None:
+        """Withdraw subscriptions, answers and token. Idempotent."""
+
+
+class Containing:
+    """See `Bus.containing`. A class, for it stands around each message."""
+
+    __slots__ = ("_bus", "_then", "_what")
+
+    def __init__(self, bus: Bus, what: object, then: Callable[[Fault], None] | None) -> None:
+        self._bus = bus
+        self._what = what
+        self._then = then
+
+    def __enter__(self) -> None:
+        pass
+
+    def __exit__(self, kind: object, error: BaseException | None, trace: object) -> bool:
+        if error is None or not isinstance(error, Exception | asyncio.CancelledError) or is_asked_to_stop():
+            return False
+        fault = self._bus.failed(error, self._what)
+        if self._then is not None:
+            try:
+                self._then(fault)
+            except Exception as worse:
+                self._bus.failed(worse, "what follows from the fault before")
+        return True
+
+
+def _text(error: BaseException) -> str:
+    try:
+        return f"{type(error).__name__}: {error}"
+    except Exception:  # it can't even say what it is
+        return type(error).__name__
+
+
+def is_asked_to_stop() -> bool:
+    """Has somebody cancelled this task? Else a CancelledError in it is a mistake of what it awaits."""
+    task = asyncio.current_task()
+    return task is not None and task.cancelling() > 0
+
+
+def _told(what: object) -> str:
+    match what:
+        case Received(key=key, source=source):
+            return f"{key} from {source or 'a stranger'}"
+        case Request(id=id):
+            return f"{kind_of(what)} {id}"
+    return str(what)
+
+
+class Hub(ABC):
+    """A process' connection to the bus."""
+
+    robot: str
+
+    @abstractmethod
+    def join(self, name: str, role: str = "manager") -> Bus:
+        """A participant's own view. Names are unique on a robot's bus; a client makes its own unique."""
+
+    @abstractmethod
+    async def vacant(self, *names: str) -> None:
+        """Wait until nobody else is there under these names, for one who has died may still seem to be.
+
+        Raises InputRefused for those who stay.
+        """
+
+    @abstractmethod
+    async def close(self) -> None: ...
+
+    async def __aenter__(self) -> Self:
+        return self
+
+    async def __aexit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        await self.close()
+
+
+LOCAL = (PeerAlive, PeerGone, Unreadable)
+"""Messages that no payload may hold: who could send them could end what others have asked for."""
+
+
+def read_payload(payload: bytes, encoding: str, key: str, source: str) -> Message:
+    """The message that another program sent, in any encoding. Raises InputRefused.
+
+    XML holds a block or a fragment; the request for it goes by its id.
+    """
+    if encoding.partition(";")[0] not in ("application/xml", "text/xml"):
+        message = decode(payload, encoding)
+        if isinstance(message, LOCAL):
+            reason = f"{type(message).__name__} is what each bus makes for its own subscribers; it is never sent"
+            raise InputRefused(Fault(reason=reason))
+        return message
+    thing = decode_xml(payload, key)
+    requester = keys.requester_of(key) or source
+    if isinstance(thing, Block):
+        return PerformBlock(id=thing.id, requester=requester, block=thing)
+    return PerformFragment(id=thing.id, requester=requester, fragment=thing)
+
+
+class _Head(Struct):
+    """As much of a request as its answer needs."""
+
+    id: str = ""
+    life: str = ""
+    type: str = ""
+
+
+def unreadable(error: EngageError, key: str, payload: bytes = b"", encoding: str = "") -> Unreadable | None:
+    """What the server of `key` gets to hear of a bad payload: it owes an answer. None on keys that have no server."""
+    if keys.key_class(key) != "cmd":
+        return None
+    codec = msgspec.json if encoding.startswith("application/json") else msgspec.msgpack
+    try:
+        head = codec.decode(payload, type=_Head)
+    except (msgspec.DecodeError, UnicodeDecodeError, RecursionError):
+        head = _Head()
+    id = getattr(error, "block", None) or head.id
+    return Unreadable(id=id, life=head.life, kind=head.type, fault=error.fault)

@@ -1,0 +1,295 @@
+"""The bus inside one process: same classes and guarantees as Zenoh, on the loop's clock, with faults on demand."""
+
+import asyncio
+import random
+from collections import deque
+from itertools import count
+from typing import NamedTuple
+
+import msgspec
+from msgspec import Struct
+
+from engage_hri.schemas import keys
+from engage_hri.schemas.faults import EngageError, Fault, InputRefused, NoReply
+from engage_hri.schemas.messages import Message, decode, encode, published
+from engage_hri.schemas.presence import PeerAlive, PeerGone
+from engage_hri.schemas.status import BusHealth
+from engage_hri.schemas.units import Probability, Seconds, Stamp
+from engage_hri.services.bus.interface import (
+    LOCAL,
+    Answer,
+    Bus,
+    Hub,
+    Keep,
+    Received,
+    Subscription,
+    read_payload,
+    unreadable,
+)
+
+
+class Faults(Struct, frozen=True, kw_only=True):
+    """What goes wrong with a message between different participants. delay: longest extra latency; order holds."""
+
+    loss: Probability = 0.0
+    duplicate: Probability = 0.0
+    delay: Seconds = 0.0
+
+
+NONE = Faults()
+
+
+class _Past(NamedTuple):
+    """A message that late subscribers still get. number: of all that were sent, so states keep their place."""
+
+    number: int
+    received: Received
+
+
+class MemoryHub(Hub):
+    """seed: of the faults. Messages go through their encoding, so what works here works on a wire."""
+
+    def __init__(self, robot: str = "robot", *, faults: Faults | None = None, seed: int = 0) -> None:
+        self.robot = robot
+        self.faults = faults or NONE
+        self._chance = random.Random(seed)
+        self._loop = asyncio.get_running_loop()
+        self._buses: dict[str, MemoryBus] = {}
+        self.sent = 0
+        self._lives = 0
+        self._state: dict[str, _Past] = {}
+        self._past: deque[_Past] = deque(maxlen=4096)
+        self._askers: list[asyncio.Future[None]] = []
+        self._cut: set[str] = set()
+        self._last_arrival: dict[tuple[str, str], Seconds] = {}
+
+    def join(self, name: str, role: str = "manager") -> "MemoryBus":
+        if name in self._buses:
+            raise ValueError(f"participant {name!r} is on the bus already")
+        self._lives += 1
+        self._buses[name] = bus = MemoryBus(self, name, role, run=str(self._lives))
+        return bus
+
+    async def vacant(self, *names: str) -> None:
+        """Whoever has died is gone at once; `join` refuses a name that is taken."""
+
+    async def close(self) -> None:
+        for bus in list(self._buses.values()):
+            await bus.leave()
+
+    def partition(self, *names: str) -> None:
+        """Cut these participants off from the others, until `heal`. Liveliness stays, as in a short cut."""
+        self._cut = set(names)
+
+    def heal(self) -> None:
+        self._cut = set()
+        self.wake_askers()
+
+    def kill(self, name: str) -> None:
+        """End a participant as SIGKILL would: its token goes, nothing it sends or should get arrives any more."""
+        if bus := self._buses.get(name):
+            bus.vanish()
+
+    # -- for MemoryBus ------------------------------------------------------------------------------------------
+
+    def send(self, sender: str, key: str, message: Message) -> None:
+        if isinstance(message, LOCAL):
+            raise TypeError(f"{type(message).__name__} is never sent")
+        payload, encoding = published(message)
+        try:
+            message = decode(payload, encoding)
+        except InputRefused as error:  # as on a wire: those who get it refuse it, not who has sent it
+            self._refuse(key, error, payload, encoding)
+            return
+        life = self._buses[sender].run
+        self._pass_on(sender, Received(key, message, sender, self._loop.time(), life=life))
+
+    def inject(self, key: str, payload: bytes, encoding: str) -> None:
+        """A payload from outside, as another program would send it. A bad one is answered with a Fault."""
+        try:
+            message = read_payload(payload, encoding, key, "")
+        except InputRefused as error:
+            self._refuse(key, error, payload, encoding)
+        else:
+            self._pass_on("", Received(key, message, "", self._loop.time()))
+
+    def _refuse(self, key: str, error: InputRefused, payload: bytes, encoding: str) -> None:
+        for bus in [bus for bus in self._buses.values() if bus.wants(key)]:
+            bus.publish(keys.fault(bus.name), msgspec.structs.replace(error.fault, where=key, service=bus.name))
+        refused = unreadable(error, key, payload, encoding)
+        if refused is not None and (server := self._buses.get(keys.server_of(key))):
+            self.sent += 1
+            server.deliver(Received(key, refused, "", self._loop.time()), self.sent)
+
+    def _pass_on(self, sender: str, received: Received) -> None:
+        self.sent += 1
+        past = _Past(self.sent, received)
+        kind = keys.key_class(received.key)
+        if kind == "state":
+            self._state[received.key] = past
+        elif kind in ("cmd", "evt"):
+            self._past.append(past)
+        is_sound = self.faults == NONE
+        for bus in tuple(self._buses.values()):
+            if self._cut and self._is_cut(sender, bus.name):
+                continue
+            if is_sound or bus.name == sender:
+                bus.deliver(received, past.number)
+            else:
+                self._carry(past, sender, bus)
+
+    def _carry(self, past: _Past, sender: str, bus: "MemoryBus") -> None:
+        """As well as the faults let it."""
+        if self._chance.random() < self.faults.loss:
+            return
+        copies = 2 if self._chance.random() < self.faults.duplicate else 1
+        for _ in range(copies):
+            arrival = self._loop.time() + self._chance.uniform(0.0, self.faults.delay)
+            link = (sender, bus.name)
+            self._last_arrival[link] = arrival = max(arrival, self._last_arrival.get(link, 0.0))
+            self._loop.call_at(arrival, self._arrive, bus, past, arrival)
+
+    def _arrive(self, bus: "MemoryBus", past: _Past, at: Seconds) -> None:
+        bus.deliver(msgspec.structs.replace(past.received, at=at), past.number)
+
+    def _is_cut(self, one: str, other: str) -> bool:
+        return (one in self._cut) != (other in self._cut)
+
+    def replay(self, name: str, subscription: Subscription) -> int:
+        """What a late subscriber still gets: who is there, then the past in order. Returns its last number."""
+        now = self._loop.time()
+        for bus in self._buses.values():
+            if bus.is_alive and subscription.wants(key := keys.alive(bus.name)):
+                subscription.offer(Received(key, PeerAlive(participant=bus.name, run=bus.run), bus.name, now))
+        recent = [past for past in self._past if now - past.received.at <= keys.HISTORY_MAX_AGE]
+        for past in sorted((*recent, *self._state.values()), key=lambda past: past.number):
+            received = past.received
+            if subscription.wants(received.key) and not self._is_cut(name, received.source):
+                subscription.offer(msgspec.structs.replace(received, at=now, past=True))
+        return self.sent
+
+    @property
+    def alive(self) -> tuple[str, ...]:
+        return tuple(sorted(bus.name for bus in self._buses.values() if bus.is_alive))
+
+    def announce(self, name: str, message: PeerAlive | PeerGone) -> None:
+        for bus in list(self._buses.values()):
+            bus.deliver(Received(keys.alive(name), message, name, self._loop.time()), self.sent + 1)
+
+    async def answerer(self, key: str, asker: str, deadline: Seconds) -> "MemoryBus | None":
+        """Who serves the key, as soon as somebody does; None at the deadline."""
+        while self._loop.time() < deadline:
+            for bus in self._buses.values():
+                if key in bus.answers and not self._is_cut(asker, bus.name):
+                    return bus
+            change: asyncio.Future[None] = self._loop.create_future()
+            self._askers.append(change)
+            timer = self._loop.call_at(deadline, self.wake_askers)
+            try:
+                await change
+            finally:
+                timer.cancel()
+        return None
+
+    def wake_askers(self) -> None:
+        """Somebody answers now, or may be heard again, or it is too late: look again."""
+        for asker in self._askers:
+            if not asker.done():
+                asker.set_result(None)
+        self._askers.clear()
+
+    def forget(self, name: str) -> None:
+        """A process takes its states with it; the events of the last seconds are kept here."""
+        self._buses.pop(name, None)
+        self._state = {key: past for key, past in self._state.items() if past.received.source != name}
+
+
+class MemoryBus(Bus):
+    clock = "loop"
+
+    def __init__(self, hub: MemoryHub, name: str, role: str, run: str) -> None:
+        self.robot = hub.robot
+        self.name = name
+        self.role = role
+        self.run = run
+        self._life_numbers = count(1)
+        self.is_alive = False
+        self.answers: dict[str, Answer] = {}
+        self._hub = hub
+        self._loop = asyncio.get_running_loop()
+        self._subscriptions: dict[Subscription, int] = {}
+        self._overflowed = 0
+        self._gone = False
+
+    @property
+    def health(self) -> BusHealth:
+        overflowed = self._overflowed + sum(subscription.overflowed for subscription in self._subscriptions)
+        health = BusHealth(peers=self._hub.alive, passed=self._hub.sent, overflowed=overflowed)
+        return msgspec.structs.replace(health, failures=self.failures)
+
+    def now(self) -> Seconds:
+        return self._loop.time()
+
+    def local(self, stamp: Stamp) -> Seconds:
+        return stamp.seconds
+
+    def publish(self, key: str, message: Message) -> None:
+        if not self._gone:
+            self._hub.send(self.name, key, message)
+
+    def wants(self, key: str) -> bool:
+        return any(subscription.wants(key) for subscription in self._subscriptions)
+
+    def deliver(self, received: Received, number: int) -> None:
+        key = received.key
+        for subscription, replayed in self._subscriptions.items():
+            # What was still on its way when the subscription came has been replayed to it.
+            if number > replayed and subscription.wants(key):
+                subscription.offer(received)
+
+    def subscribe(self, *patterns: str, keep: Keep = Keep.EVERY, capacity: int = 4096) -> Subscription:
+        subscription = Subscription(patterns, keep, capacity, self._drop)
+        if not self._gone:
+            self._subscriptions[subscription] = self._hub.replay(self.name, subscription)
+        return subscription
+
+    def _drop(self, subscription: Subscription) -> None:
+        if self._subscriptions.pop(subscription, None) is not None:
+            self._overflowed += subscription.overflowed
+
+    async def query(self, key: str, message: Message, timeout: Seconds = 1.0) -> Message:
+        await asyncio.sleep(0)
+        server = None if self._gone else await self._hub.answerer(key, self.name, self.now() + timeout)
+        if server is None:
+            raise NoReply(Fault(reason=f"no reply within {timeout} s", where=key, advice="is its server running?"))
+        answer = server.answers[key]
+        try:
+            return decode(encode(answer(decode(encode(message)))))
+        except EngageError as error:
+            raise InputRefused(error.fault) from error
+        except (Exception, asyncio.CancelledError) as error:  # nothing is awaited here: it is the server's mistake
+            raise InputRefused(server.failed(error, f"a question on {key}")) from error
+
+    def answer(self, key: str, answer: Answer, *, empty: Message | None = None) -> None:
+        self.answers[key] = answer
+        self._hub.wake_askers()
+
+    def declare_alive(self) -> None:
+        if not self.is_alive and not self._gone:
+            self.is_alive = True
+            self._hub.announce(self.name, PeerAlive(participant=self.name, run=self.run))
+
+    async def leave(self) -> None:
+        for subscription in list(self._subscriptions):
+            subscription.close()
+        self.vanish()
+
+    def vanish(self) -> None:
+        if self._gone:
+            return
+        self._gone = True
+        self._subscriptions.clear()
+        self._hub.forget(self.name)
+        if self.is_alive:
+            self.is_alive = False
+            self._hub.announce(self.name, PeerGone(participant=self.name))

@@ -1,0 +1,321 @@
+"""The bus over Zenoh: one session per process, its participants beside each other on it.
+
+Zenoh carries; what it leaves open is settled here and in `zenoh_order`: order across keys, history for late
+subscribers, loss in a cut (it never raises), who is there, and answers that do not come.
+"""
+
+import asyncio
+import time
+from collections.abc import Sequence
+from itertools import count
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import zenoh
+
+from engage_hri.schemas import keys
+from engage_hri.schemas.faults import EngageError, Fault, InputRefused, NoReply
+from engage_hri.schemas.messages import Message, decode, encode, encoding_of, published
+from engage_hri.schemas.status import BusHealth
+from engage_hri.schemas.units import Seconds, Stamp
+from engage_hri.services.bus.interface import LOG, Answer, Bus, Hub, Keep, Received, Subscription
+from engage_hri.services.bus.zenoh.clocks import Clocks
+from engage_hri.services.bus.zenoh.order import Envelope, Ledger, Pulse
+from engage_hri.services.bus.zenoh.peers import Peers, finish, pack
+from engage_hri.services.bus.zenoh.readers import Readers
+from engage_hri.services.bus.zenoh.session import QOS, RENDEZVOUS, STREAM_QOS, Doorway, open_session
+from engage_hri.services.bus.zenoh.visitors import Visitors, form_asked, in_form, refuse
+
+FIRST_PULSE: Seconds = 0.25
+NEXT_PULSE: Seconds = 1.0
+OPENING: Seconds = 0.5
+"""How long `open_hub` waits for the first acquaintance: who leaves before anybody knows him is heard by nobody."""
+
+
+ASK_AGAIN: Seconds = 0.5
+"""How long a question goes unanswered before it is asked once more."""
+VACANCY: Seconds = 4.0
+"""How long one who is dead may seem to be there: the lease of a silent link, and as long again."""
+QUIET: Seconds = 0.25
+"""Who is found through others has been found when nobody has come for so long."""
+
+
+async def open_hub(
+    robot: str,
+    *,
+    connect: Sequence[str] = (),
+    listen: Sequence[str] = (),
+    rendezvous: str | None = RENDEZVOUS,
+    mode: str = "peer",
+) -> "ZenohHub":
+    """Join the bus of `robot`. Processes may start in any order: waits for nobody for longer than `OPENING`.
+
+    connect, listen: Zenoh endpoints (`tcp/HOST:PORT`). Without any, the processes of this machine find one another
+    at `rendezvous`. Raises InputRefused when an endpoint is misspelled, RunFailed when it is taken.
+    """
+    # Blocks the loop for milliseconds, before its work has started: Zenoh has no async API, and we start no thread.
+    session, calls = open_session(robot, connect, listen, None if connect or listen else rendezvous, mode)
+    hub = ZenohHub(robot, session)
+    if calls:
+        await hub.peers.settle(asyncio.get_running_loop().time() + OPENING)
+    return hub
+
+
+class ZenohHub(Hub):
+    def __init__(self, robot: str, session: zenoh.Session) -> None:
+        self.robot = robot
+        self.run = str(session.zid())
+        self.session = session
+        self.doorway = Doorway(self.failed)
+        self.life_numbers = count(1)
+        self._loop = asyncio.get_running_loop()
+        self.clocks = Clocks(_clock_name(self._loop, self.run), self._loop.time)
+        self._ledger = Ledger(self.run)
+        self._publishers: dict[str, zenoh.Publisher] = {}
+        self._buses: dict[str, ZenohBus] = {}
+        self._pulse: asyncio.TimerHandle | None = None
+        self._closed = False
+        self.peers = Peers(session, self.doorway, self._ledger, self.clocks)
+        self.readers = Readers(session, self.doorway, self._ledger, self.peers)
+        self._visitors = Visitors(session, self.doorway)
+        self.peers.stand(self.readers.process_came, self.readers.participant_changed)
+
+    @property
+    def health(self) -> BusHealth:
+        """Of the process, without what is each participant's own."""
+        traffic = self.doorway.traffic
+        return BusHealth(
+            peers=tuple(sorted(self.peers.names)), refused=self.readers.refused,
+            passed=traffic.passed, dropped=traffic.dropped, depth=traffic.depth, lag=traffic.lag,
+            waiting=self.doorway.waiting,
+        )  # fmt: skip
+
+    def join(self, name: str, role: str = "manager") -> "ZenohBus":
+        if name in self._buses:
+            raise ValueError(f"participant {name!r} is on the bus already")
+        self._buses[name] = bus = ZenohBus(self, name, role)
+        return bus
+
+    async def vacant(self, *names: str) -> None:
+        await self.peers.rest(QUIET)
+        deadline = self._loop.time() + VACANCY
+        while taken := sorted(set(names) & set(self.peers.names)):
+            if not await self.peers.change(deadline):
+                reason = f"robot {self.robot!r} has {'this' if len(taken) == 1 else 'these'} on the bus already"
+                advice = "stop what runs there, or give this one another --robot or another endpoint"
+                raise InputRefused(Fault(reason=reason, where=", ".join(taken), advice=advice))
+
+    def forget(self, name: str) -> None:
+        self._buses.pop(name, None)
+
+    def failed(self, error: Exception, what: str) -> None:
+        """Something went wrong before it was known which participant it concerns: the first one says so."""
+        if (bus := next(iter(self._buses.values()), None)) is not None:
+            bus.failed(error, what)
+        else:
+            LOG.error("%s: %s", what, error, exc_info=error)
+
+    async def close(self) -> None:
+        if self._closed:
+            return
+        for bus in list(self._buses.values()):
+            await bus.leave()
+        await self.peers.flush()
+        self._closed = True
+        self.doorway.close()
+        if self._pulse is not None:
+            self._pulse.cancel()
+        self.readers.close()
+        self._visitors.close()
+        self.peers.close()
+        for publisher in self._publishers.values():
+            publisher.undeclare()  # type: ignore[no-untyped-call]
+        self.session.close()  # type: ignore[no-untyped-call]
+
+    # -- publishing ---------------------------------------------------------------------------------------------
+
+    def publish(self, bus: "ZenohBus", key: str, message: Message) -> None:
+        ordered = keys.key_class(key) != "stream"
+        now = self._loop.time()
+        payload, encoding = published(message)
+        stamp = self.session.new_timestamp()
+        if ordered:
+            written = self._ledger.write(key, encoding, payload, bus.name, self.clocks.own, now)
+            envelope = written.envelope
+            self._visitors.note(written, stamp)
+            if self._pulse is None:
+                self._pulse = self._loop.call_later(FIRST_PULSE, self._send_pulse)
+        else:
+            envelope = Envelope(bus.name, self.clocks.own, now, self.run)
+        self._publisher(key, ordered).put(payload, encoding=encoding, attachment=pack(envelope), timestamp=stamp)
+        self.readers.offer(Received(key, message, bus.name, now, life=self.run))
+
+    def _publisher(self, key: str, ordered: bool) -> zenoh.Publisher:
+        publisher = self._publishers.get(key)
+        if publisher is None:
+            qos = QOS if ordered else STREAM_QOS
+            publisher = self.session.declare_publisher(key, allowed_destination=zenoh.Locality.REMOTE, **qos)
+            self._publishers[key] = publisher
+        return publisher
+
+    def _send_pulse(self) -> None:
+        """Tell the recent counts, a few times: a receiver that lost the last message of a burst sees it by them."""
+        counts = self._ledger.recent(self._loop.time())
+        self._pulse = self._loop.call_later(NEXT_PULSE, self._send_pulse) if counts else None
+        if counts:
+            self._publisher(keys.own(self.run, "pulse"), True).put(
+                pack(Pulse(counts)), encoding="application/msgpack"
+            )
+
+
+class ZenohBus(Bus):
+    def __init__(self, hub: ZenohHub, name: str, role: str) -> None:
+        self.robot = hub.robot
+        self.name = name
+        self.role = role
+        self._life_numbers = hub.life_numbers
+        self.clock = hub.clocks.own
+        self.run = hub.run
+        self._hub = hub
+        self._loop = asyncio.get_running_loop()
+        self._subscriptions: list[Subscription] = []
+        self._answers: list[Any] = []
+        self._overflowed = 0
+        self._token: Any = None
+        self._gone = False
+
+    @property
+    def health(self) -> BusHealth:
+        overflowed = self._overflowed + sum(subscription.overflowed for subscription in self._subscriptions)
+        gaps, lost = self._hub.readers.missed(self)
+        return msgspec.structs.replace(
+            self._hub.health, overflowed=overflowed, gaps=gaps, lost=lost, failures=self.failures
+        )
+
+    def now(self) -> Seconds:
+        return self._loop.time()
+
+    def local(self, stamp: Stamp) -> Seconds:
+        return self._hub.clocks.local(stamp)
+
+    def publish(self, key: str, message: Message) -> None:
+        if not self._gone:
+            self._hub.publish(self, key, message)
+
+    def subscribe(self, *patterns: str, keep: Keep = Keep.EVERY, capacity: int = 4096) -> Subscription:
+        subscription = Subscription(patterns, keep, capacity, self._drop)
+        self._subscriptions.append(subscription)
+        self._hub.readers.attach(self, subscription)
+        return subscription
+
+    def _drop(self, subscription: Subscription) -> None:
+        if subscription in self._subscriptions:
+            self._subscriptions.remove(subscription)
+            self._overflowed += subscription.overflowed
+            self._hub.readers.detach(subscription)
+
+    async def query(self, key: str, message: Message, timeout: Seconds = 1.0) -> Message:
+        deadline = self._loop.time() + timeout
+        payload, encoding = encode(message), encoding_of(message)
+        while self._loop.time() < deadline:
+            known = self._hub.peers.changes
+            reply = await self._ask(key, payload, encoding, deadline)
+            if reply is not None and reply.ok is not None:
+                return decode(reply.ok.payload.to_bytes(), str(reply.ok.encoding))
+            if reply is not None and reply.err is not None:
+                raise InputRefused(_fault(reply.err.payload.to_bytes(), str(reply.err.encoding)))
+            # Nobody serves it, or its server died over it: there is hope only if somebody comes.
+            if not await self._hub.peers.change(deadline, since=known):
+                break
+        raise NoReply(Fault(reason=f"no reply within {timeout} s", where=key, advice="is its server running?"))
+
+    async def _ask(self, key: str, payload: bytes, encoding: str, deadline: Seconds) -> zenoh.Reply | None:
+        """The first answer; None once every try has ended without one.
+
+        It is asked again, as a cut may swallow a question; answers change nothing, so a second one does no harm.
+        """
+        answered: asyncio.Future[zenoh.Reply | None] = self._loop.create_future()
+        going = 0
+
+        def settle(reply: zenoh.Reply | None) -> None:
+            if not answered.done():
+                answered.set_result(reply)
+
+        def replied(reply: zenoh.Reply) -> None:
+            # Zenoh's own errors, as that the time is up, are no answer of a server.
+            if reply.ok is not None or (reply.err is not None and _is_ours(str(reply.err.encoding))):
+                settle(reply)
+
+        def ended(_: Any) -> None:
+            nonlocal going
+            going -= 1
+            if not going:
+                settle(None)
+
+        while not answered.done():
+            left = deadline - self._loop.time()
+            going += 1
+            self._hub.peers.ask(key, payload, replied, ended, max(left, 0.01), encoding)
+            await asyncio.wait([answered], timeout=min(max(left, 0.0) + 0.1, ASK_AGAIN))
+        return answered.result()
+
+    def answer(self, key: str, answer: Answer, *, empty: Message | None = None) -> None:
+        def reply(query: zenoh.Query) -> None:
+            form = "json"
+            try:
+                form = form_asked(query)
+                asked = query.payload.to_bytes() if query.payload else b""
+                question = empty if empty is not None and not asked else decode(asked, str(query.encoding))
+                payload, encoding = in_form(answer(question), form)
+                query.reply(key, payload, encoding=encoding)
+            except EngageError as error:
+                refuse(query, error.fault, form)
+            except (Exception, asyncio.CancelledError) as error:
+                refuse(query, self.failed(error, f"a question on {key}"), form)
+            finally:
+                finish(query)
+
+        session = self._hub.session
+        self._answers.append(session.declare_queryable(key, self._hub.doorway.entrance(reply)))
+        # Whoever asked too early hears by this token that it is worth asking again.
+        self._answers.append(session.liveliness().declare_token(keys.own(self._hub.run, f"answers/{key}")))
+
+    def declare_alive(self) -> None:
+        if self._token is None and not self._gone:
+            token = keys.own(self._hub.run, f"alive/{self.name}")
+            self._token = self._hub.session.liveliness().declare_token(token)
+            self._hub.peers.note(self.name, self._hub.run, True)
+
+    async def leave(self) -> None:
+        if self._gone:
+            return
+        self._gone = True
+        for subscription in list(self._subscriptions):
+            subscription.close()
+        for declared in reversed(self._answers):
+            declared.undeclare()
+        if self._token is not None:
+            self._token.undeclare()
+            self._hub.peers.note(self.name, self._hub.run, False)
+        self._hub.forget(self.name)
+
+
+def _is_ours(encoding: str) -> bool:
+    return encoding.startswith("application/")
+
+
+def _fault(payload: bytes, encoding: str) -> Fault:
+    try:
+        fault = decode(payload, encoding)
+    except EngageError as error:
+        return error.fault
+    return fault if isinstance(fault, Fault) else Fault(reason=f"answered with {type(fault).__name__}")
+
+
+def _clock_name(loop: asyncio.AbstractEventLoop, run: str) -> str:
+    """Loop time is the machine's monotonic clock, one for all its processes since boot; other loops stand alone."""
+    boot = Path("/proc/sys/kernel/random/boot_id")
+    if abs(loop.time() - time.monotonic()) < 0.1 and boot.exists():
+        return f"boot-{boot.read_text()[:8]}"
+    return f"loop-{run[:8]}"

@@ -1,0 +1,216 @@
+"""Who else is on the bus, and what processes ask one another: the past, the time, and whether all has arrived."""
+
+import asyncio
+from collections.abc import Callable
+from contextlib import suppress
+from typing import Any
+
+import msgspec
+import zenoh
+
+from engage_hri.schemas import keys
+from engage_hri.schemas.units import Seconds
+from engage_hri.services.bus.zenoh.clocks import Clocks
+from engage_hri.services.bus.zenoh.order import Ledger, Missing, Past, Pulse
+from engage_hri.services.bus.zenoh.session import QOS, Doorway
+
+CATCH_UP: Seconds = 1.0
+"""How long a process may take to hand out its past."""
+FLUSH: Seconds = 2.0
+"""How long closing waits for the others to have everything: as long as a silent one counts as alive."""
+CLOCK_TRIPS = 5
+CLOCK_TIMEOUT: Seconds = 1.0
+
+BAD = (msgspec.DecodeError, UnicodeDecodeError)
+"""What decoding raises for bytes that are none of ours."""
+pack = msgspec.msgpack.encode
+_missings = msgspec.msgpack.Decoder(Missing)
+_pasts = msgspec.msgpack.Decoder(Past)
+_instants = msgspec.msgpack.Decoder(float)
+
+
+class Peers:
+    """Liveliness and the questions between processes.
+
+    processes: runs whose process is there. names: participants, each with the runs that carry it.
+    """
+
+    def __init__(
+        self,
+        session: zenoh.Session,
+        doorway: Doorway,
+        ledger: Ledger,
+        clocks: Clocks,
+    ) -> None:
+        self.processes: set[str] = set()
+        self.names: dict[str, set[str]] = {}
+        self.changes = 0
+        self.clocks = clocks
+        self._loop = asyncio.get_running_loop()
+        self._session = session
+        self._doorway = doorway
+        self._ledger = ledger
+        self._watchers: list[asyncio.Future[None]] = []
+        run = ledger.run
+        self._declared: tuple[Any, ...] = (
+            session.declare_queryable(keys.own(run, "past"), doorway.entrance(self._tell_past)),
+            session.declare_queryable(keys.own(run, "clock"), doorway.entrance(self._tell_time)),
+        )
+
+    def stand(self, on_process: Callable[[str], None], on_participant: Callable[[str, str, bool], None]) -> None:
+        """Look out for the others, and show the own process' token: its answers are there."""
+        self._on_process = on_process
+        self._on_participant = on_participant
+        liveliness = self._session.liveliness()
+        handler = self._doorway.entrance(self._token_changed)
+        self._declared += (
+            liveliness.declare_subscriber(keys.ANY_TOKEN, handler, history=True),
+            liveliness.declare_token(keys.own(self._ledger.run, "process")),
+        )
+
+    # on_process: it has come, or come back. on_participant: come or, with False, gone.
+
+    async def settle(self, deadline: Seconds) -> None:
+        """Wait until the first other process is known."""
+        while not self.processes and await self.change(deadline):
+            pass
+
+    async def rest(self, pause: Seconds) -> None:
+        """Wait until nobody has come or gone for this long; with no other process there is nobody to wait for."""
+        while self.processes and await self.change(self._loop.time() + pause):
+            pass
+
+    def close(self) -> None:
+        for declared in reversed(self._declared):
+            declared.undeclare()
+
+    # -- who is there -------------------------------------------------------------------------------------------
+
+    def _token_changed(self, sample: zenoh.Sample) -> None:
+        run, *subject = str(sample.key_expr).split("/")[3:]
+        there = sample.kind == zenoh.SampleKind.PUT
+        if run == self._ledger.run:
+            return
+        if subject == ["process"]:
+            if there:
+                self.processes.add(run)
+                self._on_process(run)
+            else:
+                self.processes.discard(run)
+        elif len(subject) == 2 and subject[0] == "alive":
+            self.note(subject[1], run, there)
+        self._wake_watchers()
+
+    def note(self, name: str, run: str, there: bool) -> None:
+        """A participant has come or gone; those of the own process are noted by the hub."""
+        runs = self.names.setdefault(name, set())
+        if there and run not in runs:
+            runs.add(run)
+            self._on_participant(name, run, True)
+        elif not there and run in runs:
+            runs.discard(run)
+            if not runs:
+                self._on_participant(name, run, False)
+        if not runs:
+            del self.names[name]
+
+    async def change(self, deadline: Seconds, since: int | None = None) -> bool:
+        """Wait until somebody comes or goes; False at the deadline. since: true at once if `changes` is past it."""
+        if since is not None and self.changes > since:
+            return True
+        watcher: asyncio.Future[None] = self._loop.create_future()
+        self._watchers.append(watcher)
+        timer = self._loop.call_at(deadline, _resolve, watcher)
+        try:
+            await watcher
+            return self._loop.time() < deadline
+        finally:
+            timer.cancel()
+            if watcher in self._watchers:
+                self._watchers.remove(watcher)
+
+    def _wake_watchers(self) -> None:
+        self.changes += 1
+        for watcher in self._watchers:
+            _resolve(watcher)
+        self._watchers.clear()
+
+    # -- questions ----------------------------------------------------------------------------------------------
+
+    def ask(
+        self,
+        key: str,
+        payload: bytes,
+        reply: Callable[[zenoh.Reply], None],
+        end: Callable[[Any], None],
+        timeout: Seconds,
+        encoding: str | None = None,
+    ) -> None:
+        """A Zenoh query, all matching servers; `reply` for each answer and then `end`, on the loop."""
+        self._session.get(
+            key,
+            self._doorway.entrance(reply, end),
+            target=zenoh.QueryTarget.ALL,
+            consolidation=zenoh.ConsolidationMode.NONE,
+            payload=payload,
+            encoding=encoding,
+            timeout=timeout,
+            **QOS,
+        )
+
+    def ask_past(self, run: str, missing: Missing, then: Callable[[Past | None], None]) -> None:
+        """`then` gets the past of the process, or None if it does not answer."""
+        answer: list[Past] = []
+
+        def reply(got: zenoh.Reply) -> None:
+            if got.ok is not None:
+                with suppress(*BAD):  # then it has not answered
+                    answer.append(_pasts.decode(got.ok.payload.to_bytes()))
+
+        self.ask(keys.own(run, "past"), pack(missing), reply, lambda _: then(answer[0] if answer else None), CATCH_UP)
+
+    def _tell_past(self, query: zenoh.Query) -> None:
+        try:
+            missing = _missings.decode(query.payload.to_bytes() if query.payload else b"")
+        except BAD as error:
+            query.reply_err(str(error))
+        else:
+            query.reply(query.key_expr, pack(self._ledger.past(missing, self._loop.time())))
+        finish(query)
+
+    def measure_clock(self, run: str, clock: str, trips: int = CLOCK_TRIPS) -> None:
+        """Read another machine's clock in a few round trips; the quickest tells the most."""
+        asked = self._loop.time()
+
+        def reply(got: zenoh.Reply) -> None:
+            answered = self._loop.time()
+            if got.ok is not None:
+                with suppress(*BAD):
+                    self.clocks.measured(clock, asked, _instants.decode(got.ok.payload.to_bytes()), answered)
+                if trips > 1:
+                    self.measure_clock(run, clock, trips - 1)
+
+        self.ask(keys.own(run, "clock"), b"", reply, lambda _: None, CLOCK_TIMEOUT)
+
+    def _tell_time(self, query: zenoh.Query) -> None:
+        query.reply(query.key_expr, pack(self._loop.time()))
+        finish(query)
+
+    async def flush(self) -> None:
+        """Wait until every process we know has what was written last: a put and then an exit loses most of it."""
+        counts = self._ledger.recent(self._loop.time())
+        if counts and self.processes:
+            done: asyncio.Future[None] = self._loop.create_future()
+            question = pack((self._ledger.run, Pulse(counts)))
+            self.ask(keys.ANY_FLUSH, question, lambda reply: None, lambda _: _resolve(done), FLUSH)
+            await done
+
+
+def finish(query: zenoh.Query) -> None:
+    """Tell Zenoh that there will be no more replies: the asker waits for that."""
+    query.drop()  # type: ignore[no-untyped-call]
+
+
+def _resolve(future: "asyncio.Future[None]") -> None:
+    if not future.done():
+        future.set_result(None)

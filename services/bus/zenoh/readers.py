@@ -1,0 +1,249 @@
+"""Everything that arrives: which subscription gets what, in which order, and what is still missing. On the loop."""
+
+import asyncio
+from functools import partial
+from typing import Any
+
+import msgspec
+import zenoh
+
+from engage_hri.schemas import keys
+from engage_hri.schemas.faults import EngageError
+from engage_hri.schemas.messages import Message
+from engage_hri.schemas.presence import PeerAlive, PeerGone
+from engage_hri.schemas.requests import Unreadable
+from engage_hri.services.bus.interface import Bus, Received, Subscription, read_payload, unreadable
+from engage_hri.services.bus.zenoh.order import Envelope, Follower, Ledger, Missing, Past, Pulse, Written
+from engage_hri.services.bus.zenoh.peers import BAD, Peers, finish
+from engage_hri.services.bus.zenoh.session import Doorway
+
+_envelopes = msgspec.msgpack.Decoder(Envelope)
+_pulses = msgspec.msgpack.Decoder(Pulse)
+_flushes = msgspec.msgpack.Decoder(tuple[str, Pulse])
+
+
+TRIES = 3
+"""How often a process that is there, but does not answer, is asked for its past."""
+
+
+class _Reader:
+    """A subscription, whose it is, and how far it has followed each process."""
+
+    def __init__(self, bus: Bus, subscription: Subscription) -> None:
+        self.bus = bus
+        self.subscription = subscription
+        self.followers: dict[str, Follower] = {}
+
+
+class Readers:
+    """All subscriptions of the process. refused: how many payloads were bad."""
+
+    def __init__(self, session: zenoh.Session, doorway: Doorway, ledger: Ledger, peers: Peers) -> None:
+        self.refused = 0
+        self._loop = asyncio.get_running_loop()
+        self._session = session
+        self._doorway = doorway
+        self._ledger = ledger
+        self._peers = peers
+        self._readers: list[_Reader] = []
+        self._carriers: dict[str, tuple[Any, list[_Reader]]] = {}
+        self._flushing: list[tuple[str, zenoh.Query]] = []
+        self._decoded: tuple[Written, Message | None] | None = None
+        self._declared: tuple[Any, ...] = (
+            session.declare_queryable(keys.own(ledger.run, "flush"), doorway.entrance(self._flush_asked)),
+            session.declare_subscriber(keys.ANY_PULSE, doorway.samples(self._pulse_heard)),
+        )
+
+    def missed(self, bus: Bus) -> tuple[int, int]:
+        """Of one participant: how often it missed something, and how many messages were gone for good."""
+        followers = [one for reader in self._readers if reader.bus is bus for one in reader.followers.values()]
+        return sum(one.gaps for one in followers), sum(one.lost for one in followers)
+
+    def close(self) -> None:
+        for declared in self._declared:
+            declared.undeclare()
+
+    def offer(self, received: Received) -> None:
+        """Deliver what this process has published itself."""
+        for reader in self._readers:
+            if reader.subscription.wants(received.key):
+                reader.subscription.offer(received)
+
+    def attach(self, bus: Bus, subscription: Subscription) -> None:
+        reader = _Reader(bus, subscription)
+        self._readers.append(reader)
+        for name, runs in self._peers.names.items():
+            for run in sorted(runs):
+                self._offer_presence(reader, PeerAlive(participant=name, run=run))
+        for written in self._ledger.past(Missing(subscription.patterns, {}), self._loop.time()).written:
+            self._deliver(reader, written, past=True)
+        for pattern in subscription.patterns:
+            if pattern not in self._carriers:
+                handler = self._doorway.samples(partial(self._sample_came, pattern))
+                carrier = self._session.declare_subscriber(pattern, handler, allowed_origin=zenoh.Locality.REMOTE)
+                self._carriers[pattern] = (carrier, [])
+            self._carriers[pattern][1].append(reader)
+        for run in self._peers.processes:
+            self._follow(reader, run)
+
+    def detach(self, subscription: Subscription) -> None:
+        self._readers = [reader for reader in self._readers if reader.subscription is not subscription]
+        for pattern in subscription.patterns:
+            carrier, readers = self._carriers.get(pattern, (None, []))
+            readers[:] = [reader for reader in readers if reader.subscription is not subscription]
+            if carrier is not None and not readers:
+                del self._carriers[pattern]
+                carrier.undeclare()
+
+    def _sample_came(self, pattern: str, sample: zenoh.Sample) -> None:
+        if sample.kind != zenoh.SampleKind.PUT:
+            return
+        key, payload, encoding = str(sample.key_expr), sample.payload.to_bytes(), str(sample.encoding)
+        written = Written(key, encoding, payload, self._envelope(sample))
+        envelope = written.envelope
+        if self._peers.clocks.heard(envelope.clock, envelope.sent, self._loop.time()) and envelope.run:
+            self._peers.measure_clock(envelope.run, envelope.clock)
+        for reader in tuple(self._carriers[pattern][1]) if pattern in self._carriers else ():
+            # Of overlapping patterns only the first carries, so nothing comes twice.
+            if reader.subscription.carrier(key) != pattern:
+                continue
+            if not envelope.number:
+                self._deliver(reader, written, past=False)
+                continue
+            follower = reader.followers.get(envelope.run) or self._follow(reader, envelope.run)
+            for one in follower.take(written):
+                self._deliver(reader, one, past=False)
+            self._ask_past(reader, envelope.run, follower)
+
+    def _envelope(self, sample: zenoh.Sample) -> Envelope:
+        """Samples of other languages may come without one."""
+        if sample.attachment is not None:
+            try:
+                return _envelopes.decode(sample.attachment.to_bytes())
+            except BAD:
+                self.refused += 1
+        return Envelope("", "", 0.0, self._stranger(sample))
+
+    def _stranger(self, sample: zenoh.Sample) -> str:
+        """Which life of a program without an envelope this is, as far as Zenoh tells.
+
+        What a program has not stamped itself is stamped by the process that passes it on.
+        """
+        if sample.source_info is not None:
+            return str(sample.source_info.source_id.zid)
+        if sample.timestamp is None:
+            return ""
+        stamped_by = str(sample.timestamp.get_id())
+        passed_on_by = {self._ledger.run, *self._peers.processes, *map(str, self._session.info.routers_zid())}
+        return "" if stamped_by in passed_on_by else stamped_by
+
+    def _deliver(self, reader: _Reader, written: Written, *, past: bool) -> None:
+        # One sample often has several readers: it is decoded once.
+        if self._decoded is None or self._decoded[0] is not written:
+            self._decoded = (written, self._decode(reader.bus, written))
+        message = self._decoded[1]
+        if isinstance(message, Unreadable) and reader.bus.name != keys.server_of(written.key):
+            return
+        if message is not None:
+            envelope = written.envelope
+            received = Received(written.key, message, envelope.source, self._loop.time(), past, envelope.run)
+            reader.subscription.offer(received)
+
+    def _decode(self, bus: Bus, written: Written) -> Message | None:
+        """The message, or what its server hears of a bad one, which is counted and complained about."""
+        try:
+            return read_payload(written.payload, written.encoding, written.key, written.envelope.source)
+        except EngageError as error:
+            self.refused += 1
+            if not keys.matches(keys.ANY_FAULT, written.key):
+                where = f"{written.key} from {written.envelope.source or 'a stranger'}"
+                fault = msgspec.structs.replace(error.fault, where=where, service=bus.name)
+                bus.publish(keys.fault(bus.name), fault)
+            return unreadable(error, written.key, written.payload, written.encoding)
+
+    def _follow(self, reader: _Reader, run: str) -> Follower:
+        follower = reader.followers.get(run)
+        if follower is None:
+            follower = reader.followers[run] = Follower(reader.subscription.patterns)
+            self._ask_past(reader, run, follower)
+        return follower
+
+    def _ask_past(self, reader: _Reader, run: str, follower: Follower, tries: int = 1) -> None:
+        if not follower.behind or follower.asking:
+            return
+
+        def caught_up(past: Past | None) -> None:
+            follower.asking = False
+            if past is None and run in self._peers.processes and tries < TRIES:
+                # It is there, only slow, or the link was cut under the question: what it has is not lost yet.
+                self._ask_past(reader, run, follower, tries + 1)
+                return
+            again, follower.again = follower.again, False
+            for written, is_past in follower.catch_up(past):
+                self._deliver(reader, written, past=is_past)
+            if again:
+                follower.behind = True
+                self._ask_past(reader, run, follower)
+            self._answer_flushes()
+
+        follower.asking = True
+        self._peers.ask_past(run, follower.missing(), caught_up)
+
+    def process_came(self, run: str) -> None:
+        for reader in self._readers:
+            follower = reader.followers.get(run)
+            if follower is None:
+                self._follow(reader, run)
+                continue
+            # It may be back after a cut in which messages were lost, the answer to a question on its way among them.
+            follower.again = follower.asking
+            follower.behind = True
+            self._ask_past(reader, run, follower)
+
+    def _pulse_heard(self, sample: zenoh.Sample) -> None:
+        run = keys.run_of(str(sample.key_expr))
+        try:
+            pulse = _pulses.decode(sample.payload.to_bytes())
+        except BAD:
+            self.refused += 1
+        else:
+            if run != self._ledger.run:
+                self._compare(run, pulse)
+
+    def _compare(self, run: str, pulse: Pulse) -> None:
+        for reader in self._readers:
+            follower = self._follow(reader, run)
+            follower.pulse(pulse)
+            self._ask_past(reader, run, follower)
+
+    def _flush_asked(self, query: zenoh.Query) -> None:
+        try:
+            run, pulse = _flushes.decode(query.payload.to_bytes() if query.payload else b"")
+        except BAD as error:
+            query.reply_err(str(error))
+            finish(query)
+            return
+        if run != self._ledger.run:
+            self._compare(run, pulse)
+        self._flushing.append((run, query))
+        self._answer_flushes()
+
+    def _answer_flushes(self) -> None:
+        waiting = []
+        for run, query in self._flushing:
+            if any(run in reader.followers and reader.followers[run].behind for reader in self._readers):
+                waiting.append((run, query))
+            else:
+                query.reply(keys.own(self._ledger.run, "flush"), b"")
+                finish(query)
+        self._flushing = waiting
+
+    def participant_changed(self, name: str, run: str, there: bool) -> None:
+        message = PeerAlive(participant=name, run=run) if there else PeerGone(participant=name)
+        for reader in self._readers:
+            self._offer_presence(reader, message)
+
+    def _offer_presence(self, reader: _Reader, message: PeerAlive | PeerGone) -> None:
+        key = keys.alive(message.participant)
+        if reader.subscription.wants(key):
+            reader.subscription.offer(Received(key, message, message.participant, self._loop.time()))

@@ -1,0 +1,64 @@
+"""What a client gets to hear: messages of one kind as they come, with `async for` or one by one."""
+
+from collections import deque
+from collections.abc import Callable, Iterable
+from typing import TypeVar
+
+from engage_hri.schemas.recognition import ConnectionEvent
+from engage_hri.schemas.units import Seconds
+from engage_hri.services.bus.interface import Bus, Reading, Subscription
+from engage_hri.services.client.event_stream import EventStream
+
+M = TypeVar("M")
+
+
+class Feed(Reading[M]):
+    """Messages of one kind, from when it was made: `async for`, or `next` with a timeout. Ends with the client."""
+
+    def __init__(self, subscription: Subscription, kinds: tuple[type, ...], now: Callable[[], Seconds]) -> None:
+        self._subscription = subscription
+        self._kinds = kinds
+        self._now = now
+
+    async def next(self, timeout: Seconds | None = None) -> M | None:
+        """The next message; None after `timeout` seconds without one, or at the end."""
+        deadline = None if timeout is None else self._now() + timeout
+        while (received := await self._subscription.next(deadline)) is not None:
+            if isinstance(received.message, self._kinds):
+                return received.message  # type: ignore[return-value]
+        return None
+
+    def close(self) -> None:
+        self._subscription.close()
+
+
+class EventFeed(Feed[ConnectionEvent]):
+    """Connection events: each change exactly once, in order. What is open when recognition dies ends as `lost`."""
+
+    def __init__(self, bus: Bus, stream: EventStream, patterns: Iterable[str]) -> None:
+        super().__init__(bus.subscribe(*patterns), (ConnectionEvent,), bus.now)
+        self._bus = bus
+        self._stream = stream
+        self._told: deque[ConnectionEvent] = deque()
+
+    @property
+    def open(self) -> tuple[ConnectionEvent, ...]:
+        """Of what `next` has returned or will return at once, the events that have not ended."""
+        return tuple(self._stream.open.values())
+
+    async def next(self, timeout: Seconds | None = None) -> ConnectionEvent | None:
+        deadline = None if timeout is None else self._now() + timeout
+        while not self._told:
+            due = self._stream.deadline
+            received = await self._subscription.next(
+                min((at for at in (deadline, due) if at is not None), default=None)
+            )
+            if received is not None:
+                message = received.message
+                at = self._bus.local(message.at) if isinstance(message, ConnectionEvent) else received.at
+                self._told += self._stream.feed(message, at, self._now(), past=received.past)
+            elif due is not None and self._now() >= due:
+                self._told += self._stream.expire(self._now())
+            else:
+                return None
+        return self._told.popleft()

@@ -1,0 +1,159 @@
+"""For managers that are language models: tool calls, and speaking while the model still writes.
+
+    async with connect() as robot:
+        result = await perform_call(robot, call)                        # the input of the tool of `schemas/tool.py`
+        outcomes = await stream(robot, model_output(), id="turn-1")     # text, in which `[red-cup]` is an object
+        print(result.json, summary(*outcomes).json)
+
+Of a stream each clause is sent as soon as it is complete (chunking.py); generation performs one fragment right after
+the other.
+"""
+
+import asyncio
+from collections.abc import AsyncIterable
+from contextlib import suppress
+from typing import Any
+
+from msgspec.structs import replace
+
+from engage_hri.schemas.faults import EngageError, InputRefused
+from engage_hri.schemas.fragments import FragmentOutcome, TurnFragment, TurnStatus
+from engage_hri.schemas.summary import Summary, refusal, summary
+from engage_hri.schemas.tool import Part, ToolInput
+from engage_hri.schemas.tool_call import fragment_of
+from engage_hri.schemas.units import Seconds
+from engage_hri.services.client.chunking import Chunk, Chunker
+from engage_hri.services.client.robot import PerformFailed, Robot
+
+Piece = str | Part
+"""A bit of text, however short, in which `[id]` refers to an object; or a part by itself."""
+PLAIN_TURN = ToolInput(turn_status="full", parts=())
+
+
+async def perform_call(
+    robot: Robot, call: dict[str, Any] | str | bytes, *, await_answer: bool = False, timeout: Seconds | None = None
+) -> Summary:
+    """Perform a model's tool call; returns the tool's result, whatever becomes of it: nothing is raised.
+
+    call: as its API gives it, decoded or as JSON. await_answer, timeout: see `Robot.perform`.
+    """
+    try:
+        return summary(await robot.perform(call, await_answer=await_answer, timeout=timeout))
+    except EngageError as error:
+        return summary_of(error)
+
+
+def summary_of(error: EngageError) -> Summary:
+    """What became of a fragment that `Robot.perform` raised for."""
+    if isinstance(error, PerformFailed) and isinstance(error.outcome, FragmentOutcome):
+        return summary(error.outcome)
+    return refusal(error.fault)
+
+
+async def stream(
+    robot: Robot,
+    pieces: AsyncIterable[Piece],
+    *,
+    id: str,
+    turn: ToolInput = PLAIN_TURN,
+    chunker: Chunker | None = None,
+    await_answer: bool = False,
+) -> tuple[FragmentOutcome, ...]:
+    """Speak the pieces as they come, as one turn; returns what became of its fragments `<id>-1`, `<id>-2`...
+
+    turn: what concerns the whole turn (parts and status are found here); with `thinking` the robot looks away while
+    pieces fail to come. await_answer: return only when the turn has been answered, or it is too late.
+    Where a fragment is refused, fails or is interrupted no more pieces are read, and the outcomes say so; nothing is
+    raised. Cancelling this interrupts the robot, and so does what `pieces` raises; it comes as an ExceptionGroup.
+    """
+    speaking = _Speaking(robot, id, turn, await_answer)
+    try:
+        async with asyncio.TaskGroup() as tasks:
+            reading = tasks.create_task(_read(pieces, chunker or Chunker(), speaking), name=f"read {id}")
+            speaking.begin(tasks, reading)
+    except BaseException:
+        speaking.break_off()
+        raise
+    await speaking.leave_no_turn_open()
+    return speaking.outcomes
+
+
+async def _read(pieces: AsyncIterable[Piece], chunker: Chunker, speaking: "_Speaking") -> None:
+    async for piece in pieces:
+        for chunk in chunker.feed(piece):
+            speaking.go_on(chunk)
+    speaking.finish(chunker.rest())
+
+
+class _Speaking:
+    """The fragments of one turn, each performed by a task of its own."""
+
+    def __init__(self, robot: Robot, id: str, turn: ToolInput, await_answer: bool) -> None:
+        self._robot = robot
+        self._id = id
+        self._turn = turn
+        self._await_answer = await_answer
+        self._performing: list[asyncio.Task[FragmentOutcome]] = []
+        self._refused: set[str] = set()
+        self._sent: set[str] = set()
+        """Fragments whose task has come to its first step before anything was cancelled."""
+        self._is_finished = False
+        self._last = ""
+
+    def begin(self, tasks: asyncio.TaskGroup, reading: "asyncio.Task[None]") -> None:
+        self._tasks = tasks
+        self._reading = reading
+
+    @property
+    def outcomes(self) -> tuple[FragmentOutcome, ...]:
+        return tuple(task.result() for task in self._performing)
+
+    def go_on(self, chunk: Chunk) -> None:
+        self._send(chunk, "middle" if self._performing else "beginning")
+
+    def finish(self, chunk: Chunk) -> None:
+        """Nothing more comes. Where nothing came at all there is no turn."""
+        if self._performing or chunk:
+            self._send(chunk, "end" if self._performing else "full")
+
+    async def leave_no_turn_open(self) -> None:
+        """A refused fragment may have been the one to end the turn, or the last that was read."""
+        if self._refused and self._performing[0].get_name() not in self._refused:
+            with suppress(EngageError):  # there was none
+                await self._robot.perform(self._fragment((), "end"))
+
+    def break_off(self) -> None:
+        """Where the robot was just silent there was no fragment to interrupt, and the turn is still open."""
+        sent = [task for task in self._performing if task.get_name() in self._sent]
+        ended = [task.result() for task in sent if not task.cancelled() and task.exception() is None]
+        is_silent = bool(sent) and [outcome.status for outcome in ended] == ["done"] * len(sent)
+        if is_silent and (self._last not in self._sent or not self._is_finished):
+            self._robot.begin_to_perform(self._fragment((), "end"))
+
+    def _send(self, chunk: Chunk, status: TurnStatus) -> None:
+        self._is_finished = status in ("end", "full")
+        fragment = self._fragment(chunk, status)
+        self._last = fragment.id
+        # Requests keep the order of these tasks: each is sent in its task's first step.
+        self._performing.append(self._tasks.create_task(self._perform(fragment), name=fragment.id))
+
+    def _fragment(self, chunk: Chunk, status: TurnStatus) -> TurnFragment:
+        id = f"{self._id}-{len(self._performing) + 1}"
+        return fragment_of(chunk, replace(self._turn, turn_status=status), id)
+
+    async def _perform(self, fragment: TurnFragment) -> FragmentOutcome:
+        self._sent.add(fragment.id)
+        try:
+            outcome = await self._robot.perform(fragment, await_answer=self._await_answer)
+        except EngageError as error:
+            outcome = self._as_outcome(fragment.id, error)
+        if outcome.status != "done":
+            self._reading.cancel()
+        return outcome
+
+    def _as_outcome(self, id: str, error: EngageError) -> FragmentOutcome:
+        if isinstance(error, PerformFailed) and isinstance(error.outcome, FragmentOutcome):
+            return error.outcome
+        if isinstance(error, InputRefused):
+            self._refused.add(id)
+        return FragmentOutcome(id=id, fragment=id, status="failed", fault=error.fault)

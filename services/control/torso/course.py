@@ -1,0 +1,58 @@
+"""A behavior worked out for the simulated torso: where its joints go, and its sync points on the way."""
+
+from collections.abc import Mapping
+
+from msgspec import Struct
+
+from engage_hri.schemas.body import NoPointZone, Ray
+from engage_hri.schemas.feedback import WarningKind
+from engage_hri.schemas.units import Degrees
+from engage_hri.schemas.world import World
+from engage_hri.services.control.torso.motion import Leg
+
+
+class Impossible(Exception):
+    """The body cannot do a behavior: the warning it deserves and the reason."""
+
+    def __init__(self, kind: WarningKind, reason: str) -> None:
+        super().__init__(reason)
+        self.kind = kind
+        self.reason = reason
+
+
+class Point(Struct, frozen=True):
+    """A sync point. held_with: the hold point at which this one waits; its own name for a hold point itself.
+
+    stands_at: the later point that it may go on to while it waits here, since on target it is in both places.
+    """
+
+    sync: str
+    held_with: str = ""
+    stands_at: str = ""
+
+
+class Course(Struct, frozen=True, kw_only=True):
+    """A behavior worked out: `legs` for `joints` from where they are, and its sync points in order."""
+
+    parts: tuple[str, ...]
+    joints: tuple[str, ...]
+    legs: tuple[Leg, ...]
+    points: tuple[Point, ...]
+    on_target: Mapping[str, float] = {}
+    """Joint angles at the stroke, or at the end of a shift."""
+    degrees: Degrees = 0.0
+    """Of joint motion from the start to there."""
+    ray: Ray | None = None
+    is_resizable: bool = False
+    """May it be smaller, for want of time? Not where it has a target."""
+
+
+class Scene(Struct, frozen=True):
+    """What a course depends on besides the behavior. pose: where the joints are. rest: where each goes home to."""
+
+    pose: Mapping[str, float]
+    rest: Mapping[str, float]
+    world: World
+    zones: tuple[NoPointZone, ...] = ()
+    busy: tuple[str, ...] = ()
+    """Parts in use: a pointing without mode takes another arm."""

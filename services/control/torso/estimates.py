@@ -1,0 +1,71 @@
+"""Estimates of the simulated body, from the paths that it then moves along: without deviations they are exact."""
+
+from collections.abc import Mapping, Sequence
+from itertools import pairwise
+
+from engage_hri.schemas.behaviors import BlockBehavior, Speech, Wait
+from engage_hri.schemas.body import BodyPose, Estimate, Phase
+from engage_hri.schemas.faults import Fault
+from engage_hri.schemas.units import Seconds
+from engage_hri.services.control.body import sync_points
+from engage_hri.services.control.torso.course import Course, Point
+from engage_hri.services.control.torso.motion import SLOWEST, Path
+from engage_hri.services.control.torso.sizing import quickest
+from engage_hri.services.control.voice.timeline import Utterance
+
+
+def infeasible(behavior: BlockBehavior, warning: str, fault: Fault) -> Estimate:
+    return Estimate(behavior=behavior.id, feasible=False, fault=fault, warning=warning)
+
+
+def spoken(behavior: Speech, utterance: Utterance, pose: BodyPose) -> Estimate:
+    """The voice can wait at the marks between two words."""
+    times = {"start": 0.0, **{mark.id: utterance.said_by(mark.position) for mark in behavior.marks}}
+    times["end"] = utterance.seconds
+    gaps = {mark.id for mark in behavior.marks if utterance.is_gap(mark.position)}
+    phases = _phases([Point(sync, sync if sync in gaps else "") for sync in sync_points(behavior)], times)
+    return Estimate(behavior=behavior.id, feasible=True, parts=("voice",), phases=phases, pose_after=pose)
+
+
+def waited(behavior: Wait, duration: Seconds, pose: BodyPose) -> Estimate:
+    phases = _phases((Point("start"), Point("end", "end")), {"start": 0.0, "end": duration})
+    return Estimate(behavior=behavior.id, feasible=True, phases=phases, pose_after=pose)
+
+
+def moved(behavior: BlockBehavior, course: Course, path: Path, pose: BodyPose) -> Estimate:
+    """pose: on target."""
+    is_gaze, is_arm = course.parts == ("head",), course.parts[0].endswith("_arm")
+    return Estimate(
+        behavior=behavior.id,
+        feasible=True,
+        parts=("head",) if course.parts == ("nod",) else course.parts,
+        phases=_phases(course.points, path.marks, quickest(course, path), SLOWEST),
+        head_degrees=course.degrees if is_gaze else 0.0,
+        arm_degrees=course.degrees if is_arm else 0.0,
+        ray=course.ray,
+        pose_after=pose,
+    )
+
+
+def _phases(
+    points: Sequence[Point],
+    times: Mapping[str, Seconds],
+    quickest: Mapping[str, Seconds] | None = None,
+    slowest: float = 1.0,
+) -> tuple[Phase, ...]:
+    """From each sync point to the next. No upper limit: where it ends at a hold point, or has no way to go.
+
+    times: of the points, at natural pace. quickest: in the greatest hurry.
+    """
+    least = times if quickest is None else quickest
+    return tuple(
+        Phase(
+            since=since.sync,
+            to=to.sync,
+            shortest=min(least[to.sync] - least[since.sync], natural := times[to.sync] - times[since.sync]),
+            natural=natural,
+            longest=None if to.held_with or not natural else natural / slowest,
+            hold=to.held_with == to.sync,
+        )
+        for since, to in pairwise(points)
+    )

@@ -1,0 +1,125 @@
+"""Where the head looks: the base gaze, what the eyes rest on, and following entities that move. Pure."""
+
+from collections.abc import Mapping
+from math import inf, radians
+
+from engage_hri.schemas.behaviors import BlockBehavior, Gaze, GazeShift, HeadDirectionShift
+from engage_hri.schemas.units import Seconds
+from engage_hri.services.control.torso import choreography, tracks
+from engage_hri.services.control.torso.course import Course, Impossible, Scene
+from engage_hri.services.control.torso.motion import Leg, Motion, Path
+from engage_hri.services.control.torso.runs import Run
+from engage_hri.services.control.torso.tracks import Track
+
+NOTICED = radians(0.5)
+"""A target that moves less does not move the head."""
+SHORTEST: Seconds = 0.1
+"""Least time that is given to catch up with a target."""
+
+
+def is_shift(behavior: BlockBehavior) -> bool:
+    return isinstance(behavior, GazeShift | HeadDirectionShift)
+
+
+def eyes_on(behavior: BlockBehavior | None) -> str:
+    """The entity on the gaze axis once the motion is done: none with an offset."""
+    if isinstance(behavior, Gaze | GazeShift) and behavior.offset_angle and behavior.offset_direction:
+        return ""
+    return behavior.target if isinstance(behavior, Gaze | GazeShift | HeadDirectionShift) else ""
+
+
+class Attention:
+    """The base gaze and the fixation: what the eyes rest on, and since (or from) when.
+
+    The instant of a fixation is known in advance, as the motion that leads to it is.
+    """
+
+    def __init__(self) -> None:
+        self.base: BlockBehavior | None = None
+        self.angles = tracks.HOME["head"]
+        self._entity = ""
+        self._since: Seconds = 0.0
+
+    @property
+    def entity(self) -> str:
+        """What the base gaze rests on."""
+        return eyes_on(self.base)
+
+    def shift(self, behavior: BlockBehavior, course: Course) -> None:
+        self.base, self.angles = behavior, (course.legs[-1].goal[0], course.legs[-1].goal[1])
+
+    def stay(self, angles: tuple[float, ...]) -> None:
+        """The base is a direction, not an entity."""
+        self.base, self.angles = None, angles
+
+    def update(self, scene: Scene) -> None:
+        """Turn the base after its entity; the last direction stays when it is gone or out of view."""
+        if self.base is not None:
+            try:
+                goal = choreography.plan(self.base, scene).legs[-1].goal
+            except Impossible:
+                return
+            self.angles = (goal[0], goal[1])
+
+    def fixated(self, now: Seconds) -> str:
+        """The entity on the gaze axis, or nothing."""
+        return self._entity if now >= self._since else ""
+
+    def expect(self, entity: str, since: Seconds | None, now: Seconds) -> None:
+        """The eyes will rest on `entity` from `since`; on the same one they just go on."""
+        if entity and entity == self.fixated(now):
+            return
+        self._entity, self._since = entity, inf if since is None else since
+
+    def follow_run(self, run: Run, now: Seconds) -> None:
+        """Expect what the motion of `run` leads to."""
+        marks, motion = run.motion.path.marks, run.motion
+        if isinstance(run.behavior, Gaze):
+            if run.awaits("stroke"):
+                self.expect(eyes_on(run.behavior), motion.crossing(marks["stroke"]), now)
+            elif not run.awaits("relax"):
+                self.expect(self.entity, motion.crossing(marks["end"]), now)
+        elif isinstance(run.behavior, GazeShift | HeadDirectionShift) and run.awaits("end"):
+            self.expect(eyes_on(run.behavior), motion.crossing(marks["end"]), now)
+
+
+def turn(track: Track, goal: tuple[float, ...], now: Seconds) -> None:
+    """Follow a target that has moved noticeably."""
+    if apart(goal, tuple(track.motion.at(inf).q)):
+        track.return_to(goal, now)
+
+
+def way_back(here: tuple[float, ...], base: tuple[float, ...]) -> Leg:
+    """From a fixation to the base."""
+    seconds = choreography.turning_time(here, base)
+    return Leg(goal=base if seconds else here, seconds=seconds, marks=(("end", 1.0),))
+
+
+def retargeted(run: Run, course: Course, track: Track, now: Seconds) -> Path | None:
+    """What is left of a gaze or shift whose target (or base) has moved to where `course` goes; None: the same."""
+    if run.awaits("stroke") or is_shift(run.behavior):
+        legs, goal, old = course.legs, _target(course.on_target), _target(run.course.on_target)
+    elif run.awaits("relax"):
+        return None
+    else:
+        legs, goal, old = course.legs[-1:], course.legs[-1].goal, run.course.legs[-1].goal
+    if not apart(goal, old):
+        return None
+    left = run.motion.path.after(run.motion.s(now))
+    seconds = max(left[0].seconds if left else 0.0, SHORTEST)
+    first = Leg(goal=legs[0].goal, velocity=legs[0].velocity, seconds=seconds, marks=legs[0].marks)
+    return Path(track.at(now), run.with_faults((first, *legs[1:])), tracks.LIMITS["head"])
+
+
+def apart(one: tuple[float, ...], other: tuple[float, ...]) -> bool:
+    return any(abs(a - b) > NOTICED for a, b in zip(one, other, strict=True))
+
+
+def _target(angles: Mapping[str, float]) -> tuple[float, ...]:
+    return tuple(angles[joint] for joint in tracks.NECK)
+
+
+def brake(motion: Motion, now: Seconds) -> tuple[float, ...]:
+    """Stop `motion`; the angles where it comes to rest."""
+    motion.brake(now)
+    return tuple(float(angle) for angle in motion.at(inf).q)

@@ -1,0 +1,80 @@
+"""Smaller where faster does not do: how large a gesture or a nod can be that is to be somewhere on time. Pure."""
+
+from collections.abc import Sequence
+from copy import copy
+from math import inf
+
+from msgspec import Struct
+
+from engage_hri.schemas.units import Seconds
+from engage_hri.services.control.torso import tracks
+from engage_hri.services.control.torso.course import Course
+from engage_hri.services.control.torso.motion import Leg, Motion, Path
+
+SIZES = (0.9, 0.8, 0.7, 0.6, 0.5, 0.4)
+"""Of its full amplitude, largest first. Smaller than the last, nobody would take it for a gesture."""
+PUNCTUAL: Seconds = 0.001
+"""Who comes later than this is late."""
+
+
+class Reduced(Struct, frozen=True):
+    """What is left of a course, at `size` times its amplitude."""
+
+    path: Path
+    size: float
+
+
+def quickest(course: Course, path: Path) -> dict[str, Seconds]:
+    """When its sync points come in the greatest hurry: as fast as joints permit and, where that helps, as small."""
+    if course.is_resizable and _is_clear(small := _reduced(course, Motion(path, 0.0), 0.0, SIZES[-1]), course):
+        path = small
+    return {sync: s / path.fastest for sync, s in path.marks.items()}
+
+
+def hurried(
+    course: Course, motion: Motion, size: float, aims: Sequence[tuple[str, Seconds]], now: Seconds, cruise: float
+) -> Reduced | None:
+    """As large as still comes to its points when it is asked to, or is least late; None: as it is, at `size`.
+
+    aims: sync points to come and their instants. cruise: how fast its motors are, 1 = as believed.
+    """
+    least = lateness(motion, aims, now, cruise) if course.is_resizable else 0.0
+    best: Reduced | None = None
+    for each in SIZES:
+        if each < size and least > 0.0:
+            path = _reduced(course, motion, now, each / size)
+            late = lateness(Motion(path, now, cruise=cruise), aims, now, cruise)
+            if late < least and _is_clear(path, course):
+                least, best = late, Reduced(path, each)
+    return best
+
+
+def lateness(motion: Motion, aims: Sequence[tuple[str, Seconds]], now: Seconds, cruise: float) -> Seconds:
+    """By how much `motion` misses the worst of `aims` if nothing stops it; 0: none of them."""
+    trial, worst = copy(motion), 0.0
+    trial.extend(inf, now)
+    for sync, at in aims:
+        s = trial.path.marks[sync]
+        trial.come(s, at, now, cruise * trial.path.fastest)
+        crossing = trial.crossing(s)
+        assert crossing is not None, "nothing limits the trial"
+        worst, now = max(worst, crossing - at), max(now, crossing)
+    return worst if worst > PUNCTUAL else 0.0
+
+
+def _reduced(course: Course, motion: Motion, now: Seconds, by: float) -> Path:
+    """From where it is now; goals come nearer to where the course ends, which is the safe pose."""
+    s = motion.s(now)
+    legs = motion.path.after(s) if s > 0.0 else motion.path.legs
+    home = legs[-1].goal
+    return Path(motion.at(now), [_nearer(leg, home, by) for leg in legs], tracks.limits_of(course.parts))
+
+
+def _nearer(leg: Leg, home: tuple[float, ...], by: float) -> Leg:
+    goal = tuple(rest + by * (angle - rest) for angle, rest in zip(leg.goal, home, strict=True))
+    velocity = tuple(by * speed for speed in leg.velocity)
+    return Leg(goal=goal, velocity=velocity, seconds=leg.seconds, marks=leg.marks)
+
+
+def _is_clear(path: Path, course: Course) -> bool:
+    return not course.parts[0].endswith("_arm") or not tracks.meets_table(path, course.joints)

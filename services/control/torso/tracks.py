@@ -1,0 +1,133 @@
+"""What moves each part of the simulated torso, and how the parts add up to a pose. Pure: time is an argument.
+
+The head has two tracks: gaze, and a nod on top of it. They share the neck's limits, so that their sum keeps them.
+"""
+
+from collections.abc import Mapping, Sequence
+
+import msgspec
+import numpy as np
+
+from engage_hri.schemas.body import BodyPose, JointLimit
+from engage_hri.schemas.units import Seconds
+from engage_hri.services.control.torso import choreography, kinematics
+from engage_hri.services.control.torso.motion import Leg, Motion, Path, State, resting
+
+NECK = ("neck_yaw", "neck_pitch")
+GAZE_SHARE = 0.7
+"""Of the neck's speed and acceleration; the rest is for nods."""
+
+
+def _neck(share: float, reserve: float | None) -> tuple[JointLimit, ...]:
+    """reserve: kept free of the range; None: the range is that reserve, around 0."""
+    limits = []
+    for limit in (kinematics.LIMIT[joint] for joint in NECK):
+        low, high = -choreography.NOD_RESERVE, choreography.NOD_RESERVE
+        if reserve is not None:
+            low, high = limit.low + reserve, limit.high - reserve
+        limits.append(
+            msgspec.structs.replace(
+                limit, low=low, high=high, speed=share * limit.speed, acceleration=share * limit.acceleration
+            )
+        )
+    return tuple(limits)
+
+
+LIMITS: Mapping[str, tuple[JointLimit, ...]] = {
+    "head": _neck(GAZE_SHARE, choreography.NOD_RESERVE),
+    "nod": _neck(1.0 - GAZE_SHARE, None),
+    **{
+        part: tuple(kinematics.LIMIT[joint] for joint in kinematics.joints_of(part))
+        for part in ("torso", "left_arm", "right_arm", "face")
+    },
+}
+HOME: Mapping[str, tuple[float, ...]] = {
+    part: tuple(0.0 if part == "nod" else kinematics.HOME[limit.joint] for limit in limits)
+    for part, limits in LIMITS.items()
+}
+
+
+def home_of(part: str, displaced: Mapping[str, float]) -> tuple[float, ...]:
+    """Home angles of a part, with some joints elsewhere."""
+    home = zip(LIMITS[part], HOME[part], strict=True)
+    return tuple(angle if part == "nod" else displaced.get(limit.joint, angle) for limit, angle in home)
+
+
+class Track:
+    """The motion of one part. Two arms that move as one share a motion, each with its columns of it."""
+
+    def __init__(self, part: str, angles: Sequence[float]) -> None:
+        self.part = part
+        self.joints = tuple(limit.joint for limit in LIMITS[part])
+        self.motion = Motion(Path(resting(angles), (), LIMITS[part]), 0.0)
+        self._column = 0
+
+    def play(self, motion: Motion, column: int = 0) -> None:
+        self.motion, self._column = motion, column
+
+    def at(self, t: Seconds) -> State:
+        state, columns = self.motion.at(t), slice(self._column, self._column + len(self.joints))
+        return State(state.q[columns], state.v[columns], state.a[columns])
+
+    def angles(self, t: Seconds) -> tuple[float, ...]:
+        columns = self.motion.at(t).q.tolist()
+        return tuple(columns[self._column : self._column + len(self.joints)])
+
+    def is_moving(self, t: Seconds) -> bool:
+        return t < self.motion.end
+
+    def return_to(self, goal: tuple[float, ...], now: Seconds) -> None:
+        """Leave whatever it does and go to rest at `goal`, by a way that is clear of the table."""
+        start = self.at(now)
+        time = choreography.turning_time if self.part in ("head", "nod") else choreography.return_time
+        seconds = time(self.angles(now), goal)
+        direct = Path(start, (Leg(goal=goal, seconds=seconds),), LIMITS[self.part])
+        if not self.part.endswith("_arm") or not meets_table(direct, self.joints):
+            self.play(Motion(direct, now))
+            return
+        # Up first: the elbow bends and the upper arm lifts, which takes elbow and hand away from the table.
+        yaw, pitch, elbow = self.angles(now)
+        limits = LIMITS[self.part]
+        above = (yaw, min(max(pitch, 0.2) + 0.2, limits[1].high), min(elbow + 0.4, limits[2].high))
+        legs = (Leg(goal=above, seconds=0.4), Leg(goal=goal, seconds=max(seconds, 0.4)))
+        self.play(Motion(Path(start, legs, limits), now))
+
+
+def limits_of(parts: Sequence[str]) -> tuple[JointLimit, ...]:
+    return tuple(limit for part in parts for limit in LIMITS[part])
+
+
+def joined(states: Sequence[State]) -> State:
+    """The states of several tracks as one, in their order."""
+    return State(
+        np.concatenate([state.q for state in states]),
+        np.concatenate([state.v for state in states]),
+        np.concatenate([state.a for state in states]),
+    )
+
+
+def meets_table(path: Path, joints: Sequence[str]) -> bool:
+    """Does an elbow or hand come into the table anywhere on `path`?"""
+    if not path.length:
+        return False
+    sides = [side for side in kinematics.SHOULDER if f"{side}_elbow" in joints]
+    for step in range(17):
+        angles = dict(zip(joints, path.at(path.length * step / 16).q.tolist(), strict=True))
+        if kinematics.touches_table({**kinematics.HOME, **angles}, sides):
+            return True
+    return False
+
+
+def pose_at(tracks: Mapping[str, Track], t: Seconds) -> dict[str, float]:
+    """The angle of every joint, nod included."""
+    pose: dict[str, float] = {}
+    for part, track in tracks.items():
+        for joint, angle in zip(track.joints, track.angles(t), strict=True):
+            pose[joint] = pose.get(joint, 0.0) + angle if part == "nod" else angle
+    return pose
+
+
+def updated(pose: Mapping[str, float], by: BodyPose | None) -> dict[str, float]:
+    """The pose with the angles of a message; joints that this body lacks are ignored."""
+    angles = {angle.joint: angle.angle for angle in by.joints if angle.joint in pose} if by is not None else {}
+    return {**pose, **angles}

@@ -1,0 +1,85 @@
+"""Speech and waiting on loop time: the behaviors of the simulated body that move no joint."""
+
+from collections.abc import AsyncGenerator
+from math import inf
+
+from engage_hri.schemas.behaviors import Speech, Wait
+from engage_hri.schemas.units import Seconds
+from engage_hri.services.control.body import Arrived, Authority, Progress, Reached, Spoke
+from engage_hri.services.control.voice.timeline import Utterance, utter
+from engage_hri.services.control.waiting import Bell
+
+
+async def speak(behavior: Speech, authority: Authority, pace: float = 1.0) -> AsyncGenerator[Progress, None]:
+    """Say it word by word, with a pause at a mark between two words that it may not pass yet.
+
+    Revoked, it finishes the word that it is in. pace: 2 takes twice as long.
+    """
+    bell = Bell()
+    begin = bell.now()
+    utterance = utter(behavior.text, pace)
+    gaps = {mark.id for mark in behavior.marks if utterance.is_gap(mark.position)}
+    unwatch = authority.watch(bell.ring)
+    try:
+        for progress in _score(behavior, utterance):
+            while not bell.is_past(begin + progress.at) and authority.revoked is None:
+                await bell.heard(begin + progress.at)
+            arrived = at = begin + progress.at
+            if isinstance(progress, Reached) and progress.sync in gaps and not authority.covers(progress.sync):
+                yield Arrived(progress.sync, arrived)
+                while authority.revoked is None and not authority.covers(progress.sync):
+                    await bell.heard(inf)
+                at = bell.now()
+                begin += at - arrived
+            if authority.revoked is not None:
+                break
+            yield _at(progress, at, arrived)
+        since = bell.now() - begin
+        for word in utterance.words:
+            if authority.revoked is not None and word.start < since < word.end:
+                while not bell.is_past(begin + word.end):
+                    await bell.heard(begin + word.end)
+                yield Spoke(word.text, word.position, begin + word.end)
+    finally:
+        unwatch()
+
+
+def _at(progress: Reached | Spoke, at: Seconds, arrived: Seconds) -> Progress:
+    if isinstance(progress, Reached):
+        return Reached(progress.sync, at, arrived)
+    return Spoke(progress.word, progress.position, at)
+
+
+async def wait(behavior: Wait, authority: Authority) -> AsyncGenerator[Progress, None]:
+    """Let its duration pass, and then hold until its end may be passed."""
+    bell = Bell()
+    begin = bell.now()
+    due = begin + (behavior.duration or 0.0)
+    unwatch = authority.watch(bell.ring)
+    try:
+        yield Reached("start", begin, begin)
+        while not bell.is_past(due) and authority.revoked is None:
+            await bell.heard(due)
+        left = due
+        if authority.revoked is None and not authority.covers("end"):
+            yield Arrived("end", due)
+            while authority.revoked is None and not authority.covers("end"):
+                await bell.heard(inf)
+            left = bell.now()
+        if authority.revoked is None:
+            yield Reached("end", left, due)
+    finally:
+        unwatch()
+
+
+def _score(behavior: Speech, utterance: Utterance) -> list[Reached | Spoke]:
+    """Everything the voice is going to report, in time order, seconds from its start; at one instant in the order of
+    the text, a word before the mark after it."""
+    last = len(behavior.text)
+    score: list[tuple[Seconds, int, Reached | Spoke]] = [(0.0, -1, Reached("start", 0.0, 0.0))]
+    score += [(word.end, word.position, Spoke(word.text, word.position, word.end)) for word in utterance.words]
+    for mark in sorted(behavior.marks, key=lambda mark: mark.position):
+        at = utterance.said_by(mark.position)
+        score.append((at, mark.position, Reached(mark.id, at, at)))
+    score.append((utterance.seconds, last, Reached("end", utterance.seconds, utterance.seconds)))
+    return [progress for _, _, progress in sorted(score, key=lambda each: each[:2])]

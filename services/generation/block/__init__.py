@@ -1,0 +1,1 @@
+"""From a fragment and what the policies chose to a block."""

@@ -1,0 +1,365 @@
+"""A fragment becomes a BML block: references replaced, the turn's events and gaze added. Two profiles of timing.
+
+Events are behaviors of the block, so they begin exactly when the speech or gaze they belong to does. They carry
+their timing inline: the constraints that remain, but for the hold of a point until its event has ended, are
+plain BML.
+"""
+
+from collections.abc import Mapping, Sequence
+
+import msgspec
+from msgspec import Struct
+
+from engage_hri.schemas.behaviors import (
+    After,
+    BlockBehavior,
+    Constraint,
+    Event,
+    Gaze,
+    Hand,
+    Head,
+    Pointing,
+    Reference,
+    Speech,
+    Synchronize,
+    Timing,
+    TurnSignal,
+)
+from engage_hri.schemas.blocks import Block
+from engage_hri.schemas.fragments import ReferenceChoice, TurnFragment
+from engage_hri.schemas.references import type_name
+from engage_hri.services.generation.block.ordering import ordered
+from engage_hri.services.generation.block.parts import Mention, Names, Parts
+from engage_hri.services.generation.block.profiles import after, as_in_the_figure, checking_back, same
+from engage_hri.services.generation.block.punctuation import joined
+from engage_hri.services.generation.block.rewriting import Operator, Rewriting, instants, points_named
+from engage_hri.services.generation.config import GenerationConfig
+from engage_hri.services.generation.permits import Permits
+from engage_hri.services.generation.turns.policy import TurnPlan
+from engage_hri.services.generation.turns.trail import NOTHING, Stroke, Trail, first_met, stroke
+
+_LASTING = frozenset({"gaze", "face", "faceLexeme", "faceFacs", "posture", "event", "turn"})
+"""Types whose behaviors last as long as the rest of the block, or end when recognition says so."""
+
+
+class Emission(Struct, frozen=True):
+    """The block of a fragment; what it leaves for the next one; what of the input was left out, and why."""
+
+    block: Block
+    trail: Trail
+    mentions: tuple[Mention, ...]
+    warnings: tuple[str, ...]
+
+
+def emit(
+    fragment: TurnFragment,
+    turn: TurnPlan,
+    choices: Sequence[ReferenceChoice],
+    config: GenerationConfig,
+    permits: Permits,
+    hands: Mapping[str, Hand] | None = None,
+    before: Trail = NOTHING,
+) -> Emission:
+    """The block that performs `fragment`.
+
+    choices: one for each reference. hands: the one to point with, by reference; where it is left to the body, two
+    points count as of the same arm. before: what the turn's earlier fragments still have to do.
+    """
+    return _Emitter(fragment, turn, choices, config, permits, hands or {}, before).emit()
+
+
+class _Emitter:
+    def __init__(
+        self,
+        fragment: TurnFragment,
+        turn: TurnPlan,
+        choices: Sequence[ReferenceChoice],
+        config: GenerationConfig,
+        permits: Permits,
+        hands: Mapping[str, Hand],
+        before: Trail,
+    ) -> None:
+        self.fragment, self.turn, self.config, self.permits, self.hands = fragment, turn, config, permits, hands
+        self.before = before
+        self.names = Names(fragment)
+        self.figure = config.profile == "figure-3.3"
+        self.dropped = [behavior for behavior in fragment.behaviors if not permits.allows(behavior)]
+        kept = [behavior for behavior in fragment.behaviors if permits.allows(behavior)]
+        order = ordered(kept, fragment.constraints, fragment.id)
+        chosen = {choice.reference: choice for choice in choices}
+        punctuation = joined(order, [id for id, choice in chosen.items() if choice.phrase])
+        self.kept = [each for old in kept if (each := punctuation.rest.get(old.id, old)) is not None]
+        self.order = [each for old in order if (each := punctuation.rest.get(old.id, old)) is not None]
+        self.parts = {
+            behavior.id: Parts(
+                behavior,
+                chosen[behavior.id],
+                punctuation.closings.get(behavior.id, ""),
+                self.names,
+                turn,
+                hands.get(behavior.id, permits.only_hand),
+            )
+            for behavior in self.order
+            if isinstance(behavior, Reference)
+        }
+        self.named = points_named(fragment.id, fragment.behaviors, fragment.constraints)
+        self.named_behaviors = {behavior for behavior, _ in self.named}
+        self.speeches = self._speeches()
+        self.rewriting = Rewriting(
+            fragment=fragment.id,
+            replacements={id: parts.replacement(gaze_leads=self.figure) for id, parts in self.parts.items()}
+            | {id: self.parts[said_by].closing for id, said_by in punctuation.follows.items()},
+            words=frozenset(self.speeches),
+            instants=instants(fragment.behaviors, fragment.constraints),
+            dropped=frozenset(behavior.id for behavior in self.dropped),
+            begins=before.start,
+        )
+        self.constraints: list[Constraint] = []
+        self.last_gaze = self.last_glance = ""
+        """The one before the end-of-turn gaze, if it may be told when to relax; and the last glance."""
+        self.strokes: list[Stroke] = []
+
+    def emit(self) -> Emission:
+        for constraint in self.fragment.constraints:
+            if (rewritten := self.rewriting.constraint(constraint)) is not None:
+                self.constraints.append(rewritten)
+        self._follow_the_turn()
+        self._time_speeches_and_references()
+        opening, closing = self._opening(), self._closing()
+        behaviors = (*opening, *self._in_document_order(), *closing)
+        block = Block(
+            id=self.fragment.id, behaviors=behaviors, constraints=tuple(self.constraints), unread=self.fragment.unread
+        )
+        trail = Trail(self.speeches[-1] if self.speeches else "", self.last_glance, tuple(self.strokes))
+        mentions = tuple(parts.mention for parts in self.parts.values())
+        left_out = tuple(f"{behavior.id} is left out: inhibited" for behavior in self.dropped)
+        return Emission(block, trail, mentions, left_out)
+
+    def _speeches(self) -> list[str]:
+        """Ids of plain speeches and phrases, in order."""
+        speeches = []
+        for behavior in self.order:
+            if isinstance(behavior, Speech):
+                speeches.append(behavior.id)
+            elif isinstance(behavior, Reference) and self.parts[behavior.id].phrase:
+                speeches.append(self.parts[behavior.id].phrase)
+        return speeches
+
+    def _in_document_order(self) -> list[BlockBehavior]:
+        behaviors: list[BlockBehavior] = []
+        for behavior in self.kept:
+            if isinstance(behavior, Reference):
+                behaviors += self.parts[behavior.id].behaviors
+            else:
+                behaviors.append(self._passed_through(behavior))
+        return behaviors
+
+    def _passed_through(self, behavior: BlockBehavior) -> BlockBehavior:
+        timing = self.rewriting.timing(behavior)
+        if isinstance(behavior, Pointing) and behavior.mode is None and self.permits.only_hand:
+            return msgspec.structs.replace(behavior, timing=timing, mode=self.permits.only_hand)
+        return msgspec.structs.replace(behavior, timing=timing) if timing != behavior.timing else behavior
+
+    # -- what the turn is still at ---------------------------------------------------------------------------------
+
+    def _follow_the_turn(self) -> None:
+        """Nothing of the fragment begins before the words before it have ended, nor a stroke before its limb is free.
+
+        What nobody mentions follows the one before it of its type; naming it would let it go at once.
+        """
+        operators: list[Operator] = []
+        free: list[str] = []
+        types: set[str] = set()
+        for behavior in self.kept:
+            if isinstance(behavior, Reference):
+                continue
+            is_first = type_name(behavior) not in types
+            types.add(type_name(behavior))
+            if (made := stroke(behavior, self.permits.only_hand)) is not None:
+                self.strokes.append(made)
+            if is_first or behavior.id in self.named_behaviors:
+                free.append(f"{behavior.id}:{first_met(behavior, self.named)}")
+                if made is not None:
+                    operators += [after(sync, f"{behavior.id}:start") for sync in self.before.frees(made.limb)]
+        if self.before.start and free:
+            operators.insert(0, After(ref=self.before.start, syncs=tuple(free)))
+        if operators:
+            self.constraints.append(Constraint(id=self.names.fresh("turn-goes-on"), operators=tuple(operators)))
+
+    # -- references and phrases -----------------------------------------------------------------------------------
+
+    def _time_speeches_and_references(self) -> None:
+        preceding = self.before.speech  # the speech or phrase before; "": the block start stands for it
+        glance = self.before.glance
+        points: dict[Hand | None, str] = {}  # hand -> its last point
+        gazes = 0
+        last = self._last_reference()
+        for behavior in self.order:
+            if isinstance(behavior, Reference):
+                parts = self.parts[behavior.id]
+                operators: list[Operator] = list(self.rewriting.inherited(behavior))
+                hand = self.hands.get(behavior.id, self.permits.only_hand)
+                if parts.point:
+                    operators += [after(sync, f"{parts.point}:start") for sync in self.before.frees(hand)]
+                    self.strokes.append(Stroke(parts.point, hand))
+                is_timed = self.rewriting.is_timed(behavior.id, self.named)
+                if self.figure:
+                    lines = as_in_the_figure(parts, preceding, self.before.speech, is_timed, self.config.figure_lead)
+                    operators += [each for each in lines if not self._is_said(each, operators)]
+                else:
+                    previous_point = points.get(hand, "")
+                    operators += checking_back(parts, preceding, self.before.speech, is_timed, glance, previous_point)
+                    if parts.point:
+                        points[hand] = parts.point
+                        if behavior.id != last:
+                            operators.append(self._glance(parts))
+                            glance = self.last_glance = parts.glance
+                if operators:
+                    id = self.names.fresh(f"{behavior.id}-timing")
+                    self.constraints.append(Constraint(id=id, operators=tuple(operators), line=behavior.line))
+                if parts.gaze:
+                    gazes += 1
+                    self.last_gaze = parts.glance or parts.gaze
+                preceding = parts.phrase or preceding
+            elif isinstance(behavior, Speech):
+                self._keep_in_line(behavior, preceding)
+                preceding = behavior.id
+            elif isinstance(behavior, Gaze):
+                gazes += 1
+                free = not {(behavior.id, "relax"), (behavior.id, "end")} & self.named.keys()
+                # An unnamed gaze follows the one before it; naming it would make it start with the block.
+                unnamed_follower = gazes > 1 and behavior.id not in self.named_behaviors
+                self.last_gaze = behavior.id if free and not unnamed_follower else ""
+
+    def _glance(self, parts: Parts) -> Operator:
+        parts.glance = self.names.fresh(f"{parts.reference.id}-glance")
+        parts.behaviors.append(Gaze(id=parts.glance, target=self.turn.addressee))
+        return same(f"{parts.gaze}:relax", f"{parts.glance}:start")
+
+    def _is_said(self, operator: Operator, inherited: Sequence[Operator]) -> bool:
+        """Does the input, or the reference's own timing, ask for this order already?"""
+        said = [*inherited, *(each for constraint in self.constraints for each in constraint.operators)]
+        return isinstance(operator, After) and any(
+            {operator.ref, *operator.syncs} <= {each.ref, *each.syncs}
+            for each in said
+            if isinstance(each, Synchronize) or each.ref == operator.ref
+        )
+
+    def _keep_in_line(self, speech: Speech, preceding: str) -> None:
+        """Speeches whose start nobody times follow one another by document order. The realizer has them do so only
+        while nothing names them, but we do, and so does an author who ties something to a word."""
+        if preceding and preceding != self.before.speech and (speech.id, "start") not in self.named:
+            start = f"{speech.id}:start"
+            is_free = speech.id not in self.named_behaviors
+            relate = same if self.figure and is_free else after
+            operator: Operator = relate(f"{preceding}:end", start)
+            id = self.names.fresh(f"{speech.id}-timing")
+            self.constraints.append(Constraint(id=id, operators=(operator,), line=speech.line))
+
+    def _last_reference(self) -> str:
+        """The reference whose gaze lasts until the end-of-turn gaze, if there is one."""
+        if not self._ends_with_gaze or not self.parts:
+            return ""
+        return next(behavior.id for behavior in reversed(self.order) if isinstance(behavior, Reference))
+
+    # -- the turn -------------------------------------------------------------------------------------------------
+
+    @property
+    def _ends_with_gaze(self) -> bool:
+        return self.turn.closes and self.permits.looks
+
+    def _opening(self) -> list[BlockBehavior]:
+        """What begins with the first speech, or with the block if there is none."""
+        turn = self.turn
+        timing = (Timing("start", f"{self.speeches[0]}:start"),) if self.speeches else ()
+        if turn.announces_pair:
+            return [
+                Event(
+                    id=self.names.fresh("turn-pair"),
+                    kind="adjacency_pair",
+                    responder=turn.addressee,
+                    cause="turn",
+                    accept=turn.accept,
+                    turn=turn.turn,
+                    timing=timing,
+                )
+            ]
+        if turn.reply:
+            id = self.names.fresh(f"turn-{turn.reply}")
+            return [TurnSignal(id=id, turn=turn.turn, signal=turn.reply, actor=turn.addressee, timing=timing)]
+        if turn.backchannel:
+            nod = next((behavior.id for behavior in self.order if isinstance(behavior, Head)), "")
+            if not timing and nod and not self.permits.speech_only:
+                timing = (Timing("start", f"{nod}:start"),)
+            id = self.names.fresh("backchannel")
+            return [
+                Event(
+                    id=id, kind="backchannel", responder=turn.addressee, cause="turn", turn=turn.turn, timing=timing
+                )
+            ]
+        return []
+
+    def _closing(self) -> list[BlockBehavior]:
+        """End of the turn: facial gaze with an optional mutual facial gaze, and the clock of the pair."""
+        turn = self.turn
+        if not turn.closes:
+            return []
+        ended = self.names.fresh("turn-ended")
+        signal = TurnSignal(id=ended, turn=turn.turn, signal="ended", actor=turn.addressee)
+        operators: list[Operator] = []
+        closing: list[BlockBehavior] = []
+        wordless = self._wordless_at_the_end() if self.speeches else ()
+        if self._ends_with_gaze:
+            gaze = self.names.fresh("turn-gaze")
+            closing.append(Gaze(id=gaze, target=turn.addressee))
+            closing.append(
+                Event(
+                    id=self.names.fresh("turn-gaze-event"),
+                    kind="mutual_facial_gaze",
+                    responder=turn.addressee,
+                    cause="turn",
+                    optional=True,
+                    turn=turn.turn,
+                    timing=(Timing("start", f"{gaze}:start"),),
+                )
+            )
+            if wordless:
+                operators += [after(end, f"{gaze}:start") for end in (f"{self.speeches[-1]}:end", *wordless)]
+            elif self.speeches:
+                operators.append(same(f"{self.speeches[-1]}:end", f"{gaze}:start"))
+            else:
+                operators += self._once_all_is_done(f"{gaze}:start")
+            if self.last_gaze:
+                operators.append(same(f"{self.last_gaze}:relax", f"{gaze}:start"))
+            signal = msgspec.structs.replace(signal, timing=(Timing("start", f"{gaze}:start"),))
+        if self.speeches and not wordless:
+            signal = msgspec.structs.replace(signal, timing=(Timing("start", f"{self.speeches[-1]}:end"),))
+        elif not self._ends_with_gaze:
+            operators += self._once_all_is_done(f"{ended}:start")
+        closing.append(signal)
+        if operators:
+            self.constraints.append(Constraint(id=self.names.fresh("turn-timing"), operators=tuple(operators)))
+        return closing
+
+    def _wordless_at_the_end(self) -> Sequence[str]:
+        """Ends of references made after the last words, by a gesture alone: the turn is not over before."""
+        ends: list[str] = []
+        for behavior in reversed(self.order):
+            if isinstance(behavior, Speech):
+                break
+            if isinstance(behavior, Reference):
+                parts = self.parts[behavior.id]
+                if parts.phrase:
+                    break
+                ends.append(":".join(parts.mention.by))
+        return ends
+
+    def _once_all_is_done(self, sync: str) -> list[Operator]:
+        """After the last words of the turn, and all that ends by itself; a gaze or a face lasts until that has."""
+        ends = [self.before.start] if self.before.start else []
+        ends += [f"{behavior.id}:end" for behavior in self._in_document_order() if _ends_by_itself(behavior)]
+        return [after(end, sync) for end in ends]
+
+
+def _ends_by_itself(behavior: BlockBehavior) -> bool:
+    return type_name(behavior) not in _LASTING

@@ -1,0 +1,98 @@
+"""The behaviors that replace one reference, and ids that nobody in the fragment uses."""
+
+from msgspec import Struct
+
+from engage_hri.schemas.behaviors import BlockBehavior, Event, Gaze, Hand, Pointing, Reference, Speech, Timing
+from engage_hri.schemas.fragments import ReferenceChoice, TurnFragment
+from engage_hri.services.generation.block.rewriting import Point, Replacement
+from engage_hri.services.generation.turns.policy import TurnPlan
+
+
+class Mention(Struct, frozen=True):
+    """by: the sync point of the block from which on `object` has been referred to."""
+
+    object: str
+    by: Point
+
+
+class Names:
+    """Ids nobody in the fragment uses."""
+
+    def __init__(self, fragment: TurnFragment) -> None:
+        self._taken = {behavior.id for behavior in fragment.behaviors}
+
+    def fresh(self, wish: str) -> str:
+        name, count = wish, 2
+        while name in self._taken:
+            name, count = f"{wish}-{count}", count + 1
+        self._taken.add(name)
+        return name
+
+
+class Parts:
+    """The behaviors that replace one reference. closing: what its phrase ends with, no words."""
+
+    def __init__(
+        self,
+        reference: Reference,
+        choice: ReferenceChoice,
+        closing: str,
+        names: Names,
+        turn: TurnPlan,
+        hand: Hand | None,
+    ):
+        points = choice.gesture == "directed_gaze_with_pointing"
+        looks = choice.gesture != "none"
+        required, line = reference.required, reference.line
+        self.reference = reference
+        self.gaze = self.point = self.phrase = self.event = self.glance = ""
+        self.behaviors: list[BlockBehavior] = []
+        anchors: list[str] = []
+        if looks:
+            self.gaze = names.fresh(f"{reference.id}-gaze")
+            self.behaviors.append(Gaze(id=self.gaze, target=reference.target, required=required, line=line))
+            anchors.append(f"{self.gaze}:stroke")
+        if points:
+            self.point = names.fresh(f"{reference.id}-point")
+            self.behaviors.append(
+                Pointing(id=self.point, target=reference.target, mode=hand, required=required, line=line)
+            )
+            anchors.append(f"{self.point}:stroke")
+        if choice.phrase:
+            self.phrase = names.fresh(f"{reference.id}-phrase")
+            said = choice.phrase + closing
+            self.behaviors.append(Speech(id=self.phrase, text=said, required=required, line=line))
+            anchors.append(f"{self.phrase}:start")
+        if looks and choice.gesture != "gaze":
+            self.event = names.fresh(f"{reference.id}-event")
+            self.behaviors.append(
+                Event(
+                    id=self.event,
+                    kind="directed_gaze",
+                    responder=turn.addressee,
+                    objects=(reference.target,),
+                    cause="reference",
+                    anchors=tuple(anchors),
+                    turn=turn.turn,
+                    timing=(Timing("start", f"{self.gaze}:start"),),
+                )
+            )
+
+    @property
+    def closing(self) -> Replacement:
+        """Of a speech of which all is said with the phrase."""
+        return Replacement((self.phrase, "end"), (self.phrase, "end"))
+
+    @property
+    def mention(self) -> Mention:
+        return Mention(self.reference.target, self.replacement(gaze_leads=False).end)
+
+    def replacement(self, *, gaze_leads: bool) -> Replacement:
+        if self.phrase:
+            end = (self.phrase, "end")
+        else:
+            end = (self.point, "stroke_end") if self.point else (self.gaze, "stroke")
+        leads = gaze_leads and self.gaze and self.phrase
+        return Replacement(
+            (self.gaze or self.phrase, "start"), end, start_of_words=(self.phrase, "start") if leads else None
+        )

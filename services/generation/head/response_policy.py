@@ -1,0 +1,121 @@
+"""How the robot answers directed gaze and facial gaze that people initiate: it looks there. Thesis 3.3.3."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from msgspec import Struct
+
+from engage_hri.schemas.attention import Claim
+from engage_hri.schemas.body import Ray
+from engage_hri.schemas.recognition import ConnectionEvent
+from engage_hri.schemas.units import Radians, Seconds
+from engage_hri.schemas.world import Entity, World
+from engage_hri.services.generation.config import GenerationConfig
+from engage_hri.services.generation.references.distractors import TOLERANCE, angle_off_axis
+
+ANSWERED = ("directed_gaze", "mutual_facial_gaze")
+"""Adjacency pairs and backchannels belong to the collaboration manager."""
+
+
+class _Answer(Struct):
+    event: ConnectionEvent
+    targets: tuple[str, ...]
+    """To be looked at one after the other."""
+    since: Seconds
+    until: Seconds | None = None
+    """When the shared gaze will have lasted long enough."""
+
+
+class ResponsePolicy:
+    """The human-initiated events that are open, newest last."""
+
+    def __init__(self, robot: str, config: GenerationConfig) -> None:
+        self._robot = robot
+        self._config = config
+        self._open: dict[str, _Answer] = {}
+        self._seen: Seconds = float("-inf")
+
+    def feed(
+        self,
+        event: ConnectionEvent,
+        now: Seconds,
+        *,
+        world: World | None,
+        gaze: Ray | None,
+        half_angle: Radians,
+        fragment_target: str = "",
+    ) -> None:
+        """fragment_target: where a fragment's gaze holds the head; directing elsewhere is not answered then."""
+        if event.initiator == self._robot or event.responder != self._robot or event.kind not in ANSWERED:
+            return
+        if event.state == "started":
+            targets: tuple[str, ...] = (event.initiator,)
+            if event.kind == "directed_gaze":
+                targets = viewing_order(event.objects, world, gaze, half_angle)
+            if targets and fragment_target in ("", *targets):
+                self._open[event.id] = _Answer(event, targets, now)
+        elif event.state == "succeeded" and event.id in self._open:
+            self._open[event.id].until = now + self._config.response_hold
+        else:
+            self._open.pop(event.id, None)
+
+    def forget(self) -> None:
+        self._open.clear()
+
+    @property
+    def deadline(self) -> Seconds | None:
+        """When the claim changes by itself."""
+        due = [answer.until for answer in self._open.values() if answer.until is not None]
+        for answer in self._open.values():
+            due += [turn for turn in self._turns(answer) if turn > self._seen]
+        return min(due, default=None)
+
+    def claim(self, now: Seconds) -> Claim | None:
+        self._seen = now
+        for id in [id for id, answer in self._open.items() if answer.until is not None and now >= answer.until]:
+            del self._open[id]
+        for answer in reversed(self._open.values()):
+            index = sum(now >= turn for turn in self._turns(answer))
+            kind = answer.event.kind.replace("_", " ")
+            return Claim(
+                kind="response",
+                priority=4,
+                target=answer.targets[index],
+                reason=f"{kind} of {answer.event.initiator}",
+            )
+        return None
+
+    def _turns(self, answer: _Answer) -> list[Seconds]:
+        """When the gaze goes on from each of several objects to the next."""
+        return [answer.since + index * self._config.response_hold for index in range(1, len(answer.targets))]
+
+
+def viewing_order(
+    objects: Sequence[str], world: World | None, gaze: Ray | None, half_angle: Radians
+) -> tuple[str, ...]:
+    """Where to look when somebody directs to several objects.
+
+    All within one gaze cone: the object nearest to their centroid, since gaze follows entities and not places.
+    Else one after the other, the one nearest to the present gaze first.
+    """
+    entities = [entity for id in objects if world is not None and (entity := world.entity(id)) is not None]
+    if len(entities) < 2 or gaze is None:
+        return tuple(entity.id for entity in entities) or tuple(objects[:1])
+    centroid = np.mean([entity.position for entity in entities], axis=0)
+    place = (float(centroid[0]), float(centroid[1]), float(centroid[2]))
+    there = Ray(origin=gaze.origin, axis=_towards(gaze, place))
+    if all(angle_off_axis(there, entity.position) <= half_angle + TOLERANCE for entity in entities):
+        return (min(entities, key=lambda entity: (angle_off_axis(there, entity.position), entity.id)).id,)
+
+    def off(entity: Entity) -> tuple[float, str]:
+        return angle_off_axis(gaze, entity.position), entity.id
+
+    return tuple(entity.id for entity in sorted(entities, key=off))
+
+
+def _towards(gaze: Ray, place: tuple[float, float, float]) -> tuple[float, float, float]:
+    reach = np.asarray(place) - np.asarray(gaze.origin)
+    distance = float(np.linalg.norm(reach))
+    if distance <= TOLERANCE:
+        return gaze.axis
+    return float(reach[0]) / distance, float(reach[1]) / distance, float(reach[2]) / distance

@@ -1,0 +1,91 @@
+"""From a fragment to its block, in one pure step: phrases proposed, references chosen, then everything emitted."""
+
+from collections.abc import Sequence
+
+from msgspec import Struct
+
+from engage_hri.schemas.behaviors import Reference
+from engage_hri.schemas.blocks import Block
+from engage_hri.schemas.body import Capabilities
+from engage_hri.schemas.fragments import ReferenceChoice, TurnFragment
+from engage_hri.schemas.world import World
+from engage_hri.services.generation.block.emission import emit
+from engage_hri.services.generation.block.ordering import ordered
+from engage_hri.services.generation.block.parts import Mention
+from engage_hri.services.generation.config import GenerationConfig
+from engage_hri.services.generation.permits import Permits
+from engage_hri.services.generation.references.discourse import SILENCE, Discourse
+from engage_hri.services.generation.references.motions import Motions
+from engage_hri.services.generation.references.phrases import proposed
+from engage_hri.services.generation.references.policy import Choices, Scene, choose
+from engage_hri.services.generation.turns.policy import TurnPlan, vain_delay
+from engage_hri.services.generation.turns.trail import NOTHING, Trail
+
+
+class Plan(Struct, frozen=True, kw_only=True):
+    """trail: what the block leaves for the turn's next fragment. mentions: when each object has been referred to."""
+
+    block: Block
+    trail: Trail = NOTHING
+    mentions: tuple[Mention, ...] = ()
+    choices: tuple[ReferenceChoice, ...] = ()
+    warnings: tuple[str, ...] = ()
+
+
+def references(fragment: TurnFragment) -> tuple[Reference, ...]:
+    """In the order in which they are made (decision B12)."""
+    order = ordered(fragment.behaviors, fragment.constraints, fragment.id)
+    return tuple(behavior for behavior in order if isinstance(behavior, Reference))
+
+
+def targets(fragment: TurnFragment) -> Sequence[str]:
+    """Of its references, in order: what the body is asked about."""
+    return [reference.target for reference in references(fragment)]
+
+
+def glance(fragment: TurnFragment, turn: TurnPlan, config: GenerationConfig) -> str:
+    """Who is looked at after each of its points but the last; "": nobody."""
+    return turn.addressee if config.profile == "check-back" and len(references(fragment)) > 1 else ""
+
+
+def plan(
+    fragment: TurnFragment,
+    turn: TurnPlan,
+    world: World,
+    body: Capabilities | None,
+    motions: Motions,
+    permits: Permits,
+    config: GenerationConfig,
+    before: Trail = NOTHING,
+    discourse: Discourse = SILENCE,
+) -> Plan:
+    """The block of a checked fragment. body, motions: needed for references only. before: the turn's other blocks'.
+
+    discourse: what was referred to before it.
+    Raises RunFailed where a reference cannot be made at all.
+    """
+    chosen = Choices()
+    made = proposed(references(fragment), world, config, discourse)
+    if made.references:
+        chosen = choose(made.references, _scene(world, body, permits, config), motions, config)
+    emission = emit(fragment, turn, chosen.choices, config, permits, chosen.hands, before)
+    warnings = (*vain_delay(fragment), *made.warnings, *chosen.warnings, *emission.warnings)
+    return Plan(
+        block=emission.block,
+        trail=emission.trail,
+        mentions=emission.mentions,
+        choices=chosen.choices,
+        warnings=warnings,
+    )
+
+
+def _scene(world: World, body: Capabilities | None, permits: Permits, config: GenerationConfig) -> Scene:
+    said = body or Capabilities(body="unknown", types=(), parts=())
+    return Scene(
+        world=world,
+        half_angle=config.gaze_half_angle or said.gaze_half_angle,
+        pointing_radius=config.pointing_radius or said.pointing_radius,
+        zones=said.no_point_zones,
+        no_gaze=permits.no_gaze,
+        no_point=permits.no_point,
+    )

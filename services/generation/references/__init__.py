@@ -1,0 +1,1 @@
+"""The reference policy: with which words and gestures an object is referred to."""

@@ -1,0 +1,202 @@
+"""Noun phrases for a reference that comes without any, from what the world knows of the objects.
+
+The task is Dale and Reiter's (Computational interpretations of the Gricean maxims in the generation of referring
+expressions, Cognitive Science 19, 1995): a noun, and modifiers that hold of the target and rule out others. Theirs
+ends with one phrase; here the reference policy weighs words against gestures, so it is offered each phrase that no
+other one of as few words beats, from "the square" to "the big red square". As with them the noun is always said,
+the order of preference decides between equals, and what is not known of an object does not rule it out.
+"""
+
+import re
+from collections.abc import Iterator, Sequence
+from itertools import combinations, pairwise
+from typing import get_args
+
+from msgspec import Struct
+from msgspec.structs import replace
+
+from engage_hri.schemas.behaviors import Reference, SpeechOption
+from engage_hri.schemas.speakable import word_count
+from engage_hri.schemas.world import Entity, World
+from engage_hri.services.generation.config import GenerationConfig, PhraseAttribute
+from engage_hri.services.generation.references.discourse import SILENCE, Discourse
+from engage_hri.services.generation.references.distractors import extent
+
+SPOKEN: tuple[PhraseAttribute, ...] = get_args(PhraseAttribute)
+"""The order in which English says modifiers, whatever the order of preference."""
+MOST_MODIFIERS = 3
+"""In one phrase. Nobody listens to more, and there would be ever more of them to weigh."""
+SIZES_APART = 1.25
+"""Objects of a kind are big and small if the greatest step between two successive sizes is at least this ratio."""
+
+SHORTEST_NOUN = 3
+"""Letters of a word in an id: what is shorter numbers things, as in `block-a`."""
+NO_NOUNS = {"entity", "item", "marker", "node", "obj", "object", "piece", "tag", "thing", "track", "unknown"}
+"""What trackers call things that they know nothing of."""
+_ID_SEPARATORS = re.compile(r"[\W_]+|(?<=[a-z])(?=[A-Z])")
+
+
+class Property(Struct, frozen=True):
+    """What a word says of an object. An attribute of the world, or the noun."""
+
+    attribute: PhraseAttribute | None
+    word: str
+
+
+class Proposals(Struct, frozen=True):
+    """The references with phrases, and what is to be warned of."""
+
+    references: tuple[Reference, ...]
+    warnings: tuple[str, ...] = ()
+
+
+def proposed(
+    references: Sequence[Reference], world: World, config: GenerationConfig, discourse: Discourse = SILENCE
+) -> Proposals:
+    """The same references, in the order in which they are made; those that came without phrases have some.
+
+    discourse: what was referred to before them.
+    """
+    objects = _Objects(world)
+    made: list[Reference] = []
+    warnings: list[str] = []
+    for reference in references:
+        if reference.options is None:
+            is_the_topic = discourse.topic == reference.target
+            options = phrases(reference.target, objects, config, is_the_topic=is_the_topic)
+            if not objects.describes(reference.target):
+                called = _phrase(objects.noun(reference.target), ())
+                warnings.append(
+                    f"{reference.id}: the world does not say what {reference.target} is, so it is {called!r}: "
+                    "give the entity a category or a name"
+                )
+            reference = replace(reference, options=options)
+        made.append(reference)
+        discourse = discourse.naming("", [reference.target])
+    return Proposals(tuple(made), tuple(warnings))
+
+
+def phrases(
+    target: str, objects: "_Objects", config: GenerationConfig, *, is_the_topic: bool = False
+) -> tuple[SpeechOption, ...]:
+    """From short to long, each with its cost in words and its distractors.
+
+    is_the_topic: the target alone was mentioned before, so that "it" can mean nothing else.
+    """
+    options = [_option("it", frozenset())] if is_the_topic else []
+    demonstrative = "this" if objects.distance(target) <= config.this_within else "that"
+    if not objects.describes(target) and not objects.noun(target).word:
+        demonstrative += " one"
+    # What a deictic phrase leaves is what pointing leaves: the policy knows.
+    options.append(SpeechOption(text=demonstrative, cost=word_count(demonstrative), deictic=True))
+    return (*options, *_descriptions(target, objects, config))
+
+
+def _descriptions(target: str, objects: "_Objects", config: GenerationConfig) -> Iterator[SpeechOption]:
+    """Those that no other one of as few words beats."""
+    noun = objects.noun(target)
+    others = objects.ids - {target}
+    modifiers = [known for attribute in config.phrase_attributes for known in objects.properties(target, attribute)]
+    candidates = []
+    for count in range(min(len(modifiers), MOST_MODIFIERS) + 1):
+        for chosen in combinations(modifiers, count):
+            left = others.intersection(*(objects.may_be(each) for each in (noun, *chosen)))
+            candidates.append(_option(_phrase(noun, chosen), left))
+    offered: list[SpeechOption] = []
+    # Stable: of phrases that cost and leave the same, the one of the preferred attributes comes first.
+    for each in sorted(candidates, key=lambda option: (option.cost, len(option.distractors))):
+        if not any(set(shorter.distractors) <= set(each.distractors) for shorter in offered):
+            offered.append(each)
+            yield each
+
+
+def _phrase(noun: Property, modifiers: Sequence[Property]) -> str:
+    said = sorted(modifiers, key=lambda each: SPOKEN.index(each.attribute) if each.attribute else len(SPOKEN))
+    return " ".join(["the", *(each.word for each in said), noun.word or ("one" if said else "object")])
+
+
+def _option(text: str, distractors: frozenset[str]) -> SpeechOption:
+    return SpeechOption(text=text, cost=word_count(text), distractors=tuple(sorted(distractors)))
+
+
+class _Objects:
+    """What the world knows of its objects, as words."""
+
+    def __init__(self, world: World) -> None:
+        self._objects = {entity.id: entity for entity in world.objects}
+        self._sizes = _sizes(world.objects)
+        self._holders: dict[Property, frozenset[str]] = {}
+        self.ids = frozenset(self._objects)
+
+    def distance(self, id: str) -> float:
+        """From the robot, metres along the floor."""
+        x, y, _ = self._objects[id].position
+        return float((x * x + y * y) ** 0.5)
+
+    def noun(self, id: str) -> Property:
+        return Property(None, _noun(self._objects[id]))
+
+    def describes(self, id: str) -> bool:
+        """Does the world say anything of it but its id?"""
+        return bool(_names(self._objects[id])) or any(self._said(self._objects[id], each) for each in SPOKEN)
+
+    def properties(self, id: str, attribute: PhraseAttribute) -> tuple[Property, ...]:
+        entity = self._objects[id]
+        noun = _noun(entity)
+        return tuple(Property(attribute, word) for word in self._said(entity, attribute) if word != noun)
+
+    def may_be(self, known: Property) -> frozenset[str]:
+        """The objects of which it holds, or of which nobody knows."""
+        if known not in self._holders:
+            self._holders[known] = frozenset(id for id, entity in self._objects.items() if self._may(entity, known))
+        return self._holders[known]
+
+    def _may(self, entity: Entity, known: Property) -> bool:
+        if known.attribute is None:
+            names = _names(entity) or {_noun_in(entity.id)} - {""}
+            return not known.word or not names or known.word in names
+        said = self._said(entity, known.attribute)
+        return known.word in said or (not said and known.attribute != "feature")
+
+    def _said(self, entity: Entity, attribute: PhraseAttribute) -> tuple[str, ...]:
+        match attribute:
+            case "feature":
+                return entity.features
+            case "size":
+                word = entity.size or self._sizes.get(entity.id, "")
+            case "shape":
+                word = entity.shape
+            case "color":
+                word = entity.color
+        return (word,) if word else ()
+
+
+def _noun(entity: Entity) -> str:
+    return entity.category or entity.shape or entity.name or _noun_in(entity.id)
+
+
+def _names(entity: Entity) -> set[str]:
+    return {entity.category, entity.shape, entity.name} - {""}
+
+
+def _noun_in(id: str) -> str:
+    """What an id says if a person chose it: `cup` of `cup-2`, `coffee cup` of `coffeeCup`; nothing of `obj-17`."""
+    words = [word.lower() for part in _ID_SEPARATORS.split(id) if (word := part.rstrip("0123456789"))]
+    telling = [word for word in words if word.isalpha() and (len(word) >= SHORTEST_NOUN or not word.isascii())]
+    return "" if NO_NOUNS.intersection(telling) else " ".join(telling)
+
+
+def _sizes(objects: Sequence[Entity]) -> dict[str, str]:
+    """`big` and `small` among the objects of each kind, by id; nothing where they are about the same."""
+    kinds: dict[str, list[Entity]] = {}
+    for entity in objects:
+        if extent(entity) > 0:
+            kinds.setdefault(_noun(entity), []).append(entity)
+    sizes: dict[str, str] = {}
+    for members in kinds.values():
+        ordered = sorted(members, key=extent)
+        steps = [extent(larger) / extent(smaller) for smaller, larger in pairwise(ordered)]
+        if steps and max(steps) >= SIZES_APART:
+            split = steps.index(max(steps)) + 1
+            sizes |= {entity.id: "small" if place < split else "big" for place, entity in enumerate(ordered)}
+    return sizes

@@ -1,0 +1,139 @@
+"""The connection events of the robot's turns, and the outcome of each turn once all of it is decided."""
+
+from collections.abc import Collection, Iterable
+from typing import Literal
+
+from msgspec import Struct
+from msgspec.structs import replace
+
+from engage_hri.schemas.blocks import SpokenText
+from engage_hri.schemas.fragments import FragmentOutcome, TurnClosed
+from engage_hri.schemas.recognition import ConnectionEvent
+from engage_hri.schemas.units import Seconds
+from engage_hri.services.generation.turns.policy import Aborted, TurnPlan
+
+
+class TurnEvents:
+    """The connection events of the robot's turns in their last known state."""
+
+    def __init__(self) -> None:
+        self._events: dict[str, ConnectionEvent] = {}
+        self._turn_of: dict[str, str] = {}
+        """Which turn each block belongs to."""
+
+    def expect(self, block: str, turn: str) -> None:
+        self._turn_of[block] = turn
+
+    def feed(self, event: ConnectionEvent) -> None:
+        # What is first heard of in a later state belongs to an earlier performance under the same id.
+        if event.block in self._turn_of and (event.state == "started" or event.id in self._events):
+            self._events[event.id] = event
+
+    def lose(self, session: str = "") -> None:
+        """Recognition is gone, or there as this session: no other's undecided events will ever be decided."""
+        for id, event in self._events.items():
+            if event.state == "started" and event.session != session:
+                self._events[id] = replace(event, state="lost")
+
+    def of(self, turn: str) -> tuple[ConnectionEvent, ...]:
+        """By start."""
+        events = [event for event in self._events.values() if self._turn_of[event.block] == turn]
+        return tuple(sorted(events, key=lambda event: event.started.seconds))
+
+    def at(self, block: str, behavior: str) -> ConnectionEvent | None:
+        mine = (event for event in reversed(self._events.values()) if event.block == block)
+        return next((event for event in mine if event.behavior == behavior), None)
+
+    def open_pair(self, turn: str) -> ConnectionEvent | None:
+        """The adjacency pair of a turn, while it is undecided."""
+        pairs = (event for event in self.of(turn) if event.kind == "adjacency_pair")
+        return next((event for event in pairs if event.state == "started"), None)
+
+    def forget(self, turns: Iterable[str]) -> None:
+        """Keep only these turns."""
+        kept = set(turns)
+        self._turn_of = {block: turn for block, turn in self._turn_of.items() if turn in kept}
+        self._events = {id: event for id, event in self._events.items() if event.block in self._turn_of}
+
+
+class _Record(Struct):
+    """spoken: by fragment, in the order in which they came. ended: when its last fragment was, or it was aborted."""
+
+    addressee: str
+    spoken: dict[str, tuple[SpokenText, ...]] = {}
+    status: Literal["done", "aborted"] = "done"
+    reason: str = ""
+    ended: Seconds = 0.0
+
+
+class TurnOutcomes:
+    """What became of each of the robot's turns, not of backchannels. `deadline`: when to ask `closed` again."""
+
+    def __init__(self, events: TurnEvents, patience: Seconds) -> None:
+        self._events = events
+        self._patience = patience
+        self._records: dict[str, _Record] = {}
+        self._given_up: dict[str, Seconds] = {}
+        """When to stop waiting for the answer to a turn that is over."""
+
+    @property
+    def turns(self) -> Collection[str]:
+        """Those that are not closed."""
+        return self._records.keys()
+
+    def expect(self, fragment: str, turn: TurnPlan) -> TurnClosed | None:
+        """A fragment is accepted. A turn of the same name whose answer was still waited for is closed."""
+        displaced = None
+        if fragment == turn.turn and fragment in self._records:
+            displaced = self._close(fragment)
+            self._events.forget(self._records.keys())
+        if not turn.backchannel:
+            self._records.setdefault(turn.turn, _Record(turn.addressee)).spoken[fragment] = ()
+        return displaced
+
+    def refuse(self, fragment: str, turn: TurnPlan) -> None:
+        """It was never part of the turn."""
+        if record := self._records.get(turn.turn):
+            record.spoken.pop(fragment, None)
+
+    def end(self, outcome: FragmentOutcome, turn: TurnPlan, now: Seconds) -> None:
+        if record := self._records.get(turn.turn):
+            record.spoken[outcome.fragment] = outcome.spoken
+            record.ended = now
+
+    def abort(self, aborted: Aborted, now: Seconds) -> None:
+        """Recognition has yet to withdraw what the turn left open."""
+        if record := self._records.get(aborted.turn):
+            record.status, record.reason, record.ended = "aborted", aborted.reason, now
+
+    @property
+    def deadline(self) -> Seconds | None:
+        return min(self._given_up.values(), default=None)
+
+    def closed(self, going: Collection[str], now: Seconds) -> tuple[TurnClosed, ...]:
+        """Turns that are over by now. going: those that are open, or have a fragment without an outcome."""
+        over = [turn for turn in self._records if turn not in going and now >= self._until(turn)]
+        self._given_up = {turn: self._until(turn) for turn in self._records if turn not in (*going, *over)}
+        return tuple(closed for turn in over if (closed := self._close(turn)).fragments)
+
+    def _until(self, turn: str) -> Seconds:
+        """When its outcome is due. Recognition ends a pair at its limit, if there is a recognition."""
+        pair = self._events.open_pair(turn)
+        ended = self._records[turn].ended
+        return ended + (pair.limit or 0.0) + self._patience if pair is not None else ended
+
+    def _close(self, turn: str) -> TurnClosed:
+        record = self._records.pop(turn)
+        return TurnClosed(
+            turn=turn,
+            addressee=record.addressee,
+            status=record.status,
+            reason=record.reason,
+            fragments=tuple(record.spoken),
+            spoken=tuple(
+                replace(said, behavior=f"{fragment}:{said.behavior}")
+                for fragment, all_said in record.spoken.items()
+                for said in all_said
+            ),
+            events=self._events.of(turn),
+        )

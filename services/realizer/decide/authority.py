@@ -1,0 +1,333 @@
+"""How far each behavior may go, given the sync points measured so far: the realizer's decisions, without a clock.
+
+Facts go in (`arrive`, `reach`), `advance(now)` says what to do about them, `deadline` when to ask again.
+
+An instant fires when all who share it are there and all it waits for has been measured. Until then those who are
+early hold; the last to come is told to pass, and never stops. What cannot hold is kept back where it last can, so
+that by prediction it comes on time, and told to be faster or slower if that does not do; every new fact corrects
+the prediction. Only what a fact touches is looked at again.
+"""
+
+import heapq
+from collections.abc import Iterable
+from math import inf, isfinite
+
+from engage_hri.schemas.units import Seconds
+from engage_hri.services.realizer.config import RealizerConfig
+from engage_hri.services.realizer.decide.effects import Begin, Effect, Extend
+from engage_hri.services.realizer.decide.outlook import SURPRISE, Outlook
+from engage_hri.services.realizer.decide.pacing import differs, pace
+from engage_hri.services.realizer.decide.patience import Patience
+from engage_hri.services.realizer.plan.assembly import Member
+from engage_hri.services.realizer.plan.planner import Plan
+from engage_hri.services.realizer.plan.schedule import EPSILON
+from engage_hri.services.realizer.points import Point, performer
+
+
+class Authority(Outlook):
+    """The state of one performance. began: loop time of the block's start; all times are of that clock."""
+
+    def __init__(self, plan: Plan, began: Seconds, config: RealizerConfig) -> None:
+        super().__init__(plan, began)
+        self.config = config
+        self.patience = Patience(config)
+        self._through: dict[str, int] = {}
+        self._granted_at: dict[str, Seconds] = {}
+        self.replan(plan)
+        self.is_surprised = False
+
+    def replan(self, plan: Plan) -> None:
+        """Go on with another plan of the same block, from the same facts: something was dropped."""
+        self._set_plan(plan)
+        self._look_ahead()
+        size = len(plan.net.transitions)
+        self._unmet = [len(sources) for sources in self._wiring.waits_for]
+        """Of each transition: what has not been measured that it waits for, and who has not begun that is to come."""
+        for transition, members in enumerate(plan.members):
+            self._unmet[transition] += sum(self._is_to_come(member) for member in members)
+        self._unreached = [len(members) for members in plan.members]
+        self._granted: set[tuple[int, str]] = set()
+        self._wakes: list[tuple[Seconds, int]] = []
+        self._touched: set[str] = set()
+        self._unended = {id for id in plan.waited_for if not self.has_ended(id)}
+        self._dirty: set[int] = set()
+        for transition in [each for each in range(size) if not self._unmet[each]]:
+            self._open(transition)
+        self._fire(0, self.began)
+        for point in (*self.reached, *(self.arrived.keys() - self.reached.keys())):
+            if point in plan.at:
+                self._note(point)
+        for behavior in self.begun:
+            points = self._points.get(behavior, ())
+            if self.forecast is not None and points:
+                self.forecast.overdue(plan.at[points[0]], self.begun[behavior])
+                for point in points:
+                    self.forecast.require(plan.at[point])
+            if behavior not in plan.chains:
+                self.patience.forget(behavior)
+            elif not self.has_ended(behavior):
+                self._await(behavior)
+
+    # -- facts ---------------------------------------------------------------------------------------------------
+
+    def arrive(self, point: Point, at: Seconds) -> None:
+        """The behavior holds at `point`. What cannot be true is ignored."""
+        if isfinite(at) and point not in self.arrived and self._is_ahead(point):
+            at = self._heard[point.behavior] = self._not_before_last(point.behavior, at)
+            self._learn(point, at)
+            self.arrived[point] = at
+            self._note(point)
+            self._watch(point.behavior)
+
+    def reach(self, point: Point, at: Seconds) -> tuple[Point, ...]:
+        """The behavior has passed `point`: it, and earlier points whose report was lost, unless known already.
+
+        What cannot be true is ignored.
+        """
+        if not isfinite(at):
+            return ()
+        if point in self._wiring.foreign:
+            if point not in self.reached:
+                self.reached[point] = at
+                self._note(point)
+            return ()
+        if not self._is_ahead(point):
+            return ()
+        points, known = self._points[point.behavior], self.next_number(point.behavior)
+        news = points[known : points.index(point) + 1]
+        at = self._heard[point.behavior] = self._not_before_last(point.behavior, at)
+        if len(news) == 1 and not self.holds(point):
+            self._learn(point, at)
+        for each in news:
+            self.reached[each] = at
+            self._note(each)
+            self.is_surprised = self.is_surprised or abs(at - self._expected.get(each, at)) > SURPRISE
+        self._next[point.behavior] = known + len(news)
+        if self.has_ended(point.behavior):
+            self._unended.discard(point.behavior)
+        self._watch(point.behavior)
+        self._await(point.behavior)
+        return news
+
+    def _note(self, point: Point) -> None:
+        """Count a point that is reached, or arrived at, into its instant."""
+        transition = self.plan.at[point]
+        member = self._wiring.members.get(point)
+        at = self.reached.get(point)
+        self._dirty.add(transition)
+        if self.forecast is not None:
+            if at is None:
+                self.forecast.come(point.behavior, transition, self.arrived[point])
+            else:
+                self.forecast.passed(point.behavior, transition, at)
+        if at is not None and member is not None and member.point == point:
+            self._unreached[transition] -= 1
+            if not self._unreached[transition] and transition:
+                self._fire(transition, max(self.reached[each.point] for each in self.plan.members[transition]))
+
+    def _fire(self, transition: int, at: Seconds) -> None:
+        self._instants[transition] = at
+        for target in self._wiring.awaited_by[transition]:
+            self._unmet[target] -= 1
+            if not self._unmet[target]:
+                self._open(target)
+        if self.forecast is not None:
+            self.forecast.fix(transition, at)
+
+    def _open(self, transition: int) -> None:
+        """All that it waits for has been measured."""
+        self._dirty.add(transition)
+        if self.forecast is not None:
+            self.forecast.require(transition)
+
+    @property
+    def is_over(self) -> bool:
+        """Has everything ended that the block waits for?"""
+        return not self._unended
+
+    # -- decisions -----------------------------------------------------------------------------------------------
+
+    def advance(self, now: Seconds) -> list[Effect]:
+        """What to do now. Extensions come before beginnings: who hands over leaves before his successor comes."""
+        self._conclude(now)
+        while self._wakes and self._wakes[0][0] <= now + EPSILON:
+            self._dirty.add(heapq.heappop(self._wakes)[1])
+        beginning = self._decide_all(now)
+        effects: list[Effect] = []
+        for behavior in sorted(self._touched - set(beginning)):
+            if behavior in self.begun and not self.has_ended(behavior):
+                effects += self._extension(behavior, now)
+        self._touched.clear()
+        # Of two that begin together on one part, the body leaves it to the later: who that is stands in the plan.
+        for behavior in sorted(beginning, key=self.plan.entering.index) if len(beginning) > 1 else beginning:
+            through = self._furthest(behavior, now)
+            self.paces[behavior] = pace(behavior, self, now)
+            effects.append(Begin(behavior, self._points[behavior][through].sync, self.paces[behavior]))
+            self._watch(behavior)
+        effects += self.patience.overdue(now)
+        return effects
+
+    def _decide_all(self, now: Seconds) -> list[str]:
+        """Decide what is to be, until nothing follows from it; who begins."""
+        beginning: list[str] = []
+        count = 0
+        while self._dirty:
+            dirty, self._dirty = sorted(self._dirty), set()
+            for transition in dirty:
+                self._decide(transition, now, beginning)
+            for behavior in beginning[count:]:
+                self.begun[behavior] = now
+                self._follow(behavior, now)
+            count = len(beginning)
+        return beginning
+
+    @property
+    def deadline(self) -> Seconds | None:
+        """When to ask again, whatever happens until then."""
+        wake = self._wakes[0][0] if self._wakes else inf
+        patience, overdue = self.patience.deadline, self._overdue_at
+        at = min(wake, inf if patience is None else patience, inf if overdue is None else overdue)
+        return None if at == inf else at
+
+    def _conclude(self, now: Seconds) -> None:
+        """What is expected at another time than before is decided anew."""
+        for transition in self._changes(now):
+            if transition < len(self.plan.members):
+                if not self._unmet[transition]:
+                    self._dirty.add(transition)
+                self._touched.update(member.behavior for member in self.plan.members[transition])
+
+    def _decide(self, transition: int, now: Seconds, beginning: list[str]) -> None:
+        members = self.plan.members[transition]
+        if self._unmet[transition] or (transition and transition in self._instants):
+            return
+        missing = [member for member in members if member.kind != "start" and not self._is_there(member)]
+        may_pass = missing[0] if len(missing) == 1 and missing[0].can_wait else None
+        ready = max(
+            (self._instants[source] + lag for source, lag in self._wiring.waits_for[transition]), default=self.began
+        )
+        due = ready if self.forecast is None else max(ready, self.forecast.times[transition])
+        for member in missing:
+            if self._wiring.pauses(member.point):
+                self._decide_pause(transition, member, due, now)
+        if due > now + EPSILON:
+            self._wake(transition, due)
+            if may_pass is not None and (arrival := self._arrival(may_pass)) is not None and arrival >= due - EPSILON:
+                # Told no earlier than it needs to know: should it be faster than expected, it must wait after all.
+                if ready - self.config.lead > now + EPSILON:
+                    self._wake(transition, ready - self.config.lead)
+                else:
+                    self._grant(transition, may_pass)
+            return
+        if may_pass is not None:
+            self._grant(transition, may_pass)
+        if not missing:
+            for member in members:
+                self._grant(transition, member)
+                if member.kind == "start" and member.behavior not in self.begun:
+                    beginning.append(member.behavior)
+
+    def _is_to_come(self, member: Member) -> bool:
+        """Is it of a behavior that has not even begun, and later than its start?"""
+        return member.kind != "start" and member.behavior in self._points and member.behavior not in self.begun
+
+    def _follow(self, behavior: str, now: Seconds) -> None:
+        """It begins: when its points are to be matters from now on."""
+        for transition in {self.plan.at[point] for point in self._points.get(behavior, ())}:
+            member = next(each for each in self.plan.members[transition] if each.behavior == behavior)
+            if member.kind != "start":
+                self._unmet[transition] -= 1
+                if not self._unmet[transition]:
+                    self._open(transition)
+            if self.forecast is not None:
+                self.forecast.require(transition)
+                if member.kind == "start":
+                    self.forecast.overdue(transition, now)
+        self._conclude(now)
+
+    def _decide_pause(self, transition: int, member: Member, due: Seconds, now: Seconds) -> None:
+        """An utterance goes through a word gap unless it would be noticeably early; it is told just before."""
+        arrival = self._arrival(member)
+        if arrival is None or (transition, member.behavior) in self._granted:
+            return
+        if arrival - self.config.gap > now + EPSILON:
+            self._wake(transition, arrival - self.config.gap)
+        elif due <= arrival + self.config.skew:
+            self._grant(transition, member)
+
+    def _grant(self, transition: int, member: Member) -> None:
+        if (transition, member.behavior) not in self._granted:
+            self._granted.add((transition, member.behavior))
+            self._touched.add(member.behavior)
+
+    def _extension(self, behavior: str, now: Seconds) -> Iterable[Extend]:
+        """Its new authority, if that is further than before or asks for another pace."""
+        known, before = self._through[behavior], self.paces.get(behavior, ())
+        through = self._furthest(behavior, now)
+        after = pace(behavior, self, now)
+        if through > known or differs(before, after):
+            self.paces[behavior] = after
+            self._watch(behavior)
+            yield Extend(behavior, self._points[behavior][through].sync, after)
+
+    def _furthest(self, behavior: str, now: Seconds) -> int:
+        """The number of the last point that it may go through."""
+        points = self._points[behavior]
+        known = furthest = self._through.get(behavior, -1)
+        for number in range(known + 1, len(points)):
+            if not self.may_pass(points[number]):
+                break
+            furthest = number
+        if furthest > known:
+            self._through[behavior] = furthest
+            self._granted_at[behavior] = now
+        return max(0, furthest)
+
+    def may_pass(self, point: Point) -> bool:
+        if point in self.reached or not (self.member(point).can_wait or self._wiring.pauses(point)):
+            return True
+        return (self.plan.at[point], point.behavior) in self._granted
+
+    def _wake(self, transition: int, at: Seconds) -> None:
+        heapq.heappush(self._wakes, (at, transition))
+
+    # -- who owes a report ---------------------------------------------------------------------------------------
+
+    def _watch(self, behavior: str) -> None:
+        chain = self.plan.chains.get(behavior)
+        if chain is None or behavior not in self.begun or performer(chain.behavior) != "body":
+            return
+        points, number = chain.points, self._next.get(behavior, 0)
+        if number >= len(points):
+            self.patience.forget(behavior)
+            return
+        is_there = self.holds(points[number])
+        if is_there and not self.may_pass(self.member(points[number]).point):
+            self.patience.forget(behavior)
+            return
+        since = self.reached[points[number - 1]] if number else self.begun[behavior]
+        natural = chain.segments[number - 1].natural if number else 0.0
+        asked = self._asked(points[number], since + natural)
+        expected = max(since + natural, asked, self._granted_at[behavior] if is_there else 0.0)
+        self.patience.expect(behavior, points[number].sync, expected, natural)
+
+    def _await(self, behavior: str) -> None:
+        """What is expected of it next, now that it has come so far."""
+        points = self._points[behavior]
+        for point in points[self._next.get(behavior, 0) :]:
+            # Whether it comes on time to where it must ask next can be told only now that it is under way.
+            if not self.may_pass(point):
+                self._dirty.add(self.plan.at[point])
+                break
+        self._expect_next(behavior)
+
+    # -- other blocks --------------------------------------------------------------------------------------------
+
+    def follow(self, points: Iterable[Point]) -> None:
+        """Others want to know when these are to be: see `ahead`."""
+        self._followed.update(points)
+        if self.forecast is None:
+            self.replan(self.plan)
+            return
+        for point in self._followed & self.plan.at.keys():
+            self.forecast.require(self.plan.at[point])

@@ -1,0 +1,25 @@
+"""What is to be done: the realizer's decisions, as its shell carries them out."""
+
+from msgspec import Struct
+
+from engage_hri.services.realizer.decide.pacing import Pace
+from engage_hri.services.realizer.decide.patience import Late, Stalled
+
+
+class Begin(Struct, frozen=True):
+    """Start `behavior`; it may go through `through` without asking. pace: see `Pace`; empty: as is natural."""
+
+    behavior: str
+    through: str
+    pace: Pace = ()
+
+
+class Extend(Struct, frozen=True):
+    """`behavior` may now go through `through`, and is to come to its points as `pace` says."""
+
+    behavior: str
+    through: str
+    pace: Pace = ()
+
+
+Effect = Begin | Extend | Late | Stalled

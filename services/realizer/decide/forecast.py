@@ -1,0 +1,310 @@
+"""When each instant of a running block will be, as far as is known: a fact costs what it changes, not the whole net.
+
+Longest paths from what was measured, through phases at the pace measured so far and through bounds. What stretches
+(a phase within the body's shortest and longest time) gives way where a bound could not be kept otherwise.
+"""
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from math import inf
+
+from engage_hri.schemas.units import Seconds
+from engage_hri.services.realizer.decide.longest_paths import FINEST, Arc, Circle, LongestPaths
+from engage_hri.services.realizer.net.petri_net import order
+from engage_hri.services.realizer.plan.planner import Plan
+from engage_hri.services.realizer.plan.schedule import EPSILON
+from engage_hri.services.realizer.points import Point
+
+REPAIRS = 200
+"""Bounds that are made way for in one go, before those that are left are given up for this time."""
+
+
+class Forecast(LongestPaths):
+    """times: of each transition that was measured, that is required, or that those depend on.
+
+    factor: how much longer than estimated a behavior takes, by its id. foreseen: points of other blocks.
+    """
+
+    def __init__(
+        self, plan: Plan, began: Seconds, factor: Callable[[str], float], foreseen: Mapping[Point, Seconds]
+    ) -> None:
+        net = plan.net
+        size = len(net.transitions)
+        super().__init__(size, began)
+        self._there: list[Seconds] = [began] * size
+        """When the last of those was there who are there."""
+        self._factor = factor
+        self._phase_to: dict[tuple[str, int], int] = {}
+        self._phase_from: dict[tuple[str, int], int] = {}
+        self._natural: dict[int, tuple[Seconds, Seconds]] = {}
+        """Of arcs of phases: asked and least as estimated."""
+        self._of_behavior: dict[str, list[int]] = {}
+        self._node_of: dict[str, int] = {}
+        self._given_way: set[int] = set()
+        self._broken: set[int] = set()
+        for rank, transition in enumerate(order(net) or range(size)):
+            self._rank[transition] = rank
+        for place in net.places:
+            # Nothing is earlier than the block's start anyway.
+            if place.kind != "idle" and (place.source or place.lag > 0.0):
+                behavior = place.behavior if place.kind == "phase" else ""
+                arc = self._add(place.source, place.target, place.lag, min(place.shortest, place.lag), behavior)
+                if behavior:
+                    self._phase_to[behavior, place.target] = self._phase_from[behavior, place.source] = arc
+        self._longest = {
+            (bound.behavior, bound.source): inf if bound.stretch is None else bound.stretch - bound.lag
+            for bound in net.bounds
+            if bound.kind == "phase"
+        }
+        for bound in plan.bounds:
+            behavior = bound.behavior if bound.kind == "phase" else ""
+            least = bound.lag if not behavior else -inf if bound.stretch is None else bound.lag - bound.stretch
+            self._add(bound.source, bound.target, bound.lag, least, behavior, is_bound=True)
+        self._elsewhere: dict[int, int] = {}
+        """Of instants with points of other blocks: the arc that keeps them to what those foresee."""
+        for point in plan.foreign:
+            transition = plan.at[point]
+            if transition not in self._elsewhere:
+                node = self._new_node()
+                self.times[node] = began
+                self._elsewhere[transition] = self._add(node, transition, 0.0, 0.0, "")
+        self._drop_idle_bounds()
+        self.fix(0, began)
+        for point, at in foreseen.items():
+            if point in plan.at:
+                self.foresee(plan.at[point], at)
+
+    def _add(
+        self, source: int, target: int, asked: Seconds, least: Seconds, behavior: str, *, is_bound: bool = False
+    ) -> int:
+        number = len(self._arcs)
+        factor = 1.0
+        if behavior:
+            self._natural[number] = (asked, least)
+            self._of_behavior.setdefault(behavior, []).append(number)
+            factor = self._factor(behavior)
+        arc = Arc(source, target, asked * factor, least * factor, behavior, is_bound)
+        arc.seconds = arc.asked
+        self._arcs.append(arc)
+        self._out[source].append(number)
+        self._in[target].append(number)
+        return number
+
+    def _drop_idle_bounds(self) -> None:
+        """A phase need not be bounded from above where nothing but the phase itself makes its end come late."""
+        pending = {arc.source for arc in self._arcs if arc.is_bound and arc.behavior}
+        while pending:
+            here = pending.pop()
+            into = [self._arcs[number] for number in self._in[here] if self._arcs[number].is_on]
+            if len(into) != 1:
+                continue
+            for number in self._out[here]:
+                bound = self._arcs[number]
+                if bound.is_on and bound.is_bound and bound.behavior == into[0].behavior != "":
+                    bound.is_on = False
+                    pending.add(bound.target)
+
+    # -- facts ---------------------------------------------------------------------------------------------------
+
+    def fix(self, transition: int, at: Seconds) -> None:
+        """The instant was at `at`."""
+        expected, was_known = self.times[transition], self._is_known[transition]
+        self._is_fact[transition] = self._is_known[transition] = True
+        for number in self._in[transition]:
+            if self._arcs[number].is_bound and not self._arcs[number].behavior:
+                self.require(self._arcs[number].source)
+        if was_known and abs(at - expected) <= FINEST:
+            self._uncause(transition)
+            return
+        self._set(transition, at, -1)
+        if was_known and at < expected:
+            for effect in list(self._effects[transition]):
+                self._invalidate(effect)
+            for number in self._in[transition]:
+                self._touch(self._arcs[number].source)
+
+    def passed(self, behavior: str, transition: int, at: Seconds) -> None:
+        """The behavior has passed its point there; the others of the instant perhaps not yet."""
+        self.come(behavior, transition, at)
+        if (number := self._phase_from.get((behavior, transition))) is None:
+            return
+        arc = self._arcs[number]
+        if arc.source == (node := self._whereabouts(behavior)):
+            return
+        is_cause = self._cause[arc.target] == number
+        as_expected = is_cause and abs(at + arc.seconds - self.times[arc.target]) <= FINEST
+        if is_cause:
+            self._effects[arc.source].discard(arc.target)
+            self._effects[node].add(arc.target)
+        self._out[arc.source].remove(number)
+        arc.source, self.times[node] = node, at
+        self._out[node] = [number]
+        if not as_expected:
+            self._loosen(number)
+            self._touch(node)
+        for other in self._of_behavior[behavior]:
+            # What has begun to run no longer keeps its beginning back.
+            if self._arcs[other].is_bound and self._arcs[other].target == transition:
+                self._switch_off(other)
+
+    def _whereabouts(self, behavior: str) -> int:
+        """An instant of its own: when the behavior passed its latest point."""
+        if (node := self._node_of.get(behavior)) is None:
+            node = self._node_of[behavior] = self._new_node()
+        return node
+
+    def come(self, behavior: str, transition: int, at: Seconds) -> None:
+        """The behavior is at its point there, or past it."""
+        self._there[transition] = max(self._there[transition], at)
+        number = self._phase_to.get((behavior, transition))
+        if number is None or not self._arcs[number].is_on:
+            self._raise_base(transition, at)
+            return
+        self._base[transition] = self._there[transition]
+        if self._cause[transition] == number and abs(at - self.times[transition]) <= FINEST:
+            self._uncause(transition)
+        self._switch_off(number)
+        if self._is_fact[transition]:
+            return
+        if self._cause[transition] < 0 and self.times[transition] > self._base[transition] + FINEST:
+            self._invalidate(transition)
+        elif self._base[transition] > self.times[transition]:
+            self._set(transition, self._base[transition], -1)
+
+    def overdue(self, transition: int, at: Seconds) -> None:
+        """What was to come there has not; it is not expected before `at`."""
+        if not self._is_fact[transition]:
+            self._raise_base(transition, at)
+
+    def foresee(self, transition: int, at: Seconds) -> None:
+        """Another block expects its point there at `at` now."""
+        number = self._elsewhere[transition]
+        node = self._arcs[number].source
+        before, self.times[node] = self.times[node], at
+        if at < before:
+            self._loosen(number)
+        self._touch(node)
+
+    def relearn(self, behaviors: Iterable[str]) -> None:
+        """The factors of these have changed."""
+        for behavior in behaviors:
+            factor = self._factor(behavior)
+            for number in self._of_behavior.get(behavior, ()):
+                arc, (asked, least) = self._arcs[number], self._natural[number]
+                arc.asked, arc.least = asked * factor, least * factor
+                if arc.is_on and number not in self._given_way:
+                    self._set_seconds(number, arc.asked)
+
+    # -- questions -----------------------------------------------------------------------------------------------
+
+    def phase(self, behavior: str, target: int) -> Seconds:
+        """How long the phase that ends there is to take."""
+        number = self._phase_to.get((behavior, target))
+        return 0.0 if number is None else self._arcs[number].seconds
+
+    def longest(self, behavior: str, target: int) -> Seconds:
+        """How long the phase that ends there may take; inf where the body can wait."""
+        return self._longest.get((behavior, target), inf) * self._factor(behavior)
+
+    def is_hurried(self, behavior: str) -> bool:
+        """Is it to be faster than is natural?"""
+        if not self._given_way:  # as is usual
+            return False
+        hurried = (number for number in self._given_way if not self._arcs[number].is_bound)
+        return any(self._arcs[number].behavior == behavior for number in hurried)
+
+    def update(self) -> set[int]:
+        """Draw the conclusions of all facts since the last time; the transitions whose time has changed."""
+        if not self._todo and not self._old:
+            return set()
+        if self._given_way or self._broken:
+            for number in sorted(self._given_way | self._broken):
+                self._restore(number)
+            self._given_way.clear()
+            self._broken.clear()
+        for _ in range(REPAIRS):
+            try:
+                excess = self._relax()
+            except Circle as cycle:
+                self._make_way(cycle.arcs, sum(self._arcs[each].seconds for each in cycle.arcs))
+                continue
+            if excess is None:
+                break
+            arc = self._arcs[excess]
+            self._make_way([*self._reasons(arc.source), excess], self._violation(arc))
+        else:
+            self._give_up()
+        changed = {each for each, old in self._old.items() if abs(self.times[each] - old) > FINEST}
+        self._old.clear()
+        return changed
+
+    def _violation(self, arc: Arc) -> Seconds:
+        return self.times[arc.source] + arc.seconds - self.times[arc.target]
+
+    def _switch_off(self, number: int) -> None:
+        self._given_way.discard(number)
+        self._broken.discard(number)
+        super()._switch_off(number)
+
+    # -- making way ----------------------------------------------------------------------------------------------
+
+    def _make_way(self, numbers: Sequence[int], excess: Seconds) -> None:
+        """Let the phases along the way take less, or bear more, by `excess` in all; if they cannot, break a bound."""
+        room = {each: self._arcs[each].seconds - self._arcs[each].least for each in numbers}
+        elastic = [each for each in numbers if room[each] > FINEST and self._arcs[each].behavior]
+        boundless = [each for each in elastic if room[each] == inf]
+        if boundless:
+            elastic, share = boundless[:1], 1.0
+            room[elastic[0]] = excess
+        else:
+            total = sum(room[each] for each in elastic)
+            share = min(1.0, excess / total) if total > 0.0 else 0.0
+        enough = bool(elastic) and sum(room[each] for each in elastic) >= excess - EPSILON
+        for each in elastic:
+            self._given_way.add(each)
+            self._set_seconds(each, self._arcs[each].seconds - share * room[each])
+        if not enough:
+            bounds = [each for each in numbers if self._arcs[each].is_bound]
+            self._break(next((each for each in bounds if self._arcs[each].behavior), bounds[-1]))
+
+    def _break(self, number: int) -> None:
+        self._broken.add(number)
+        self._arcs[number].is_on = False
+        self._loosen(number)
+
+    def _restore(self, number: int) -> None:
+        arc = self._arcs[number]
+        if number in self._broken:
+            arc.is_on = True
+            self._touch(arc.source)
+        self._set_seconds(number, arc.asked)
+
+    def _give_up(self) -> None:
+        for number, arc in enumerate(self._arcs):
+            if arc.is_on and arc.is_bound and not self._is_fact[arc.source]:
+                self._break(number)
+        self._relax()
+
+
+def full_forecast(
+    plan: Plan,
+    began: Seconds,
+    factor: Callable[[str], float],
+    foreseen: Mapping[Point, Seconds],
+    reached: Mapping[Point, Seconds],
+    arrived: Mapping[Point, Seconds],
+    instants: Mapping[int, Seconds],
+) -> Forecast:
+    """Of every instant, from scratch: points that are reached or arrived at, and instants that are over."""
+    forecast = Forecast(plan, began, factor, foreseen)
+    for point, at in reached.items():
+        if point in plan.at:
+            forecast.passed(point.behavior, plan.at[point], at)
+    for point in arrived.keys() - reached.keys():
+        if point in plan.at:
+            forecast.come(point.behavior, plan.at[point], arrived[point])
+    for transition, at in instants.items():
+        forecast.fix(transition, at)
+    for transition in range(len(plan.members)):
+        forecast.require(transition)
+    forecast.update()
+    return forecast

@@ -1,0 +1,115 @@
+"""How long the realizer waits: for the next report of a behavior under way, and for the decision of an event."""
+
+import heapq
+from collections.abc import Mapping
+
+from msgspec import Struct
+
+from engage_hri.schemas.behaviors import Event, Speech
+from engage_hri.schemas.blocks import Block
+from engage_hri.schemas.references import type_name
+from engage_hri.schemas.syncref import SyncRef, canonical_sync
+from engage_hri.schemas.units import Seconds
+from engage_hri.services.realizer.config import RealizerConfig
+from engage_hri.services.realizer.plan.schedule import EPSILON
+from engage_hri.services.realizer.points import Point
+
+
+class Late(Struct, frozen=True):
+    """`behavior` is taking much longer to `sync` than it should."""
+
+    behavior: str
+    sync: str
+    overdue: Seconds
+
+
+class Stalled(Struct, frozen=True):
+    """`behavior` has been late for `sync` so long that it must be given up."""
+
+    behavior: str
+    sync: str
+    overdue: Seconds
+
+
+class _Awaited(Struct, frozen=True):
+    """What a behavior is to report next."""
+
+    sync: str
+    expected: Seconds
+    late: Seconds
+    stalled: Seconds
+
+
+class Patience:
+    """What each behavior under way is to report next, and when that becomes too late."""
+
+    def __init__(self, config: RealizerConfig) -> None:
+        self._config = config
+        self._awaited: dict[str, _Awaited] = {}
+        self._warned: set[str] = set()
+        self._alarms: list[tuple[Seconds, str]] = []
+
+    def expect(self, behavior: str, sync: str, expected: Seconds, natural: Seconds) -> None:
+        """Its next report is `sync`, about at `expected`; natural: the duration of the phase before."""
+        limits = self._config
+        late = expected + limits.late + limits.late_factor * natural
+        stalled = expected + limits.stall + limits.stall_factor * natural
+        awaited = _Awaited(sync, expected, late, stalled)
+        if awaited != self._awaited.get(behavior):
+            self._awaited[behavior] = awaited
+            heapq.heappush(self._alarms, (stalled if behavior in self._warned else late, behavior))
+
+    def forget(self, behavior: str) -> None:
+        """It owes no report: it has ended, or waits for us."""
+        self._awaited.pop(behavior, None)
+
+    @property
+    def deadline(self) -> Seconds | None:
+        """When to ask again."""
+        while self._alarms and not self._is_current(*self._alarms[0]):
+            heapq.heappop(self._alarms)
+        return self._alarms[0][0] if self._alarms else None
+
+    def _is_current(self, at: Seconds, behavior: str) -> bool:
+        awaited = self._awaited.get(behavior)
+        return awaited is not None and at in (awaited.late, awaited.stalled)
+
+    def overdue(self, now: Seconds) -> list[Late | Stalled]:
+        """Who is late, once each, and who has been for too long."""
+        found: list[Late | Stalled] = []
+        due = []
+        while (deadline := self.deadline) is not None and deadline <= now + EPSILON:
+            due.append(heapq.heappop(self._alarms)[1])
+        for behavior in dict.fromkeys(due):
+            awaited = self._awaited[behavior]
+            if now >= awaited.stalled - EPSILON:
+                found.append(Stalled(behavior, awaited.sync, now - awaited.expected))
+                self.forget(behavior)
+                continue
+            heapq.heappush(self._alarms, (awaited.stalled, behavior))
+            if behavior not in self._warned:
+                self._warned.add(behavior)
+                found.append(Late(behavior, awaited.sync, now - awaited.expected))
+        return found
+
+
+def event_deadline(
+    event: Event, block: Block, reached: Mapping[Point, Seconds], config: RealizerConfig, *, is_heard: bool
+) -> Seconds:
+    """When to give the event up as failed: its limit, from the latest of its start and the anchors realised by now.
+
+    is_heard: recognition has the request; then it is given far more time, since deciding is its business.
+    """
+    limit = config.limit_of(event.kind) if event.limit is None else event.limit
+    anchors = (reached.get(_point(text, block)) for text in event.anchors)
+    since = max(time for time in (reached[Point(event.id, "start")], *anchors) if time is not None)
+    return since + limit + (config.event_patience if is_heard else config.event_grace)
+
+
+def _point(text: str, block: Block) -> Point:
+    ref = SyncRef.parse(text)
+    behavior = next((each for each in block.behaviors if each.id == ref.behavior), None)
+    if isinstance(behavior, Speech):
+        ref = SyncRef.parse(text, [mark.id for mark in behavior.marks])
+    sync = canonical_sync(ref.sync, type_name(behavior) if behavior else "", block.dialect)
+    return Point(ref.behavior, sync)

@@ -1,0 +1,1 @@
+"""The Petri net as data, and as PNML."""

@@ -1,0 +1,1 @@
+"""Live blocks on the event loop."""

@@ -1,0 +1,172 @@
+"""What the realizer says about a block while it runs, in the words of the block's dialect."""
+
+from collections.abc import Iterable, Mapping
+from math import inf
+
+from engage_hri.schemas import keys
+from engage_hri.schemas.blocks import SpokenText
+from engage_hri.schemas.feedback import (
+    BlockProgress,
+    Feedback,
+    PlannedPoint,
+    PredictionFeedback,
+    SyncPointProgress,
+    WarningFeedback,
+    WarningKind,
+)
+from engage_hri.schemas.references import type_name
+from engage_hri.schemas.syncref import dialect_sync
+from engage_hri.schemas.units import Seconds
+from engage_hri.services.bus.interface import Bus
+from engage_hri.services.realizer.decide.authority import Authority
+from engage_hri.services.realizer.plan.planner import Plan
+from engage_hri.services.realizer.points import Point
+
+NOTICEABLE: Seconds = 0.1
+"""What people notice between what they see and what they hear; a prediction that moves less is not worth telling."""
+
+AGAIN: Seconds = 0.001
+"""How long after a prediction the next may follow, for each point that it told: what it costs grows with these."""
+
+
+def moved_noticeably(old: Mapping[Point, Seconds], new: Mapping[Point, Seconds]) -> bool:
+    """Is any point of `new` expected at another time than `old` said, by more than people notice, or unheard of?
+
+    Points that `new` lacks have been, or were dropped: their feedback says so.
+    """
+    return any(point not in old or abs(time - old[point]) > NOTICEABLE for point, time in new.items())
+
+
+class Reporter:
+    """The feedback of one block. It never goes back in time: what is told late is told as of the last message."""
+
+    def __init__(self, bus: Bus, block: str, tolerance: Seconds) -> None:
+        """tolerance: what misses its instant by more is late."""
+        self._bus = bus
+        self._block = block
+        self._tolerance = tolerance
+        self._spelling: dict[Point, str | None] = {}
+        self._late: set[Point] = set()
+        """Instants of behaviors of which that has been said."""
+        self._character = ""
+        self._latest: Seconds = -inf
+        """Of all that was told: nothing after it is told as of an earlier instant."""
+        self._predicted: Mapping[Point, Seconds] = {}
+        self._not_before = 0.0
+        """When to look again whether the prediction has moved."""
+
+    def started(self, plan: Plan, began: Seconds) -> None:
+        self._character = plan.block.character_id
+        at = self._bus.stamp(self._no_earlier(began))
+        start = BlockProgress(block=self._block, progress="start", at=at, character_id=self._character)
+        self._say(start)
+        self._predict(plan, began, {point: plan.predicted(point) for point in _points(plan)})
+
+    def may_expect(self) -> bool:
+        """Is it time to find out what is expected now?"""
+        return self._bus.now() >= self._not_before
+
+    def expect(self, plan: Plan, began: Seconds, times: Mapping[Point, Seconds]) -> None:
+        """Tell when the points still to come are expected, seconds from the block's start, if that is news."""
+        ours = {point: times[point] for point in _points(plan) if point in times}
+        self._not_before = self._bus.now() + AGAIN * len(ours)
+        if moved_noticeably(self._predicted, ours):
+            self._predict(plan, began, ours)
+
+    def _predict(self, plan: Plan, began: Seconds, times: Mapping[Point, Seconds]) -> None:
+        self._predicted = times
+        points = []
+        for point, time in times.items():
+            if (sync := self._spelled(point, plan)) is not None:
+                type = type_name(plan.chains[point.behavior].behavior)
+                points.append(PlannedPoint(behavior=point.behavior, sync=sync, time=time, type=type))
+        prediction = PredictionFeedback(
+            block=self._block, points=tuple(points), at=self._bus.stamp(began), character_id=self._character
+        )
+        self._say(prediction)
+
+    def reached(
+        self, first_plan: Plan, authority: Authority, point: Point, *, arrived: Seconds | None, by_body: bool
+    ) -> None:
+        """Report a point, and how much later it was than the first of its instant, as measured.
+
+        first_plan: the one the block began with, which said when the point was to be.
+        """
+        plan, at = authority.plan, authority.reached[point]
+        together = (authority.reached.get(member.point, at) for member in plan.members[plan.at[point]])
+        skew = at - min(at, *together)
+        if (sync := self._spelled(point, plan)) is not None:
+            told = self._no_earlier(at)
+            self._say(
+                SyncPointProgress(
+                    block=self._block,
+                    behavior=point.behavior,
+                    sync=sync,
+                    at=self._bus.stamp(told),
+                    time=told - authority.began,
+                    predicted=first_plan.predicted(point),
+                    arrived=None if arrived is None or arrived == at else arrived - authority.began,
+                    skew=skew,
+                    source="body" if by_body else "clock",
+                    character_id=self._character,
+                )
+            )
+        if (late := max(skew, authority.lateness(point))) > self._tolerance:
+            self.late(authority.member(point).point, f"{point.sync} came {late:.2f} s later than it should")
+
+    def late(self, instant: Point, message: str) -> None:
+        """Once for each instant of a behavior."""
+        if instant not in self._late:
+            self._late.add(instant)
+            self.warn("LATE", message, instant.behavior)
+
+    def warn(self, kind: WarningKind, message: str, behavior: str = "") -> None:
+        warning = WarningFeedback(
+            block=self._block,
+            kind=kind,
+            message=message,
+            behavior=behavior,
+            at=self._bus.stamp(self._no_earlier(self._bus.now())),
+            character_id=self._character,
+        )
+        self._say(warning)
+
+    def interrupted(self, behavior: str, spoken: SpokenText | None) -> None:
+        """Somebody has asked for its end."""
+        said = f" after {spoken.text!r}" if spoken is not None else ""
+        self.warn("INTERRUPTED", f"interrupted{said}", behavior)
+
+    def ended(self, status: str, began: Seconds) -> None:
+        now = self._no_earlier(self._bus.now())
+        progress = BlockProgress(
+            block=self._block,
+            progress="end",
+            at=self._bus.stamp(now),
+            time=now - began,
+            status=status,  # type: ignore[arg-type]
+            character_id=self._character,
+        )
+        self._say(progress)
+
+    def _no_earlier(self, at: Seconds) -> Seconds:
+        """`at`, or when the last message was if that is later; the next is no earlier than that."""
+        self._latest = max(self._latest, at)
+        return self._latest
+
+    def _say(self, feedback: Feedback) -> None:
+        self._bus.publish(keys.FEEDBACK, feedback)
+
+    def _spelled(self, point: Point, plan: Plan) -> str | None:
+        """As the block's dialect has it; None of what feedback does not tell: what is no default point there."""
+        try:
+            return self._spelling[point]
+        except KeyError:
+            is_repetition = point.sync.startswith("stroke:")
+            type = type_name(plan.chains[point.behavior].behavior)
+            spelled = None if is_repetition else dialect_sync(point.sync, type, plan.block.dialect)
+            self._spelling[point] = spelled
+            return spelled
+
+
+def _points(plan: Plan) -> Iterable[Point]:
+    return (point for chain in plan.chains.values() for point in chain.points)

@@ -1,0 +1,395 @@
+"""One live block on the event loop: one task per behavior, one future per beginning, one timer.
+
+Decides nothing: what was measured goes to the `Authority`, and what that says is sent to whoever performs.
+"""
+
+import asyncio
+from collections.abc import Callable, Iterable, Mapping
+from functools import partial
+
+from msgspec.structs import replace
+
+from engage_hri.schemas.behaviors import BlockBehavior, Event, TurnSignal, Wait
+from engage_hri.schemas.blocks import Block, BlockOutcome
+from engage_hri.schemas.body import BehaviorOutcome, SyncPointArrived, SyncPointReached
+from engage_hri.schemas.faults import EngageError, Fault, InputRefused
+from engage_hri.schemas.feedback import WarningKind
+from engage_hri.schemas.syncref import BLOCK_ITSELF
+from engage_hri.schemas.units import Seconds
+from engage_hri.services.bus.interface import Containing
+from engage_hri.services.realizer.decide.authority import Authority
+from engage_hri.services.realizer.decide.effects import Begin, Effect, Extend
+from engage_hri.services.realizer.decide.patience import Late, Stalled
+from engage_hri.services.realizer.perform.control_link import BodyLink
+from engage_hri.services.realizer.perform.feedback import Reporter
+from engage_hri.services.realizer.perform.recognition_link import RecognitionLink
+from engage_hri.services.realizer.perform.spoken import Spoken
+from engage_hri.services.realizer.perform.surroundings import Ending, Live, Surroundings
+from engage_hri.services.realizer.plan.planner import Plan, plan_block
+from engage_hri.services.realizer.plan.relations import DROPPED
+from engage_hri.services.realizer.points import Point, performer, sync_points
+from engage_hri.services.requests.ends import NeverEnded, Pending, RequestRefused
+from engage_hri.services.runtime.alarm import Timer
+
+
+class Performance:
+    """A block being performed."""
+
+    def __init__(self, live: Live, plan: Plan, around: Surroundings, elsewhere: Mapping[str, Block]) -> None:
+        """elsewhere: the blocks whose points the plan may name."""
+        loop = asyncio.get_running_loop()
+        self._live = live
+        self.plan = plan
+        self._around = around
+        self._bus = around.bus
+        self._requests = around.requests
+        self._config = around.config
+        self._recognition = RecognitionLink(around.bus, around.requests, around.config, around.peers)
+        self._body = BodyLink(around.bus, around.requests, live.request.id, plan.block.id)
+        self._report = Reporter(around.bus, plan.block.id, around.config.skew)
+        self._begun: dict[str, asyncio.Future[None]] = {id: loop.create_future() for id in plan.chains}
+        self._asked: dict[str, Begin | Extend] = {}
+        """Of each behavior, what it was last told."""
+        self._pending: dict[str, Pending] = {}
+        self._running: dict[str, asyncio.Task[None]] = {}
+        why = {each.behavior: each.message.removesuffix(DROPPED) for each in reversed(plan.problems)}
+        self._dropped = {id: why.get(id, "") for id in plan.dropped}
+        """And why."""
+        self._unwanted: set[str] = set()
+        """Whose end somebody has asked for."""
+        self._elsewhere = elsewhere
+        self._foreign = frozenset(plan.foreign)
+        self._vanished: set[str] = set()
+        """Behaviors of other blocks, of which some point will never be."""
+        self._performed: dict[str, BlockBehavior] = {}
+        """As they were begun: a later plan may have chosen another hand."""
+        self.spoken = Spoken(plan.block.behaviors)
+        self._ending = live.ending
+        self._timer = Timer(self._take_in)
+        self._is_stale = False
+
+    def containing(self) -> Containing:
+        """An exception in the body of `with` ends this block, and no other."""
+        return self._bus.containing(self._live, self._live.fail)
+
+    def abandon(self) -> None:
+        """Its end has gone wrong, too: stop what it asked for, and take its parts home."""
+        for behavior in self._pending:
+            self._requests.cancel(self._body.id(behavior), "its block broke")
+        self._go_home(self.parts_used)
+
+    async def run(self) -> BlockOutcome:
+        """Perform the block to its end, whatever that is. Ends everything it began."""
+        began = self._bus.now()
+        self.authority = Authority(self.plan, began, self._config)
+        self._report.started(self.plan, began)
+        for problem in self.plan.problems:
+            self._report.warn(problem.kind, problem.message, problem.behavior)
+        for behavior in self.plan.dropped:
+            self._around.ledger.lose(self.plan.block.id, behavior)
+        self._around.ledger.reach(self.plan.block.id, Point(BLOCK_ITSELF, "start"), began)
+        try:
+            async with asyncio.TaskGroup() as tasks:
+                self._running = {
+                    behavior.id: tasks.create_task(
+                        self._perform(behavior), name=f"{self.plan.block.id}/{behavior.id}"
+                    )
+                    for behavior in self.plan.behaviors
+                }
+                self._around.ledger.perform(self.plan.block.id, self)
+                with self._around.ledger.followed(self, self._foreign, self._elsewhere):
+                    self._advance()
+                    ending = await asyncio.shield(self._ending)  # which others wait for, too
+                    await self._end_what_moves(ending)
+                for task in self._running.values():
+                    task.cancel()
+        finally:
+            self._close()
+        self._report.ended(ending.status, began)
+        self._around.ledger.reach(self.plan.block.id, Point(BLOCK_ITSELF, "end"), self._bus.now())
+        return replace(
+            self._live.outcome,
+            spoken=self.spoken.texts,
+            dropped=tuple(id for id in self._dropped if id not in self._unwanted),
+            reasons=tuple(why for id, why in self._dropped.items() if id not in self._unwanted),
+            interrupted=tuple(id for id in self._dropped if id in self._unwanted),
+        )
+
+    def is_going_on(self, behavior: str) -> bool:
+        """Is it of this block, and has it neither ended nor been dropped?"""
+        return not self._ending.done() and behavior in self._running and not self.authority.has_ended(behavior)
+
+    async def interrupt(self, behavior: str) -> bool:
+        """End one behavior on request; the others go on. Returns once it has ended: had it come to its end before?"""
+        task = self._running[behavior]
+        self._unwanted.add(behavior)
+        if behavior in self._pending and performer(self._performed[behavior]) == "body":
+            self._body.abort(behavior)
+            await asyncio.wait([task])
+        else:
+            task.cancel()
+            self._requests.cancel(self._body.id(behavior), "interrupted")
+            self._lose(behavior, Fault(reason="interrupted"))
+            self._advance()
+        return behavior not in self._dropped and self.authority.has_ended(behavior)
+
+    def feed(self, message: SyncPointArrived | SyncPointReached) -> None:
+        """A body's report about a behavior of this block."""
+        pending = self._pending.get(message.behavior)
+        if pending is None or pending.request.id != message.id or pending.outcome.done():
+            return
+        point = Point(message.behavior, message.sync)
+        at = self.authority.plausible(point, self._bus.local(message.at), self._bus.now())
+        if isinstance(message, SyncPointArrived):
+            self.authority.arrive(point, at)
+        else:
+            arrived = self.authority.plausible(point, self._bus.local(message.arrived), at)
+            self._reach(point, at, arrived=arrived, by_body=True)
+        self._advance()
+
+    # -- other blocks ------------------------------------------------------------------------------------------------
+
+    def hear(self, point: Point, at: Seconds) -> None:
+        """A point of another block is reached."""
+        if point in self._foreign:
+            self._take_in(partial(self.authority.reach, point, at))
+
+    def foresee(self, point: Point, at: Seconds) -> None:
+        """A point of another block is expected at `at` now."""
+        if point in self._foreign:
+            self._take_in(partial(self.authority.foresee, point, at))
+
+    def follow(self, points: Iterable[Point]) -> None:
+        """Other blocks are tied to these."""
+        if points:
+            self._take_in(partial(self.authority.follow, points))
+
+    def miss(self, behaviors: Iterable[str]) -> None:
+        """What has not been reached of these, in other blocks, never will be."""
+        lost = {point.behavior for point in self._foreign - self.authority.reached.keys()}.intersection(behaviors)
+        lost -= self._vanished
+        if lost:
+            self._vanished |= lost
+            self._take_in(self._replan)
+
+    def _take_in(self, news: Callable[[], object] = lambda: None) -> None:
+        if not self._ending.done():
+            with self.containing():
+                news()
+                self._advance()
+
+    async def _end_what_moves(self, ending: Ending) -> None:
+        """Abort what still runs, and wait until all has ended, or for as long as the body is given."""
+        moving, running = dict[asyncio.Task[None], str](), self._running
+        for behavior in self.plan.block.behaviors:
+            pending = self._pending.get(behavior.id)
+            if pending is None or running[behavior.id].done():
+                continue
+            if performer(behavior) == "body":
+                moving[running[behavior.id]] = behavior.id
+                if ending.status != "done" and not pending.outcome.done():
+                    self._body.abort(behavior.id)
+            elif ending.status != "done":
+                self._requests.cancel(self._body.id(behavior.id), f"block {ending.status}")
+        if moving:
+            _, stuck = await asyncio.wait(moving, timeout=self._config.abort)
+            for task in stuck:  # Nobody is to keep alive what has come to its end, and does not say so.
+                self._requests.cancel(self._body.id(moving[task]), "its block has ended")
+        if ending.status == "failed":
+            self._go_home(self.parts_used)
+
+    def _close(self) -> None:
+        self._timer.set(None)
+        for behavior in self.plan.block.behaviors:
+            self._around.routes.pop(self._body.id(behavior.id), None)
+        for future in self._begun.values():
+            future.cancel()
+
+    # -- decisions, as the authority makes them ----------------------------------------------------------------------
+
+    def _advance(self) -> None:
+        if self._is_stale and not self._ending.done():
+            self._replan()
+        again = True
+        while again and not self._ending.done():
+            made_facts = [self._apply(effect) for effect in self.authority.advance(self._bus.now())]
+            again = any(made_facts)
+        if self.authority.is_surprised and self._report.may_expect() and not self._ending.done():
+            self._report.expect(self.authority.plan, self.authority.began, self.authority.expected(self._bus.now()))
+        self._around.ledger.foresee(self.plan.block.id, self.authority.ahead)
+        if self.authority.is_over:
+            self._live.stop(Ending("done"))
+        self._timer.set(None if self._ending.done() else self.authority.deadline)
+
+    def _apply(self, effect: Effect) -> bool:
+        """Do what the authority says; whether that made new facts at once."""
+        match effect:
+            case Extend(behavior=id):
+                self._asked[id] = effect
+                behavior, end = self._performed.get(id), Point(id, "end")
+                if isinstance(behavior, Wait) and end in self.authority.arrived:
+                    self._reach(end, self._bus.now(), arrived=self.authority.arrived[end])
+                    return True
+                if behavior is not None and id in self._pending and performer(behavior) == "body":
+                    self._send(behavior)
+            case Begin(behavior=id) if not self._begun[id].done():  # else its task has been cancelled
+                self._asked[id] = effect
+                self._begun[id].set_result(None)
+            case Late(behavior=id, sync=sync, overdue=overdue):
+                if not self._around.peers.has_left("control"):
+                    instant = self.authority.member(Point(id, sync)).point
+                    self._report.late(instant, f"{sync} is {overdue:.1f} s overdue")
+                self.authority.is_surprised = True
+            case Stalled(behavior=id, sync=sync, overdue=overdue):
+                self._body.abort(id)
+                self._lose(id, Fault(reason=f"stalled before {sync}, {overdue:.1f} s overdue"))
+                return True
+        return False
+
+    def _reach(self, point: Point, at: Seconds, *, arrived: Seconds | None = None, by_body: bool = False) -> None:
+        for each in self.authority.reach(point, at):
+            came = self.authority.arrived.get(each, arrived if each == point else None)
+            self._report.reached(self.plan, self.authority, each, arrived=came, by_body=by_body)
+            self.spoken.reach(each)
+            self._around.ledger.reach(self.plan.block.id, each, at)
+
+    def _lose(self, id: str, fault: Fault, kind: WarningKind = "EXECUTION_FAILURE", *, at_rest: bool = False) -> None:
+        """It cannot be finished: the block fails if it is required, else goes on without. at_rest: its parts are."""
+        if id in self._dropped or self._ending.done():
+            return
+        self._dropped[id] = str(fault)
+        if id in self._unwanted:
+            # Its parts go home by themselves: the body does not need to be told, nor to forget what it looked at.
+            self._report.interrupted(id, self.spoken.of(id))
+        else:
+            self._report.warn(kind, str(fault), id)
+            if id in self.authority.begun and not at_rest:
+                self._go_home(self._parts(id), id)
+            if id in self.plan.required:
+                self._live.stop(Ending("failed", Fault(reason=fault.reason, where=f"{self.plan.block.id}: {id}")))
+        self._is_stale = True  # Planned anew once for all that is lost in one go.
+        asyncio.get_running_loop().call_soon(self._take_in)
+
+    def _replan(self) -> None:
+        """Go on as if what was dropped, or vanished elsewhere, had never been written."""
+        self._is_stale = False
+        gone = (*self._dropped, *self._vanished)
+        try:
+            plan = plan_block(self.plan.block, self.plan.estimates.values(), dropped=gone, elsewhere=self._elsewhere)
+        except InputRefused as error:
+            self._live.stop(Ending("failed", error.fault))
+            return
+        self.authority.replan(plan)
+        for id in self._dropped:  # Only now that it goes on without: else those that follow it end with it.
+            self._around.ledger.lose(self.plan.block.id, id)
+        for problem in plan.problems:
+            # What is too late now that something else is gone.
+            if problem.behavior in plan.dropped and problem.behavior not in gone:
+                if problem.behavior in self._pending:
+                    self._body.abort(problem.behavior)
+                self._lose(problem.behavior, Fault(reason=problem.message), problem.kind)
+
+    # -- performers --------------------------------------------------------------------------------------------------
+
+    async def _perform(self, behavior: BlockBehavior) -> None:
+        await self._begun[behavior.id]
+        behavior = self._performed[behavior.id] = self.authority.plan.chains[behavior.id].behavior
+        match behavior:
+            case Wait(duration=duration):
+                await self._wait(behavior.id, duration or 0.0)
+            case Event():
+                await self._event(behavior)
+            case TurnSignal():
+                self._recognition.signal(self._body.id(behavior.id), self.plan.block.id, behavior)
+                self._at_once(behavior.id)
+            case _ if performer(behavior) == "clock":
+                self._at_once(behavior.id)
+            case _:
+                await self._by_body(behavior)
+
+    async def _by_body(self, behavior: BlockBehavior) -> None:
+        self._around.routes[self._body.id(behavior.id)] = self
+        try:
+            outcome = await self._send(behavior).outcome
+        except (RequestRefused, NeverEnded) as error:
+            refused = isinstance(error, RequestRefused)
+            self._lose(behavior.id, error.fault, "CANNOT_CREATE_BEHAVIOR" if refused else "EXECUTION_FAILURE")
+            return
+        except EngageError as error:
+            self._pending.pop(behavior.id)
+            fault = Fault(reason=error.fault.reason, where=self.plan.block.id)
+            if not self._ending.done():
+                self._report.warn("EXECUTION_FAILURE", str(fault))
+            self._live.stop(Ending("failed", fault))
+            return
+        if not isinstance(outcome, BehaviorOutcome):
+            self._lose(behavior.id, Fault(reason=f"control ended it with a {type(outcome).__name__}"))
+            return
+        is_done = outcome.status == "done"
+        self.spoken.end(outcome)
+        if is_done:
+            end = Point(behavior.id, sync_points(behavior)[-1])
+            at = self.authority.plausible(end, self._bus.local(outcome.at), self._bus.now())
+            self._reach(end, at, by_body=True)
+            self._advance()
+        else:
+            fault = outcome.fault or Fault(reason=f"the body {outcome.status} it")
+            self._lose(behavior.id, fault, at_rest=outcome.status == "aborted")
+
+    def _send(self, behavior: BlockBehavior) -> Pending:
+        pending = self._pending[behavior.id] = self._body.perform(behavior, self._asked[behavior.id])
+        return pending
+
+    def _go_home(self, parts: set[str], name: str = "") -> None:
+        """But not what another behavior moves by now."""
+        others = (other for other in self._around.others() if name or other is not self)
+        if parts := parts.difference(*(other.parts_moving for other in others)):
+            self._body.go_home(parts, name)
+
+    @property
+    def parts_used(self) -> set[str]:
+        """Of the body, by what has begun so far."""
+        return {part for id in self.authority.begun for part in self._parts(id)}
+
+    @property
+    def parts_moving(self) -> set[str]:
+        """By what has begun and not ended."""
+        moving = self._performed.keys() - set(self._dropped)
+        return {part for id in moving if not self.authority.has_ended(id) for part in self._parts(id)}
+
+    def _parts(self, id: str) -> set[str]:
+        estimate = self.plan.estimates.get(id)
+        return set(estimate.parts) if estimate else set()
+
+    async def _wait(self, id: str, duration: Seconds) -> None:
+        began = self._bus.now()
+        self._reach(Point(id, "start"), began)
+        self._advance()
+        if duration:
+            await asyncio.sleep(began + duration - self._bus.now())
+        if self._asked[id].through == "end":
+            self._reach(Point(id, "end"), self._bus.now())
+        else:
+            self.authority.arrive(Point(id, "end"), self._bus.now())
+        self._advance()
+
+    def _at_once(self, id: str) -> None:
+        now = self._bus.now()
+        for sync in ("start", "end"):
+            self._reach(Point(id, sync), now)
+        self._advance()
+
+    async def _event(self, event: Event) -> None:
+        began = self._bus.now()
+        self._reach(Point(event.id, "start"), began)
+        pending = self._recognition.ask(self._body.id(event.id), self.plan.block.id, event, began)
+        if pending is not None:
+            self._pending[event.id] = pending
+        self._advance()
+        try:
+            decision = await self._recognition.decision(event, self.plan.block, pending, self.authority.reached)
+        except RequestRefused as error:
+            self._lose(event.id, error.fault, kind="CANNOT_CREATE_BEHAVIOR")
+        else:
+            self._reach(Point(event.id, "end"), max(began, decision.at), by_body=decision.by_recognition)
+        self._advance()

@@ -1,0 +1,83 @@
+"""Connection events and turn signals: the behaviors that recognition realizes, and the clock if it is not there."""
+
+import asyncio
+from collections.abc import Mapping
+from typing import Any
+
+from msgspec import Struct
+
+from engage_hri.schemas import keys
+from engage_hri.schemas.behaviors import Event, TurnSignal
+from engage_hri.schemas.blocks import Block
+from engage_hri.schemas.faults import EngageError
+from engage_hri.schemas.recognition import EventOutcome, RequestEvent, SignalTurn
+from engage_hri.schemas.units import Seconds
+from engage_hri.services.bus.interface import Bus
+from engage_hri.services.realizer.config import RealizerConfig
+from engage_hri.services.realizer.decide.patience import event_deadline
+from engage_hri.services.realizer.perform.surroundings import Presence
+from engage_hri.services.realizer.plan.schedule import EPSILON
+from engage_hri.services.realizer.points import Point
+from engage_hri.services.requests.ends import Pending, Requester, RequestRefused, ServerRestarted
+
+
+class Decision(Struct, frozen=True):
+    """When an event was decided; by recognition, or by us for want of it."""
+
+    at: Seconds
+    by_recognition: bool
+
+
+class RecognitionLink:
+    """Asks recognition for the events of one block."""
+
+    def __init__(self, bus: Bus, requests: Requester, config: RealizerConfig, peers: Presence) -> None:
+        self._bus = bus
+        self._requests = requests
+        self._config = config
+        self._peers = peers
+
+    def signal(self, id: str, block: str, signal: TurnSignal) -> None:
+        """Tell it what became of a turn. Nobody waits for the answer."""
+        message = SignalTurn(id=id, signal=signal, at=self._bus.stamp(), block=block)
+        if "recognition" in self._peers:
+            self._requests.send(keys.TURN, message)
+        else:
+            self._bus.publish(keys.TURN, message)
+
+    def ask(self, id: str, block: str, event: Event, began: Seconds) -> Pending | None:
+        """Request the event; None if nobody is there to decide it."""
+        if "recognition" not in self._peers:
+            return None
+        request = RequestEvent(id=id, block=block, event=event, at=self._bus.stamp(began))
+        return self._requests.send(keys.EVENT, request)
+
+    async def decision(
+        self, event: Event, block: Block, pending: Pending | None, reached: Mapping[Point, Seconds]
+    ) -> Decision:
+        """Wait for it, however it comes about. reached: the facts so far, as they grow. Raises RequestRefused."""
+        while True:
+            if pending is not None and pending.outcome.done():
+                try:
+                    decided = await pending.outcome
+                except RequestRefused:
+                    raise
+                except ServerRestarted:
+                    return Decision(self._bus.now(), False)  # Its new life knows nothing of the event.
+                except EngageError:
+                    pending = None  # It died.
+                    continue
+                at = self._bus.local(decided.at) if isinstance(decided, EventOutcome) else self._bus.now()
+                return Decision(at, True)
+            is_heard = pending is not None and "recognition" in self._peers
+            deadline = event_deadline(event, block, reached, self._config, is_heard=is_heard)
+            remaining = deadline - self._bus.now()
+            if remaining <= EPSILON:
+                if pending is not None:
+                    self._requests.cancel(pending.request.id, "no decision in time")
+                return Decision(self._bus.now(), False)
+            # Asked again then: an anchor may have been realised meanwhile, and the limit runs from there.
+            news: list[asyncio.Future[Any]] = [self._peers.changed]
+            if pending is not None:
+                news.append(pending.outcome)
+            await asyncio.wait(news, timeout=remaining, return_when=asyncio.FIRST_COMPLETED)

@@ -1,0 +1,24 @@
+"""Long work on the event loop, a slice at a time: whatever else is due comes in between."""
+
+import asyncio
+
+from engage_hri.services.realizer.plan.steps import Steps, T
+
+SLICE = 512
+"""Elements, see `steps`: one to five milliseconds of processor. Counted, not timed: equal runs stay equal."""
+
+
+async def unhurried(steps: Steps[T]) -> T:
+    """What `steps` return. A cancellation takes effect at the end of the slice."""
+    done = 0
+    try:
+        while True:
+            done += next(steps)
+            if done >= SLICE:
+                done = 0
+                await asyncio.sleep(0)
+    except StopIteration as end:
+        result: T = end.value
+        return result
+    finally:
+        steps.close()

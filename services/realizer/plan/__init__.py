@@ -1,0 +1,1 @@
+"""From a block to a Petri net and its schedule. No clock."""

@@ -1,0 +1,376 @@
+"""Relations between points, assembled into a Petri net: the middle part of planning."""
+
+from collections.abc import Iterable, Mapping, Sequence
+from functools import reduce
+from itertools import pairwise
+from operator import or_
+
+from msgspec import Struct
+from msgspec.structs import replace
+
+from engage_hri.schemas.units import Seconds
+from engage_hri.services.realizer.net.petri_net import Bound, PetriNet, Place, PlaceKind, Transition
+from engage_hri.services.realizer.plan.cycles import components
+from engage_hri.services.realizer.plan.handover import Arrangement
+from engage_hri.services.realizer.plan.instants import Classes, Instant, instants
+from engage_hri.services.realizer.plan.numbering import numbered
+from engage_hri.services.realizer.plan.phases import Chain
+from engage_hri.services.realizer.plan.relations import Order, Relations
+from engage_hri.services.realizer.plan.schedule import EPSILON
+from engage_hri.services.realizer.plan.steps import PORTION, Steps, portions
+from engage_hri.services.realizer.points import (
+    ORIGIN,
+    WITH_STROKE,
+    Gate,
+    Point,
+    gate,
+    gate_point,
+    one_instant,
+    performer,
+)
+
+
+class Member(Struct, frozen=True, gc=False):
+    """A behavior's part in an instant: how it can be made to wait there, and the point whose report counts."""
+
+    behavior: str
+    kind: Gate
+    point: Point
+
+    @property
+    def can_wait(self) -> bool:
+        """Under way, and there before the others?"""
+        return self.kind in ("hold", "prompt")
+
+
+class Assembly(Struct, frozen=True):
+    """is_ordered: transitions are numbered as they can fire; else some wait for each other."""
+
+    net: PetriNet
+    is_ordered: bool
+    at: Mapping[Point, int]
+    """The transition of each point."""
+    members: tuple[tuple[Member, ...], ...]
+    """Of each transition."""
+
+    def waits(self, ties: Iterable[Place | Bound]) -> set[tuple[str, str]]:
+        """Those of `ties` that only make sure of an order: from which transition for which, by their names."""
+        names = [each.name for each in self.net.transitions]
+        return {
+            (names[tie.source], names[tie.target])
+            for tie in ties
+            if tie.kind == "order" and tie.behavior and tie.source and tie.target != len(names) - 1
+        }
+
+
+class Assembler:
+    """chains: in document order. waited_for: behaviors that the end of the block waits for.
+
+    `assembling` makes one.
+    """
+
+    def __init__(
+        self, chains: Mapping[str, Chain], relations: Relations, classes: Classes, waited_for: frozenset[str]
+    ) -> None:
+        self.chains = chains
+        self.relations = relations
+        self.classes = classes
+        self.waited_for = waited_for
+        self.waived: set[tuple[str, str]] = set()
+
+    def prepare(self) -> Steps[None]:
+        """What does not depend on an arrangement."""
+        chains, relations = self.chains, self.relations
+        foreign = sorted(point for point in relations.named if ":" in point.behavior)
+        own = [point for id in sorted(chains) for point in chains[id].points]
+        found = yield from instants(self.classes, [ORIGIN, *foreign, *own])
+        # The start of the block first; the others keep their canonical order.
+        found.sort(key=lambda instant: ORIGIN not in instant.points)
+        self.size = len(found)
+        self.at = {point: number for number, instant in enumerate(found) for point in instant.points}
+        self.members: list[tuple[Member, ...]] = []
+        for portion in portions(found):
+            self.members += [self._members(instant.points) for instant in portion]
+            yield len(portion)
+        yield len(found) // 8
+        self.kinds = {
+            (member.behavior, number): member.kind for number, those in enumerate(self.members) for member in those
+        }
+        self.transitions = [
+            *(Transition(" = ".join(map(str, instant.points)), instant.points) for instant in found),
+            Transition("bml:end", ()),
+        ]
+        self.places: list[Place] = []
+        self.bounds: list[Bound] = []
+        yield len(found) // 8
+        self._class_delays(found)
+        for orders in portions(relations.orders):
+            for relation in orders:
+                self._order(relation)
+            yield len(orders)
+        self._foreign = frozenset(self.at[point] for point in foreign)
+        if foreign:
+            yield from self._set_out_late([instant.class_id for instant in found])
+        self._fixed = (self.places, self.bounds)
+
+    def assemble(self, arrangement: Arrangement) -> Steps[Assembly]:
+        self.arrangement = arrangement
+        places, bounds = self._fixed
+        self.places, self.bounds = list(places), list(bounds)
+        for portion in portions(sorted(self.chains)):
+            for id in portion:
+                self._phases(self.chains[id])
+            yield 4 * len(portion)
+        self._series()
+        yield 2 * len(self.chains)
+        self._arranged()
+        yield len(self.arrangement.lasting) * len(self.chains) // 8
+        yield from self._never_too_soon()
+        self._ending(self.size)
+        yield 2 * len(self.chains)
+        return (yield from self._in_firing_order())
+
+    def _members(self, points: tuple[Point, ...]) -> tuple[Member, ...]:
+        if len(points) == 1 and (alone := self.chains.get(points[0].behavior)):
+            return (Member(alone.behavior.id, gate(alone.type, (points[0].sync,)), points[0]),)
+        groups: dict[str, list[str]] = {}
+        for behavior, sync in points:
+            groups.setdefault(behavior, []).append(sync)
+        members = []
+        for id, syncs in groups.items():
+            if chain := self.chains.get(id):
+                ordered = tuple(syncs)
+                members.append(Member(id, gate(chain.type, ordered), Point(id, gate_point(chain.type, ordered))))
+            elif id:
+                members.append(Member(id, "passive", Point(id, syncs[0])))
+        return tuple(members)
+
+    def _class_delays(self, found: list[Instant]) -> None:
+        by_class: dict[int, list[tuple[Seconds, int]]] = {}
+        for number, instant in enumerate(found):
+            by_class.setdefault(instant.class_id, []).append((instant.offset, number))
+        for number, instant in enumerate(found):
+            if instant.at is not None and instant.offset == 0.0 and number:
+                self._clock(number, round(instant.at, 9))
+        for ladder in by_class.values():
+            for (low, source), (high, target) in pairwise(sorted(ladder)):
+                seconds = round(high - low, 9)
+                self.places.append(Place("delay", source, target, seconds, seconds))
+                self.bounds.append(Bound("delay", target, source, -seconds))
+
+    def _set_out_late(self, class_ids: Sequence[int]) -> Steps[None]:
+        """Whose stroke comes after a point of another block, but not his start, comes just in time.
+
+        Ours begins when it is sent, which may be long before: nobody is to hold his arm up all the while.
+        class_ids: of each instant.
+        """
+        bits = {class_ids[here]: 1 << number for number, here in enumerate(sorted(self._foreign))}
+        after = [bits.get(each, 0) for each in class_ids]
+        """Which of those points each instant comes after, or is tied to: a bit for each."""
+        out: dict[int, list[int]] = {}
+        for place in self.places:
+            out.setdefault(place.source, []).append(place.target)
+        for chain in self.chains.values():
+            for since, to in pairwise(chain.points):
+                out.setdefault(self.at[since], []).append(self.at[to])
+        yield self.size // 8
+        for circle in (yield from components(self.size, out)):  # what comes before it has been here
+            known = reduce(or_, (after[each] for each in circle))
+            yield len(circle)
+            for here in circle:
+                after[here] = known
+                for each in out.get(here, ()):
+                    after[each] |= known
+        for id, chain in self.chains.items():
+            if chain.type in WITH_STROKE:
+                here, stroke = (self.at[Point(id, sync)] for sync in ("stroke_start", "stroke"))
+                if after[stroke] & ~after[self.at[chain.points[0]]] and self.kinds[id, here] == "hold":
+                    self.kinds[id, here] = "prompt"
+                    self.members[here] = tuple(
+                        [replace(each, kind="prompt") if each.behavior == id else each for each in self.members[here]]
+                    )
+
+    def _clock(self, number: int, at: Seconds) -> None:
+        """Each time is counted from the block's start, whatever else was late."""
+        if at >= 0.0:
+            self.places.append(Place("delay", 0, number, at, at))
+        self.bounds.append(Bound("delay", number, 0, -at))
+
+    def _phases(self, chain: Chain) -> None:
+        id, lines, at = chain.behavior.id, _lines(chain.behavior.line), self.at
+        always = {pair for group in one_instant(chain.type) for pair in pairwise(group)}
+        cut = self.arrangement.cuts.get(id)
+        if (start := at[chain.points[0]]) != 0:
+            self.places.append(Place("order", 0, start, behavior=id, lines=lines))
+        lag, shortest, longest = 0.0, 0.0, 0.0
+        unlimited = False
+        for number, segment in enumerate(chain.segments):
+            source, target = at[chain.points[number]], at[chain.points[number + 1]]
+            gone = cut is not None and number >= cut
+            limit = chain.longest[number]
+            if not gone:
+                lag += segment.natural
+                shortest += segment.shortest
+                longest += limit if limit is not None else segment.natural
+                unlimited = unlimited or (limit is None and source != target)
+            if (segment.since, segment.to) in always or (source == target and shortest <= EPSILON):
+                continue
+            self.places.append(Place("phase", source, target, lag, shortest, id, lines))
+            kind = self.kinds[id, target]
+            if not gone and source != target and kind != "hold":
+                stretch = None if unlimited or kind == "prompt" else max(0.0, longest - lag)
+                self.bounds.append(Bound("phase", target, source, -lag, stretch, id, lines))
+            lag, shortest, longest, unlimited = 0.0, 0.0, 0.0, False
+
+    def _order(self, relation: Order) -> None:
+        earlier, later = relation.earlier, relation.later
+        if earlier.point not in self.at or later.point not in self.at:
+            return
+        source, target = self.at[earlier.point], self.at[later.point]
+        seconds = round(earlier.offset - later.offset, 9)
+        lines = _lines(earlier.line, later.line)
+        if source == target and seconds <= EPSILON:
+            return
+        if seconds >= 0 and target:
+            self.places.append(Place("order", source, target, seconds, seconds, lines=lines))
+        else:
+            self.bounds.append(Bound("order", source, target, seconds, lines=lines))
+
+    def _series(self) -> None:
+        """Thesis 4.5.2: what nothing is said about follows the previous of its type. Nothing waits for it."""
+        named = {point.behavior for point in self.relations.named}
+        previous: dict[str, Chain] = {}
+        for id, chain in self.chains.items():
+            before = previous.get(chain.type)
+            previous[chain.type] = chain
+            if before is None or id in named or performer(chain.behavior) == "recognition":
+                continue
+            other = before.behavior.id
+            sync, seconds = "end", 0.0
+            if other in self.arrangement.natural:
+                # It would last until this one takes over: this one does as soon as it is on target.
+                sync = "stroke"
+                seconds = sum(each.natural for each in before.segments if each.since in ("stroke", "stroke_end"))
+            self._follow(Point(other, sync), Point(id, "start"), seconds, lines=_lines(chain.behavior.line))
+
+    def _arranged(self) -> None:
+        for later, earlier in self.arrangement.turns:
+            self._follow(earlier, Point(later, "start"), behavior=later)
+        for id, (successor, point) in self.arrangement.successors.items():
+            kind: PlaceKind = "series" if id in self.arrangement.natural else "handover"
+            self._follow(Point(successor, "start"), point, behavior=id, kind=kind)
+        others = [id for id in self.chains if id in self.waited_for and id not in self.arrangement.natural]
+        for id in self.arrangement.lasting:
+            for other in others:
+                self._follow(self.chains[other].points[-1], Point(id, "relax"), behavior=id)
+
+    def _follow(
+        self,
+        before: Point,
+        point: Point,
+        seconds: Seconds = 0.0,
+        *,
+        behavior: str = "",
+        lines: tuple[int, ...] = (),
+        kind: PlaceKind = "series",
+    ) -> None:
+        source, target = self.at[before], self.at[point]
+        if source != target:
+            self.places.append(Place(kind, source, target, seconds, seconds, behavior, lines))
+
+    def _never_too_soon(self) -> Steps[None]:
+        """An order on a point that cannot wait is kept for certain by where its behavior can: it waits there.
+
+        Unless what it would wait for waits for it in turn, or it has no time to; then prediction must do. So it does
+        where others of the instant wait for another block: words that follow its words do not wait for a stroke, too.
+        """
+        waits = []
+        for number, place in enumerate(self.places):
+            if not number % PORTION:
+                yield PORTION // 4
+            if place.source in self._foreign and any(each.kind != "passive" for each in self.members[place.target]):
+                continue
+            if place.kind == "order" and place.source != 0:
+                for member in self.members[place.target]:
+                    if member.kind == "passive" and (chain := self.chains.get(member.behavior)):
+                        waits_at, seconds = self._last_wait(chain, place.target)
+                        lag = max(0.0, round(place.lag - seconds, 9))
+                        wait = Place("order", place.source, waits_at, lag, lag, member.behavior, place.lines)
+                        if (self._name(place.source), self._name(waits_at)) not in self.waived:
+                            waits.append(wait)
+        if not waits:
+            return
+        out: dict[int, list[int]] = {}
+        for place in (*self.places, *waits):
+            out.setdefault(place.source, []).append(place.target)
+        yield len(self.places) // 32
+        groups = yield from components(self.size, out)
+        circle = {each: number for number, group in enumerate(groups) for each in group}
+        yield len(self.places) // 32
+        self.places += [place for place in waits if circle[place.source] != circle[place.target]]
+
+    def _name(self, transition: int) -> str:
+        return self.transitions[transition].name
+
+    def waive(self, ties: Iterable[tuple[str, str]]) -> None:
+        """Do without these waits: from one transition for another, by their names."""
+        self.waived |= set(ties)
+
+    def _last_wait(self, chain: Chain, transition: int) -> tuple[int, Seconds]:
+        """Where the behavior can last wait before `transition`, and how long it takes from there."""
+        stations = [self.at[point] for point in chain.points]
+        seconds = 0.0
+        for number in range(stations.index(transition) - 1, -1, -1):
+            seconds += chain.segments[number].natural
+            here = stations[number]
+            if here != transition and self.kinds[chain.behavior.id, here] != "passive":
+                return here, seconds
+        return stations[0], seconds
+
+    def _ending(self, end: int) -> None:
+        """Everything follows the start and leads to the end, or it could happen again before that has come.
+
+        What may outlast the block holds a token from its end to its start instead: it is not begun again before.
+        """
+        self.places.append(Place("order", 0, end))
+        for id, chain in self.chains.items():
+            start, last = self.at[chain.points[0]], self.at[chain.points[-1]]
+            if id in self.waited_for:
+                self.places.append(Place("order", last, end, behavior=id))
+            else:
+                self.places.append(Place("order", start, end, behavior=id))
+                self.places.append(Place("idle", last, start, behavior=id))
+        fed = {place.target for place in self.places if place.kind != "idle"}
+        left = {place.source for place in self.places}
+        self.places += [Place("order", 0, each) for each in range(1, end) if each not in fed]
+        self.places += [Place("order", each, end) for each in range(end) if each not in left]
+        self.places.append(Place("idle", end, 0))
+
+    def _in_firing_order(self) -> Steps[Assembly]:
+        net, ranked, is_ordered = yield from numbered(self.transitions, self.places, self.bounds)
+        number = {old: new for new, old in enumerate(ranked)}
+        members = [*self.members, ()]
+        at = {point: number[each] for point, each in self.at.items()}
+        return Assembly(net, is_ordered, at, tuple([members[each] for each in ranked]))
+
+    def circles(self) -> Steps[list[list[Point]]]:
+        """Points that wait for each other in a circle of no length, so are one instant: circular synchronization."""
+        out: dict[int, list[int]] = {}
+        for place in self.places:
+            if place.kind != "idle" and place.shortest <= EPSILON:
+                out.setdefault(place.source, []).append(place.target)
+        yield len(self.places) // 16
+        groups = [group for group in (yield from components(len(self.transitions), out)) if len(group) > 1]
+        return [[self.transitions[each].points[0] for each in group if each < self.size] for group in groups]
+
+
+def assembling(
+    chains: Mapping[str, Chain], relations: Relations, classes: Classes, waited_for: frozenset[str]
+) -> Steps[Assembler]:
+    assembler = Assembler(chains, relations, classes, waited_for)
+    yield from assembler.prepare()
+    return assembler
+
+
+def _lines(*lines: int) -> tuple[int, ...]:
+    return tuple(sorted(set(lines) - {0}))

@@ -1,0 +1,157 @@
+"""Who is to blame for points that wait for each other in a circle: a behavior that is dropped, or the whole block."""
+
+from collections.abc import Collection, Container, Iterable, Mapping, Sequence
+from itertools import accumulate
+from typing import NamedTuple
+
+from engage_hri.schemas.faults import Fault
+from engage_hri.services.realizer.net.petri_net import Bound, PetriNet, Place
+from engage_hri.services.realizer.plan.assembly import Assembly
+from engage_hri.services.realizer.plan.instants import Classes
+from engage_hri.services.realizer.plan.phases import Chain
+from engage_hri.services.realizer.plan.prediction import Circle, Impossible
+from engage_hri.services.realizer.plan.relations import BlockRefused
+from engage_hri.services.realizer.plan.schedule import EPSILON
+from engage_hri.services.realizer.plan.steps import Steps
+from engage_hri.services.realizer.points import Point
+
+Turn = tuple[str, Point]
+"""Who waits for which point of another before it takes its part."""
+
+
+class Loss(NamedTuple):
+    """A behavior that cannot be on time, and why. turn: that it, or another, would have to wait for."""
+
+    behavior: str
+    reason: str
+    turn: Turn | None = None
+
+
+class Losses(Exception):
+    """What cannot be on time, in document order."""
+
+    def __init__(self, losses: Sequence[Loss]) -> None:
+        self.losses = tuple(losses)
+        super().__init__("; ".join(f"{loss.behavior} {loss.reason}" for loss in losses))
+
+
+def clashes(
+    turns: Iterable[Turn], chains: Mapping[str, Chain], required: Collection[str], classes: Classes
+) -> Steps[list[Loss]]:
+    """Turns that cannot be waited for, whatever the rest of the block: what ties the two leaves no time for both."""
+    rank = {id: number for number, id in enumerate(chains)}
+    losses: dict[str, Loss] = {}
+    stays: dict[str, str] = {}
+    """Who has the part instead of who is lost."""
+    for later, (earlier, sync) in sorted(turns, key=lambda turn: (rank[turn[0]], rank[turn[1].behavior])):
+        yield 16
+        earlier = stays.get(earlier, earlier)
+        free = [id for id in (earlier, later) if id not in required]
+        if free and later not in losses and _clash(chains[earlier], sync, chains[later], classes):
+            lost = max(free, key=rank.__getitem__)
+            turn = (later, Point(earlier, sync))
+            losses[lost] = Loss(lost, f"cannot be on time: {later} would have to wait for {turn[1]}", turn)
+            stays[lost] = later if lost == earlier else earlier
+    return list(losses.values())
+
+
+def _clash(earlier: Chain, sync: str, later: Chain, classes: Classes) -> bool:
+    """Is there a point of each so close to the other's that `later` has to start before `earlier` is at `sync`?"""
+    last = next(number for number, point in enumerate(earlier.points) if point.sync == sync)
+    since_start = list(accumulate((each.shortest for each in later.segments), initial=0.0))
+    left = list(accumulate((each.shortest for each in reversed(earlier.segments[:last])), initial=0.0))[::-1]
+    return any(
+        (apart := classes.offset_between(one, other)) is not None and apart < still + gone - EPSILON
+        for one, still in zip(earlier.points, left, strict=False)
+        for other, gone in zip(later.points, since_start, strict=True)
+    )
+
+
+def judge(
+    impossible: Impossible,
+    assembly: Assembly,
+    chains: Mapping[str, Chain],
+    required: Collection[str],
+    classes: Classes,
+    block: str,
+    turns: Collection[Turn],
+) -> Steps[Losses | BlockRefused]:
+    """A time that cannot be met costs a behavior, the later in the document; waiting for each other costs the block.
+
+    Each circle costs a behavior, unless one that is lost already was part of it.
+    """
+    net = assembly.net
+    rank = {id: number for number, id in enumerate(chains) if id not in required}
+    ends = {(assembly.at[turn[1]], assembly.at[Point(turn[0], "start")]): turn for turn in sorted(turns)}
+    found = []
+    for circle in impossible.circles:
+        found.append((_loss(circle, net, rank, chains, ends), circle))
+        yield 1 + len(circle)
+    losses: dict[str, Loss] = {}
+    for loss, circle in sorted(found, key=lambda each: rank[each[0].behavior] if each[0] else -1):
+        yield len(circle)
+        if loss is not None and not _touched(circle, net) & losses.keys():
+            losses[loss.behavior] = loss
+    return Losses(tuple(losses.values())) if losses else _deadlock(impossible.circles[0], net, classes, block)
+
+
+def _loss(
+    circle: Circle,
+    net: PetriNet,
+    rank: Mapping[str, int],
+    chains: Container[str],
+    turns: Mapping[tuple[int, int], Turn],
+) -> Loss | None:
+    """Who is to blame for a circle, if not the block. rank: in the document, of those that may be dropped.
+
+    Two that must have the same part at the same time: the later of them. A phase that is too long for the time it
+    is given: whose phase it is; else whose phase would have to be longer than it can be.
+    """
+    ties = [tie for tie, _ in circle]
+    series = ((tie.source, tie.target) for tie in ties if tie.kind == "series")
+    turn = next((turns[ends] for ends in series if ends in turns), None)
+    slow = {tie.behavior for tie in ties if isinstance(tie, Place) and tie.kind == "phase"}
+    quick = {tie.behavior for tie in ties if isinstance(tie, Bound) and tie.kind == "phase"}
+    touched = _touched(circle, net)
+    is_timed = any(tie.source == 0 for tie in ties)
+    if turn or quick or is_timed or len([id for id in slow or touched if id in chains]) == 1:
+        for group in ({turn[0], turn[1].behavior},) if turn else (slow, quick, touched):
+            if free := group & rank.keys():
+                return Loss(max(free, key=rank.__getitem__), f"cannot be on time: {_route(net, circle)}", turn)
+    return None
+
+
+def _touched(circle: Circle, net: PetriNet) -> set[str]:
+    """Behaviors with a point in an instant of the circle."""
+    return {point.behavior for tie, _ in circle for point in net.transitions[tie.source].points}
+
+
+def _deadlock(circle: Circle, net: PetriNet, classes: Classes, block: str) -> BlockRefused:
+    ties = [tie for tie, _ in circle]
+    lines = sorted({line for tie in ties for line in tie.lines} | _lines_of_instants(ties, net, classes))
+    fault = Fault(
+        reason=f"these points wait for each other in a circle: {_route(net, circle)}",
+        where=block,
+        line=lines[0] if lines else 0,
+        advice=f"see lines {', '.join(map(str, lines))}" if len(lines) > 1 else "",
+    )
+    return BlockRefused(fault, "IMPOSSIBLE_TO_SCHEDULE")
+
+
+def _route(net: PetriNet, circle: Circle) -> str:
+    steps = [f"{net.transitions[tie.source].name} ({seconds:+g} s)" for tie, seconds in circle]
+    return " -> ".join((*steps, net.transitions[circle[0][0].source].name))
+
+
+def _lines_of_instants(ties: list[Place | Bound], net: PetriNet, classes: Classes) -> set[int]:
+    """Where it is written that the points of these instants belong together."""
+    lines: set[int] = set()
+    for before, after in zip([ties[-1], *ties], ties, strict=False):
+        came, goes = before.behavior, after.behavior
+        here = net.transitions[after.source].points
+        ends = [next((point for point in here if point.behavior == id), None) for id in (came, goes)]
+        lines |= classes.lines(*(end for end in ends if end is not None))
+        if after.kind == "delay":
+            there = net.transitions[after.target].points
+            lines |= classes.lines(here[0], there[0])
+    return lines

@@ -1,0 +1,177 @@
+"""Points that are one instant, give or take fixed offsets: a weighted union-find. Thesis 4.4 had limits here.
+
+Synchronizations that share a point merge, whatever their number, direction and sign of offset.
+"""
+
+from collections import defaultdict, deque
+from collections.abc import Collection
+
+from msgspec import Struct
+
+from engage_hri.schemas.faults import Fault
+from engage_hri.schemas.units import Seconds
+from engage_hri.services.realizer.plan.relations import BlockRefused, Equal, Term
+from engage_hri.services.realizer.plan.schedule import EPSILON
+from engage_hri.services.realizer.plan.steps import PORTION, Steps, portions
+from engage_hri.services.realizer.points import ORIGIN, Point
+
+
+class Instant(Struct, frozen=True, gc=False):
+    """Points that happen together. class_id, offset: its place within its class, lowest offset 0.
+
+    at: seconds from the block's start, if that is what is asked for.
+    """
+
+    points: tuple[Point, ...]
+    class_id: int
+    offset: Seconds
+    at: Seconds | None = None
+
+
+class Classes:
+    """Which points are tied together, and by how many seconds.
+
+    Times of the clock contradict each other as well, but make no class: two behaviors that are both to end at 10 s
+    do not wait for each other.
+    """
+
+    def __init__(self) -> None:
+        self._clock: dict[Point, Seconds] = {}
+        """When a representative is to happen, seconds from the block's start, if that is said."""
+        self._parent: dict[Point, Point] = {}
+        self._offset: dict[Point, Seconds] = {}
+        """Of a point to its parent: when it happens, counted from the parent."""
+        self._links: dict[Point, list[tuple[Point, Term]]] = defaultdict(list)
+
+    def add(self, point: Point) -> None:
+        if point not in self._parent:
+            self._parent[point], self._offset[point] = point, 0.0
+
+    def find(self, point: Point) -> tuple[Point, Seconds]:
+        """The representative of the point's class, and when the point happens, counted from it."""
+        path = []
+        while self._parent[point] != point:
+            path.append(point)
+            point = self._parent[point]
+        offset = 0.0
+        for each in reversed(path):
+            offset += self._offset[each]
+            self._parent[each], self._offset[each] = point, offset
+        return point, offset
+
+    def at(self, point: Point) -> Seconds | None:
+        """When it is to happen, seconds from the block's start, if that is said."""
+        if point == ORIGIN:
+            return 0.0
+        root, offset = self.find(point)
+        clock = self._clock.get(root)
+        return None if clock is None else clock + offset
+
+    def offset_between(self, one: Point, other: Point) -> Seconds | None:
+        """Seconds from `one` to `other`; None if nothing ties them."""
+        (root, start), (other_root, end) = self.find(one), self.find(other)
+        if root == other_root:
+            return end - start
+        since, to = self.at(one), self.at(other)
+        return None if since is None or to is None else to - since
+
+    def tie(self, equal: Equal, block: str) -> None:
+        """Merge. Raises BlockRefused if that contradicts what is known, naming points and lines."""
+        first, *others = sorted(equal.terms, key=lambda term: term.point == ORIGIN)
+        for term in others:
+            self.add(first.point)
+            self.add(term.point)
+            apart = first.offset - term.offset  # first + first.offset = term + term.offset
+            known = self.offset_between(first.point, term.point)
+            if known is not None and abs(known - apart) > EPSILON:
+                raise self._contradiction(first, term, known, block)
+            self._links[first.point].append((term.point, term))
+            self._links[term.point].append((first.point, first))
+            self._merge(first.point, term.point, apart)
+
+    def _merge(self, one: Point, other: Point, apart: Seconds) -> None:
+        root, start = self.find(one)
+        if other == ORIGIN:
+            self._clock[root] = -apart - start
+            return
+        joined, end = self.find(other)
+        if joined == root:
+            return
+        self._parent[joined], self._offset[joined] = root, start + apart - end
+        if (clock := self._clock.pop(joined, None)) is not None:
+            self._clock[root] = clock - self._offset[joined]
+
+    def tie_if_possible(self, equal: Equal) -> bool:
+        """Merge, unless that contradicts what is known."""
+        try:
+            self.tie(equal, "")
+        except BlockRefused:
+            return False
+        return True
+
+    def lines(self, *points: Point) -> set[int]:
+        """Where it is written that the first of `points` and the last are tied, if they are."""
+        return {term.line for term in self._chain(points[0], points[-1])} - {0} if len(points) > 1 else set()
+
+    def _contradiction(self, first: Term, second: Term, known: Seconds, block: str) -> BlockRefused:
+        chain = self._chain(first.point, second.point)
+        lines = sorted({term.line for term in (first, second, *chain)} - {0})
+        via = ", ".join(dict.fromkeys(str(term.point) for term in chain))
+        reason = (
+            f"{first.text!r} and {second.text!r} cannot be one instant: {second.point} is already "
+            f"{known:+g} s from {first.point}" + (f" (through {via})" if via else "")
+        )
+        advice = f"see lines {', '.join(map(str, lines))}" if len(lines) > 1 else ""
+        fault = Fault(reason=reason, where=block, line=max(lines, default=0), advice=advice)
+        return BlockRefused(fault, "IMPOSSIBLE_TO_SCHEDULE")
+
+    def _chain(self, start: Point, end: Point) -> list[Term]:
+        came: dict[Point, tuple[Point, Term] | None] = {start: None}
+        queue = deque([start])
+        while queue and end not in came:
+            here = queue.popleft()
+            for there, term in self._links[here]:
+                if there not in came:
+                    came[there] = (here, term)
+                    queue.append(there)
+        chain = []
+        while (step := came.get(end)) is not None:
+            chain.append(step[1])
+            end = step[0]
+        return chain[::-1]
+
+
+def instants(classes: Classes, points: Collection[Point]) -> Steps[list[Instant]]:
+    """`points` (in a canonical order) grouped into instants: classes by their first point, each by offset."""
+    members: dict[Point, list[tuple[Seconds, int, Point]]] = {}
+    number = 0
+    for portion in portions(points):
+        for point in portion:
+            classes.add(point)
+            root, offset = classes.find(point)
+            members.setdefault(root, []).append((offset, number, point))
+            number += 1
+        yield len(portion)
+    found: list[Instant] = []
+    for class_id, group in enumerate(members.values()):
+        if not class_id % PORTION:
+            yield PORTION
+        if len(group) == 1:
+            alone = group[0][2]
+            found.append(Instant((alone,), class_id, 0.0, classes.at(alone)))
+            continue
+        group.sort()
+        lowest = group[0][0]
+        together: list[tuple[Seconds, int, Point]] = []
+        for member in group:
+            if together and member[0] - together[0][0] > EPSILON:
+                found.append(_instant(classes, together, class_id, lowest))
+                together = []
+            together.append(member)
+        found.append(_instant(classes, together, class_id, lowest))
+    return found
+
+
+def _instant(classes: Classes, together: list[tuple[Seconds, int, Point]], class_id: int, lowest: Seconds) -> Instant:
+    points = tuple(point for _, _, point in sorted(together, key=lambda member: member[1]))
+    return Instant(points, class_id, round(together[0][0] - lowest, 9), classes.at(points[0]))

@@ -1,0 +1,82 @@
+"""What the planner knows of each behavior: its points, the seconds between them, and the parts it moves."""
+
+from collections.abc import Mapping
+
+from msgspec import Struct
+
+from engage_hri.schemas.behaviors import BlockBehavior, Gesture, Head, Pointing
+from engage_hri.schemas.body import Estimate
+from engage_hri.schemas.references import type_name
+from engage_hri.schemas.units import Seconds
+from engage_hri.services.realizer.plan.relations import Relations
+from engage_hri.services.realizer.points import BENEATH, ON_TARGET, Point, Segment, family, segments
+
+_ARMS = {"LEFT_HAND": ("left_arm",), "RIGHT_HAND": ("right_arm",), "BOTH_HANDS": ("left_arm", "right_arm")}
+_SHARED = ON_TARGET | BENEATH | {"pointing", "gesture", "head", "speech", "faceShift", "postureShift", "pose"}
+"""Types of which another behavior of the same part takes the place."""
+
+
+class Chain(Struct, frozen=True):
+    """A behavior with the seconds between its points.
+
+    longest: of each segment; None: it can be stretched without limit. parts: what it takes from another that has it.
+    """
+
+    behavior: BlockBehavior
+    type: str
+    points: tuple[Point, ...]
+    segments: tuple[Segment, ...]
+    longest: tuple[Seconds | None, ...]
+    parts: tuple[str, ...] = ()
+
+
+def chain(behavior: BlockBehavior, estimate: Estimate | None) -> Chain:
+    """`behavior` as the body estimates it; nominal where it does not."""
+    longest = {(phase.since, phase.to): phase.longest for phase in estimate.phases} if estimate else {}
+    parts = segments(behavior, estimate)
+    if isinstance(behavior, Head) and estimate is not None:
+        parts = _stroke_by_stroke(parts, estimate)
+    return Chain(
+        behavior,
+        type_name(behavior),
+        tuple([Point(behavior.id, sync) for sync in ("start", *(part.to for part in parts))]),
+        parts,
+        tuple([longest.get((part.since, part.to)) for part in parts]) if longest else (None,) * len(parts),
+        _parts(behavior, estimate),
+    )
+
+
+def _stroke_by_stroke(parts: tuple[Segment, ...], estimate: Estimate) -> tuple[Segment, ...]:
+    """With each repetition of a movement, if the body says that it will tell of them: `stroke:2` and on."""
+    syncs = [phase.since for phase in estimate.phases]
+    if "stroke" not in syncs or "stroke_end" not in syncs:
+        return parts
+    first, last = syncs.index("stroke"), syncs.index("stroke_end")
+    strokes = [
+        Segment(phase.since, phase.to, min(phase.shortest, phase.natural), phase.natural, phase.to == "stroke_end")
+        for phase in estimate.phases[first:last]
+    ]
+    number = next(number for number, part in enumerate(parts) if part.since == "stroke")
+    return (*parts[:number], *strokes, *parts[number + 1 :])
+
+
+def _parts(behavior: BlockBehavior, estimate: Estimate | None) -> tuple[str, ...]:
+    type = type_name(behavior)
+    if type not in _SHARED:
+        return ()
+    if isinstance(behavior, Pointing | Gesture) and behavior.mode is not None:
+        return _ARMS[behavior.mode]
+    parts = estimate.parts if estimate and estimate.parts else (family(type),)
+    # A nod is on top of whatever else the head does.
+    return tuple([f"nod of {part}" for part in parts]) if type == "head" else parts
+
+
+def natural_ends(chains: Mapping[str, Chain], relations: Relations) -> frozenset[str]:
+    """Behaviors that last until something else takes their place or all ends: nobody has said when they end."""
+    constrained = relations.constrained
+    return frozenset(
+        id
+        for id, each in chains.items()
+        if each.type in ON_TARGET
+        and not any(Point(id, sync) in constrained for sync in ("stroke_end", "relax", "end"))
+    )

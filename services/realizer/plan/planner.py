@@ -1,0 +1,381 @@
+"""From a block and what the body expects of its behaviors to a plan: the net and its earliest schedule.
+
+Refused here, before anything moves: references to nothing, contradictions, and circles of waiting. Dropped here,
+each with a warning: what the body cannot do, and what cannot be on time. Document order decides only between
+equals; any other permutation of a block gives the same net.
+"""
+
+from collections.abc import Collection, Container, Iterable, Mapping, Sequence
+from typing import get_args
+
+from msgspec import Struct
+from msgspec.structs import replace
+
+from engage_hri.schemas.behaviors import BlockBehavior, Event, Hand, Head, Unknown
+from engage_hri.schemas.blocks import Block
+from engage_hri.schemas.body import Estimate, Estimates
+from engage_hri.schemas.faults import Fault
+from engage_hri.schemas.feedback import WarningKind
+from engage_hri.schemas.units import Seconds
+from engage_hri.services.realizer.net.petri_net import Bound, PetriNet
+from engage_hri.services.realizer.plan.assembly import Assembler, Assembly, Member, assembling
+from engage_hri.services.realizer.plan.deadlocks import Losses, clashes, judge
+from engage_hri.services.realizer.plan.handover import Arrangement, Conflict, arrange, entering
+from engage_hri.services.realizer.plan.instants import Classes
+from engage_hri.services.realizer.plan.phases import Chain, chain, natural_ends
+from engage_hri.services.realizer.plan.prediction import Impossible, predict
+from engage_hri.services.realizer.plan.relations import (
+    DROPPED,
+    BlockRefused,
+    Elsewhere,
+    Equal,
+    Order,
+    Problem,
+    Relations,
+    Term,
+    at_line,
+    relation_steps,
+)
+from engage_hri.services.realizer.plan.schedule import EPSILON, Solution
+from engage_hri.services.realizer.plan.steps import PORTION, Steps, finished, portions
+from engage_hri.services.realizer.points import ORIGIN, Point, one_instant
+
+
+class Plan(Struct, frozen=True, kw_only=True):
+    """schedule: of each transition of the net, seconds from the block's start, if all goes as estimated.
+
+    block: with a hand for each gesture that must use a certain one. critical: the transitions that make the block as
+    long as it is, from first to last.
+    entering: behaviors in the order in which they take their parts: of two that begin at one instant, too.
+    behaviors: those that will be performed, in document order. dropped: those that will not, with `problems`.
+    natural: behaviors that end when something takes their place, or with the block.
+    waited_for: behaviors that the end of the block waits for.
+    """
+
+    block: Block
+    behaviors: tuple[BlockBehavior, ...]
+    net: PetriNet
+    at: Mapping[Point, int]
+    members: tuple[tuple[Member, ...], ...]
+    schedule: tuple[Seconds, ...]
+    chains: Mapping[str, Chain]
+    estimates: Mapping[str, Estimate]
+    natural: frozenset[str]
+    required: frozenset[str]
+    waited_for: frozenset[str]
+    entering: tuple[str, ...]
+    critical: tuple[int, ...] = ()
+    dropped: tuple[str, ...] = ()
+    problems: tuple[Problem, ...] = ()
+
+    def predicted(self, point: Point) -> Seconds:
+        return self.schedule[self.at[point]]
+
+    @property
+    def foreign(self) -> tuple[Point, ...]:
+        """Points of other blocks that this one is tied to."""
+        return tuple([point for point in self.at if ":" in point.behavior])
+
+    @property
+    def bounds(self) -> tuple[Bound, ...]:
+        return self.net.bounds
+
+
+def plan_block(
+    block: Block,
+    estimates: Estimates | Iterable[Estimate] = (),
+    *,
+    dropped: Iterable[str] = (),
+    elsewhere: Elsewhere | None = None,
+    barred: Container[tuple[str, Hand]] = (),
+) -> Plan:
+    """Plan `block`; durations that no estimate gives are nominal. Raises BlockRefused, with place and line.
+
+    dropped: behaviors to leave out as if never written. elsewhere: other live blocks, by id. barred: hands
+    with which a behavior cannot be done.
+    """
+    return finished(plan_steps(block, estimates, dropped=dropped, elsewhere=elsewhere, barred=barred))
+
+
+def plan_steps(
+    block: Block,
+    estimates: Estimates | Iterable[Estimate] = (),
+    *,
+    dropped: Iterable[str] = (),
+    elsewhere: Elsewhere | None = None,
+    barred: Container[tuple[str, Hand]] = (),
+) -> Steps[Plan]:
+    """See `plan_block`."""
+    items = estimates.items if isinstance(estimates, Estimates) else tuple(estimates)
+    planner = _Planner(block, {each.behavior: each for each in items}, dropped, barred)
+    yield from planner.read(elsewhere)
+    return (yield from planner.plan())
+
+
+class _Planner:
+    def __init__(
+        self,
+        block: Block,
+        estimates: Mapping[str, Estimate],
+        dropped: Iterable[str],
+        barred: Container[tuple[str, Hand]],
+    ) -> None:
+        self.block = block
+        self.lines = {behavior.id: behavior.line for behavior in block.behaviors}
+        self.estimates = estimates
+        self.barred = barred
+        self.dropped = dict.fromkeys(dropped)
+        """In the order in which they were; the values say nothing."""
+        self.turns: frozenset[tuple[str, Point]] = frozenset()
+        self.overlaps: set[tuple[str, Point]] = set()
+        """Turns that there is no time to wait for."""
+        self.hands: dict[str, Hand] = {}
+        self.chains: dict[str, Chain] = {}
+
+    def read(self, elsewhere: Elsewhere | None) -> Steps[None]:
+        self.relations = yield from relation_steps(self.block, elsewhere)
+        self.problems = list(self.relations.problems)
+        for portion in portions(self.block.behaviors):
+            for behavior in portion:
+                if behavior.id not in self.dropped:
+                    self._read(behavior)
+            yield 4 * len(portion)
+
+    def _read(self, behavior: BlockBehavior) -> None:
+        if isinstance(behavior, Unknown):
+            self._drop(behavior.id, "BEHAVIOR_TYPE_NOT_SUPPORTED", f"unknown element <{behavior.element}>")
+        elif behavior.id in self.relations.unusable:
+            self._refuse_if_required(behavior.id, "its timing names a sync point it does not have", "PARSING_FAILURE")
+            self.dropped[behavior.id] = None
+        elif (estimate := self.estimates.get(behavior.id)) and not estimate.feasible:
+            self._drop(behavior.id, _kind(estimate.warning), str(estimate.fault or "the body cannot do it"))
+        else:
+            self.chains[behavior.id] = chain(behavior, estimate)
+
+    def _refuse_if_required(self, id: str, reason: str, kind: WarningKind) -> None:
+        if id in self.relations.required:
+            advice = "it is required; without `required` it would be dropped"
+            fault = Fault(reason=reason, where=f"{self.block.id}: {id}", line=self.lines[id], advice=advice)
+            raise BlockRefused(fault, kind)
+
+    def _drop(self, id: str, kind: WarningKind, reason: str) -> None:
+        self._refuse_if_required(id, reason, kind)
+        self.chains.pop(id, None)
+        self.dropped[id] = None
+        self.problems.append(Problem(kind, at_line(self.lines[id], f"{reason}{DROPPED}"), id))
+
+    def plan(self) -> Steps[Plan]:
+        """What cannot be on time is dropped, until the rest can be."""
+        while True:
+            present, classes = yield from self._present()
+            try:
+                return (yield from self._plan(present, classes))
+            except Losses as found:
+                self.turns = frozenset()
+                for number, loss in enumerate(found.losses):
+                    if not number % PORTION:
+                        yield PORTION
+                    if loss.turn is not None and self._may_speak_at_once(loss.turn[1].behavior, present):
+                        self.overlaps.add(loss.turn)
+                    else:
+                        self._drop(loss.behavior, "IMPOSSIBLE_TO_SCHEDULE", loss.reason)
+
+    def _plan(self, present: Relations, classes: Classes) -> Steps[Plan]:
+        """Raises Losses: what cannot be on time."""
+        natural = natural_ends(self.chains, present)
+        waited_for = frozenset(self.chains) - self._unawaited_events(present)
+        arrangement = Arrangement(natural=natural)
+        assembler = yield from assembling(self.chains, present, classes, waited_for)
+        mentioned = {point.behavior for point in present.constrained}
+        while True:
+            assembler, assembly, solution = yield from self._solved(assembler, arrangement, classes)
+            times = {point: solution.times[transition] for point, transition in assembly.at.items()}
+            yield len(times) // 4
+            rounds = _rounds(assembly, solution.times)
+            yield len(times) // 4
+            arranged, conflicts = yield from arrange(
+                self.chains, present, classes, arrangement, times, rounds, self.barred
+            )
+            conflicts = [each for each in conflicts if each.hand or each.turn not in self.overlaps]
+            turns = [each.turn for each in conflicts if each.turn and not each.hand]
+            if losses := (yield from clashes(turns, self.chains, self.relations.required, classes)):
+                raise Losses(losses)
+            for part in portions(conflicts):
+                for conflict in part:
+                    self._resolve(conflict)
+                yield 2 * len(part)
+            if conflicts:
+                arrangement = Arrangement(natural=natural, turns=self.turns)
+            elif arranged == arrangement:
+                break
+            else:
+                arrangement = arranged
+        return Plan(
+            block=self._block(),
+            behaviors=tuple([chain.behavior for chain in self.chains.values()]),
+            net=assembly.net,
+            at=assembly.at,
+            members=assembly.members,
+            schedule=tuple(solution.times),
+            chains=dict(self.chains),
+            estimates=self.estimates,
+            natural=natural,
+            required=present.required,
+            waited_for=waited_for,
+            entering=entering(self.chains, mentioned, times, rounds),
+            critical=_critical(solution),
+            dropped=tuple(self.dropped),
+            problems=tuple(self.problems),
+        )
+
+    def _present(self) -> Steps[tuple[Relations, Classes]]:
+        """What is said about the points of those that are performed, and which of them are one instant."""
+
+        def there(term: Term) -> bool:
+            return term.point.behavior not in self.dropped
+
+        shown = self._timed
+        equals = [
+            Equal(tuple(map(shown, kept)))
+            for equal in self.relations.equals
+            if (kept := tuple(filter(there, equal.terms))) and (len(kept) > 1 or len(equal.terms) == 1)
+        ]
+        yield len(equals)
+        classes = yield from self._classes(equals)
+        equals += [equal for equal in self._left_over() if classes.tie_if_possible(equal)]
+        yield len(equals)
+        orders = [each for each in self.relations.orders if there(each.earlier) and there(each.later)]
+        present = Relations(
+            tuple(equals),
+            tuple([Order(shown(each.earlier), shown(each.later)) for each in orders]),
+            self.relations.required - self.dropped.keys(),
+        )
+        return present, classes
+
+    def _left_over(self) -> list[Equal]:
+        """What the points of a dropped behavior tied together stays tied, unless they could not have been."""
+        torn = [
+            Equal(tuple(map(self._timed, equal.terms)))
+            for equal in self.relations.equals
+            if equal.behavior not in self.dropped  # else it goes with the timing written on it
+            and any(term.point.behavior in self.dropped for term in equal.terms)
+        ]
+        through = Classes()
+        for equal in sorted(torn, key=lambda equal: [term.text for term in equal.terms]):
+            through.tie_if_possible(equal)
+        survivors = {
+            term.point: term
+            for equal in torn
+            for term in equal.terms
+            if term.point != ORIGIN and term.point.behavior not in self.dropped
+        }
+        first: dict[Point, Term] = {}
+        found = []
+        for point, term in sorted(survivors.items()):
+            root, offset = through.find(point)
+            here = replace(term, offset=-offset, stroke=0)
+            if root in first:
+                found.append(Equal((first[root], here)))
+                continue
+            first[root] = here
+            if (at := through.at(point)) is not None:
+                found.append(Equal((here, Term(ORIGIN, at - offset, term.text, term.line))))
+        return found
+
+    def _timed(self, term: Term) -> Term:
+        """A later stroke as a point of its own, if the body tells of it; else as so much later than the first."""
+        if term.stroke < 2 or (movement := self.chains.get(term.point.behavior)) is None:
+            return term
+        later = Point(term.point.behavior, f"{term.point.sync}:{term.stroke}")
+        if later in movement.points:
+            return replace(term, point=later, stroke=0)
+        assert isinstance(movement.behavior, Head)
+        strokes = next(each.natural for each in movement.segments if each.since == "stroke")
+        share = (term.stroke - 1) / movement.behavior.repetition
+        return replace(term, offset=term.offset + share * strokes, stroke=0)
+
+    def _classes(self, equals: Collection[Equal]) -> Steps[Classes]:
+        classes = Classes()
+        for portion in portions(self.chains.values()):
+            for each in portion:
+                for syncs in one_instant(each.type):
+                    classes.tie(Equal(tuple([Term(Point(each.behavior.id, sync), 0.0, sync) for sync in syncs])), "")
+            yield 2 * len(portion)
+        for equal in equals:
+            classes.tie(equal, self.block.id)
+            yield 2 * len(equal.terms)
+        return classes
+
+    def _unawaited_events(self, present: Relations) -> frozenset[str]:
+        """Events whose decision nothing in the block waits for."""
+        events = {id for id, each in self.chains.items() if isinstance(each.behavior, Event)}
+        awaited = {point.behavior for point in present.constrained if point.sync == "end"} if events else ()
+        return frozenset(events.difference(awaited))
+
+    def _solved(
+        self, assembler: Assembler, arrangement: Arrangement, classes: Classes
+    ) -> Steps[tuple[Assembler, Assembly, Solution]]:
+        """What waits for each other without delay is made one instant. Raises Losses, or BlockRefused: a deadlock."""
+        while True:
+            assembly = yield from assembler.assemble(arrangement)
+            if assembly.is_ordered or not (circles := (yield from assembler.circles())):
+                break
+            for points in circles:
+                terms = tuple([Term(point, 0.0, str(point)) for point in points])
+                classes.tie(Equal(terms), self.block.id)
+            assembler = yield from assembling(self.chains, assembler.relations, classes, assembler.waited_for)
+        try:
+            solution = yield from predict(assembly.net, lambda ties: bool(assembly.waits(ties)))
+            return assembler, assembly, solution
+        except Impossible as impossible:
+            if waits := assembly.waits(tie for circle in impossible.circles for tie, _ in circle):
+                assembler.waive(waits)
+                return (yield from self._solved(assembler, arrangement, classes))
+            required = self.relations.required
+            raise (
+                yield from judge(impossible, assembly, self.chains, required, classes, self.block.id, self.turns)
+            ) from None
+
+    def _may_speak_at_once(self, id: str, present: Relations) -> bool:
+        """Of an utterance that only begins the block nobody has said that it must be over by then: the voice will."""
+        return self.chains[id].type == "speech" and all(point.behavior != id for point in present.constrained)
+
+    def _resolve(self, conflict: Conflict) -> None:
+        """Use the other arm, or wait for one's turn."""
+        if conflict.hand is None:
+            assert conflict.turn is not None
+            self.turns |= {conflict.turn}
+            return
+        id, hand = conflict.hand
+        self.hands[id] = hand
+        behavior = replace(self.chains[id].behavior, mode=hand)
+        self.chains[id] = chain(behavior, self.estimates.get(id))
+
+    def _block(self) -> Block:
+        if not self.hands:
+            return self.block
+        chosen = [
+            replace(each, mode=hand) if (hand := self.hands.get(each.id)) else each for each in self.block.behaviors
+        ]
+        return replace(self.block, behaviors=tuple(chosen))
+
+
+def _kind(warning: str) -> WarningKind:
+    return warning if warning in get_args(WarningKind) else "CANNOT_CREATE_BEHAVIOR"  # type: ignore[return-value]
+
+
+def _rounds(assembly: Assembly, times: Sequence[Seconds]) -> dict[Point, int]:
+    """How many measured events in a row each point waits for at its own time: who waits for one comes after it."""
+    rounds = [0] * len(times)
+    for place in sorted(assembly.net.places, key=lambda place: place.source):  # numbered in firing order
+        if place.kind != "idle" and place.source and times[place.target] - times[place.source] < EPSILON:
+            rounds[place.target] = max(rounds[place.target], rounds[place.source] + 1)
+    return {point: rounds[transition] for point, transition in assembly.at.items()}
+
+
+def _critical(solution: Solution) -> tuple[int, ...]:
+    """From the end of the block back along what keeps each instant from being earlier."""
+    path = [len(solution.times) - 1]
+    while (cause := solution.causes.get(path[-1])) is not None:
+        path.append(cause.source)
+    return tuple(path[::-1])

@@ -1,0 +1,79 @@
+"""The predicted schedule of a net: phases last as long as is natural, faster or slower only where they must be."""
+
+from collections.abc import Callable, Iterable, Sequence
+from math import inf
+
+from engage_hri.schemas.units import Seconds
+from engage_hri.services.realizer.net.petri_net import Bound, PetriNet, Place
+from engage_hri.services.realizer.plan.schedule import EPSILON, Lag, PositiveCycle, Solution, solve
+from engage_hri.services.realizer.plan.steps import PORTION, Steps
+
+Circle = tuple[tuple[Place | Bound, Seconds], ...]
+"""Ties that lead back to their start, in order, each with the seconds it asks for: more than none in all."""
+
+
+class Impossible(Exception):
+    """No schedule, with every phase of these circles as short or long as can be.
+
+    circles: all that were found, no two of which share an instant other than the start of the block.
+    """
+
+    def __init__(self, circles: Sequence[Circle]) -> None:
+        self.circles = tuple(circles)
+        super().__init__(f"a cycle of {sum(seconds for _, seconds in self.circles[0]):+g} s")
+
+
+def predict(
+    net: PetriNet, is_dispensable: Callable[[Iterable[Place | Bound]], bool] = lambda ties: False
+) -> Steps[Solution]:
+    """The earliest schedule; `reason` of a cause is the number of the place or, after them, of the bound.
+
+    What a cycle takes too long is shared by its phases, each according to the room it has. Raises Impossible; also
+    for a cycle with a tie that nobody insists on: no phase is hurried for its sake.
+    """
+    ties: tuple[Place | Bound, ...] = (*net.places, *net.bounds)
+    lags = []
+    for number, tie in enumerate(ties):
+        if tie.kind != "idle":
+            lags.append(Lag(tie.source, tie.target, tie.lag, number))
+        if not number % PORTION:
+            yield PORTION // 4
+    index: dict[int, int] = {}
+    while True:
+        try:
+            return (yield from solve(len(net.transitions), lags))
+        except PositiveCycle as found:
+            index = index or {lag.reason: number for number, lag in enumerate(lags)}
+            hopeless = []
+            for cycle in found.cycles:
+                yield 3 * len(cycle)
+                circle = tuple([(ties[lag.reason], lag.seconds) for lag in cycle])
+                room = [seconds - _least(tie) for tie, seconds in circle]
+                excess = sum(lag.seconds for lag in cycle)
+                if sum(room) < excess - EPSILON or is_dispensable([tie for tie, _ in circle]):
+                    hopeless.append(circle)
+                    continue
+                for lag in _shortened(cycle, room, excess):
+                    lags[index[lag.reason]] = lag
+            if hopeless:
+                raise Impossible(hopeless) from None
+
+
+def _shortened(cycle: tuple[Lag, ...], room: list[Seconds], excess: Seconds) -> list[Lag]:
+    """The lags of the cycle that give way, by `excess` in all, each according to its `room`."""
+    total = sum(room)
+    if total == inf:
+        shares = [float(each == inf) for each in room]
+        shares = [share / sum(shares) for share in shares]
+    else:
+        shares = [each / total for each in room]
+    return [
+        lag._replace(seconds=lag.seconds - excess * share) for lag, share in zip(cycle, shares, strict=True) if share
+    ]
+
+
+def _least(tie: Place | Bound) -> Seconds:
+    """What the lag may be reduced to."""
+    if isinstance(tie, Place):
+        return tie.shortest
+    return -inf if tie.stretch is None else tie.lag - tie.stretch

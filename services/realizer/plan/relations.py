@@ -1,0 +1,298 @@
+"""What a block says about its sync points, read into relations between points: which are one instant, which in order.
+
+Constraints and inline timing mean the same thing and become the same relations; so do `before` and `after`.
+"""
+
+from collections.abc import Mapping
+from functools import cached_property
+
+from msgspec import Struct
+from msgspec.structs import replace
+
+from engage_hri.schemas.behaviors import (
+    After,
+    Before,
+    Behavior,
+    BlockBehavior,
+    Head,
+    Speech,
+    Synchronize,
+    Unknown,
+    Wait,
+)
+from engage_hri.schemas.blocks import Block
+from engage_hri.schemas.faults import Fault, InputRefused
+from engage_hri.schemas.feedback import WarningKind
+from engage_hri.schemas.references import type_name
+from engage_hri.schemas.syncref import BLOCK_ITSELF, SyncRef, canonical_sync, dialect_sync
+from engage_hri.schemas.units import Seconds
+from engage_hri.services.realizer.plan.steps import PORTION, Steps, finished, portions
+from engage_hri.services.realizer.points import ORIGIN, Point, sync_points
+
+
+class BlockRefused(InputRefused):
+    """The whole block is refused. kind: of the warning that says so."""
+
+    def __init__(self, fault: Fault, kind: WarningKind = "PARSING_FAILURE") -> None:
+        super().__init__(fault)
+        self.kind = kind
+
+
+Elsewhere = Mapping[str, Block | None]
+"""Other live blocks, by id. None: it is not known what is in it, so any point may be."""
+
+
+class Term(Struct, frozen=True, gc=False):
+    """A point and an offset: the instant `offset` seconds after the point. text: as its author wrote it.
+
+    stroke: of a repeated movement, which of its strokes is meant, from 1; 0 of anything else.
+    """
+
+    point: Point
+    offset: Seconds
+    text: str
+    line: int = 0
+    stroke: int = 0
+
+
+class Equal(Struct, frozen=True, gc=False):
+    """All terms are one instant; a single one is only named. behavior: whose own timing says so, if any does."""
+
+    terms: tuple[Term, ...]
+    behavior: str = ""
+
+
+class Order(Struct, frozen=True, gc=False):
+    """`later` is no earlier than `earlier`."""
+
+    earlier: Term
+    later: Term
+
+
+DROPPED = "; the behavior is dropped"
+"""What the message of a problem that costs a behavior ends with."""
+
+
+class Problem(Struct, frozen=True):
+    """A warning about a behavior (empty: about the block)."""
+
+    kind: WarningKind
+    message: str
+    behavior: str = ""
+
+
+def at_line(line: int, reason: str) -> str:
+    """The reason with its place in the XML, if it came from there."""
+    return f"line {line}: {reason}" if line else reason
+
+
+class Relations(Struct, frozen=True, dict=True):
+    """unusable: behaviors that cannot be performed as written. required: those whose loss fails the block."""
+
+    equals: tuple[Equal, ...]
+    orders: tuple[Order, ...]
+    required: frozenset[str]
+    problems: tuple[Problem, ...] = ()
+    unusable: frozenset[str] = frozenset()
+
+    @cached_property
+    def named(self) -> frozenset[Point]:
+        """Every point that is written anywhere."""
+        return self.constrained | {term.point for equal in self.equals for term in equal.terms}
+
+    @cached_property
+    def constrained(self) -> frozenset[Point]:
+        """Every point that has to do with another."""
+        return self.held | {order.earlier.point for order in self.orders}
+
+    @cached_property
+    def held(self) -> frozenset[Point]:
+        """Every point that must share an instant or wait for one: it cannot come at any earlier time."""
+        instants = ({term.point for term in equal.terms} for equal in self.equals)
+        shared = {point for points in instants if len(points) > 1 for point in points}
+        return frozenset(shared | {order.later.point for order in self.orders})
+
+
+class _Reader:
+    def __init__(self, block: Block, elsewhere: Elsewhere) -> None:
+        self.block = block
+        self.elsewhere = elsewhere
+        self.theirs: dict[str, Mapping[str, Behavior]] = {}
+        """Behaviors of other blocks that are named, by id."""
+        self.behaviors: Mapping[str, Behavior] = {behavior.id: behavior for behavior in block.behaviors}
+        self.points = {id: frozenset(sync_points(behavior)) for id, behavior in self.behaviors.items()}
+        self.equals: list[Equal] = []
+        self.orders: list[Order] = []
+        self.problems = [Problem(each.kind, each.message, each.behavior) for each in block.unread]
+        self.unusable: set[str] = set()
+        self.required = {behavior.id for behavior in block.behaviors if behavior.required}
+
+    def term(self, text: str, where: str, line: int) -> Term | Problem:
+        """The point and offset of a reference; a Problem if it names a sync point that its behavior lacks."""
+        try:
+            ref = SyncRef.parse(text)
+            if isinstance(speech := self.behaviors.get(ref.behavior), Speech) and speech.marks:
+                ref = SyncRef.parse(text, [mark.id for mark in speech.marks])
+        except ValueError as error:
+            raise self.refusal(str(error), where, line) from error
+        here = ref.block in ("", self.block.id)
+        if not ref.behavior or ref.behavior == BLOCK_ITSELF:
+            if ref.sync == "end" and here:
+                raise self.refusal(f"{text!r}: nothing in a block can wait for its own end", where, line)
+            return Term(ORIGIN, ref.offset, text, line) if here else self._elsewhere(ref, text, where, line)
+        if not here:
+            return self._elsewhere(ref, text, where, line)
+        behavior = self.behaviors.get(ref.behavior)
+        if behavior is None:
+            raise self.refusal(f"unknown behavior {ref.behavior!r}", where, line, self._advice())
+        sync = canonical_sync(ref.sync, type_name(behavior), self.block.dialect)
+        if isinstance(behavior, Unknown):
+            return Term(Point(behavior.id, sync), ref.offset, text, line)  # It will vanish with its behavior.
+        strokes = behavior.repetition if isinstance(behavior, Head) else 1
+        if not self._has(behavior, sync) or ref.repetition > strokes:
+            return Problem(
+                "PARSING_FAILURE", f"{where}: {type_name(behavior)} has no sync point {text!r}", behavior.id
+            )
+        return Term(Point(behavior.id, sync), ref.offset, text, line, ref.repetition)
+
+    def _has(self, behavior: Behavior, sync: str) -> bool:
+        """BML 1.0 knows fewer points than the drafts. Of an unknown element any may be."""
+        spelled = dialect_sync(sync, type_name(behavior), self.block.dialect)
+        is_known = spelled is not None and sync in self.points[behavior.id]
+        return is_known or isinstance(behavior, Unknown)
+
+    def _elsewhere(self, ref: SyncRef, text: str, where: str, line: int) -> Term:
+        """A point of another block, spelled as in this one."""
+        other = self.elsewhere.get(ref.block)
+        if other is not None and ref.block not in self.theirs:
+            self.theirs[ref.block] = {each.id: each for each in other.behaviors}
+        known = self.theirs.get(ref.block, {})
+        if isinstance(behavior := known.get(ref.behavior), Speech):
+            ref = SyncRef.parse(text, [mark.id for mark in behavior.marks])
+        sync = canonical_sync(ref.sync, type_name(behavior) if behavior else "", self.block.dialect)
+        if other is None or ref.behavior in ("", BLOCK_ITSELF):
+            is_there = ref.block in self.elsewhere
+        else:
+            is_there = behavior is not None and sync in sync_points(behavior) and ref.repetition < 2
+        if not is_there:
+            advice = "the block it names must be running when this one comes"
+            raise self.refusal(f"{text!r} is not a point of a live block", where, line, advice)
+        return Term(Point(f"{ref.block}:{ref.behavior or BLOCK_ITSELF}", sync or "start"), ref.offset, text, line)
+
+    def refusal(self, reason: str, where: str, line: int, advice: str = "") -> BlockRefused:
+        return BlockRefused(Fault(reason=reason, where=f"{self.block.id}: {where}", line=line, advice=advice))
+
+    def _advice(self) -> str:
+        return f"the block has {', '.join(sorted(self.behaviors)) or 'no behaviors'}"
+
+    def read_constraints(self) -> Steps[None]:
+        done = 0
+        for number, constraint in enumerate(self.block.constraints, 1):
+            where = constraint.id or f"constraint {number}"
+            for operator in constraint.operators:
+                line = operator.line or constraint.line
+                texts = (*([operator.ref] if operator.ref else []), *operator.syncs)
+                terms = self._terms(texts, where, line, required=constraint.required)
+                self._relate(operator, terms)
+                if constraint.required:
+                    self.required |= {term.point.behavior for term in terms.values()} & self.behaviors.keys()
+                if (done := done + 4 * len(texts)) >= PORTION:
+                    yield done
+                    done = 0
+        yield done
+
+    def _terms(self, texts: tuple[str, ...], where: str, line: int, *, required: bool) -> dict[str, Term]:
+        terms = {}
+        for text in texts:
+            match self.term(text, where, line):
+                case Term() as term:
+                    terms[text] = term
+                case Problem(message=message) if required:
+                    raise self.refusal(message.removeprefix(f"{where}: "), where, line, "the constraint is required")
+                case Problem(message=message):
+                    told = at_line(line, f"{message}; it is ignored")
+                    self.problems.append(Problem("PARSING_FAILURE", told))
+        return terms
+
+    def _relate(self, operator: Synchronize | Before | After, terms: dict[str, Term]) -> None:
+        if isinstance(operator, Synchronize):
+            if terms:
+                self.equals.append(Equal(tuple(terms.values())))
+            return
+        ref = terms.get(operator.ref)
+        for text in operator.syncs:
+            if ref is not None and (sync := terms.get(text)) is not None:
+                self.orders.append(Order(ref, sync) if isinstance(operator, After) else Order(sync, ref))
+
+    def read_timing(self) -> Steps[None]:
+        for portion in portions(self.block.behaviors):
+            for behavior in portion:
+                self._read_timing_of(behavior)
+            yield 4 * len(portion)
+
+    def _read_timing_of(self, behavior: BlockBehavior) -> None:
+        relations: list[Equal] = []
+        for timing in behavior.timing:
+            sync = canonical_sync(timing.sync, type_name(behavior), self.block.dialect)
+            own = f"{behavior.id}:{timing.sync}"
+            problem: Problem | None = None
+            if not self._has(behavior, sync):
+                problem = Problem("PARSING_FAILURE", f"{type_name(behavior)} has no sync point {timing.sync!r}")
+            else:
+                other = self.term(timing.ref, behavior.id, behavior.line)
+                if isinstance(other, Problem):
+                    problem = other
+                else:
+                    term = Term(Point(behavior.id, sync), 0.0, own, behavior.line)
+                    relations.append(Equal((term, other), behavior.id))
+            if problem is not None:
+                self.unusable.add(behavior.id)
+                message = at_line(behavior.line, f"{problem.message}{DROPPED}")
+                self.problems.append(Problem("PARSING_FAILURE", message, behavior.id))
+                return
+        self.equals += relations
+
+    def result(self) -> Relations:
+        found = Relations(
+            tuple(self.equals),
+            tuple(self.orders),
+            frozenset(self.required),
+            tuple(self.problems),
+            frozenset(self.unusable),
+        )
+        endless = tuple(
+            Problem(
+                "PARSING_FAILURE",
+                at_line(behavior.line, "wait has neither a duration nor an end; it ends at once"),
+                behavior.id,
+            )
+            for behavior in self.block.behaviors
+            if isinstance(behavior, Wait)
+            and behavior.duration is None
+            and Point(behavior.id, "end") not in found.held
+        )
+        return replace(found, problems=found.problems + endless)
+
+
+def relations(block: Block, elsewhere: Elsewhere | None = None) -> Relations:
+    """Everything `block` says about its points. Raises InputRefused: a malformed or dangling reference.
+
+    elsewhere: other live blocks, by id. Their points become `Point("block:behavior", sync)`.
+    """
+    return finished(relation_steps(block, elsewhere))
+
+
+def relation_steps(block: Block, elsewhere: Elsewhere | None = None) -> Steps[Relations]:
+    """See `relations`."""
+    reader = _Reader(block, elsewhere or {})
+    yield from reader.read_constraints()
+    yield from reader.read_timing()
+    return reader.result()
+
+
+def extent(block: Block) -> int:
+    """How much there is to plan: behaviors, marks in speech, and sync references."""
+    marks = sum(len(each.marks) for each in block.behaviors if isinstance(each, Speech))
+    inline = sum(len(each.timing) for each in block.behaviors)
+    operators = (operator for constraint in block.constraints for operator in constraint.operators)
+    return len(block.behaviors) + marks + inline + sum(1 + len(operator.syncs) for operator in operators)

@@ -1,0 +1,109 @@
+"""The earliest instants that satisfy lower and upper bounds: longest paths, and the cycles that forbid them."""
+
+from collections.abc import Iterable, Mapping, Sequence
+from typing import NamedTuple
+
+from engage_hri.schemas.units import Seconds
+from engage_hri.services.realizer.plan.steps import Steps
+
+EPSILON: Seconds = 1e-6
+"""Times closer than this are the same instant."""
+
+LAGS_AN_ELEMENT = 32
+"""How many are looked at in the time that others take for an element of a block: see `steps`."""
+
+
+class Lag(NamedTuple):
+    """`target` is no earlier than `source` + `seconds`; which may be negative. reason: the caller's index."""
+
+    source: int
+    target: int
+    seconds: Seconds
+    reason: int
+
+
+class PositiveCycle(Exception):
+    """No schedule: these lags lead back to their start and take longer than no time at all.
+
+    cycles: all that were found, no two of which share an instant other than the first. lags: of the first.
+    """
+
+    def __init__(self, cycles: Sequence[Sequence[Lag]]) -> None:
+        self.cycles = tuple(map(tuple, cycles))
+        self.lags = self.cycles[0]
+        super().__init__(f"a cycle of {sum(lag.seconds for lag in self.lags):+g} s")
+
+
+class Solution(NamedTuple):
+    """times: of each instant. causes: what keeps an instant from being earlier; none where nothing does."""
+
+    times: list[Seconds]
+    causes: dict[int, Lag]
+
+
+def solve(size: int, lags: Sequence[Lag]) -> Steps[Solution]:
+    """Least instants, none before 0, that satisfy `lags`. Raises PositiveCycle.
+
+    Sweeps go to and fro over the lags. Where these are in an order in which they can be met, forward lags need one
+    sweep, what backward ones push back another; only what is pushed to and fro costs more (Yen's Bellman-Ford).
+    Instant 0 stays where it is, so that every bound on a time of the clock that cannot be kept is found in one go.
+    """
+    times = [0.0] * size
+    causes: dict[int, Lag] = {}
+    inner = [lag for lag in lags if lag.target]
+    clock = [lag for lag in lags if not lag.target]
+    sweeps = (inner, inner[::-1])
+    for number in range(2 * size + 4):
+        moved = None
+        yield 1 + len(lags) // LAGS_AN_ELEMENT
+        for lag in sweeps[number % 2]:
+            source, target, seconds, _ = lag
+            at = times[source] + seconds
+            if at > times[target] + EPSILON / 100:
+                times[target] = at
+                causes[target] = lag
+                moved = target
+        if number and moved is not None and (cycles := _cycles(causes)):
+            raise PositiveCycle(cycles)
+        if moved is None:
+            late = [lag for lag in clock if times[lag.source] + lag.seconds > times[0] + EPSILON / 100]
+            if not late:
+                return Solution(times, causes)
+            late.sort(key=lambda lag: times[lag.source] + lag.seconds, reverse=True)
+            if cycles := _round_trips(late, causes, {lag.target: lag for lag in inner if lag[::2] == (0, 0.0)}):
+                raise PositiveCycle(cycles)
+            times[0], causes[0] = times[late[0].source] + late[0].seconds, late[0]
+    raise AssertionError("every transition moved once too often, yet no cycle of causes")  # pragma: no cover
+
+
+def _round_trips(late: Iterable[Lag], causes: Mapping[int, Lag], at_once: Mapping[int, Lag]) -> list[list[Lag]]:
+    """From instant 0 along what makes each of `late` too late, and by that back. at_once: lags of no time from 0."""
+    found = []
+    visited: set[int] = set()
+    for last in late:
+        trip = [last]
+        while (here := trip[-1].source) and here not in visited:
+            visited.add(here)
+            if (before := causes.get(here) or at_once.get(here)) is None:
+                break
+            trip.append(before)
+        if not here:
+            found.append(trip[::-1])
+    return found
+
+
+def _cycles(causes: dict[int, Lag]) -> list[list[Lag]]:
+    """Every cycle among the causes: each instant has one, so they are disjoint."""
+    found = []
+    visited: dict[int, int] = {}
+    for root in causes:
+        here = root
+        while here in causes and here not in visited:
+            visited[here] = root
+            here = causes[here].source
+        if here in causes and visited[here] == root:
+            cycle = [causes[here]]
+            while (before := cycle[-1].source) != here:
+                cycle.append(causes[before])
+            found.append(cycle[::-1])
+    return found

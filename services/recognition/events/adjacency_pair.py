@@ -1,0 +1,256 @@
+"""Adjacency pair: a first turn that calls for a second, in words, gestures or the manipulation of an object.
+
+Thesis 2.2.3. The delay runs from the end of the first turn and is negative for an interruption; so an answer
+that comes while the turn still goes on is known at once, but decided only when the turn has ended.
+"""
+
+from engage_hri.schemas.behaviors import Action
+from engage_hri.schemas.units import Probability, Seconds
+from engage_hri.services.recognition.events.limits import in_time
+from engage_hri.services.recognition.events.machine import IDLE, Ledger, Machine, Row, UnderWay, table
+
+ROBOT_WAITING, HUMAN_WAITING = "robot_waiting", "human_waiting"
+INTERRUPTED, RESPONDING = "interrupted", "responding"
+
+TABLE = table(
+    Row(IDLE, "robot_asks", ROBOT_WAITING, ("started",)),
+    Row(IDLE, "human_asks", HUMAN_WAITING, ("started",)),
+    Row(IDLE, "third_turn", IDLE),
+    Row(ROBOT_WAITING, "turn_ends", ROBOT_WAITING),
+    Row(ROBOT_WAITING, "responder_interrupts", INTERRUPTED),
+    Row(ROBOT_WAITING, "human_answers", RESPONDING, ("succeeded",)),
+    Row(ROBOT_WAITING, "repaired", IDLE, ("succeeded", "completed")),
+    Row(ROBOT_WAITING, "limit", IDLE, ("failed",)),
+    Row(ROBOT_WAITING, "withdraw", IDLE, ("withdrawn",)),
+    Row(ROBOT_WAITING, "person_gone", IDLE, ("failed",)),
+    Row(ROBOT_WAITING, "supersede", IDLE, ("superseded",)),
+    Row(HUMAN_WAITING, "turn_ends", HUMAN_WAITING),
+    Row(HUMAN_WAITING, "turn_goes_on", HUMAN_WAITING),
+    Row(HUMAN_WAITING, "responder_interrupts", INTERRUPTED),
+    Row(HUMAN_WAITING, "robot_answers", RESPONDING, ("succeeded",)),
+    Row(HUMAN_WAITING, "limit", IDLE, ("failed",)),
+    Row(HUMAN_WAITING, "person_gone", IDLE, ("withdrawn",)),
+    Row(HUMAN_WAITING, "supersede", IDLE, ("superseded",)),
+    Row(INTERRUPTED, "turn_ends", RESPONDING, ("succeeded",)),
+    Row(RESPONDING, "response_ends", IDLE, ("completed",)),
+    Row(RESPONDING, "repaired", IDLE, ("completed",)),
+    Row(RESPONDING, "supersede", IDLE, ("completed",)),
+    Row(RESPONDING, "person_gone", IDLE, ("completed",)),
+)
+
+
+class AdjacencyPair(Machine):
+    """The adjacency pair between one person and the robot: at most one at a time, a new first turn replaces it.
+
+    limit: of a person's pair. patience: how long an unfinished turn of the robot is believed in.
+    """
+
+    TABLE = TABLE
+
+    def __init__(self, ledger: Ledger, *, limit: Seconds, patience: Seconds) -> None:
+        super().__init__(ledger)
+        self._limit = limit
+        self._patience = patience
+        self._by_robot = False
+        self._asked_with: Action = "speak"
+        self._turn_end: Seconds | None = None
+        self._last_heard: Seconds | None = None
+        self._response_since: Seconds = 0.0
+        self._response_until: Seconds | None = None
+        self._third_turn_of = ""
+        self._third_turn_until: Seconds = 0.0
+
+    @property
+    def robot_holds_turn(self) -> bool:
+        """The robot's first turn has begun and not ended: pauses in its speech belong to it."""
+        return self._by_robot and self._turn_end is None and self.state in (ROBOT_WAITING, INTERRUPTED)
+
+    @property
+    def deadline(self) -> Seconds | None:
+        if self.event is None or self.state not in (ROBOT_WAITING, HUMAN_WAITING, INTERRUPTED):
+            return None
+        if self._turn_end is not None:
+            return self._turn_end + (self.event.limit or self._limit)
+        if self._by_robot and self._last_heard is not None:
+            return self._last_heard + self._patience
+        return None
+
+    def expire(self, at: Seconds) -> None:
+        """No answer within the limit; or a turn of the robot that nobody ended."""
+        if self.state == INTERRUPTED:
+            self.turn_ends(at)
+        elif self._turn_end is None:
+            self.step("withdraw", at)
+        else:
+            self.step("limit", at)
+
+    # -- first turn ---------------------------------------------------------------------------------------------
+
+    def robot_asks(self, event: UnderWay) -> None:
+        """The robot's first turn begins. A pair still pending is superseded; see `make_way`."""
+        self.make_way(event.started)
+        self._open(event, by_robot=True)
+        self._last_heard = event.started
+        self.step("robot_asks", event.started)
+
+    def make_way(self, at: Seconds) -> None:
+        """End what is pending because the robot speaks. A person who has finished gets this as the answer."""
+        if self.state == HUMAN_WAITING and self._turn_end is not None:
+            self._answer("robot_answers", "speak", at)
+        if self.state == INTERRUPTED:
+            self.turn_ends(at)
+        if self.state == RESPONDING:
+            self._end_response("supersede", at)
+        elif self.state != IDLE:
+            self.step("supersede", at)
+
+    def human_asks(self, event: UnderWay, action: Action) -> None:
+        """A person's first turn begins with `action` (speech, or the manipulation of an object)."""
+        self._open(event, by_robot=False)
+        self._asked_with = action
+        self.step("human_asks", event.started)
+
+    def _open(self, event: UnderWay, *, by_robot: bool) -> None:
+        self.event = event
+        self._by_robot = by_robot
+        self._turn_end = self._last_heard = self._response_until = None
+
+    def is_turn(self, turn: str) -> bool:
+        """Is `turn` (empty: whichever) the robot's turn that this pair began with?"""
+        return self.event is not None and self._by_robot and turn in ("", self.event.turn)
+
+    def is_third_turn(self, person: str, at: Seconds) -> bool:
+        """Does this speech of the initiator follow the answer so closely that it closes that pair?"""
+        return self.state == IDLE and person == self._third_turn_of and in_time(at, self._third_turn_until)
+
+    def third_turn(self, at: Seconds) -> None:
+        self._third_turn_of = ""
+        self.step("third_turn", at)
+
+    def turn_ends(self, at: Seconds) -> None:
+        """The first turn is over: the response clock starts, and an interruption gets its negative delay."""
+        if self.event is None or self._turn_end is not None:
+            return
+        if self.state == INTERRUPTED:
+            self._turn_end = at
+            self.event.delay = self._response_since - at
+            self.step("turn_ends", at)
+            if self._response_until is not None:
+                self._end_response("response_ends", at)
+        elif self.state in (ROBOT_WAITING, HUMAN_WAITING):
+            self._turn_end = at
+            self.step("turn_ends", at)
+
+    def robot_heard(self, at: Seconds | None) -> None:
+        """at: when the robot last fell silent, None while it speaks."""
+        if self.robot_holds_turn:
+            self._last_heard = at
+
+    def abort(self, at: Seconds) -> None:
+        """The robot's turn was cut off. Who interrupted it has answered; otherwise the question is taken back."""
+        if self.state == INTERRUPTED and self._by_robot:
+            self.turn_ends(at)
+        elif self.state == ROBOT_WAITING:
+            self.step("withdraw", at)
+
+    # -- second turn --------------------------------------------------------------------------------------------
+
+    def may_be_answered_with(self, action: Action) -> bool:
+        """Does the robot wait for an answer of the person, and would `action` be one?"""
+        return self.event is not None and self.state == ROBOT_WAITING and action in self.event.accept
+
+    def human_begins(self, action: Action, at: Seconds, confidence: Probability = 1.0) -> bool:
+        """A person's action as the answer to the robot's turn; False if it is none."""
+        if self.event is None:
+            return False
+        if self._is_earlier_answer(action, at):
+            self.event.rests_on(confidence)
+            self.event.response, self._response_since, self._response_until = action, at, None
+            return True
+        if self.may_be_answered_with(action):
+            self.event.rests_on(confidence)
+            self._answer("human_answers", action, at)
+            return True
+        return False
+
+    def _is_earlier_answer(self, action: Action, at: Seconds) -> bool:
+        """Did it begin before what has been taken for the answer, and only becomes known now, while that is open?"""
+        assert self.event is not None
+        undecided = self.state == INTERRUPTED and self._by_robot
+        return undecided and at < self._response_since and action in self.event.accept
+
+    def human_goes_on(self, action: Action, at: Seconds) -> bool:
+        """The asking person speaks or manipulates again: the turn is not over yet. False if nobody waits."""
+        if self.state != HUMAN_WAITING:
+            return False
+        self._asked_with = action
+        self._turn_end = None
+        self.step("turn_goes_on", at)
+        return True
+
+    def robot_begins(self, action: Action, at: Seconds) -> None:
+        """The robot speaks or gestures: that answers a waiting person."""
+        if self.state == HUMAN_WAITING:
+            self._answer("robot_answers", action, at)
+
+    def _answer(self, given: str, action: Action, at: Seconds) -> None:
+        assert self.event is not None
+        self.event.response = action
+        self._response_since = at
+        if self._turn_end is None:
+            self.step("responder_interrupts", at)
+        else:
+            self.event.delay = at - self._turn_end
+            self.step(given, max(at, self._turn_end))
+
+    def ends(self, action: Action, at: Seconds, *, by_robot: bool) -> None:
+        """Somebody's action has ended: the person's turn, or the response."""
+        if self.event is None:
+            return
+        if by_robot == self._by_robot:
+            if not by_robot and action == self._asked_with:
+                self.turn_ends(at)
+        elif self.event.response == action and self.state == RESPONDING:
+            self._end_response("response_ends", at)
+        elif self.event.response == action and self.state == INTERRUPTED:
+            self._response_until = at
+
+    def _end_response(self, given: str, at: Seconds, until: Seconds | None = None) -> None:
+        assert self.event is not None
+        end = self._response_until if until is None else until
+        self.event.duration = max(0.0, (at if end is None else end) - self._response_since)
+        self._third_turn_of = self.event.initiator
+        self._third_turn_until = at + self._limit
+        self.step(given, at)
+
+    def repaired(self, at: Seconds) -> None:
+        """The robot's third turn closes its pair, whether or not the second was seen."""
+        if not self._by_robot:
+            return
+        if self.state == INTERRUPTED:
+            self.turn_ends(at)
+        if self.state == RESPONDING:
+            self._end_response("repaired", at)
+        elif self.state == ROBOT_WAITING:
+            self.step("repaired", at)
+
+    def block_ended(self, block: str, at: Seconds, *, aborted: bool) -> None:
+        """For pairs whose turn nobody names: their turn is the block."""
+        if self.event is not None and self.event.block == block and not self.event.turn:
+            if aborted:
+                self.abort(at)
+            else:
+                self.turn_ends(at)
+
+    def answered_block_ended(self, at: Seconds) -> None:
+        """The fragment that answered the person is over, and with it an answer without words."""
+        if self.state == RESPONDING and not self._by_robot:
+            self._end_response("response_ends", at)
+
+    def person_gone(self, at: Seconds, until: Seconds) -> None:
+        if self.state == INTERRUPTED:
+            self.turn_ends(at)
+        if self.state == RESPONDING:
+            self._end_response("person_gone", at, until)
+        elif self.state != IDLE:
+            self.step("person_gone", at)

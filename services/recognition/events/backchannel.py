@@ -1,0 +1,91 @@
+"""Backchannel: a short sign of the listener while the other holds the floor. Thesis 2.2.4.
+
+It starts with the responder, has no delay and cannot fail. Speech shows only at its end, or after the limit,
+whether it was one; longer speech is a change of floor, and so is speech that outlasts the other's turn.
+"""
+
+from engage_hri.schemas.units import Seconds
+from engage_hri.services.recognition.events.machine import IDLE, Ledger, Machine, Row, UnderWay, table
+
+UNDECIDED, BRIEF = "undecided", "brief"
+
+TABLE = table(
+    Row(IDLE, "speaks", UNDECIDED),
+    Row(IDLE, "gestures", BRIEF, ("started", "succeeded")),
+    Row(IDLE, "announced", BRIEF, ("started", "succeeded")),
+    Row(UNDECIDED, "ends", IDLE, ("started", "succeeded", "completed")),
+    Row(UNDECIDED, "limit", IDLE),
+    Row(UNDECIDED, "outlasts_turn", IDLE),
+    Row(UNDECIDED, "announced", BRIEF, ("started", "succeeded")),
+    Row(UNDECIDED, "person_gone", IDLE),
+    Row(BRIEF, "ends", IDLE, ("completed",)),
+    Row(BRIEF, "person_gone", IDLE, ("completed",)),
+)
+
+
+class Backchannel(Machine):
+    """The backchannels of one listener to one speaker."""
+
+    TABLE = TABLE
+
+    def __init__(self, ledger: Ledger, *, limit: Seconds) -> None:
+        super().__init__(ledger)
+        self._limit = limit
+        self.last: tuple[Seconds, str] | None = None
+        """Start and id of the last one that was published."""
+
+    @property
+    def undecided_since(self) -> Seconds | None:
+        """Start of speech that may still become a backchannel."""
+        return self.event.started if self.event is not None and self.state == UNDECIDED else None
+
+    @property
+    def deadline(self) -> Seconds | None:
+        return None if self.undecided_since is None else self.undecided_since + self._limit
+
+    def speaks(self, event: UnderWay) -> None:
+        self._begin(event, "speaks")
+
+    def gestures(self, event: UnderWay) -> None:
+        self._begin(event, "gestures")
+
+    def announced(self, event: UnderWay) -> None:
+        """The robot says that what it does now is a backchannel; its speech may have been noticed already."""
+        if self.state == BRIEF:
+            self.ends(event.started)
+        if self.state == UNDECIDED and self.event is not None:
+            event.started = min(event.started, self.event.started)
+        self.event = event
+        self.step("announced", event.started)
+        self.last = (event.started, event.id)
+
+    def _begin(self, event: UnderWay, given: str) -> None:
+        if self.state == BRIEF:
+            self.ends(event.started)
+        if self.state == UNDECIDED:
+            return
+        self.event = event
+        self.step(given, event.started)
+        if given == "gestures":
+            self.last = (event.started, event.id)
+
+    def ends(self, at: Seconds) -> None:
+        """The speech or gesture has ended."""
+        event = self.event
+        if event is None:
+            return
+        event.duration = max(0.0, at - event.started)
+        self.step("ends", at)
+        self.last = (event.started, event.id)
+
+    def takes_floor(self, given: str, at: Seconds) -> Seconds:
+        """It was none: `limit` passed, or it `outlasts_turn` of the speaker. When the speech began."""
+        assert self.event is not None
+        started = self.event.started
+        self.step(given, at)
+        return started
+
+    def person_gone(self, at: Seconds, until: Seconds) -> None:
+        if self.event is not None:
+            self.event.duration = max(0.0, until - self.event.started)
+            self.step("person_gone", at)

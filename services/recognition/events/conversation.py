@@ -1,0 +1,215 @@
+"""What a person and the robot say and do to one another: speech, gestures and manipulations, turn by turn.
+
+Input of the adjacency pair and of the two backchannels, the person's own and the robot's.
+"""
+
+from collections.abc import Callable, Iterator
+
+from engage_hri.schemas.behaviors import Action, Cause
+from engage_hri.schemas.units import Probability, Seconds
+from engage_hri.services.recognition.config import RecognitionConfig
+from engage_hri.services.recognition.events.adjacency_pair import AdjacencyPair
+from engage_hri.services.recognition.events.backchannel import BRIEF, UNDECIDED, Backchannel
+from engage_hri.services.recognition.events.limits import in_time
+from engage_hri.services.recognition.events.machine import IDLE, Ledger, UnderWay
+from engage_hri.services.recognition.events.scene import Scene
+
+
+class Conversation:
+    """Of one person with the robot."""
+
+    def __init__(self, id: str, scene: Scene, config: RecognitionConfig, ledger: Ledger) -> None:
+        self.id = id
+        self.speaks_since: Seconds | None = None
+        self.silent_since: Seconds | None = None
+        self.acts_since: Seconds | None = None
+        self.pair = AdjacencyPair(ledger, limit=config.adjacency_pair_limit, patience=config.turn_patience)
+        self.own_backchannel = Backchannel(ledger, limit=config.backchannel_limit)
+        self.robot_backchannel = Backchannel(ledger, limit=config.backchannel_limit)
+        self._speech_confidence: Probability = 1.0
+        self._scene = scene
+        self._config = config
+
+    @property
+    def deadlines(self) -> tuple[Seconds | None, ...]:
+        """The times of the `dues`."""
+        return self.own_backchannel.deadline, self.robot_backchannel.deadline, self._pair_deadline
+
+    @property
+    def dues(self) -> Iterator[tuple[Seconds | None, Callable[[Seconds], None]]]:
+        """What will happen by itself, and when."""
+        yield self.own_backchannel.deadline, self._takes_floor
+        yield self.robot_backchannel.deadline, self._robot_takes_floor
+        yield self._pair_deadline, self.pair.expire
+
+    @property
+    def _pair_deadline(self) -> Seconds | None:
+        """Speech that began in time and may yet turn out to be the answer is waited for."""
+        at, since = self.pair.deadline, self.own_backchannel.undecided_since
+        if at is not None and since is not None and in_time(since, at) and self.pair.may_be_answered_with("speak"):
+            return None
+        return at
+
+    def person_gone(self, at: Seconds, until: Seconds) -> None:
+        self.pair.person_gone(at, until)
+        self.own_backchannel.person_gone(at, until)
+        self.robot_backchannel.person_gone(at, until)
+        self.speaks_since = self.acts_since = None
+        self.silent_since = until
+
+    # -- the person ---------------------------------------------------------------------------------------------
+
+    @property
+    def robot_holds_floor(self) -> bool:
+        return self._scene.robot_speaks_since is not None or self.pair.robot_holds_turn
+
+    @property
+    def holds_floor(self) -> bool:
+        return self.speaks_since is not None
+
+    def speaks(self, at: Seconds, confidence: Probability = 1.0) -> None:
+        if self.speaks_since is not None:
+            return
+        self.speaks_since, self.silent_since = at, None
+        self._scene.speaks(self.id)
+        self._speech_confidence = confidence
+        if self.robot_holds_floor:
+            self.own_backchannel.speaks(self._backchannel(self._scene.robot, self.id, at, confidence))
+        else:
+            self._human_turn(at, "speak", confidence)
+
+    def falls_silent(self, at: Seconds) -> None:
+        if self.speaks_since is None:
+            return
+        self.speaks_since, self.silent_since = None, at
+        self._scene.falls_silent(self.id, at)
+        self._backchannel_speech_ends(self.own_backchannel, at)
+        self._floor_is_free(at)
+        self.pair.ends("speak", at, by_robot=False)
+
+    def gestures(self, action: Action, at: Seconds, confidence: Probability = 1.0) -> None:
+        """A nod or a shake."""
+        if self.robot_holds_floor and self.own_backchannel.state != UNDECIDED:
+            self.own_backchannel.gestures(self._backchannel(self._scene.robot, self.id, at, confidence))
+        else:
+            self.pair.human_begins(action, at, confidence)
+
+    def gesture_ends(self, action: Action, at: Seconds) -> None:
+        if self.own_backchannel.state == BRIEF:
+            self.own_backchannel.ends(at)
+        self.pair.ends(action, at, by_robot=False)
+
+    def points(self, at: Seconds, confidence: Probability = 1.0) -> None:
+        self.pair.human_begins("point", at, confidence)
+
+    def manipulates(self, at: Seconds, confidence: Probability = 1.0) -> None:
+        if self.acts_since is None:
+            self.acts_since = at
+            self._human_turn(at, "act", confidence)
+
+    def manipulation_ends(self, at: Seconds) -> None:
+        self.acts_since = None
+        self.pair.ends("act", at, by_robot=False)
+
+    def _human_turn(self, at: Seconds, action: Action, confidence: Probability) -> None:
+        """Speech that is no backchannel, or a manipulation: an answer, more of the same turn, or a first turn."""
+        pair = self.pair
+        if pair.human_begins(action, at, confidence) or pair.human_goes_on(action, at):
+            pass
+        elif action == "speak" and pair.is_third_turn(self.id, at):
+            pair.third_turn(at)
+        elif pair.state == IDLE:
+            event = UnderWay(
+                kind="adjacency_pair", initiator=self.id, responder=self._scene.robot, started=at,
+                limit=self._config.adjacency_pair_limit, confidence=confidence,
+            )  # fmt: skip
+            pair.human_asks(event, action)
+        if action == "speak" and self.speaks_since is None and self.silent_since is not None:
+            pair.ends("speak", self.silent_since, by_robot=False)
+
+    # -- the robot ----------------------------------------------------------------------------------------------
+
+    def robot_speaks(self, at: Seconds) -> None:
+        self.pair.robot_heard(None)
+        if self.holds_floor:
+            if self.robot_backchannel.state != BRIEF:
+                self.robot_backchannel.speaks(self._backchannel(self.id, self._scene.robot, at))
+        else:
+            self.pair.robot_begins("speak", at)
+
+    def robot_falls_silent(self, at: Seconds) -> None:
+        self.pair.robot_heard(at)
+        self._backchannel_speech_ends(self.robot_backchannel, at)
+        self.pair.ends("speak", at, by_robot=True)
+        self._floor_is_free(at)
+
+    def robot_gestures(self, action: Action, at: Seconds) -> None:
+        """A nod, a shake, or pointing: the robot's."""
+        if not self.holds_floor or action == "point":
+            self.pair.robot_begins(action, at)
+        elif self.robot_backchannel.state == IDLE:
+            self.robot_backchannel.gestures(self._backchannel(self.id, self._scene.robot, at))
+
+    def robot_gesture_ends(self, action: Action, at: Seconds) -> None:
+        if self.robot_backchannel.state == BRIEF and action != "point":
+            self.robot_backchannel.ends(at)
+        self.pair.ends(action, at, by_robot=True)
+
+    def turn_ends(self, at: Seconds) -> None:
+        self.pair.turn_ends(at)
+        self._floor_is_free(at)
+
+    def _backchannel_speech_ends(self, backchannel: Backchannel, at: Seconds) -> None:
+        since = backchannel.undecided_since
+        if backchannel.state == BRIEF or (since is not None and in_time(at, since + self._config.backchannel_limit)):
+            backchannel.ends(at)
+
+    def _floor_is_free(self, at: Seconds) -> None:
+        """Speech that outlasts the turn in which it began is a turn of its own."""
+        if self.own_backchannel.state == UNDECIDED and not self.robot_holds_floor:
+            self._takes_floor(at, "outlasts_turn")
+        if self.robot_backchannel.state == UNDECIDED and not self.holds_floor:
+            self._robot_takes_floor(at, "outlasts_turn")
+
+    def _robot_takes_floor(self, at: Seconds, given: str = "limit") -> None:
+        self.pair.robot_begins("speak", self.robot_backchannel.takes_floor(given, at))
+
+    def _takes_floor(self, at: Seconds, given: str = "limit") -> None:
+        """The person's speech is no backchannel after all, but a turn since it began."""
+        self._human_turn(self.own_backchannel.takes_floor(given, at), "speak", self._speech_confidence)
+
+    def turn_ended(self, turn: str, at: Seconds) -> None:
+        if self.pair.is_turn(turn):
+            self.turn_ends(at)
+
+    def is_answered(self, at: Seconds, *, repairs: bool) -> None:
+        """The robot's second turn, or its third one, that repairs. Either answers a person who waits."""
+        if repairs:
+            self.pair.repaired(at)
+        self.pair.robot_begins("speak", at)
+
+    def abort(self, at: Seconds, *, turn: str) -> None:
+        """The robot's turn was cut off: what it asked for is taken back."""
+        if self.pair.is_turn(turn):
+            self.pair.abort(at)
+            self._floor_is_free(at)
+
+    def block_ended(self, block: str, at: Seconds, *, aborted: bool) -> None:
+        self.pair.block_ended(block, at, aborted=aborted)
+        announced = self.robot_backchannel.event
+        if announced is not None and announced.block == block:
+            self.robot_backchannel.ends(at)
+        self._floor_is_free(at)
+
+    def robot_asks(self, event: UnderWay) -> None:
+        if self.robot_backchannel.state == UNDECIDED:
+            self.robot_backchannel.takes_floor("outlasts_turn", event.started)
+        self.pair.robot_asks(event)
+        if self._scene.robot_speaks_since is not None:
+            self.pair.robot_heard(None)
+
+    def _backchannel(self, speaker: str, listener: str, at: Seconds, confidence: Probability = 1.0) -> UnderWay:
+        cause: Cause = "human" if listener == self.id else "turn"
+        return UnderWay(
+            kind="backchannel", initiator=speaker, responder=listener, started=at, cause=cause, confidence=confidence
+        )

@@ -1,0 +1,51 @@
+"""Mutual facial gaze: each looks at the other's face. Thesis 2.2.2.
+
+The robot asks for it when its head begins to move. Its turning away counts only once its gaze has been on the
+face since the request; before that it has not yet come.
+"""
+
+from engage_hri.schemas.units import Seconds
+from engage_hri.services.recognition.events.machine import IDLE, Row, table
+from engage_hri.services.recognition.events.shared_gaze import SharedGaze
+
+ROBOT_WAITING, HUMAN_WAITING, MUTUAL = "robot_waiting", "human_waiting", "mutual"
+
+TABLE = table(
+    Row(IDLE, "robot_looks", ROBOT_WAITING, ("started",)),
+    Row(IDLE, "robot_looks_mutual", MUTUAL, ("started", "succeeded")),
+    Row(IDLE, "human_looks", HUMAN_WAITING, ("started",)),
+    Row(IDLE, "human_looks_mutual", MUTUAL, ("started", "succeeded")),
+    Row(IDLE, "human_looks_in_vain", IDLE, ("started", "preempted")),
+    Row(ROBOT_WAITING, "human_answers", MUTUAL, ("succeeded",)),
+    Row(ROBOT_WAITING, "limit", IDLE, ("failed",)),
+    Row(ROBOT_WAITING, "robot_leaves", IDLE, ("withdrawn",)),
+    Row(ROBOT_WAITING, "withdraw", IDLE, ("withdrawn",)),
+    Row(ROBOT_WAITING, "person_gone", IDLE, ("failed",)),
+    Row(ROBOT_WAITING, "supersede", IDLE, ("superseded",)),
+    Row(HUMAN_WAITING, "robot_answers", MUTUAL, ("succeeded",)),
+    Row(HUMAN_WAITING, "limit", IDLE, ("failed",)),
+    Row(HUMAN_WAITING, "human_leaves", IDLE, ("failed",)),
+    Row(HUMAN_WAITING, "fragment_takes_head", IDLE, ("preempted",)),
+    Row(HUMAN_WAITING, "person_gone", IDLE, ("withdrawn",)),
+    Row(HUMAN_WAITING, "supersede", IDLE, ("superseded",)),
+    Row(MUTUAL, "part", IDLE, ("completed",)),
+    Row(MUTUAL, "directed_gaze_begins", IDLE, ("completed",)),
+    Row(MUTUAL, "supersede", IDLE, ("completed",)),
+    Row(MUTUAL, "person_gone", IDLE, ("completed",)),
+)
+
+
+class MutualFacialGaze(SharedGaze):
+    """The mutual facial gaze of one person and the robot."""
+
+    TABLE = TABLE
+    ROBOT_WAITS, HUMAN_WAITS, TOGETHER = ROBOT_WAITING, HUMAN_WAITING, MUTUAL
+    ROBOT_BEGINS, HUMAN_BEGINS = "robot_looks", "human_looks"
+    ROBOT_JOINS, HUMAN_JOINS = "robot_answers", "human_answers"
+
+    def directed_gaze_begins(self, at: Seconds, *, by_robot: bool) -> None:
+        """Eyes go elsewhere: a mutual gaze is over, and the robot takes its own request back."""
+        if self.state == MUTUAL:
+            self._part("directed_gaze_begins", at)
+        elif self.state == ROBOT_WAITING and by_robot:
+            self.step("withdraw", at)

@@ -1,0 +1,339 @@
+"""One person and the robot: what each does becomes input of the four recognizers between them."""
+
+from collections.abc import Callable, Iterator
+from functools import partial
+from typing import NamedTuple
+
+from engage_hri.schemas.actions import ActionBegan, ActionEnded
+from engage_hri.schemas.behaviors import Action, EventKind
+from engage_hri.schemas.units import Probability, Seconds
+from engage_hri.services.recognition.config import RecognitionConfig
+from engage_hri.services.recognition.events.conversation import Conversation
+from engage_hri.services.recognition.events.directed_gaze import HUMAN_DIRECTING, DirectedGaze
+from engage_hri.services.recognition.events.limits import LimitClock, in_time
+from engage_hri.services.recognition.events.machine import IDLE, Ledger, UnderWay
+from engage_hri.services.recognition.events.mutual_facial_gaze import HUMAN_WAITING, MutualFacialGaze
+from engage_hri.services.recognition.events.news import News
+from engage_hri.services.recognition.events.presence import Presence
+from engage_hri.services.recognition.events.scene import Gaze, Scene
+from engage_hri.services.recognition.events.shared_gaze import SharedGaze
+
+ACTIONS_KEPT = 64
+"""Of each person; of those it is known when they last began and ended."""
+
+
+class _Directed(NamedTuple):
+    """A directed gaze of the robot that is over."""
+
+    objects: tuple[str, ...]
+    at: Seconds
+
+
+class _Doing(NamedTuple):
+    """What a person does, and since when. targets: with what."""
+
+    targets: tuple[str, ...]
+    since: Seconds
+
+
+class Person:
+    """The recognizers of one actor. number: in the order of acquaintance."""
+
+    def __init__(self, id: str, number: int, scene: Scene, config: RecognitionConfig, ledger: Ledger) -> None:
+        self.id = id
+        self.number = number
+        self.presence = Presence(config.lost_face_grace)
+        self.gaze = Gaze()
+        self.directed: list[DirectedGaze] = []
+        self.facial = MutualFacialGaze(ledger)
+        self.conversation = Conversation(id, scene, config, ledger)
+        self.news = News(ACTIONS_KEPT)
+        self._doing: dict[Action, _Doing] = {}
+        """Other than looking."""
+        self._scene = scene
+        self._config = config
+        self._ledger = ledger
+        self._robot_directed: list[_Directed] = []
+
+    # -- time ---------------------------------------------------------------------------------------------------
+
+    @property
+    def deadline(self) -> Seconds | None:
+        """When something happens by itself, unless something comes in between; then `pass_time`."""
+        times = [self.gaze.deadline, self.presence.deadline, self.facial.deadline, self._look_directs_at]
+        times += self.conversation.deadlines
+        times += [one.deadline for one in self.directed]
+        times += [one.since + self._longest(action) for action, one in self._doing.items()]
+        return min([at for at in times if at is not None], default=None)
+
+    @property
+    def _dues(self) -> Iterator[tuple[Seconds | None, Callable[[Seconds], None]]]:
+        """All that has a time, in the order in which it happens if the times are equal."""
+        yield self.gaze.deadline, self._gaze_expires
+        yield self.presence.deadline, self.leave
+        yield from ((one.deadline, partial(self._expire_directed, one)) for one in self.directed)
+        yield self.facial.deadline, self.facial.expire
+        yield from self.conversation.dues
+        yield self._look_directs_at, self._look_directs
+        yield from (
+            (one.since + self._longest(action), self._goes_on_too_long) for action, one in self._doing.items()
+        )
+
+    def pass_time(self, at: Seconds) -> None:
+        """What is due at `at`, the deadline, happens: the first of it."""
+        next(happen for due, happen in self._dues if due == at)(at)
+
+    @property
+    def _look_directs_at(self) -> Seconds | None:
+        """When this look will have lasted long enough to direct the robot's, if nothing changes."""
+        if self.gaze.spent or self.gaze.ended is not None or self.conversation.acts_since is not None:
+            return None
+        if not any(map(self._scene.is_object, self.gaze.targets)):
+            return None
+        silent_since = self._scene.others_silent_since(self.id)
+        return None if silent_since is None else max(self.gaze.since, silent_since) + self._config.direct_by_look
+
+    def leave(self, at: Seconds) -> None:
+        """The person has gone: close whatever is open."""
+        until = self.presence.leave()
+        for one in self.directed:
+            one.person_gone(at, until)
+        self.forget_idle(at)
+        self.facial.person_gone(at, until)
+        self.conversation.person_gone(at, until)
+        self.gaze = Gaze(since=until)
+        self._doing.clear()
+        self._scene.stops(self.id, until)
+
+    # -- what the person does -----------------------------------------------------------------------------------
+
+    def begins(self, began: ActionBegan, at: Seconds) -> None:
+        if not self.news.is_news(began, at) or not self.presence.seen(at):
+            return
+        action, targets, confidence = began.action, began.targets, began.confidence
+        if action == "look":
+            self.looks(targets, at, confidence)
+            return
+        if action in self._doing:
+            if at < self._doing[action].since:
+                return
+            self._stops(action, at)  # its end has been lost
+        self._doing[action] = _Doing(targets, at)
+        match action:
+            case "point":
+                self.points(targets, at, confidence)
+            case "speak":
+                self.conversation.speaks(at, confidence)
+            case "nod" | "shake":
+                self.conversation.gestures(action, at, confidence)
+            case "act":
+                self._scene.acting.add(self.id)
+                self.conversation.manipulates(at, confidence)
+
+    def ends(self, ended: ActionEnded, at: Seconds) -> None:
+        if not self.news.is_news(ended, at):
+            return
+        if ended.action == "look":
+            self.gaze.end(ended.targets, at)
+            return
+        doing = self._doing.get(ended.action)
+        if doing is not None and at >= doing.since and (not ended.targets or ended.targets == doing.targets):
+            self._stops(ended.action, at)
+
+    def _stops(self, action: Action, at: Seconds) -> None:
+        del self._doing[action]
+        match action:
+            case "point":
+                self.conversation.pair.ends("point", at, by_robot=False)
+            case "speak":
+                self.conversation.falls_silent(at)
+            case "nod" | "shake":
+                self.conversation.gesture_ends(action, at)
+            case "act":
+                self.gaze.spent = True
+                self._scene.acting.discard(self.id)
+                self.conversation.manipulation_ends(at)
+
+    def _longest(self, action: Action) -> Seconds:
+        if action == "speak":
+            return self._config.longest_speech
+        return self._config.longest_manipulation if action == "act" else self._config.longest_gesture
+
+    def _goes_on_too_long(self, at: Seconds) -> None:
+        """An end has been lost, and no other beginning has followed."""
+        for action in [action for action, one in self._doing.items() if one.since + self._longest(action) <= at]:
+            self._stops(action, at)
+
+    # -- gaze ---------------------------------------------------------------------------------------------------
+
+    @property
+    def on_robots_face(self) -> bool:
+        return self._scene.robot in self.gaze.targets
+
+    def looks(self, targets: tuple[str, ...], at: Seconds, confidence: Probability = 1.0) -> None:
+        was_on_face = self.on_robots_face
+        if not self.gaze.begin(targets, at, confidence):
+            return
+        self.gaze_changed(at)
+        if self.on_robots_face and not was_on_face and self.facial.state == IDLE:
+            self._human_looks_at_face(at)
+
+    def _gaze_expires(self, at: Seconds) -> None:
+        self.gaze_changed(self.gaze.expire())
+
+    def gaze_changed(self, at: Seconds) -> None:
+        """The person's or the robot's gaze is elsewhere now."""
+        confidence = self.gaze.confidence
+        robot_on = self._scene.robot_looks_at((self.id,))
+        self.facial.gazes(robot_on=robot_on, human_on=self.on_robots_face, at=at, confidence=confidence)
+        for one in self.directed:
+            human_on = self._scene.person_looks_at(self.gaze, one.objects)
+            if human_on and one.event is not None and one.event.cause != "human":
+                self.gaze.spent = True
+            robot_on = self._scene.robot_looks_at(one.objects)
+            one.gazes(robot_on=robot_on, human_on=human_on, at=at, confidence=confidence)
+        self.forget_idle(at)
+        if any(
+            self._scene.person_looks_at(self.gaze, past.objects) and self._is_recent(past, at)
+            for past in self._robot_directed
+        ):
+            self.gaze.spent = True
+        self.hands_changed()
+
+    def hands_changed(self) -> None:
+        """What the person's hands hide may be on the move: a look that goes with it directs nothing."""
+        self.gaze.spent = self.gaze.spent or self._scene.goes_with_hand(self.id, self.gaze.targets)
+
+    def head_owner_changed(self, at: Seconds) -> None:
+        """What the robot can no longer answer, because its fragment looks elsewhere, is preempted."""
+        if self.facial.state == HUMAN_WAITING and self._scene.fragment_looks_elsewhere((self.id,)):
+            self.facial.step("fragment_takes_head", at)
+        for one in self.directed:
+            if one.state == HUMAN_DIRECTING and self._scene.fragment_looks_elsewhere(one.objects):
+                one.step("fragment_takes_head", at)
+        self.forget_idle(at)
+
+    def gaze_machines(self) -> Iterator[SharedGaze]:
+        yield self.facial
+        yield from self.directed
+
+    def _human_looks_at_face(self, at: Seconds) -> None:
+        limit = self._config.mutual_facial_gaze_limit
+        event = self._by_human("mutual_facial_gaze", at, limit, self.gaze.confidence)
+        self.facial.human_begins(
+            event,
+            LimitClock(at, limit),
+            robot_since=self._scene.robot_since((self.id,)),
+            human_on=True,
+            in_vain=self._scene.fragment_looks_elsewhere((self.id,)),
+            at=at,
+        )
+
+    # -- directed gaze ------------------------------------------------------------------------------------------
+
+    def points(self, targets: tuple[str, ...], at: Seconds, confidence: Probability = 1.0) -> None:
+        objects = tuple(filter(self._scene.is_object, targets))
+        if objects:
+            self._human_directs(objects, at, at, confidence)
+        self.conversation.points(at, confidence)
+
+    def _look_directs(self, at: Seconds) -> None:
+        self.gaze.spent = True
+        objects = tuple(filter(self._scene.is_object, self.gaze.targets))
+        self._human_directs(objects, at - self._config.direct_by_look, at, self.gaze.confidence)
+
+    def _human_directs(self, objects: tuple[str, ...], since: Seconds, at: Seconds, confidence: Probability) -> None:
+        """since: start of the pointing, or of the look that has become a direction at `at`."""
+        if any(set(one.objects) & set(objects) for one in self.directed):
+            return
+        limit = self._config.directed_gaze_limit
+        event = self._by_human("directed_gaze", since, limit, confidence, objects)
+        in_vain = self._scene.fragment_looks_elsewhere(objects)
+        robot_since = self._scene.robot_since(objects)
+        if robot_since is not None or not in_vain:
+            self.facial.directed_gaze_begins(at, by_robot=False)
+        human_on = self._scene.person_looks_at(self.gaze, objects)
+        one = DirectedGaze(self._ledger, objects)
+        self.directed.append(one)
+        clock = LimitClock(since, limit)
+        one.human_begins(event, clock, robot_since=robot_since, human_on=human_on, in_vain=in_vain, at=at)
+        self.gaze.spent = self.gaze.spent or human_on
+        self.forget_idle(at)
+
+    def robot_directs(self, event: UnderWay, clock: LimitClock) -> DirectedGaze:
+        for one in self.directed:
+            if set(one.objects) == set(event.objects):
+                one.supersede(event.started)
+        self.forget_idle(event.started)
+        self.facial.directed_gaze_begins(event.started, by_robot=True)
+        one = DirectedGaze(self._ledger, event.objects)
+        self.directed.append(one)
+        there = self._scene.person_looks_at(self.gaze, event.objects)
+        self.gaze.spent = self.gaze.spent or there
+        robot_on = self._scene.robot_looks_at(event.objects)
+        one.robot_begins(event, clock, robot_on=robot_on, look=self.gaze if there else None)
+        self.forget_idle(event.started)
+        return one
+
+    def _expire_directed(self, one: DirectedGaze, at: Seconds) -> None:
+        one.expire(at)
+        self.forget_idle(at)
+
+    def forget_idle(self, at: Seconds) -> None:
+        """Drop finished directed gazes; the robot's are remembered for a while."""
+        self._robot_directed = [past for past in self._robot_directed if self._is_recent(past, at)]
+        for one in self.directed:
+            if one.state == IDLE and one.by_robot:
+                self._robot_directed.append(_Directed(one.objects, at))
+        self.directed = [one for one in self.directed if one.state != IDLE]
+
+    def point_realised(self, block: str, name: str, at: Seconds) -> None:
+        """A point of a block of the robot has come: time limits may run from there."""
+        for machine in self.gaze_machines():
+            if machine.clock is not None and machine.event is not None and machine.event.block == block:
+                machine.clock.realised(name, at)
+
+    def abort(self, at: Seconds, *, turn: str) -> None:
+        """The robot's turn was cut off: what it asked for is taken back."""
+        self.conversation.abort(at, turn=turn)
+        for machine in self.gaze_machines():
+            if machine.event is not None and turn and machine.event.turn == turn:
+                machine.block_ended(at, aborted=True)
+        self.forget_idle(at)
+
+    def block_ended(self, block: str, at: Seconds, *, aborted: bool) -> None:
+        for machine in self.gaze_machines():
+            if machine.event is not None and machine.event.block == block:
+                machine.block_ended(at, aborted=aborted)
+        self.forget_idle(at)
+        self.conversation.block_ended(block, at, aborted=aborted)
+
+    def withdraw(self, event: UnderWay, at: Seconds) -> None:
+        """The robot takes back what it has asked for."""
+        if self.conversation.pair.event is event:
+            self.conversation.pair.abort(at)
+            return
+        for machine in self.gaze_machines():
+            if machine.event is event:
+                machine.step("withdraw", at)
+        self.forget_idle(at)
+
+    def _is_recent(self, past: _Directed, at: Seconds) -> bool:
+        return in_time(at, past.at + self._config.after_robot_directed)
+
+    # -- mutual facial gaze -------------------------------------------------------------------------------------
+
+    def robot_looks_at_face(self, event: UnderWay, clock: LimitClock) -> None:
+        self.facial.supersede(event.started)
+        robot_on = self._scene.robot_looks_at((self.id,))
+        self.facial.robot_begins(event, clock, robot_on=robot_on, look=self.gaze if self.on_robots_face else None)
+
+    # -- new events ---------------------------------------------------------------------------------------------
+
+    def _by_human(
+        self, kind: EventKind, at: Seconds, limit: Seconds, confidence: Probability, objects: tuple[str, ...] = ()
+    ) -> UnderWay:
+        return UnderWay(
+            kind=kind, initiator=self.id, responder=self._scene.robot, started=at, limit=limit, objects=objects,
+            confidence=confidence,
+        )  # fmt: skip

@@ -1,0 +1,360 @@
+"""The whole of recognition as one pure machine: observations in, effects out, and when it must be woken.
+
+    session = Session(robot="robot", config=RecognitionConfig())
+    effects = session.feed(observation, at)         # at: when it happened, on the session's clock
+    effects = session.advance(now)                  # whenever `session.deadline` has been reached
+
+Everything is decided by the times of the observations, not of their arrival: what was due before an observation
+happens before it, at its own time. An answer at the very limit still counts.
+"""
+
+from collections.abc import Callable, Set
+
+from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost
+from engage_hri.schemas.attention import HeadOwner
+from engage_hri.schemas.behaviors import Action, Event
+from engage_hri.schemas.body import RobotState
+from engage_hri.schemas.faults import Fault
+from engage_hri.schemas.feedback import BlockProgress, SyncPointProgress
+from engage_hri.schemas.presence import PeerGone
+from engage_hri.schemas.recognition import EventOutcome, RequestEvent, SignalTurn, TurnOutcome
+from engage_hri.schemas.requests import Accepted, Cancel, Refused
+from engage_hri.schemas.units import Seconds
+from engage_hri.schemas.world import World
+from engage_hri.services.recognition.config import RecognitionConfig
+from engage_hri.services.recognition.events.company import Company
+from engage_hri.services.recognition.events.latest import Latest
+from engage_hri.services.recognition.events.limits import BLOCKS_KEPT, ROUNDING, Blocks, LimitClock
+from engage_hri.services.recognition.events.machine import Effect, Ledger, UnderWay
+from engage_hri.services.recognition.events.news import News
+from engage_hri.services.recognition.events.person import Person
+from engage_hri.services.recognition.events.scene import Covered, Scene
+
+Observation = (
+    ActionBegan | ActionEnded | ActorFound | ActorLost | RequestEvent | SignalTurn | Cancel
+    | SyncPointProgress | BlockProgress | HeadOwner | World | PeerGone | RobotState
+)  # fmt: skip
+TURNS_KEPT = 64
+"""Ended turns that are remembered, for an adjacency pair that is announced after its turn's end; aborted ones too."""
+SILENCE: Seconds = 3.0
+"""How long a body shows that it does not speak before a speech of its is over whose end was not told."""
+ACTIONS_KEPT = 256
+"""Of the robot; of those it is known when they last began and ended."""
+
+
+class Session:
+    """All persons with one robot. clock: of the stamps in the effects. name: prefix of the events' ids.
+
+    strict: a bug here, an undefined transition for instance, raises. Otherwise it costs the open events of the person
+    that it shows with, is told as a `Mishap`, and everything else goes on.
+    """
+
+    def __init__(
+        self, robot: str, config: RecognitionConfig, *, clock: str = "loop", name: str = "", strict: bool = True
+    ) -> None:
+        self.robot = robot
+        self.blocks = Blocks()
+        self.scene = Scene(robot, config.gaze_resolution)
+        self._config = config
+        self._ledger = Ledger(clock, name)
+        self._company = Company(self.scene, config, self._ledger, strict=strict)
+        self._ended_turns: Latest[str, Seconds] = Latest(TURNS_KEPT)
+        self._aborted_turns: Latest[str, Seconds] = Latest(TURNS_KEPT)
+        self._robot_does: dict[tuple[str, Action], ActionBegan] = {}
+        """Its speech and gestures, by behavior."""
+        self._heard_at: Seconds | None = None
+        """When its body last showed that it speaks."""
+        self._live: dict[str, UnderWay] = {}
+        """Undecided requests."""
+        self._answering_blocks: Latest[str, str] = Latest(BLOCKS_KEPT)
+        """Whom they answer."""
+        self._news = News(ACTIONS_KEPT)
+        """Of the robot."""
+
+    @property
+    def persons(self) -> dict[str, Person]:
+        """Who is here, and who has not been gone for long."""
+        return self._company.persons
+
+    @property
+    def busy(self) -> Set[str]:
+        """People with a task in hand."""
+        return self.scene.acting
+
+    # -- time ---------------------------------------------------------------------------------------------------
+
+    @property
+    def deadline(self) -> Seconds | None:
+        """When `advance` has something to do, unless an observation comes first."""
+        gaze, company = self.scene.gaze.deadline, self._company.deadline
+        return company if gaze is None or (company is not None and company < gaze) else gaze
+
+    def advance(self, now: Seconds) -> list[Effect]:
+        """What happens by itself up to and including `now`."""
+        while (due := self.deadline) is not None and due <= now:
+            self._happens(due)
+        self._company.forget(now)
+        return self._take()
+
+    def _advance_before(self, at: Seconds) -> None:
+        while (due := self.deadline) is not None and due < at - ROUNDING:
+            self._happens(due)
+        self._company.forget(at)
+
+    def _happens(self, due: Seconds) -> None:
+        if due == self.scene.gaze.deadline:
+            self._robot_gaze_changed(self.scene.gaze.expire())
+        else:
+            self._company.advance()
+
+    def _let_all(self, at: Seconds, happen: Callable[[Person], object]) -> None:
+        self._company.let_all(at, happen)
+
+    # -- observations -------------------------------------------------------------------------------------------
+
+    def feed(self, observation: Observation | Covered, at: Seconds) -> list[Effect]:
+        """Take what happened at `at`. Slightly late or repeated observations are put right or ignored."""
+        self._advance_before(at)
+        match observation:
+            case ActionBegan(actor=self.robot):
+                self._robot_begins(observation, at)
+            case ActionEnded(actor=self.robot):
+                self._robot_ends(observation, at)
+            case ActionBegan(actor=actor):
+                self._company.hear(actor, at, lambda person: person.begins(observation, at))
+            case ActionEnded(actor=actor) if actor in self.persons:
+                self._company.hear(actor, at, lambda person: person.ends(observation, at))
+            case ActorFound(actor=actor) if actor != self.robot:
+                self._company.hear(actor, at, lambda person: person.presence.found(at))
+            case ActorLost(actor=actor) if actor in self.persons:
+                self._company.hear(actor, at, lambda person: person.presence.lost(at))
+            case RequestEvent():
+                self._request(observation, at)
+            case SignalTurn():
+                self._signal(observation, at)
+            case Cancel(id=id):
+                self._cancel(id, at)
+            case SyncPointProgress(block=block):
+                name = self.blocks.realised(block, observation.behavior, observation.sync, at)
+                self._let_all(at, lambda person: person.point_realised(block, name, at))
+            case BlockProgress(block=str() as block, progress="end"):
+                self._block_ended(block, at, aborted=observation.status in ("failed", "interrupted"))
+            case RobotState(speaking=said):
+                self._robot_is_heard(bool(said), at)
+            case PeerGone(participant="control"):
+                self._robot_stops(at)
+                self.scene.gaze.end((), at)
+            case HeadOwner(owner=owner):
+                self.scene.head_owner = owner
+                self._let_all(at, lambda person: person.head_owner_changed(at))
+            case World():
+                self._company.see(observation, at)
+            case Covered():
+                self.scene.covered = observation
+                self._let_all(at, lambda person: person.hands_changed())
+        return self._take()
+
+    def lose_track(self, person: str, at: Seconds) -> list[Effect]:
+        """After a failure with this person: its open events end as lost, and what it does is to be seen anew."""
+        if person in self.persons:
+            self._company.lose_track(self.persons[person], at)
+        return self._take()
+
+    def _take(self) -> list[Effect]:
+        effects = self._ledger.take()
+        for effect in effects:
+            if isinstance(effect, EventOutcome):
+                self._live.pop(effect.id, None)
+        return effects
+
+    # -- what the robot does ------------------------------------------------------------------------------------
+
+    def _robot_begins(self, began: ActionBegan, at: Seconds) -> None:
+        if not self._news.is_news(began, at):
+            return
+        match began.action:
+            case "look":
+                if self.scene.gaze.begin(began.targets, at):
+                    self._robot_gaze_changed(at)
+            case "speak":
+                self._robot_does[began.behavior, "speak"] = began
+                self._heard_at = None
+                if self.scene.robot_speaks_since is None:
+                    self.scene.robot_speaks_since = at
+                    self.scene.speaks(self.robot)
+                    self._let_all(at, lambda person: person.conversation.robot_speaks(at))
+            case "nod" | "shake" | "point":
+                self._robot_does[began.behavior, began.action] = began
+                self._let_all(at, lambda person: person.conversation.robot_gestures(began.action, at))
+
+    def _robot_ends(self, ended: ActionEnded, at: Seconds) -> None:
+        if not self._news.is_news(ended, at):
+            return
+        self._robot_does.pop((ended.behavior, ended.action), None)
+        match ended.action:
+            case "look":
+                self.scene.gaze.end(ended.targets, at)
+            case "speak":
+                speaks = any(action == "speak" for _, action in self._robot_does)
+                if self.scene.robot_speaks_since is not None and not speaks:
+                    self.scene.robot_speaks_since = None
+                    self.scene.falls_silent(self.robot, at)
+                    self._let_all(at, lambda person: person.conversation.robot_falls_silent(at))
+            case "nod" | "shake" | "point":
+                self._let_all(at, lambda person: person.conversation.robot_gesture_ends(ended.action, at))
+
+    def _robot_is_heard(self, is_speaking: bool, at: Seconds) -> None:
+        """A body that shows when it speaks is believed that it has stopped: the end itself may have been lost."""
+        if is_speaking:
+            self._heard_at = at
+        elif self._heard_at is not None and at > self._heard_at + SILENCE:
+            self._heard_at = None
+            for began in [began for (_, action), began in self._robot_does.items() if action == "speak"]:
+                self._robot_ends(
+                    ActionEnded(actor=self.robot, action="speak", at=began.at, behavior=began.behavior), at
+                )
+
+    def _robot_stops(self, at: Seconds, behaviors: str = "") -> None:
+        """Whatever ends have been lost: what the robot says and does with its hands and head is over.
+
+        behaviors: what their ids begin with.
+        """
+        for began in list(self._robot_does.values()):
+            if began.behavior.startswith(behaviors):
+                ended = ActionEnded(
+                    actor=self.robot, action=began.action, at=began.at, targets=began.targets, behavior=began.behavior
+                )
+                self._robot_ends(ended, at)
+
+    def _robot_gaze_changed(self, at: Seconds) -> None:
+        self._let_all(at, lambda person: person.gaze_changed(at))
+
+    # -- requests -----------------------------------------------------------------------------------------------
+
+    def _request(self, request: RequestEvent, at: Seconds) -> None:
+        """Accept and begin, or refuse, a robot-initiated event (thesis Fig. 5.2)."""
+        if request.id in self._live:
+            return
+        fault = self._fault_in(request)
+        if fault is not None:
+            self._ledger.effects.append(Refused(id=request.id, fault=fault))
+            return
+        self._ledger.effects.append(Accepted(id=request.id))
+        wanted = request.event
+        event = UnderWay(
+            kind=wanted.kind, initiator=self.robot, responder=wanted.responder, started=at, objects=wanted.objects,
+            cause=wanted.cause, optional=wanted.optional, block=request.block, behavior=wanted.id, turn=wanted.turn,
+            request=request.id,
+        )  # fmt: skip
+        self._live[request.id] = event
+        self._company.let(wanted.responder, at, lambda person: self._begin(person, event, wanted))
+        if event.request and not event.id:  # a bug has shown before the event could be told
+            self._ledger.publish(event, "started", at)
+            self._ledger.publish(event, "lost", at)
+
+    def _begin(self, person: Person, event: UnderWay, wanted: Event) -> None:
+        """The robot's event with this person."""
+        match wanted.kind:
+            case "directed_gaze":
+                person.robot_directs(event, self._clock(event, wanted, self._config.directed_gaze_limit))
+            case "mutual_facial_gaze":
+                person.robot_looks_at_face(event, self._clock(event, wanted, self._config.mutual_facial_gaze_limit))
+            case "adjacency_pair":
+                self._ask(person, event, wanted)
+            case "backchannel":
+                self._announce_backchannel(person, event)
+                if (ended := self.blocks.ended(event.block)) is not None:
+                    person.conversation.robot_backchannel.ends(max(event.started, ended))
+
+    def _fault_in(self, request: RequestEvent) -> Fault | None:
+        event, where = request.event, f"{request.block}: {request.event.id}"
+        person = self.persons.get(event.responder)
+        if person is None:
+            known = ", ".join(sorted(self.persons)) or "nobody"
+            return Fault(reason=f"unknown actor {event.responder!r}", where=where, advice=f"known: {known}")
+        if not person.presence.here:
+            return Fault(reason=f"{event.responder!r} has gone", where=where)
+        if event.kind == "directed_gaze" and not event.objects:
+            return Fault(reason="directed gaze without objects", where=where)
+        unknown = [name for name in event.objects if not self.scene.knows(name)]
+        if event.turn and event.turn in self._aborted_turns:
+            return Fault(reason=f"turn {event.turn!r} has been cut off", where=where)
+        if unknown:
+            return Fault(reason=f"unknown object {', '.join(map(repr, unknown))}", where=where)
+        if event.limit is not None and not event.limit > 0:
+            return Fault(reason=f"limit must be greater than 0 s, not {event.limit}", where=where)
+        return None
+
+    def _clock(self, event: UnderWay, wanted: Event, default: Seconds) -> LimitClock:
+        event.limit = wanted.limit or default
+        clock = LimitClock(event.started, event.limit, wanted.anchors, self._config.turn_patience)
+        for name in clock.waiting:
+            realised = self.blocks.point(event.block, name)
+            if realised is not None:
+                clock.realised(name, realised)
+        ended = self.blocks.ended(event.block)
+        if ended is not None:
+            clock.stop_waiting(ended)
+        return clock
+
+    def _ask(self, person: Person, event: UnderWay, wanted: Event) -> None:
+        event.accept = wanted.accept or self._config.accept
+        by_acting = "act" in event.accept
+        default = self._config.manipulation_limit if by_acting else self._config.adjacency_pair_limit
+        event.limit = wanted.limit or default
+        person.conversation.robot_asks(event)
+        turn_end = self._ended_turns.get(event.turn) if event.turn else self.blocks.ended(event.block)
+        if turn_end is not None:
+            person.conversation.turn_ends(max(turn_end, event.started))
+
+    def _announce_backchannel(self, person: Person, event: UnderWay) -> None:
+        """The person holds the floor, so it is the initiator. What was noticed already gets no second event."""
+        event.initiator, event.responder = person.id, self.robot
+        backchannel = person.conversation.robot_backchannel
+        noticed = backchannel.last
+        if noticed is not None and abs(event.started - noticed[0]) <= self._config.backchannel_limit:
+            self._ledger.answer(event.request, noticed[1], event.started)
+            event.request = ""
+        else:
+            backchannel.announced(event)
+
+    def _cancel(self, id: str, at: Seconds) -> None:
+        event = self._live.pop(id, None)
+        if event is not None and event.request == id:
+            self._company.let(event.responder, at, lambda person: person.withdraw(event, at))
+
+    # -- turns and blocks ---------------------------------------------------------------------------------------
+
+    def _signal(self, request: SignalTurn, at: Seconds) -> None:
+        """What became of a turn. Ends at once, whatever it says."""
+        signal = request.signal
+        match signal.signal:
+            case "ended":
+                self._ended_turns[signal.turn] = at
+                self._let_addressees(signal.actor, at, lambda person: person.conversation.turn_ended(signal.turn, at))
+            case "answered" | "repaired":
+                repairs = signal.signal == "repaired"
+                self._let_addressees(
+                    signal.actor, at, lambda person: person.conversation.is_answered(at, repairs=repairs)
+                )
+                if request.block and self.blocks.ended(request.block) is None:
+                    self._answering_blocks[request.block] = signal.actor
+            case "aborted":
+                self._aborted_turns[signal.turn] = at
+                self._let_addressees(signal.actor, at, lambda person: person.abort(at, turn=signal.turn))
+        self._ledger.effects.append(TurnOutcome(id=request.id, at=self._ledger.stamp(at)))
+
+    def _let_addressees(self, actor: str, at: Seconds, happen: Callable[[Person], object]) -> None:
+        """actor: empty for all."""
+        if not actor:
+            self._let_all(at, happen)
+        elif actor in self.persons:
+            self._company.let(actor, at, happen)
+
+    def _block_ended(self, block: str, at: Seconds, *, aborted: bool) -> None:
+        self.blocks.end(block, at)
+        self._robot_stops(at, f"{block}:")
+        self._let_all(at, lambda person: person.block_ended(block, at, aborted=aborted))
+        answered = self._answering_blocks.pop(block, None)
+        if answered is not None:
+            self._let_addressees(answered, at, lambda person: person.conversation.pair.answered_block_ended(at))

@@ -1,0 +1,143 @@
+"""What both gazes are: one begins, the other joins, and the shared phase lasts while both look there. Thesis 2.2.1-2.
+
+Which names the states and inputs have is data of the subclasses; what follows from each stands in their tables.
+"""
+
+from typing import ClassVar
+
+from engage_hri.schemas.units import Probability, Seconds
+from engage_hri.services.recognition.events.limits import LimitClock
+from engage_hri.services.recognition.events.machine import IDLE, Ledger, Machine, UnderWay
+from engage_hri.services.recognition.events.scene import Gaze
+
+
+class SharedGaze(Machine):
+    """One event of one person and the robot that looking decides."""
+
+    ROBOT_WAITS: ClassVar[str]
+    """The state after the robot has begun, until the person joins."""
+    HUMAN_WAITS: ClassVar[str]
+    TOGETHER: ClassVar[str]
+    """The state of the shared phase."""
+    ROBOT_BEGINS: ClassVar[str]
+    """The robot's first input; `<input>_<TOGETHER>` if the person looks there already."""
+    HUMAN_BEGINS: ClassVar[str]
+    """As the robot's; and `<input>_in_vain`."""
+    ROBOT_JOINS: ClassVar[str]
+    HUMAN_JOINS: ClassVar[str]
+
+    def __init__(self, ledger: Ledger) -> None:
+        super().__init__(ledger)
+        self.by_robot = False
+        self.clock: LimitClock | None = None
+        self._robot_on = self._human_on = self._robot_came = False
+        self._shared_since: Seconds | None = None
+
+    @property
+    def deadline(self) -> Seconds | None:
+        if self.clock is None or self.state not in (self.ROBOT_WAITS, self.HUMAN_WAITS):
+            return None
+        return self.clock.deadline
+
+    def expire(self, at: Seconds) -> None:
+        """Nobody came within the limit; or the robot has never shown what it meant."""
+        never_shown = self.clock is not None and self.clock.waiting
+        self.step("withdraw" if never_shown else "limit", at)
+
+    def robot_begins(self, event: UnderWay, clock: LimitClock, *, robot_on: bool, look: Gaze | None) -> None:
+        """The robot's request. look: the person's, if it is there already."""
+        self._begin(event, clock, by_robot=True, robot_on=robot_on, human_on=look is not None)
+        if look is None:
+            self.step(self.ROBOT_BEGINS, event.started)
+        else:
+            given = f"{self.ROBOT_BEGINS}_{self.TOGETHER}"
+            self._join(given, max(event.started, look.since), confidence=look.confidence)
+
+    def human_begins(
+        self,
+        event: UnderWay,
+        clock: LimitClock,
+        *,
+        robot_since: Seconds | None,
+        human_on: bool,
+        in_vain: bool,
+        at: Seconds,
+    ) -> None:
+        """The person's gesture or look, recognized at `at`, which may be later than its start.
+
+        robot_since: since when the robot looks there, None if elsewhere. in_vain: a fragment's own gaze holds
+        the head elsewhere.
+        """
+        self._begin(event, clock, by_robot=False, robot_on=robot_since is not None, human_on=human_on)
+        if robot_since is not None:
+            self._join(f"{self.HUMAN_BEGINS}_{self.TOGETHER}", at, came=robot_since)
+        else:
+            self.step(f"{self.HUMAN_BEGINS}_in_vain" if in_vain else self.HUMAN_BEGINS, at)
+
+    def _begin(self, event: UnderWay, clock: LimitClock, *, by_robot: bool, robot_on: bool, human_on: bool) -> None:
+        self.event, self.clock, self.by_robot = event, clock, by_robot
+        self._robot_on = self._robot_came = robot_on
+        self._human_on, self._shared_since = human_on, None
+
+    def gazes(self, *, robot_on: bool, human_on: bool, at: Seconds, confidence: Probability = 1.0) -> None:
+        """Somebody's gaze has changed: who looks there now. confidence: of the person's look."""
+        if self.event is None:
+            return
+        robot_left, human_left = self._robot_on and not robot_on, self._human_on and not human_on
+        self._robot_on, self._human_on = robot_on, human_on
+        self._robot_came = self._robot_came or robot_on
+        if self.state == self.ROBOT_WAITS and human_on:
+            self._join(self.HUMAN_JOINS, at, confidence=confidence)
+        elif self.state == self.HUMAN_WAITS and robot_on:
+            self._join(self.ROBOT_JOINS, at)
+        elif self.state == self.ROBOT_WAITS and robot_left:
+            self.step("robot_leaves", at)
+        elif self.state == self.HUMAN_WAITS and human_left:
+            self.step("human_leaves", at)
+        elif self.state == self.TOGETHER:
+            self._share(at)
+
+    def _join(self, given: str, at: Seconds, came: Seconds | None = None, confidence: Probability = 1.0) -> None:
+        """The responder is there; came: since when, if not `at`. confidence: of the look that says so."""
+        assert self.event is not None
+        self.event.rests_on(confidence)
+        together_since = max(at if came is None else came, self.event.started)
+        self.event.delay = together_since - self.event.started
+        self.step(given, at)
+        self._share(together_since)
+
+    def _share(self, at: Seconds) -> None:
+        """The shared phase: begins when both are there, ends when one of them is not."""
+        if self._robot_on and self._human_on:
+            self._shared_since = at if self._shared_since is None else self._shared_since
+        elif self._shared_since is not None or not self._human_on or self._robot_came:
+            self._part("part", at)
+
+    def _part(self, given: str, at: Seconds, until: Seconds | None = None) -> None:
+        """End the shared phase; until: when it was last seen, if not `at`."""
+        assert self.event is not None
+        since = self._shared_since
+        self.event.duration = 0.0 if since is None else max(0.0, (at if until is None else until) - since)
+        self.step(given, at)
+
+    def block_ended(self, at: Seconds, *, aborted: bool) -> None:
+        """The robot is done: an aborted fragment takes its event back; a gaze that never came is over."""
+        if self.clock is not None:
+            self.clock.stop_waiting(at)
+        if self.state == self.ROBOT_WAITS and aborted:
+            self.step("withdraw", at)
+        elif self.state == self.TOGETHER and not self._robot_on:
+            self._part("part", at)
+
+    def supersede(self, at: Seconds) -> None:
+        """The robot begins anew: the shared phase completes, what is pending gives way."""
+        self._close("supersede", at)
+
+    def person_gone(self, at: Seconds, until: Seconds) -> None:
+        self._close("person_gone", at, until)
+
+    def _close(self, given: str, at: Seconds, until: Seconds | None = None) -> None:
+        if self.state == self.TOGETHER:
+            self._part(given, at, until)
+        elif self.state != IDLE:
+            self.step(given, at)

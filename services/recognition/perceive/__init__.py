@@ -1,0 +1,1 @@
+"""From raw perception to actions: looks, speech, hands."""

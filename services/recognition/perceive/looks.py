@@ -1,0 +1,85 @@
+"""From where a gaze is, pose by pose, to looks: on something for a dwell time, and over when off it for as long.
+
+Decided by the poses' own times. A beginning needs evidence: a pose after the dwell that agrees with the first.
+"""
+
+from typing import NamedTuple
+
+from engage_hri.schemas.behaviors import Action
+from engage_hri.schemas.units import Probability, Seconds
+from engage_hri.services.recognition.perceive.gaze_targets import Seen, Targets
+
+ROUNDING: Seconds = 1e-9
+
+
+class Change(NamedTuple):
+    """An action has begun or ended, at `at`."""
+
+    began: bool
+    action: Action
+    at: Seconds
+    targets: Targets = ()
+    confidence: Probability = 1.0
+
+
+class _Candidate(NamedTuple):
+    seen: Seen
+    since: Seconds
+
+
+class Looking:
+    """One person's looks. `nearest`: what the gaze was on at the latest pose, a look or not."""
+
+    def __init__(self, dwell: Seconds) -> None:
+        self.target: Targets | None = None
+        """Of the present look; None: there is none."""
+        self.nearest: Targets | None = None
+        self._dwell = dwell - ROUNDING
+        self._confidence: Probability = 1.0
+        self._left: Seconds | None = None
+        """When the gaze left the target of the look that may be over."""
+        self._candidate: _Candidate | None = None
+
+    @property
+    def undecided_since(self) -> Seconds | None:
+        """What happened from then on is still open."""
+        if self._left is not None:
+            return self._left
+        return None if self._candidate is None else self._candidate.since
+
+    def feed(self, seen: Seen, at: Seconds) -> list[Change]:
+        """The gaze is on this at `at`, later than before."""
+        self.nearest = seen.targets
+        if seen.targets == self.target:
+            self._left = self._candidate = None
+            return []
+        if self.target is not None and self._left is None:
+            self._left = at
+        before = self._candidate
+        if before is None or before.seen.targets != seen.targets:
+            self._candidate = _Candidate(seen, at)
+        else:
+            self._candidate = _Candidate(min(before.seen, seen, key=lambda one: one.confidence), before.since)
+        settled = at - self._candidate.since >= self._dwell
+        changes = []
+        if settled or (self._left is not None and at - self._left >= self._dwell):
+            changes += self.end(at)
+        if settled:
+            (targets, self._confidence), since = self._candidate
+            self.target, self._candidate = targets, None
+            changes.append(Change(True, "look", since, targets, self._confidence))
+        return changes
+
+    def end(self, at: Seconds) -> list[Change]:
+        """The look is over, since `at` if the gaze had not left before."""
+        if self.target is None:
+            return []
+        ended = Change(False, "look", at if self._left is None else self._left, self.target, self._confidence)
+        self.target = self._left = None
+        return [ended]
+
+    def lose(self, at: Seconds) -> list[Change]:
+        """The face is out of sight since `at`: nothing of it is known any more."""
+        ended = self.end(at)
+        self._candidate = self.nearest = None
+        return ended

@@ -1,0 +1,257 @@
+"""From where hands and pieces are to manipulations: a piece that leaves its place together with a hand.
+
+Vision trembles, so places are averaged, and what stays within the tremor of its place rests. A piece that is covered
+neither begins nor ends anything: while it is being moved it goes where the hand goes, and one that comes to light
+elsewhere was moved by the hand that had been at it.
+"""
+
+import math
+from collections import deque
+from typing import NamedTuple
+
+from msgspec import Struct, field
+
+from engage_hri.schemas.units import Probability, Seconds, Vector
+from engage_hri.schemas.world import Entity, World
+from engage_hri.services.recognition.config import RecognitionConfig
+from engage_hri.services.recognition.events.scene import Covering
+from engage_hri.services.recognition.perceive.looks import ROUNDING, Change
+
+ALONG = 0.5
+"""Share of the piece's way that a hand must have gone meanwhile, to have moved it."""
+FOLLOW = 0.1
+"""How quickly the place of a resting piece follows what is seen of it: share of the difference at each sight."""
+
+HANDS_KEPT = 16
+"""So many hands may have taken what they hid: the last ones."""
+
+
+class _Piece(Struct):
+    place: Vector
+    """Where it rests, or has rested last."""
+    still_at: Seconds
+    """When it was last seen there."""
+    hands_then: dict[str, Entity]
+    pause: Vector
+    """Where it may be coming to rest, from `moved_at` until `paused_at` at least."""
+    moved_at: Seconds
+    paused_at: Seconds
+    holder: str = ""
+    """The hand that moves it."""
+    grip: Vector = (0.0, 0.0, 0.0)
+    """From that hand to the piece."""
+    hidden: bool = False
+    touched: dict[str, Seconds] = field(default_factory=dict)
+    """Hands that have been at its place since it was hidden, and until when: before they first left it."""
+    sights: deque[tuple[Seconds, Vector]] = field(default_factory=deque)
+
+
+class _Act(Struct):
+    """One person's manipulation. first: the piece it began with."""
+
+    first: str
+    confidence: Probability
+    pieces: set[str]
+
+
+class Acts(NamedTuple):
+    """Changes of one person."""
+
+    actor: str
+    changes: list[Change]
+
+
+class Manipulation:
+    """All hands and pieces. Hands without an owner, and the robot's, move pieces in nobody's name."""
+
+    def __init__(self, robot: str, config: RecognitionConfig) -> None:
+        self._robot = robot
+        self._least = config.least_confidence
+        self._sensing = config.sensing
+        self._pieces: dict[str, _Piece] = {}
+        self._hands: dict[str, Entity] = {}
+        self._acts: dict[str, _Act] = {}
+        self._before: Seconds = float("-inf")
+        """When the world was last seen."""
+
+    def acts(self, actor: str) -> bool:
+        return actor in self._acts
+
+    @property
+    def covering(self) -> frozenset[Covering]:
+        """Whose hands may have taken what they hide, as long as that is believed in."""
+        return frozenset(
+            Covering(self._hands[hand].owner, id, until < self._before)
+            for id, piece in self._pieces.items()
+            if piece.hidden and not piece.holder
+            for hand, until in piece.touched.items()
+            if hand in self._hands and self._before - until < self._sensing.memory
+        )
+
+    @property
+    def deadline(self) -> Seconds | None:
+        """When a piece will have come to rest, if nothing is seen to change."""
+        return min((self._rests_at(piece) for piece in self._pieces.values() if piece.holder), default=None)
+
+    def _rests_at(self, piece: _Piece) -> Seconds:
+        """What goes on out of sight, hand and all, is not over so soon."""
+        lost = piece.hidden and piece.holder not in self._hands
+        return piece.moved_at + (self._sensing.memory if lost else self._sensing.rest)
+
+    def feed(self, world: World, at: Seconds) -> list[Acts]:
+        """The world at `at`, later than before."""
+        found = self.advance(at)
+        seen = {one.id: one for one in world.entities if one.confidence >= self._least}
+        self._hands = {
+            id: one for id, one in seen.items() if one.kind == "hand" and one.owner not in ("", self._robot)
+        }
+        for id, entity in seen.items():
+            if entity.kind == "object":
+                found += self._see(id, entity, at)
+        for id, piece in self._pieces.items():
+            if id not in seen:
+                self._miss(piece, at)
+        self._before = at
+        return found
+
+    def advance(self, now: Seconds) -> list[Acts]:
+        found = []
+        for id, piece in self._pieces.items():
+            if piece.holder and now >= self._rests_at(piece) - ROUNDING:
+                found += self._end(id, piece)
+        return found
+
+    def acting(self, actor: str) -> tuple[str, ...]:
+        """The piece with which the person's manipulation began; empty if there is none."""
+        return (self._acts[actor].first,) if actor in self._acts else ()
+
+    def lose(self, actor: str) -> None:
+        """The person has gone, and whatever they did is over."""
+        act = self._acts.pop(actor, None)
+        for id in act.pieces if act else ():
+            self._rest(self._pieces[id])
+
+    # -- one piece ----------------------------------------------------------------------------------------------
+
+    def _see(self, id: str, entity: Entity, at: Seconds) -> list[Acts]:
+        piece = self._pieces.get(id)
+        if piece is None:
+            place = entity.position
+            self._pieces[id] = piece = _Piece(place, at, self._hands, pause=place, moved_at=at, paused_at=at)
+        place = self._averaged(piece, entity.position, at)
+        self._pause(piece, place, at)
+        found = []
+        if piece.holder:
+            self._grip(piece, entity.position)
+        elif piece.hidden:
+            found = self._reappears(id, piece, entity, at)
+        elif math.dist(place, piece.place) <= self._sensing.tremor:
+            piece.still_at, piece.hands_then = at, self._hands
+            piece.place = _between(piece.place, place, FOLLOW)
+        elif math.dist(place, piece.place) >= self._sensing.moved:
+            if hand := self._moving_along(piece, entity.position):
+                found = self._begin(id, piece, entity, hand, piece.still_at)
+            else:
+                self._rest(piece)
+        elif at - piece.moved_at >= self._sensing.rest:
+            self._rest(piece)  # nudged
+        piece.hidden = False
+        piece.touched.clear()
+        return found
+
+    def _miss(self, piece: _Piece, at: Seconds) -> None:
+        if not piece.hidden:
+            piece.hidden = True
+            piece.sights.clear()
+        if not piece.holder:
+            for hand, entity in self._hands.items():
+                here_before = piece.touched.get(hand, self._before) == self._before
+                if here_before and self._reaches(entity, piece.place):
+                    piece.touched[hand] = at
+            if len(piece.touched) > HANDS_KEPT:
+                del piece.touched[min(piece.touched, key=lambda hand: piece.touched[hand])]
+        elif piece.holder in self._hands:
+            palm = self._hands[piece.holder].position
+            self._pause(piece, _plus(palm, piece.grip), at)
+
+    def _averaged(self, piece: _Piece, place: Vector, at: Seconds) -> Vector:
+        piece.sights.append((at, place))
+        while piece.sights[0][0] < at - self._sensing.smoothing:
+            piece.sights.popleft()
+        x, y, z = (sum(part) / len(piece.sights) for part in zip(*(place for _, place in piece.sights), strict=True))
+        return (x, y, z)
+
+    def _pause(self, piece: _Piece, place: Vector, at: Seconds) -> None:
+        if math.dist(place, piece.pause) > self._sensing.tremor:
+            piece.pause, piece.moved_at = place, at
+        piece.paused_at = at
+
+    def _grip(self, piece: _Piece, place: Vector) -> None:
+        if piece.holder in self._hands:
+            x, y, z = self._hands[piece.holder].position
+            piece.grip = (place[0] - x, place[1] - y, place[2] - z)
+
+    def _rest(self, piece: _Piece) -> None:
+        """It lies where it is."""
+        piece.holder, piece.place = "", piece.pause
+        piece.still_at, piece.hands_then = piece.paused_at, self._hands
+
+    def _reappears(self, id: str, piece: _Piece, entity: Entity, at: Seconds) -> list[Acts]:
+        if math.dist(entity.position, piece.place) < self._sensing.moved:
+            return []
+        hands = [hand for hand in piece.touched if hand in self._hands]
+        if not hands:
+            self._rest(piece)
+            return []
+        hand = max(
+            hands, key=lambda hand: (piece.touched[hand], -math.dist(self._hands[hand].position, entity.position))
+        )
+        piece.moved_at = at
+        return self._begin(id, piece, entity, hand, piece.touched[hand])
+
+    def _reaches(self, hand: Entity, place: Vector) -> bool:
+        return math.dist(hand.position, place) <= self._sensing.hand_reach
+
+    def _moving_along(self, piece: _Piece, place: Vector) -> str:
+        """The hand at `place` that has come a like way; empty if there is none."""
+        way = ALONG * math.dist(place, piece.place)
+        hands = [
+            hand
+            for hand, entity in self._hands.items()
+            if self._reaches(entity, place)
+            and hand in piece.hands_then
+            and math.dist(entity.position, piece.hands_then[hand].position) >= way
+        ]
+        return min(hands, key=lambda hand: math.dist(self._hands[hand].position, place), default="")
+
+    # -- one person ---------------------------------------------------------------------------------------------
+
+    def _begin(self, id: str, piece: _Piece, entity: Entity, hand: str, at: Seconds) -> list[Acts]:
+        piece.holder = hand
+        self._grip(piece, entity.position)
+        owner = self._hands[hand].owner
+        if owner in self._acts:
+            self._acts[owner].pieces.add(id)
+            return []
+        confidence = min(entity.confidence, self._hands[hand].confidence)
+        self._acts[owner] = _Act(id, confidence, {id})
+        return [Acts(owner, [Change(True, "act", at, (id,), confidence)])]
+
+    def _end(self, id: str, piece: _Piece) -> list[Acts]:
+        """The piece rests; the person's manipulation is over when all their pieces do."""
+        at = piece.moved_at
+        self._rest(piece)
+        owner, act = next((owner, act) for owner, act in self._acts.items() if id in act.pieces)
+        act.pieces.discard(id)
+        if act.pieces:
+            return []
+        del self._acts[owner]
+        return [Acts(owner, [Change(False, "act", at, (act.first,), act.confidence)])]
+
+
+def _between(a: Vector, b: Vector, share: float) -> Vector:
+    return (a[0] + share * (b[0] - a[0]), a[1] + share * (b[1] - a[1]), a[2] + share * (b[2] - a[2]))
+
+
+def _plus(a: Vector, b: Vector) -> Vector:
+    return (a[0] + b[0], a[1] + b[1], a[2] + b[2])

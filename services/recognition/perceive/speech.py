@@ -1,0 +1,69 @@
+"""From voice levels to speech: short sounds are none, short silences do not end it.
+
+Levels, not edges: any of them may be lost. A beginning needs evidence, for an end its absence is enough.
+"""
+
+from engage_hri.schemas.units import Probability, Seconds
+from engage_hri.services.recognition.config import Sensing
+from engage_hri.services.recognition.perceive.looks import ROUNDING, Change
+
+
+class Voice:
+    """One person's speech."""
+
+    def __init__(self, sensing: Sensing) -> None:
+        self.speaks = False
+        self._sensing = sensing
+        self._heard: Seconds = float("-inf")
+        """The latest level's time."""
+        self._since: Seconds | None = None
+        """Start of the sound that is, or may become, speech."""
+        self._silent_since: Seconds | None = None
+        """Start of the silence that may end it."""
+        self._confidence: Probability = 1.0
+
+    @property
+    def undecided_since(self) -> Seconds | None:
+        return self._silent_since if self.speaks else self._since
+
+    @property
+    def deadline(self) -> Seconds | None:
+        """When speech, or a sound, will be over if nothing more is heard."""
+        if self._silent_since is not None:
+            return self._silent_since + self._sensing.voice_pause
+        return None if self._since is None else self._heard + self._sensing.voice_lost
+
+    def feed(self, active: bool, at: Seconds, confidence: Probability) -> list[Change]:
+        """The level at `at`, later than before."""
+        changes = self.advance(at)
+        self._heard = at
+        if active:
+            changes += self._sounds(at, confidence)
+        elif not self.speaks:
+            self._since = None
+        elif self._silent_since is None:
+            self._silent_since = at
+        return changes + self.advance(at)
+
+    def _sounds(self, at: Seconds, confidence: Probability) -> list[Change]:
+        self._silent_since = None
+        if self._since is None:
+            self._since, self._confidence = at, confidence
+        elif not self.speaks:
+            self._confidence = min(self._confidence, confidence)
+        if self.speaks or at - self._since < self._sensing.voice_onset - ROUNDING:
+            return []
+        self.speaks = True
+        return [Change(True, "speak", self._since, (), self._confidence)]
+
+    def advance(self, now: Seconds) -> list[Change]:
+        if self.deadline is None or now < self.deadline:
+            return []
+        return self.lose(self._heard)
+
+    def lose(self, at: Seconds) -> list[Change]:
+        """Nothing is heard since `at`, or since the silence began."""
+        ended = Change(False, "speak", at if self._silent_since is None else self._silent_since, (), self._confidence)
+        spoke, self.speaks = self.speaks, False
+        self._since = self._silent_since = None
+        return [ended] if spoke else []

@@ -1,0 +1,1 @@
+"""What connection events say in numbers."""

@@ -1,0 +1,129 @@
+"""How engaged somebody seems: pace times quality, with reasons, and levels that do not flutter. Thesis 2.3.
+
+Pace compares the usual time between connection events with the recent one, or with the interval that is still
+open if that is longer. Quality is the share of recent events that did not fail. While somebody is busy with a
+task nothing is concluded from silence: that explains the 70 s gap of the canapé study.
+"""
+
+from typing import Literal, NamedTuple
+
+from engage_hri.schemas.units import Probability, Seconds
+from engage_hri.services.recognition.config import RecognitionConfig
+from engage_hri.services.recognition.statistics.tally import Tally
+
+Level = Literal["engaged", "weakening", "disengaged", "unknown"]
+
+JUST_AFTER: Seconds = 0.001
+"""The estimate must have passed the threshold, not be on it."""
+
+
+class Estimate(NamedTuple):
+    value: Probability | None
+    level: Level
+    reasons: tuple[str, ...]
+
+
+UNKNOWN = Estimate(None, "unknown", ("no connection event yet",))
+
+
+def pace(usual: Seconds, recent: Seconds | None, open: Seconds) -> Probability:
+    """1 while events come at least as fast as usual, falling towards 0 as they stay away."""
+    longest = max(recent or 0.0, open)
+    return 1.0 if longest <= usual else usual / longest
+
+
+def share_of_good(failed: int, judged: int) -> Probability:
+    """Quality: 1 while nothing has been decided."""
+    return 1.0 - failed / judged if judged else 1.0
+
+
+def next_level(level: Level, value: Probability, config: RecognitionConfig) -> Level:
+    """The level of `value`; it changes only when the value has passed a threshold by the hysteresis."""
+    margin = config.hysteresis
+    engaged_from = config.engaged_from + {"engaged": -margin, "unknown": 0.0}.get(level, margin)
+    disengaged_below = config.disengaged_below + {"disengaged": margin, "unknown": 0.0}.get(level, -margin)
+    if value >= engaged_from:
+        return "engaged"
+    return "disengaged" if value < disengaged_below else "weakening"
+
+
+class Engagement:
+    """The estimate for one actor (or all), from its tally."""
+
+    def __init__(self, config: RecognitionConfig, tally: Tally) -> None:
+        self.estimate = UNKNOWN
+        self.busy = False
+        self._config = config
+        self._tally = tally
+        self._busy_until: Seconds = float("-inf")
+
+    def update(self, now: Seconds, *, busy: bool) -> Estimate:
+        """The estimate now. busy: with a task, so that it stays as it was when that began."""
+        if self.busy and not busy:
+            self._busy_until = now
+        if not (self.busy and busy) and self._tally.starts.last is not None:
+            self.estimate = self._estimate(now, max(0.0, now - self._silent_since))
+        if busy and not self.busy:
+            reasons = ("busy with a task: estimate frozen", *self.estimate.reasons)
+            self.estimate = self.estimate._replace(reasons=reasons)
+        self.busy = busy
+        return self.estimate
+
+    @property
+    def _silent_since(self) -> Seconds:
+        """The last start, or the end of the last task, whichever was later."""
+        last = self._tally.starts.last
+        return self._busy_until if last is None else max(last, self._busy_until)
+
+    def _estimate(self, now: Seconds, open: Seconds) -> Estimate:
+        usual, recent = self._usual, self._recent(now)
+        failed, judged = self._tally.judged(now)
+        quality = share_of_good(failed, judged)
+        speed = pace(usual, recent, open)
+        value = speed * quality
+        between = f"{recent:.1f} s between recent events" if recent is not None else "no recent pace"
+        return Estimate(
+            value,
+            next_level(self.estimate.level, value, self._config),
+            (
+                f"pace {speed:.2f}: {between}, {open:.1f} s since the last, usually {usual:.1f} s",
+                f"quality {quality:.2f}: {failed} of {judged} recent events failed",
+            ),
+        )
+
+    @property
+    def _usual(self) -> Seconds:
+        mean = self._tally.starts.mean_difference
+        if mean is None or mean <= 0.0 or self._tally.starts.count < self._config.enough_events:
+            return self._config.reference_mtbce
+        return mean
+
+    @property
+    def _recent_from(self) -> Seconds:
+        """From when on the recent window holds no time in which the actor was busy."""
+        return self._busy_until + self._config.window
+
+    def _recent(self, now: Seconds) -> Seconds | None:
+        return self._tally.recent_mean(now) if now >= self._recent_from else None
+
+    def next_change(self, now: Seconds) -> Seconds | None:
+        """When the estimate changes otherwise than by getting less, or its level falls, if nothing happens any more.
+
+        None if neither will, or if it is frozen. The tally's own `next_change` may come first.
+        """
+        if self.busy or self._tally.starts.last is None:
+            return None
+        changes = (self._recent_from, self._level_falls(now))
+        return min((at for at in changes if at is not None and at > now), default=None)
+
+    def _level_falls(self, now: Seconds) -> Seconds | None:
+        """When silence alone will have passed the next threshold."""
+        level = self.estimate.level
+        if level not in ("engaged", "weakening"):
+            return None
+        threshold = self._config.engaged_from if level == "engaged" else self._config.disengaged_below
+        threshold -= self._config.hysteresis
+        quality = share_of_good(*self._tally.judged(now))
+        if threshold <= 0.0 or quality <= threshold:
+            return None
+        return self._silent_since + self._usual * quality / threshold + JUST_AFTER

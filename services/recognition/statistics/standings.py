@@ -1,0 +1,74 @@
+"""The statistics message of each person and of all together: made anew whenever something in it changes."""
+
+from collections.abc import Iterable, Set
+
+from engage_hri.schemas.recognition import ConnectionEvent, Statistics
+from engage_hri.schemas.units import Seconds, Stamp
+from engage_hri.services.recognition.config import RecognitionConfig
+from engage_hri.services.recognition.events.agenda import Agenda
+from engage_hri.services.recognition.events.machine import Forgotten
+from engage_hri.services.recognition.statistics.engagement import Engagement
+from engage_hri.services.recognition.statistics.tally import Tally
+
+EVERYBODY = ""
+
+
+class _Standing:
+    def __init__(self, config: RecognitionConfig, clock: str) -> None:
+        self.tally = Tally(config.window, clock)
+        self.engagement = Engagement(config, self.tally)
+
+
+class Standings:
+    """robot: whoever else takes part in an event is the person it counts for. clock: of the stamps."""
+
+    def __init__(self, robot: str, config: RecognitionConfig, clock: str = "loop") -> None:
+        self._robot = robot
+        self._config = config
+        self._clock = clock
+        self._standings: dict[str, _Standing] = {EVERYBODY: _Standing(config, clock)}
+        self._agenda: Agenda[str] = Agenda()
+        self._busy: frozenset[str] = frozenset()
+
+    @property
+    def deadline(self) -> Seconds | None:
+        """When somebody's statistics change by the passing of time."""
+        return self._agenda.deadline
+
+    def feed(self, changes: Iterable[ConnectionEvent | Forgotten], busy: Set[str], now: Seconds) -> list[Statistics]:
+        """Count what happened, in its order; the statistics that are new. busy: persons with a task in hand."""
+        touched = set(self._agenda.take_due(now))
+        for change in changes:
+            if isinstance(change, Forgotten):
+                self._standings.pop(change.actor, None)
+                self._agenda.set(change.actor, None)
+                touched.discard(change.actor)
+                continue
+            for name in (change.person(self._robot), EVERYBODY):
+                self._standing(name).tally.feed(change)
+                touched.add(name)
+        if busy != self._busy:
+            touched |= {EVERYBODY, *(busy ^ self._busy)}
+            self._busy = frozenset(busy)
+        return [self._statistics(actor, now) for actor in sorted(touched)]
+
+    def overall(self, now: Seconds) -> Statistics:
+        """Of all together, as they are."""
+        return self._statistics(EVERYBODY, now)
+
+    def _standing(self, actor: str) -> _Standing:
+        if actor not in self._standings:
+            self._standings[actor] = _Standing(self._config, self._clock)
+        return self._standings[actor]
+
+    def _statistics(self, actor: str, now: Seconds) -> Statistics:
+        one = self._standing(actor)
+        busy = bool(self._busy) if actor == EVERYBODY else actor in self._busy
+        estimate = one.engagement.update(now, busy=busy)
+        statistics = Statistics(
+            actor=actor, at=Stamp(self._clock, now), session=one.tally.session(), recent=one.tally.recent(now),
+            engagement=estimate.value, level=estimate.level, reasons=estimate.reasons, busy=busy,
+        )  # fmt: skip
+        changes = (one.tally.next_change, one.engagement.next_change(now))
+        self._agenda.set(actor, min((at for at in changes if at is not None), default=None))
+        return statistics

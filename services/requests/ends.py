@@ -1,0 +1,397 @@
+"""Long requests over a bus that neither raises nor acknowledges: both ends of `schemas/requests.py`.
+
+Zenoh drops silently, a server may start late, restart or die, a link may be cut, a caller may be cancelled at any
+moment. What follows from each of these is in two tables (asking_table.py, serving_table.py), which two pure machines
+follow (asking.py, serving.py). Here they meet the bus, the clock and the futures that callers await: each request has
+exactly one terminal state, whatever happens in between.
+
+A restarted server remembers nothing. What its former life had accepted fails at the requester and is not sent
+again: a robot must not say and do things twice. What had not been accepted is sent again. The gap that remains
+is an acceptance lost in the same moment as its server; its request is performed again from the start.
+A server leaves commands that it gets from history to their requester, which knows what became of them.
+"""
+
+import asyncio
+from collections.abc import Callable
+from functools import partial
+from types import TracebackType
+from typing import Self
+
+from msgspec.structs import replace
+
+from engage_hri.schemas import keys
+from engage_hri.schemas.faults import (
+    EngageError,
+    Fault,
+    InputRefused,
+    NeverEnded,
+    RequestRefused,
+    RunFailed,
+    ServerRestarted,
+)
+from engage_hri.schemas.messages import COMMANDS, Message
+from engage_hri.schemas.presence import PeerAlive, PeerGone
+from engage_hri.schemas.requests import Accepted, Answer, Cancel, KeepAlive, Outcome, Refused, Request, Unreadable
+from engage_hri.schemas.units import Seconds
+from engage_hri.services.bus.interface import Bus, Containing, Received
+from engage_hri.services.requests import asking, serving
+from engage_hri.services.requests.asking import Asking
+from engage_hri.services.requests.asking_table import State
+from engage_hri.services.requests.patience import Patience
+from engage_hri.services.requests.serving import Serving
+from engage_hri.services.runtime.alarm import Alarm
+
+__all__ = ["NeverEnded", "Patience", "Pending", "RequestDesk", "RequestRefused", "Requester", "ServerRestarted"]
+
+
+_COMMANDS = (Request, KeepAlive)
+
+
+class Pending:
+    """A request on its way. Both futures raise RequestRefused, or RunFailed if the server died or does not answer.
+
+    Cancelling a future only stops waiting; `Requester.cancel` ends the request.
+    """
+
+    def __init__(self, key: str, request: Request) -> None:
+        loop = asyncio.get_running_loop()
+        self.key = key
+        self.request = request
+        self.accepted: asyncio.Future[None] = loop.create_future()
+        self.outcome: asyncio.Future[Outcome] = loop.create_future()
+
+    @property
+    def server(self) -> str:
+        return keys.server_of(self.key)
+
+    def accept(self) -> None:
+        if not self.accepted.done():
+            self.accepted.set_result(None)
+
+    def end(self, end: Outcome | EngageError) -> None:
+        if isinstance(end, Outcome):
+            self.accept()
+            if not self.outcome.done():
+                self.outcome.set_result(end)
+            return
+        for future in (self.accepted, self.outcome):
+            if not future.done():
+                future.set_exception(end)
+                future.exception()  # seen: a caller may care for only one of the two
+
+
+class Requester:
+    """The asking side, for any number of requests at once.
+
+    `async with Requester(bus) as requests` listens by itself. A service that wants request states in order with
+    its other messages subscribes to `Requester.PATTERNS` itself and passes every message to `feed` instead.
+    A request to a server that has not come yet waits for it. Raises ValueError if the bus' name can't be in a key.
+    """
+
+    PATTERNS = (keys.ANY_REQUEST_STATE, keys.ANY_ALIVE)
+
+    def __init__(self, bus: Bus, patience: Patience | None = None) -> None:
+        keys.chunk(bus.name)
+        self._bus = bus
+        self._life = bus.new_life()
+        self._asking = Asking(bus.name, self._life, patience or Patience())
+        self._pending: dict[str, Pending] = {}
+        self._alarm = Alarm(self._tick)
+        self._listening: asyncio.Task[None] | None = None
+        self._broken: EngageError | None = None
+
+    def send(self, key: str, request: Request, within: Seconds | None = None) -> Pending:
+        """Publish the request and keep at it. A known id is an update: the newest content is what is sent again.
+
+        key: the expression of the command (`keys.BLOCK`). within: seconds until it is cancelled. An update of a
+        request that is being cancelled is void. An id that a live request of another kind has, or one that was given
+        up, is refused at once.
+        """
+        if self._broken is not None:
+            return self._failed(key, request, self._broken)
+        known = self._pending.get(request.id)
+        effects = self._asking.send(key, request, self._bus.now(), within)
+        match effects:
+            case [asking.TellEnd(end=EngageError() as error)]:
+                return self._failed(key, request, error)
+        pending = known
+        if pending is None:
+            pending = self._pending[request.id] = Pending(key, request)
+        pending.request = self._asking.request(request.id) or request
+        self._carry_out(effects)
+        return pending
+
+    def _failed(self, key: str, request: Request, error: EngageError) -> Pending:
+        pending = Pending(key, request)
+        pending.end(error)
+        return pending
+
+    def cancel(self, id: str, reason: str = "") -> None:
+        """Ask the server to end request `id` as interrupted; its outcome still comes, or it fails for want of it.
+
+        A server that has never got the request refuses it.
+        """
+        self._carry_out(self._asking.cancel(id, reason, self._bus.now()))
+
+    def state(self, id: str) -> State:
+        return self._asking.state(id)
+
+    def feed(self, received: Received) -> bool:
+        """Take a message of `PATTERNS`; False if it was none of ours."""
+        message = received.message
+        if isinstance(message, Answer):
+            effects = self._asking.hear(message, self._bus.now(), keys.server_of(received.key))
+            if effects:
+                self._carry_out(effects)
+        elif isinstance(message, PeerGone):
+            self._carry_out(self._asking.server_gone(message.participant, self._bus.now()))
+        elif isinstance(message, PeerAlive):
+            self._carry_out(self._asking.server_there(message.participant, message.run, self._bus.now()))
+        else:
+            return False
+        return True
+
+    def _tick(self) -> None:
+        self._carry_out(self._asking.tick(self._bus.now()))
+
+    def _carry_out(self, effects: list[asking.Effect]) -> None:
+        for effect in effects:  # by isinstance: with each message, and twice as quick as patterns
+            if isinstance(effect, asking.Publish):
+                try:
+                    self._publish(effect.expression, _as_message(effect.message))
+                except Exception as error:
+                    self._could_not_send(effect.message.id, error)
+            elif isinstance(effect, asking.TellAccepted):
+                if (pending := self._pending.get(effect.id)) is not None:
+                    pending.accept()
+            elif isinstance(effect, asking.TellEnd):
+                if (ended := self._pending.pop(effect.id, None)) is not None:
+                    ended.end(effect.end)
+            elif isinstance(effect, asking.Renew):
+                at, name = self._bus.stamp(), self._bus.name
+                still = KeepAlive(live=effect.live, at=at, requester=name, life=self._life)
+                self._publish(keys.keep_alive(effect.server), still)
+            else:
+                self._bus.publish(keys.fault(self._bus.name), effect.fault)
+        self._alarm.set(self._asking.deadline)
+
+    def _could_not_send(self, id: str, error: Exception) -> None:
+        """What has no encoded form, half a character for instance, ends this request and leaves the others alone."""
+        self._asking.forget(id)
+        fault = Fault(
+            reason=str(error), where=id, advice="text in Unicode, numbers in their range, fields of their type"
+        )
+        if (pending := self._pending.pop(id, None)) is not None:
+            pending.end(RequestRefused(error.fault if isinstance(error, InputRefused) else fault))
+
+    def _publish(self, expression: str, message: Message) -> None:
+        self._bus.publish(keys.command(expression, self._bus.role, self._bus.name), message)
+
+    def close(self) -> None:
+        """Stop sending again; what has not ended is cancelled at its server."""
+        for id in self._asking.ids:
+            self.cancel(id, "requester closed")
+        self._fail_all(self._broken or RunFailed("the client is closed"))
+
+    def _fail_all(self, error: EngageError) -> None:
+        """Nothing is sent or awaited any more."""
+        self._broken = error
+        self._alarm.stop()
+        for pending in self._pending.values():
+            pending.end(error)
+        self._pending.clear()
+
+    # -- listening by itself ----------------------------------------------------------------------------------------
+
+    def check(self) -> None:
+        """Raises RunFailed if this hears nothing any more."""
+        if self._broken is not None:
+            raise self._broken
+
+    async def _listen(self) -> None:
+        with self._bus.subscribe(*self.PATTERNS) as inbox:
+            async for received in inbox:
+                with self._bus.containing(received):
+                    self.feed(received)
+
+    def _stopped_listening(self, task: "asyncio.Task[None]") -> None:
+        """It ends with the client and not before; who awaits an answer would wait for ever."""
+        if self._broken is not None or task.cancelled():
+            return
+        error = task.exception()
+        reason = f"the client hears nothing any more: {error or 'it has left the bus'}"
+        self._fail_all(RunFailed(Fault(reason=reason, advice="connect again", service=self._bus.name)))
+
+    async def __aenter__(self) -> Self:
+        self._listening = asyncio.create_task(self._listen(), name=f"requests of {self._bus.name}")
+        self._listening.add_done_callback(self._stopped_listening)
+        await asyncio.sleep(0)
+        return self
+
+    async def __aexit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+        if self._listening is not None:
+            self._listening.cancel()
+            await asyncio.gather(self._listening, return_exceptions=True)
+
+
+class RequestDesk:
+    """The serving side: takes commands from the service's own subscription, answers, and never serves one twice.
+
+        match desk.take(received):
+            case PerformBlock() as request: ...         # new, or updated (`desk.is_live` was true before)
+            case Cancel(id=id): ...                     # only for live requests
+            case None: ...                              # not ours, a duplicate, or already ended
+
+    `request.id` is its name at this server: its own id, or `id~2` where another requester's, or a former life's, has
+    that. The answers carry the id that was asked with.
+
+    on_cancel: called when a requester has been gone for longer than the grace, has come back as another life, or has
+    not renewed its request. on_extend: called with a request that a `KeepAlive` gives more authority. term: the lease
+    of requests that name none. The service's subscription must hold `RequestDesk.patterns(server)`.
+    """
+
+    def __init__(
+        self,
+        bus: Bus,
+        server: str,
+        on_cancel: Callable[[Cancel], None],
+        *,
+        on_extend: Callable[[Request], None] | None = None,
+        term: Seconds | None = None,
+    ) -> None:
+        self._bus = bus
+        self._server = server
+        self._on_cancel = on_cancel
+        self._on_extend = on_extend
+        self._serving = Serving(server, term)
+        self._answers = keys.request_state(server)
+        self._alarm = Alarm(self._tick)
+
+    @staticmethod
+    def patterns(server: str) -> tuple[str, str]:
+        return (keys.commands(server), keys.ANY_ALIVE)
+
+    def is_live(self, name: str) -> bool:
+        return self._serving.is_live(name)
+
+    @property
+    def live(self) -> int:
+        """How many requests have not ended."""
+        return self._serving.live
+
+    def asked(self, name: str) -> Request:
+        """The request as it came, with its own id. Raises KeyError if it was never made, or is forgotten."""
+        request = self._serving.asked(name)
+        if request is None:
+            raise KeyError(name)
+        return request
+
+    def take(self, received: Received) -> Request | None:
+        """The request, if it is new, changed or a cancellation of a live one; each of these once."""
+        message = received.message
+        if isinstance(message, _COMMANDS):
+            is_ours = keys.is_command_of(self._server, received.key)
+            return self._take(message, received, self._bus.now()) if is_ours else None
+        match message:
+            case Unreadable(id=id, life=life, kind=kind, fault=fault) if id:
+                # As far as it could be read it is this request, which may be live, or have ended.
+                requester, life = keys.requester_of(received.key), life or received.life
+                known = Cancel(id=id, requester=requester, life=life, of=kind)
+                return self._carry_out(self._serving.refuse(known, fault))
+            case PeerGone(participant=requester):
+                return self._carry_out(self._serving.requester_gone(requester, self._bus.now()))
+            case PeerAlive(participant=requester, run=run):
+                return self._carry_out(self._serving.requester_there(requester, run, self._bus.now()))
+        return None
+
+    def _take(self, message: Request | KeepAlive, received: Received, now: Seconds) -> Request | None:
+        # A requester of ours that is still there sends it again; one that has left wants it no more.
+        if received.past and (message.life or self._serving.is_there(keys.requester_of(received.key))):
+            return None
+        requester = keys.requester_of(received.key) or message.requester
+        if requester != message.requester or not message.life:
+            message = replace(message, requester=requester, life=message.life or received.life)
+        if isinstance(message, KeepAlive):
+            sent = min(now, self._bus.local(message.at))
+            return self._carry_out(self._serving.keep_alive(message, sent, now))
+        if (fault := _misplaced(message, received.key)) is not None:
+            return self._carry_out(self._serving.refuse(message, fault))
+        return self._carry_out(self._serving.take(message, now))
+
+    def accept(self, name: str) -> None:
+        self._answer(name, Accepted(id=name))
+
+    def refuse(self, name: str, fault: Fault) -> None:
+        self._answer(name, Refused(id=name, fault=fault))
+
+    def end(self, outcome: Message) -> None:
+        """Answer the request whose name is the outcome's id with a terminal state."""
+        assert isinstance(outcome, Outcome)
+        self._answer(outcome.id, outcome)
+
+    def _answer(self, name: str, answer: Answer) -> None:
+        self._carry_out(self._serving.answer(name, answer, self._bus.now()))
+
+    def _tick(self) -> None:
+        self._carry_out(self._serving.tick(self._bus.now()))
+
+    def _carry_out(self, effects: list[serving.Effect], /) -> Request | None:
+        """The one request to be handed over at once; what more there is goes to the clerks."""
+        handed: Request | None = None
+        for effect in effects:
+            if isinstance(effect, serving.Publish):
+                self._bus.publish(self._answers, effect.answer)  # type: ignore[arg-type]
+            elif isinstance(effect, serving.Hand):
+                if effect.is_asked:
+                    handed = effect.request
+                else:
+                    self._hand_to_clerk(effect.request)
+            elif effect.is_ours:
+                self._bus.report(effect.fault)
+            else:
+                self._bus.publish(keys.fault(self._server), effect.fault)
+        self._alarm.set(self._serving.deadline)
+        return handed
+
+    def _hand_to_clerk(self, request: Request) -> None:
+        with self._bus.containing(request):
+            if isinstance(request, Cancel):
+                self._on_cancel(request)
+            elif self._on_extend is not None:
+                self._on_extend(request)
+
+    def serving(self, request: Request) -> Containing:
+        """An exception in the body of `with` ends this request, and nothing else."""
+        return self._bus.containing(request, partial(self._refuse_if_live, request.id))
+
+    def _refuse_if_live(self, name: str, fault: Fault) -> None:
+        if self.is_live(name):
+            self.refuse(name, fault)
+
+    def close(self) -> None:
+        self._alarm.stop()
+
+
+def _misplaced(request: Request, key: str) -> Fault | None:
+    """What is wrong with sending this request there."""
+    expression = keys.expression_of(key)
+    expected = COMMANDS.get(expression, ())
+    if request.id and (isinstance(request, expected) or (expression and isinstance(request, Cancel))):
+        return None
+    server, name = keys.server_of(key), type(request).__name__
+    if not request.id:
+        return Fault(reason=f"{name} without an id", where=key, service=server, advice="make one up: `id`")
+    home = next((known for known, kinds in COMMANDS.items() if isinstance(request, kinds)), keys.cancel(server))
+    takes = (
+        f", which takes {' and '.join(kind.__name__ for kind in expected)}" if expected else ", which is no command"
+    )
+    who = key.split("/")[4:6] if expression else ["<role>", "<requester>"]
+    advice = f"send it on {home.replace('*/*', '/'.join(who))}" if home else ""
+    return Fault(reason=f"{name} came on {key}{takes}", where=request.id, service=server, advice=advice)
+
+
+def _as_message(request: Request) -> Message:
+    return request  # type: ignore[return-value]

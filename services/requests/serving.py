@@ -1,0 +1,391 @@
+"""The serving side of long requests, pure: commands, the service's answers, presence and time in; messages out.
+
+What becomes of one request is `TABLE` in serving_table.py. `Serving` knows requests by requester, life, kind
+and id, and calls each by a name that no other request of this server has or had lately.
+
+    effects = serving.take(request, now)               # a command; keep_alive, requester_gone, requester_there, tick
+    effects = serving.answer(name, Accepted(id=name), now)      # what the service decides
+"""
+
+from collections import OrderedDict
+from collections.abc import Callable, Iterable, Mapping
+from functools import partial
+from math import inf
+
+from msgspec import Struct
+from msgspec.structs import replace
+
+from engage_hri.schemas.faults import Fault
+from engage_hri.schemas.requests import (
+    Accepted,
+    Answer,
+    Cancel,
+    Heard,
+    KeepAlive,
+    Kept,
+    Outdated,
+    Refused,
+    Request,
+    answering,
+    is_life_of,
+    kind_meant,
+)
+from engage_hri.schemas.units import Seconds
+from engage_hri.services.requests.deadlines import Deadlines
+from engage_hri.services.requests.names import Names
+from engage_hri.services.requests.serving_table import TABLE, Do, Event, State
+
+GRACE: Seconds = 2.0
+"""How long a requester may be gone before its requests end: a router's restart looks like a death."""
+ENDED_KEPT = 1024
+"""How many ended requests are remembered, to answer what comes again."""
+LIFELESS_KEPT: Seconds = 10.0
+"""How long those of a requester that names no life are: longer than anything is sent again after."""
+LAPSED = "nobody has renewed it"
+GONE = "requester is gone"
+
+# Asked for with each message, and an enum is slow to give a member.
+_ENDED, _UNKNOWN = State.ENDED, State.UNKNOWN
+_STOPPED = (State.CANCELLED, State.ENDED)
+_GRACE_OVER, _LEASE_OVER = Event.GRACE_OVER, Event.LEASE_OVER
+_DECISIONS = {Accepted: Event.ACCEPT, Refused: Event.REFUSE}
+"""What an answer of the service is; each other one is an end."""
+
+
+class Publish(Struct, frozen=True):
+    """Send this answer."""
+
+    answer: Answer
+
+
+class Hand(Struct, frozen=True):
+    """Give this to the service: a request, new or changed, or a `Cancel`; `id` is its name here.
+
+    is_asked: it is what has just come; else it follows from something else.
+    """
+
+    request: Request
+    is_asked: bool
+
+
+class Complain(Struct, frozen=True):
+    """Everybody is to know. is_ours: a mistake of the service itself."""
+
+    fault: Fault
+    is_ours: bool
+
+
+Effect = Publish | Hand | Complain
+_Cause = Request | Answer | Kept | None
+"""What has come with an event."""
+_Key = tuple[str, str, str]
+"""Requester, life, id: what is live under it has one kind."""
+
+
+class _Record:
+    """One request. run: the requester's life by its token. kind: of the request, or of what a cancellation ends."""
+
+    __slots__ = ("answer", "ended_at", "key", "kind", "lease", "name", "request", "run", "state")
+
+    def __init__(self, name: str, request: Request, run: str) -> None:
+        self.name = name
+        self.request = request
+        self.run = run
+        self.key = _key(request)
+        self.kind = kind_meant(request)
+        self.lease = (_LEASE_OVER, name)
+        """Its clock among the deadlines."""
+        self.state = _UNKNOWN
+        self.answer: Answer | None = None
+        self.ended_at: Seconds = inf
+
+
+class Serving:
+    """All requests to one server. term: the lease of a request that names none; None: it has none."""
+
+    def __init__(self, server: str, term: Seconds | None = None) -> None:
+        self._server = server
+        self._term = term
+        self._known: dict[tuple[_Key, str], _Record] = {}
+        """By kind, too."""
+        self._newest: dict[_Key, _Record] = {}
+        """Of whatever kind."""
+        self._named: dict[str, _Record] = {}
+        self._ended: OrderedDict[str, _Record] = OrderedDict()
+        self._names = Names()
+        self._runs: dict[str, str] = {}
+        self._deadlines: Deadlines[tuple[Event, str]] = Deadlines()
+        self._effects: list[Effect] = []
+
+    # -- what is known --------------------------------------------------------------------------------------------
+
+    @property
+    def deadline(self) -> Seconds | None:
+        """When to `tick`; what was due then may have been settled since."""
+        return None if self._deadlines.look == inf else self._deadlines.look
+
+    def is_live(self, name: str) -> bool:
+        return name in self._named and self._named[name].state is not _ENDED
+
+    @property
+    def live(self) -> int:
+        """How many requests have not ended."""
+        return len(self._named) - len(self._ended)
+
+    def asked(self, name: str) -> Request | None:
+        """The request as it came, with its own id."""
+        record = self._named.get(name)
+        return None if record is None else record.request
+
+    def is_there(self, requester: str) -> bool:
+        return requester in self._runs
+
+    # -- events ---------------------------------------------------------------------------------------------------
+
+    def take(self, request: Request, now: Seconds) -> list[Effect]:
+        """A command that has come; `requester` as its key names it."""
+        key, kind = _key(request), kind_meant(request)
+        newest = self._newest.get(key)
+        if newest is not None and newest.state is not _ENDED and kind not in ("", newest.kind):
+            is_cancel = isinstance(request, Cancel)
+            advice = f"`of` is the kind of what it ends: {newest.kind}" if is_cancel else "give it another id"
+            self._refuse(request, f"{request.id!r} is the id of a live {newest.kind}", advice)
+        else:
+            record = self._record(key, kind)
+            if record is None or self._is_new(record, request, now):
+                record = self._new(request)
+            self._step(record, _event(record, request), now, request)
+        return self._told()
+
+    def refuse(self, request: Request, fault: Fault) -> list[Effect]:
+        """It came on a wrong key, or could not be read. The same request, if live here or ended, is as it was."""
+        record = self._record(_key(request), kind_meant(request))
+        if record is not None and record.state is not _ENDED:
+            return [Complain(fault, False)]
+        if record is not None and record.answer is not None:
+            return [Publish(answering(request, record.answer))]
+        return [Publish(answering(request, Refused(id=request.id, fault=fault)))]
+
+    def keep_alive(self, message: KeepAlive, sent: Seconds, now: Seconds) -> list[Effect]:
+        """sent: local time, not after `now`."""
+        for kept in message.live:
+            record = self._known.get(((message.requester, message.life, kept.id), kept.kind))
+            if record is None:
+                unknown = Cancel(id=kept.id, requester=message.requester, life=message.life, of=kept.kind)
+                record = _Record(kept.id, unknown, "")
+            is_newer = record.request.is_updatable and kept.revision > record.request.revision
+            self._step(record, Event.EXTENDED if is_newer else Event.NAMED, sent, kept)
+        return self._told()
+
+    def answer(self, name: str, answer: Answer, now: Seconds) -> list[Effect]:
+        """What the service says of the request that it knows by `name`."""
+        record = self._named.get(name)
+        if record is None:
+            self._warn_ended(name, answer, "was never made")
+        else:
+            self._step(record, _DECISIONS.get(type(answer), Event.END), now, answer)
+        return self._told()
+
+    def requester_gone(self, requester: str, now: Seconds) -> list[Effect]:
+        self._runs.pop(requester, None)
+        for record in self._of(requester):
+            self._step(record, Event.GONE, now)
+        return self._told()
+
+    def requester_there(self, requester: str, run: str, now: Seconds) -> list[Effect]:
+        """Its token has come. run: which life of it; empty: unknown."""
+        self._runs[requester] = run
+        for record in self._of(requester):
+            is_another = bool(record.run and run and record.run != run)
+            self._step(record, Event.REBORN if is_another else Event.BACK, now)
+            record.run = run
+        return self._told()
+
+    def tick(self, now: Seconds) -> list[Effect]:
+        while (due := self._deadlines.due(now)) is not None:
+            event, name = due
+            if (record := self._named.get(name)) is not None:
+                self._step(record, event, now)
+        return self._told()
+
+    # -- one request ----------------------------------------------------------------------------------------------
+
+    def _told(self) -> list[Effect]:
+        effects, self._effects = self._effects, []
+        return effects
+
+    def _of(self, requester: str) -> Iterable[_Record]:
+        live = (record for record in self._named.values() if record.state is not _ENDED)
+        return [record for record in live if record.request.requester == requester]
+
+    def _is_new(self, record: _Record, request: Request, now: Seconds) -> bool:
+        """Is it another than the one that has ended? Without a life nobody can tell a repetition for ever."""
+        if record.state is not _ENDED or request.life:
+            return False
+        may_differ = not isinstance(request, Cancel) and not isinstance(record.request, Cancel)
+        differs = may_differ and _content(request) != _content(record.request)
+        return differs or now - record.ended_at > LIFELESS_KEPT
+
+    def _record(self, key: _Key, kind: str) -> _Record | None:
+        """What is known by these. Who does not say the kind means what is live, or was last."""
+        newest = self._newest.get(key)
+        if newest is not None and (not kind or (not newest.kind and (key, kind) not in self._known)):
+            return newest
+        return self._known.get((key, kind))
+
+    def _new(self, request: Request) -> _Record:
+        run = self._runs.get(request.requester, "")
+        if not is_life_of(request.life, run):
+            run = ""  # of a new life, whose token is still on its way
+        while (name := self._names.unique(request.id)) in self._named:
+            pass  # a live one from so long ago that its name is forgotten
+        record = _Record(name, request, run)
+        known = (record.key, record.kind)
+        if (before := self._known.get(known)) is not None:
+            self._forget(before)
+        self._known[known] = self._named[record.name] = self._newest[record.key] = record
+        return record
+
+    def _forget(self, record: _Record) -> None:
+        self._ended.pop(record.name, None)
+        self._named.pop(record.name, None)
+        if self._known.get((record.key, record.kind)) is record:
+            del self._known[record.key, record.kind]
+        if self._newest.get(record.key) is record:
+            del self._newest[record.key]
+
+    def _step(self, record: _Record, event: Event, now: Seconds, cause: _Cause = None) -> None:
+        before = record.state
+        record.state, actions = TABLE[before][event]
+        for action in actions:
+            _ACTS[action](self, record, now, cause)
+        if record.state is not before and record.state in _STOPPED:
+            self._deadlines.clear((_GRACE_OVER, record.name))
+            self._deadlines.clear(record.lease)
+            if record.state is _ENDED:
+                record.ended_at = now
+                self._ended[record.name] = record
+                if len(self._ended) > ENDED_KEPT:
+                    self._forget(next(iter(self._ended.values())))
+
+    # -- what follows: one for each of `Do`, with what has caused it ----------------------------------------------
+
+    def _hand_asked(self, record: _Record, now: Seconds, cause: _Cause) -> None:
+        assert isinstance(cause, Request)
+        if not isinstance(cause, Cancel):
+            record.request = cause
+        self._hand(record, cause, is_asked=True)
+
+    def _hand_extended(self, record: _Record, now: Seconds, cause: _Cause) -> None:
+        """The content itself is still the older one: the answer says so, and brings the newest."""
+        assert isinstance(cause, Kept)
+        self._hand(record, record.request.with_authority(cause.authority))
+
+    def _renew(self, record: _Record, now: Seconds, cause: _Cause) -> None:
+        """A late message never shortens what a newer one has granted."""
+        term = cause.valid if isinstance(cause, Kept) else record.request.term
+        if not 0.0 < term < inf:
+            if self._term is None:
+                return
+            term = self._term
+        self._deadlines.set(record.lease, max(self._deadlines[record.lease] or 0.0, now + term))
+
+    def _wait_grace(self, record: _Record, now: Seconds, cause: _Cause) -> None:
+        self._deadlines.set((_GRACE_OVER, record.name), now + GRACE)
+
+    def _stop_grace(self, record: _Record, now: Seconds, cause: _Cause) -> None:
+        self._deadlines.clear((_GRACE_OVER, record.name))
+
+    def _say_outdated(self, record: _Record, now: Seconds, cause: _Cause) -> None:
+        self._effects.append(Publish(answering(record.request, Outdated(id=record.name))))
+
+    def _answer(self, record: _Record, now: Seconds, cause: _Cause) -> None:
+        assert isinstance(cause, Answer)
+        record.answer = answering(record.request, cause)
+        self._effects.append(Publish(record.answer))
+
+    def _repeat(self, record: _Record, now: Seconds, cause: _Cause) -> None:
+        """To whoever asks now: of a request whose cancellation came first, that did not say which kind it is."""
+        asks = cause if isinstance(cause, Request) and not isinstance(cause, Cancel) else record.request
+        self._effects.append(Publish(answering(asks, record.answer or Heard(id=record.name))))
+
+    def _refuse_unheard(self, record: _Record, now: Seconds, cause: _Cause) -> None:
+        reason = f"cancelled before {self._server} had heard of it; it is refused should it come yet"
+        fault = self._fault(record.request.id, reason, "a cancellation names requester and life, too")
+        self._answer(record, now, Refused(id=record.name, fault=fault))
+
+    def _refuse_forgotten(self, record: _Record, now: Seconds, cause: _Cause) -> None:
+        self._refuse(record.request, f"{self._server} does not know it any more", "send it again under a new id")
+
+    def _warn_different(self, record: _Record, now: Seconds, cause: _Cause) -> None:
+        which = "an ended" if record.state is _ENDED else "a live"
+        reason = f"{which} {record.kind} of this id has other content, and that counts"
+        self._complain(record.request.id, reason, "give what is new another id", is_ours=False)
+
+    def _warn_over(self, record: _Record, now: Seconds, cause: _Cause) -> None:
+        assert isinstance(cause, Answer)
+        self._warn_ended(record.name, cause, f"has ended already, with {record.answer}")
+
+    def _hand(self, record: _Record, request: Request, *, is_asked: bool = False) -> None:
+        named = request if request.id == record.name else replace(request, id=record.name)
+        self._effects.append(Hand(named, is_asked))
+
+    def _hand_end(self, record: _Record, now: Seconds, cause: _Cause, *, reason: str) -> None:
+        asked = record.request
+        self._hand(record, Cancel(id=asked.id, requester=asked.requester, life=asked.life, reason=reason))
+
+    # -- what is wrong --------------------------------------------------------------------------------------------
+
+    def _fault(self, where: str, reason: str, advice: str = "") -> Fault:
+        return Fault(reason=reason, where=where, advice=advice, service=self._server)
+
+    def _refuse(self, request: Request, reason: str, advice: str) -> None:
+        refusal = Refused(id=request.id, fault=self._fault(request.id, reason, advice))
+        self._effects.append(Publish(answering(request, refusal)))
+
+    def _complain(self, where: str, reason: str, advice: str, *, is_ours: bool) -> None:
+        self._effects.append(Complain(self._fault(where, reason, advice), is_ours))
+
+    def _warn_ended(self, name: str, answer: Answer, why: str) -> None:
+        reason = f"request {name} {why}; now {type(answer).__name__}"
+        self._complain(name, reason, "a mistake of this service", is_ours=True)
+
+
+def _key(request: Request) -> _Key:
+    return (request.requester, request.life, request.id)
+
+
+def _event(record: _Record, request: Request) -> Event:
+    """What this command is to what is known."""
+    if isinstance(request, Cancel):
+        return Event.CANCEL
+    known = record.request
+    if record.state is _UNKNOWN or isinstance(known, Cancel) or request == known:
+        return Event.CAME
+    if not request.is_updatable:
+        return Event.CAME if _content(request) == _content(known) else Event.DIFFERED
+    return Event.CAME if request.revision < known.revision else Event.CHANGED
+
+
+def _content(request: Request) -> Request:
+    """Without what does not count as content."""
+    return replace(request, revision=0, lease=0.0)
+
+
+_ACTS: Mapping[Do, Callable[[Serving, _Record, Seconds, _Cause], None]] = {
+    Do.HAND: Serving._hand_asked,
+    Do.HAND_EXTENDED: Serving._hand_extended,
+    Do.HAND_CANCEL: Serving._hand_asked,
+    Do.HAND_GONE: partial(Serving._hand_end, reason=GONE),
+    Do.HAND_LAPSED: partial(Serving._hand_end, reason=LAPSED),
+    Do.RENEW: Serving._renew,
+    Do.WAIT_GRACE: Serving._wait_grace,
+    Do.STOP_GRACE: Serving._stop_grace,
+    Do.SAY_OUTDATED: Serving._say_outdated,
+    Do.REPEAT: Serving._repeat,
+    Do.ANSWER: Serving._answer,
+    Do.REFUSE_UNHEARD: Serving._refuse_unheard,
+    Do.REFUSE_FORGOTTEN: Serving._refuse_forgotten,
+    Do.WARN_DIFFERENT: Serving._warn_different,
+    Do.WARN_ENDED: Serving._warn_over,
+}

@@ -1,0 +1,81 @@
+"""How a service lives: joins the hub under its name, subscribes, shows its token, serves until cancelled.
+
+A service is one coroutine function of its bus, its configuration and `ready`, which it calls once its
+subscribers stand. Each answers how it is (`keys.status`). No message ends a service: what goes wrong while one is
+taken ends at most what the message is about (`Bus.containing`). What goes wrong elsewhere ends the process, loudly.
+"""
+
+import asyncio
+from collections.abc import AsyncIterator, Awaitable, Callable, Mapping
+from contextlib import asynccontextmanager
+from functools import cache
+from importlib.metadata import PackageNotFoundError, version
+
+from engage_hri.schemas import keys
+from engage_hri.schemas.messages import Message
+from engage_hri.schemas.status import AskStatus, Status
+from engage_hri.schemas.units import Stamp
+from engage_hri.services.bus.interface import Bus, Hub
+
+Ready = Callable[[], None]
+Service = Callable[[Bus, Ready], Awaitable[None]]
+"""With its configuration bound already (`functools.partial(realize, config=...)`)."""
+
+
+async def serve(hub: Hub, name: str, service: Service, ready: Ready = lambda: None) -> None:
+    """Run one service on the hub until it is cancelled or fails. Raises InputRefused if another one is there."""
+    await hub.vacant(name)
+    bus = hub.join(name, role=name if name in keys.ROLES else "manager")
+    joined = bus.stamp()
+    since: Stamp | None = None
+
+    def stands() -> None:
+        nonlocal since
+        since = bus.stamp()
+        bus.declare_alive()
+        ready()
+
+    def status(question: Message) -> Status:
+        return Status(
+            participant=name, run=bus.run, version=installed_version(),
+            at=bus.stamp(), joined=joined, stands=since, bus=bus.health,
+        )  # fmt: skip
+
+    bus.answer(keys.status(name), status, empty=AskStatus())
+    try:
+        await service(bus, stands)
+    finally:
+        await bus.leave()
+
+
+@cache
+def installed_version() -> str:
+    """Of Engage, as its package says; `unknown` without one."""
+    try:
+        return version("engage-hri")
+    except PackageNotFoundError:  # run from its sources
+        return "unknown"
+
+
+@asynccontextmanager
+async def running(hub: Hub, services: Mapping[str, Service]) -> AsyncIterator[None]:
+    """Run services in this process; the body of `async with` starts when all stand, and its end stops them."""
+    standing = {name: asyncio.Event() for name in services}
+    async with asyncio.TaskGroup() as group:
+        tasks = [
+            group.create_task(_serve_for_ever(hub, name, service, standing[name]), name=f"service {name}")
+            for name, service in services.items()
+        ]
+        try:
+            for stands in standing.values():
+                await stands.wait()
+            yield
+        finally:
+            for task in reversed(tasks):
+                task.cancel()
+
+
+async def _serve_for_ever(hub: Hub, name: str, service: Service, standing: asyncio.Event) -> None:
+    await serve(hub, name, service, standing.set)
+    if not standing.is_set():
+        raise RuntimeError(f"service {name} ended before it stood")

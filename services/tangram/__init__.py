@@ -1,0 +1,1 @@
+"""The tangram table of the anchor study: its pieces and where they lie."""

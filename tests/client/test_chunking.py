@@ -1,0 +1,144 @@
+"""Text as it comes, cut where it can be spoken."""
+
+import re
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from engage_hri.schemas.tool import Gesture, Part, Refer, Say
+from engage_hri.services.client.chunking import Chunk, Chunker
+
+
+def chunks(*pieces: str | Part, **settings: int) -> list[Chunk]:
+    chunker = Chunker(**settings)
+    made = [chunk for piece in pieces for chunk in chunker.feed(piece)]
+    return [*made, *filter(None, [chunker.rest()])]
+
+
+def words(*pieces: str | Part, **settings: int) -> list[str]:
+    """Each chunk as a line."""
+    return [
+        " ".join(part.say if isinstance(part, Say) else f"<{part.refer}>" for part in chunk)  # type: ignore[union-attr]
+        for chunk in chunks(*pieces, **settings)
+    ]
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("Hello there. How are you? Fine", ["Hello there.", "How are you?", "Fine"]),
+        ("Well, yes", ["Well, yes"]),
+        ("If you have a moment, look here", ["If you have a moment,", "look here"]),
+        ("It weighs 3.5 kg, or so; see e.g. this", ["It weighs 3.5 kg,", "or so; see e.g.", "this"]),
+        ("Mr. Bean and Dr. Who met J. Smith. Then", ["Mr. Bean and Dr. Who met J. Smith.", "Then"]),
+        ('"Really?" she said... "Yes!" No', ['"Really?"', "she said...", '"Yes!"', "No"]),
+        ("One\n\nTwo \n \n three", ["One", "Two", "three"]),
+        ("line one\nline two", ["line one line two"]),
+        ("Take [a]. And [b], please, now", ["Take <a> .", "And <b> , please,", "now"]),
+        ("[a] [b] [c]", ["<a> <b> <c>"]),
+        ("an [open bracket. And [] more", ["an [open bracket.", "And [] more"]),
+        ("你好。请把方块给我！谢谢", ["你好。", "请把方块给我！", "谢谢"]),
+        ("他说“好。”然后走了", ["他说“好。”", "然后走了"]),
+        ("好的，我们现在开始吧，请看这里", ["好的，我们现在开始吧，", "请看这里"]),
+        ("好的,我们现在开始吧,好吗?好", ["好的,我们现在开始吧,", "好吗?", "好"]),
+        ("今日は、いい天気ですね。「そう？」と", ["今日は、いい天気ですね。", "「そう？」", "と"]),
+        ("現在12：30、です", ["現在12：30、です"]),
+        ("ขอบคุณมากครับ สวัสดี", ["ขอบคุณมากครับ", "สวัสดี"]),
+        ("把[a]给我。好", ["把 <a> 给我。", "好"]),
+        ("Well 😊 done. 😊", ["Well 😊 done.", "😊"]),
+        ("   ", []),
+        ("... !", []),
+    ],
+)
+def test_text_is_cut_at_ends_of_sentences_and_of_clauses_that_are_long_enough(text: str, expected: list[str]) -> None:
+    assert words(text) == expected
+
+
+def test_a_chunk_comes_as_soon_as_the_next_character_shows_that_it_is_complete() -> None:
+    chunker = Chunker()
+
+    assert list(chunker.feed("Hello.")) == []  # it might be 3.5
+    assert list(chunker.feed(" ")) == [(Say(say="Hello."),)]
+    assert chunker.rest() == ()
+
+
+def test_references_may_be_certain() -> None:
+    assert chunks("see [a!]") == [(Say(say="see"), Refer(refer="a", certainty="high"))]
+
+
+def test_parts_stand_where_they_stand() -> None:
+    nod = Gesture(gesture="nod")
+
+    assert chunks("Yes, ", nod, "it is [a") == [(Say(say="Yes,"), nod, Say(say="it is [a"))]
+
+
+def test_what_stands_behind_a_reference_is_said_though_it_is_no_word() -> None:
+    assert chunks("Is it [a]?") == [(Say(say="Is it"), Refer(refer="a"), Say(say="?"))]
+
+
+def test_a_part_of_words_leaves_as_soon_as_its_sentence_is_complete() -> None:
+    chunker = Chunker()
+
+    assert list(chunker.feed("A whole sentence. Now ")) == [(Say(say="A whole sentence."),)]
+    assert list(chunker.feed(Say(say="another one."))) == [(Say(say="Now another one."),)]
+    assert list(chunker.feed(Say(say="Could you hand me"))) == []
+    assert list(chunker.feed(Refer(refer="cup"))) == []
+    assert list(chunker.feed(Say(say="? Thanks. And"))) == [
+        (Say(say="Could you hand me"), Refer(refer="cup"), Say(say="?")),
+        (Say(say="Thanks."),),
+    ]
+    assert chunker.rest() == (Say(say="And"),)
+
+
+def test_a_part_shows_that_the_sentence_before_it_is_complete() -> None:
+    nod = Gesture(gesture="nod")
+
+    assert chunks("Yes.", nod, "it is") == [(Say(say="Yes."),), (nod, Say(say="it is"))]
+
+
+def test_brackets_in_a_part_of_words_are_words() -> None:
+    assert chunks(Say(say="see [a] there")) == [(Say(say="see [a] there"),)]
+
+
+def test_words_of_different_parts_are_different_words() -> None:
+    assert words("one", Say(say="two"), "three", Say(say="four")) == ["one two three four"]
+    assert words("把方块", Say(say="给我"), "吧") == ["把方块给我吧"]
+
+
+def test_how_long_a_clause_must_be_can_be_set() -> None:
+    assert words("one, two, three", clause_words=1) == ["one,", "two,", "three"]
+
+
+texts = st.text(st.sampled_from(list("ab .,!?[]\n\"'DrM好。，」ขั")), max_size=60) | st.lists(
+    st.sampled_from(
+        ["[a]", "[b!]", "Dr. ", "word ", "end. ", "so, ", "\n\n", "3.5 ", "e.g. ", "我们，", "好。", "吧"]
+    ),
+    max_size=15,
+).map("".join)
+
+
+@settings(max_examples=200)
+@given(texts, st.data())
+def test_it_does_not_matter_in_what_bits_the_text_comes(text: str, data: st.DataObject) -> None:
+    cuts = sorted(data.draw(st.lists(st.integers(0, len(text)), max_size=8)))
+    bits = [text[start:end] for start, end in zip([0, *cuts], [*cuts, len(text)], strict=True)]
+
+    assert chunks(*bits) == chunks(text) == chunks(*text)
+
+
+@settings(max_examples=100)
+@given(texts)
+def test_no_word_is_lost(text: str) -> None:
+    spoken = " ".join(words(text))
+    plain = re.sub(r"\[([^\[\]\s!]+)!?\]", r"<\1>", text)
+
+    assert "".join(re.findall(r"\w+", spoken)) == "".join(re.findall(r"\w+", plain))
+
+
+@settings(max_examples=200)
+@given(texts)
+def test_no_word_is_torn(text: str) -> None:
+    inside = set(re.findall(r"[a-zM]+", text))
+
+    assert {word for chunk in words(text) for word in re.findall(r"[a-zM]+", chunk)} == inside

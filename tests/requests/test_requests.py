@@ -1,0 +1,320 @@
+"""Both ends of a long request, over a memory bus that loses, repeats, delays, is cut, and whose ends die."""
+
+import asyncio
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import pytest
+
+from engage_hri.schemas import keys
+from engage_hri.schemas.blocks import BlockOutcome
+from engage_hri.schemas.faults import Fault, RunFailed
+from engage_hri.schemas.presence import PeerAlive, PeerGone
+from engage_hri.schemas.requests import Accepted, Cancel, Request
+from engage_hri.services.bus.interface import Received
+from engage_hri.services.bus.memory import MemoryBus, MemoryHub
+from engage_hri.services.requests.ends import RequestDesk, Requester, RequestRefused
+from engage_hri.services.requests.serving import ENDED_KEPT, GRACE
+from tests.bus.performer import Server, answered, bare, block, extent
+from tests.commanding import command, key_of
+
+
+@contextmanager
+def requester_of(bus: MemoryBus) -> Iterator[Requester]:
+    """A requester that is fed at the instant of arrival, without a task."""
+    requester = Requester(bus)
+    inbox = bus.subscribe(*Requester.PATTERNS)
+    offer = inbox.offer
+    inbox.offer = lambda received: (offer(received), requester.feed(received))[0]  # type: ignore[method-assign]
+    yield requester
+    requester.close()
+
+
+async def test_a_request_is_accepted_and_ends(hub: MemoryHub):
+    server = Server(hub)
+    async with Requester(hub.join("client")) as requests:
+        pending = requests.send(keys.BLOCK, block())
+        await pending.accepted
+
+        outcome = await pending.outcome
+
+    assert outcome == answered(pending, BlockOutcome(id="b", block="b", status="done"))
+    assert asyncio.get_running_loop().time() == 0.5
+    await server.die(hub)
+
+
+async def test_a_server_that_comes_late_gets_the_request_at_once_and_once(hub: MemoryHub):
+    client = hub.join("client")
+    client.declare_alive()
+    async with Requester(client) as requests:
+        pending = requests.send(keys.BLOCK, block())
+        await asyncio.sleep(60.0)
+        server = Server(hub)
+
+        await pending.outcome
+
+    assert asyncio.get_running_loop().time() == 60.5
+    assert server.taken == [block()]
+    await server.die(hub)
+
+
+async def test_a_refusal_ends_both_futures_with_the_servers_fault(hub: MemoryHub):
+    server = hub.join("realizer")
+    desk = RequestDesk(server, "realizer", lambda cancel: None)
+    inbox = server.subscribe(*RequestDesk.patterns("realizer"))
+    async with Requester(hub.join("client")) as requests:
+        pending = requests.send(keys.BLOCK, block())
+        received = await inbox.next()
+        assert received is not None
+        taken = desk.take(received)
+        assert taken is not None
+        assert bare(taken) == block()
+        desk.refuse("b", Fault(reason="no such target"))
+
+        for future in (pending.accepted, pending.outcome):
+            with pytest.raises(RequestRefused, match="no such target"):
+                await future
+
+
+async def test_a_cancelled_request_ends_as_interrupted(hub: MemoryHub):
+    server = Server(hub)
+    async with Requester(hub.join("client")) as requests:
+        pending = requests.send(keys.BLOCK, block())
+        await pending.accepted
+        requests.cancel("b", "changed my mind")
+        requests.cancel("b", "really")
+
+        outcome = await pending.outcome
+
+    assert outcome == answered(pending, BlockOutcome(id="b", block="b", status="interrupted"))
+    cancel = Cancel(id="b", requester="client", of="perform_block", reason="changed my mind")
+    assert server.taken == [block(), cancel]
+    await server.die(hub)
+
+
+async def test_cancelling_what_the_server_never_got_ends_as_refused_and_it_is_never_performed(hub: MemoryHub):
+    server = Server(hub)
+    client = hub.join("client")
+    async with Requester(client) as requests:
+        hub.partition("client")
+        pending = requests.send(keys.BLOCK, block())
+        hub.heal()
+        requests.cancel("b")
+
+        with pytest.raises(RequestRefused, match="cancelled before realizer had heard"):
+            await pending.outcome
+
+    command(client, keys.BLOCK, pending.request)
+    await asyncio.sleep(1.0)
+    assert server.taken == []
+    await server.die(hub)
+
+
+async def test_a_killed_server_fails_the_request_after_the_grace(hub: MemoryHub):
+    server = Server(hub, seconds=100.0)
+    async with Requester(hub.join("client")) as requests:
+        pending = requests.send(keys.BLOCK, block())
+        await pending.accepted
+        await asyncio.sleep(1.0)
+        await server.die(hub)
+
+        with pytest.raises(RunFailed, match="realizer is gone"):
+            await pending.outcome
+
+    assert asyncio.get_running_loop().time() == 1.0 + GRACE
+
+
+async def test_a_restarted_server_does_not_perform_again_what_it_had_accepted(hub: MemoryHub):
+    server = Server(hub, seconds=100.0)
+    client = hub.join("client")
+    client.declare_alive()
+    async with Requester(client) as requests:
+        pending = requests.send(keys.BLOCK, block())
+        await pending.accepted
+        await server.die(hub)
+        again = Server(hub)
+
+        with pytest.raises(RunFailed, match="restarted"):
+            await pending.outcome
+        await asyncio.sleep(10.0)
+
+    assert again.taken == []
+    await again.die(hub)
+
+
+async def test_a_request_that_died_with_its_server_unaccepted_is_performed_by_the_next(hub: MemoryHub):
+    server = Server(hub)
+    async with Requester(hub.join("client")) as requests:
+        hub.partition("client")
+        pending = requests.send(keys.BLOCK, block())
+        await server.die(hub)
+        hub.heal()
+        again = Server(hub)
+
+        assert (await pending.outcome).id == "b"
+
+    assert (server.taken, again.taken) == ([], [block()])
+    await again.die(hub)
+
+
+async def test_a_short_absence_of_the_server_is_harmless(hub: MemoryHub):
+    server = Server(hub, seconds=5.0)
+    async with Requester(hub.join("client")) as requests:
+        pending = requests.send(keys.BLOCK, block())
+        await pending.accepted
+        hub.announce("realizer", PeerGone(participant="realizer"))
+        await asyncio.sleep(GRACE - 0.1)
+        hub.announce("realizer", PeerAlive(participant="realizer", run=server.bus.run))
+
+        assert (await pending.outcome).id == "b"
+
+    assert asyncio.get_running_loop().time() == 5.0
+    await server.die(hub)
+
+
+async def test_a_dead_requester_ends_its_requests_after_the_grace(hub: MemoryHub):
+    server = Server(hub, seconds=100.0)
+    await asyncio.sleep(0)
+    client, other = hub.join("client"), hub.join("other")
+    for bus in (client, other):
+        bus.declare_alive()
+    command(client, keys.BLOCK, block("mine"))
+    command(other, keys.BLOCK, block("others", "other"))
+    await asyncio.sleep(1.0)
+
+    hub.kill("client")
+    await asyncio.sleep(GRACE + 0.001)
+
+    assert server.ended == ["mine interrupted"]
+    assert server.desk.is_live("others")
+    await server.die(hub)
+
+
+async def test_a_requester_that_is_back_within_the_grace_keeps_its_requests(hub: MemoryHub):
+    server = Server(hub, seconds=100.0)
+    await asyncio.sleep(0)
+    client = hub.join("client")
+    client.declare_alive()
+    command(client, keys.BLOCK, block())
+    hub.announce("client", PeerGone(participant="client"))
+    await asyncio.sleep(GRACE - 0.001)
+    hub.announce("client", PeerAlive(participant="client", run=client.run))
+
+    await asyncio.sleep(2 * GRACE)
+
+    assert server.ended == []
+    await server.die(hub)
+
+
+async def test_a_restarted_requester_has_forgotten_its_requests_so_they_end_at_once(hub: MemoryHub):
+    server = Server(hub, seconds=100.0)
+    await asyncio.sleep(0)
+    client = hub.join("client")
+    client.declare_alive()
+    command(client, keys.BLOCK, block())
+    await asyncio.sleep(1.0)
+    hub.kill("client")
+    hub.join("client").declare_alive()
+    await asyncio.sleep(0)
+
+    assert server.ended == ["b interrupted"]
+    await server.die(hub)
+
+
+async def test_a_duplicate_is_answered_with_the_last_state(hub: MemoryHub):
+    server = Server(hub)
+    client = hub.join("client")
+    states = client.subscribe(keys.ANY_REQUEST_STATE)
+    for _ in range(2):
+        command(client, keys.BLOCK, block())
+    await asyncio.sleep(1.0)
+    command(client, keys.BLOCK, block())
+    await asyncio.sleep(0)
+
+    told = [await states.next() for _ in range(4)]
+    assert [type(each.message) for each in told if each] == [Accepted, Accepted, BlockOutcome, BlockOutcome]
+    assert {(each.message.id, each.message.requester) for each in told if each} == {("b", "client")}  # type: ignore[union-attr]
+    assert server.taken == [block()]
+    await server.die(hub)
+
+
+async def test_an_older_content_never_replaces_a_newer(hub: MemoryHub):
+    server = Server(hub, name="control")
+    await asyncio.sleep(0)  # it listens
+    client = hub.join("client")
+    with requester_of(client) as requests:
+        first = requests.send(keys.BEHAVIOR, extent("start")).request
+        requests.send(keys.BEHAVIOR, extent("stroke_start"))
+        newest = requests.send(keys.BEHAVIOR, extent("stroke_end")).request
+        command(client, keys.BEHAVIOR, first)
+        await asyncio.sleep(0.4)
+
+        assert [request.through for request in server.taken] == ["start", "stroke_start", "stroke_end"]  # type: ignore[attr-defined]
+        assert newest.revision == 2
+    await server.die(hub)
+
+
+async def test_an_update_after_the_cancellation_is_void(hub: MemoryHub):
+    bus = hub.join("control")
+    desk = RequestDesk(bus, "control", lambda cancel: None)
+
+    def take(message: Any) -> Request | None:
+        return desk.take(Received(key_of(bus, keys.BEHAVIOR), message, "client", 0.0))
+
+    assert take(extent("start")) is not None
+    assert take(Cancel(id="b", requester="client")) is not None
+    assert take(extent("end")) is None
+    assert take(Cancel(id="b", requester="client")) is None
+
+
+async def test_an_id_used_again_by_somebody_else_is_a_new_request(hub: MemoryHub):
+    server = Server(hub)
+    command(hub.join("client"), keys.BLOCK, block("b", "client"))
+    await asyncio.sleep(1.0)
+
+    command(hub.join("another"), keys.BLOCK, block("b", "another"))
+    await asyncio.sleep(0)
+
+    assert server.taken == [block("b", "client"), block("b~2", "another", of="b")]
+    await server.die(hub)
+
+
+@pytest.mark.contained
+async def test_a_server_that_ends_a_request_twice_has_a_bug(hub: MemoryHub):
+    server = Server(hub)
+    hub.join("client").publish(keys.BLOCK, block())
+    await asyncio.sleep(1.0)
+
+    with hub.join("ear").subscribe(keys.ANY_FAULT) as faults:
+        server.desk.end(BlockOutcome(id="b", block="b", status="done"))
+        server.desk.accept("x")
+        told = [await faults.next(), await faults.next()]
+
+    reasons = [each.message.reason for each in told if each and isinstance(each.message, Fault)]
+    assert reasons[0].startswith("request b has ended already, with BlockOutcome(")
+    assert reasons[1] == "request x was never made; now Accepted"
+    assert server.bus.health.failures == 2
+    await server.die(hub)
+
+
+async def test_a_desk_forgets_the_oldest_ended_requests_and_no_live_one(hub: MemoryHub):
+    bus = hub.join("realizer")
+    desk = RequestDesk(bus, "realizer", lambda cancel: None)
+    inbox = bus.subscribe(*RequestDesk.patterns("realizer"))
+    states = bus.subscribe(keys.ANY_REQUEST_STATE)
+    for number in range(ENDED_KEPT + 2):
+        command(bus, keys.BLOCK, block(str(number)))
+        received = await inbox.next()
+        assert received is not None
+        assert desk.take(received) is not None
+        if number:
+            desk.refuse(str(number), Fault(reason="no"))
+
+    def is_forgotten(id: str) -> bool:
+        return desk.take(Received(key_of(bus, keys.BLOCK), block(id), "client", 0.0, life=bus.run)) is not None
+
+    assert desk.is_live("0")
+    assert is_forgotten("1")
+    assert not is_forgotten("2")
+    assert len(states) == ENDED_KEPT + 2
