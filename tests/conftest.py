@@ -5,6 +5,7 @@ Property tests try the same examples each time. To search for new ones: `pytest 
 
 import asyncio
 import logging
+import signal
 from collections.abc import AsyncIterator, Callable, Iterator, Mapping
 
 import pytest
@@ -17,6 +18,9 @@ from engage_hri.services.runtime.virtual_time import VirtualTimeLoop
 settings.register_profile("same", derandomize=True, database=None)
 settings.register_profile("search", parent=settings.get_profile("default"))
 settings.load_profile("same")
+
+if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:  # as in a shell's background, and all children would inherit it
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 
 LONGEST_TEST = 24 * 3600.0
 """Virtual seconds; then a test waits for something that never comes."""
