@@ -34,7 +34,9 @@ SHELLS = {
     "services/realizer/perform/control_link.py",  # asks the body
     "services/realizer/perform/recognition_link.py",  # asks recognition
     "services/realizer/perform/feedback.py",  # publishes feedback
-    "services/realizer/perform/surroundings.py",  # what the executor is given
+    "services/realizer/perform/surroundings.py",  # what performances share: the bus, too
+    "services/realizer/perform/live.py",  # resolved when a block has ended
+    "services/realizer/perform/presence.py",  # resolved when it changes
     "services/realizer/perform/unhurried.py",  # lets the loop go on between slices of planning
     "services/generation/body_link.py",  # asks the body
     "services/generation/conductor.py",  # awaits the blocks of fragments
@@ -244,6 +246,26 @@ def test_every_file_keeps_the_rules() -> None:
             found += violations(name, data.decode(errors="replace"))
 
     assert not found, "\n".join(found)
+
+
+def test_no_module_imports_itself_through_others() -> None:
+    """Nor for types alone: what stands under TYPE_CHECKING counts as well."""
+    modules = {}
+    for name in tracked():
+        place = PurePosixPath(name)
+        if place.parts[0] in ("schemas", "services") and place.suffix == ".py":
+            modules[".".join(place.with_suffix("").parts).removesuffix(".__init__")] = place
+    imports = {
+        name: {*_imports(place, ast.parse((ROOT / place).read_text()))} & modules.keys() - {name}
+        for name, place in modules.items()
+    }
+    # A package is imported with each of its modules; what it says itself counts, that it is there does not.
+    imports = {name: {each for each in found if not name.startswith(each + ".")} for name, found in imports.items()}
+    while free := {name for name, found in imports.items() if not found & imports.keys()}:
+        imports = {name: found for name, found in imports.items() if name not in free}
+    circle = {name for name, found in imports.items() if any(name in others for others in imports.values())}
+
+    assert not circle, f"these import one another, or what does: {', '.join(sorted(circle))}"
 
 
 def test_the_list_of_shells_holds_only_files_that_need_it() -> None:

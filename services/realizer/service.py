@@ -29,8 +29,10 @@ from engage_hri.services.bus.interface import Bus, Received
 from engage_hri.services.realizer.config import RealizerConfig
 from engage_hri.services.realizer.perform.control_link import LONGEST_WAY
 from engage_hri.services.realizer.perform.ledger import Ledger
+from engage_hri.services.realizer.perform.live import Ending, Live
 from engage_hri.services.realizer.perform.performance import Performance
-from engage_hri.services.realizer.perform.surroundings import Ending, Live, Presence, Surroundings
+from engage_hri.services.realizer.perform.presence import Presence
+from engage_hri.services.realizer.perform.surroundings import Moving, Surroundings
 from engage_hri.services.realizer.perform.unhurried import unhurried
 from engage_hri.services.realizer.plan.planner import Plan, plan_steps
 from engage_hri.services.realizer.plan.poses import poses_before, poses_left
@@ -49,7 +51,9 @@ class _Realizer:
         self.requests = Requester(bus, Patience(pulse=config.pulse, lease=config.lease, cancel=config.abort))
         self.desk = RequestDesk(bus, "realizer", self.cancel)
         self.live: dict[str, Live] = {}
-        self.routes: dict[str, Performance] = {}
+        self.performances: dict[str, Performance] = {}
+        """By the id of the request: of those of `live` that are being performed."""
+        self.routes: dict[str, Moving] = {}
         self.peers = Presence()
         self.ledger = Ledger()
         self.homing: set[asyncio.Future[Outcome]] = set()
@@ -100,7 +104,7 @@ class _Realizer:
                 performance.feed(report)
 
     def performing(self) -> list[Performance]:
-        return [live.performance for live in self.live.values() if live.performance is not None]
+        return list(self.performances.values())
 
     def cancel(self, cancel: Cancel) -> None:
         if live := self.live.get(cancel.id):
@@ -143,12 +147,13 @@ class _Realizer:
 
     def _abandon(self, live: Live, fault: Fault) -> None:
         live.stop(Ending("failed", fault))
+        performance = self.performances.get(live.request.id)
         if live.request.id in self.live:
             self.desk.end(replace(live.outcome, status="failed", fault=fault))
             self._forget(live)
-        if live.performance is not None:
+        if performance is not None:
             with self.bus.containing(f"the rest of block {live.request.block.id}"):
-                live.performance.abandon()
+                performance.abandon()
 
     async def perform(self, live: Live) -> None:
         """A block from request to outcome."""
@@ -177,8 +182,8 @@ class _Realizer:
                 return
             named = {point.behavior.partition(":")[0] for point in plan.foreign}
             tied_to = {id: elsewhere[id] for id in named}
-            live.performance = Performance(live, plan, self.around, tied_to)
-            await self._end(live, await live.performance.run())
+            performance = self.performances[live.request.id] = Performance(live, plan, self.around, tied_to)
+            await self._end(live, await performance.run())
 
     async def _plan(self, block: Block, elsewhere: Mapping[str, Block]) -> Plan:
         """The body is asked again from where it will be by then, and about the hands that the plan has chosen."""
@@ -251,13 +256,15 @@ class _Realizer:
         is_free = not earlier and not (replaces and self.homing)
         if live.request.block.composition == "MERGE" or is_free:
             return plan
+        performed = (self.performances.get(other.request.id) for other in earlier)
+        replaced = [each for each in performed if each is not None]
         if replaces:
             for other in earlier:
                 other.stop(Ending("interrupted", replaced_by=block))
         if earlier:
             await asyncio.wait([other.ended for other in earlier])
         if replaces:
-            self._send_home(live, [other.performance for other in earlier if other.performance is not None])
+            self._send_home(live, replaced)
             if self.homing:
                 # Also those that a block has sent home which was itself replaced before it began.
                 _, lost = await asyncio.wait(self.homing, timeout=self.config.abort)
@@ -303,6 +310,7 @@ class _Realizer:
 
     def _forget(self, live: Live) -> None:
         del self.live[live.request.id]
+        self.performances.pop(live.request.id, None)
         live.ended.set_result(None)
 
 

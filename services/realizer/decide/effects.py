@@ -2,8 +2,11 @@
 
 from msgspec import Struct
 
-from engage_hri.services.realizer.decide.pacing import Pace
+from engage_hri.schemas.units import Seconds
 from engage_hri.services.realizer.decide.patience import Late, Stalled
+
+Pace = tuple[tuple[str, Seconds], ...]
+"""Sync points and their instants, by loop time, where a behavior's own pace would miss them. Empty: as is natural."""
 
 
 class Begin(Struct, frozen=True):

@@ -4,10 +4,10 @@ import heapq
 from collections.abc import Iterable, Mapping
 
 from engage_hri.schemas.units import Seconds
+from engage_hri.services.realizer.decide.effects import Pace
 from engage_hri.services.realizer.decide.experience import Experience
 from engage_hri.services.realizer.decide.facts import Facts
 from engage_hri.services.realizer.decide.forecast import Forecast, full_forecast
-from engage_hri.services.realizer.decide.pacing import Pace
 from engage_hri.services.realizer.plan.assembly import Member
 from engage_hri.services.realizer.plan.planner import Plan
 from engage_hri.services.realizer.plan.schedule import EPSILON

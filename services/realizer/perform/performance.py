@@ -22,9 +22,10 @@ from engage_hri.services.realizer.decide.effects import Begin, Effect, Extend
 from engage_hri.services.realizer.decide.patience import Late, Stalled
 from engage_hri.services.realizer.perform.control_link import BodyLink
 from engage_hri.services.realizer.perform.feedback import Reporter
+from engage_hri.services.realizer.perform.live import Ending, Live
 from engage_hri.services.realizer.perform.recognition_link import RecognitionLink
 from engage_hri.services.realizer.perform.spoken import Spoken
-from engage_hri.services.realizer.perform.surroundings import Ending, Live, Surroundings
+from engage_hri.services.realizer.perform.surroundings import Surroundings
 from engage_hri.services.realizer.plan.planner import Plan, plan_block
 from engage_hri.services.realizer.plan.relations import DROPPED
 from engage_hri.services.realizer.points import Point, performer, sync_points

@@ -1,0 +1,85 @@
+"""A block from its request to its outcome: how it ends, and who ends with it."""
+
+import asyncio
+from collections import deque
+from collections.abc import Sequence
+from typing import Literal
+
+from msgspec import Struct
+
+from engage_hri.schemas.blocks import BlockOutcome, PerformBlock
+from engage_hri.schemas.faults import Fault
+
+Status = Literal["done", "failed", "interrupted"]
+
+
+class Ending(Struct, frozen=True):
+    """Why a block ends."""
+
+    status: Status
+    fault: Fault | None = None
+    replaced_by: str = ""
+
+
+class Live:
+    """A block from its request to its outcome.
+
+    earlier: those that were there when it came. ended: resolved when its outcome is out. ending: how it is to end.
+    """
+
+    def __init__(self, request: PerformBlock, earlier: Sequence["Live"]) -> None:
+        loop = asyncio.get_running_loop()
+        self.request = request
+        self.earlier = list(earlier)
+        self.ended: asyncio.Future[None] = loop.create_future()
+        self.ending: asyncio.Future[Ending] = loop.create_future()
+        there = {each.request.block.id: each for each in reversed(earlier)}  # a second of an id is refused
+        self.leaders = tuple([there[id] for id in request.follows if id in there])
+        """Those whose turn it goes on with: it ends with any of them that is not done."""
+        self.ended_by: Live | None = None
+        """The one of them that it ends with."""
+        self._followers: list[Live] = []
+        for leader in self.leaders:
+            leader._followers.append(self)
+            if leader.ending.done():
+                self._end_with(leader)
+
+    def stop(self, ending: Ending) -> None:
+        """End it now. The first to end it decides how. Its followers end at once: before they hear what is lost."""
+        if self.ending.done():
+            return
+        self.ending.set_result(ending)
+        todo = deque([self])
+        while todo:
+            leader = todo.popleft()
+            todo += [each for each in leader._followers if each._end_with(leader)]
+
+    def _end_with(self, leader: "Live") -> bool:
+        """Whether it does."""
+        ending = leader.ending.result()
+        if ending.status == "done" or self.ending.done():
+            return False
+        verb = "failed" if ending.status == "failed" else "was interrupted"
+        why = f": {ending.fault.reason}" if ending.fault else ""
+        fault = Fault(reason=f"{leader.request.block.id}, which it follows, {verb}{why}", where=self.request.block.id)
+        self.ended_by = leader
+        self.ending.set_result(Ending("interrupted", fault, ending.replaced_by))
+        return True
+
+    def __str__(self) -> str:
+        return f"block {self.request.block.id}"
+
+    def fail(self, fault: Fault) -> None:
+        self.stop(Ending("failed", fault))
+
+    @property
+    def outcome(self) -> BlockOutcome:
+        """As it is if nothing of it was performed."""
+        ending = self.ending.result()
+        return BlockOutcome(
+            id=self.request.id,
+            block=self.request.block.id,
+            status=ending.status,
+            replaced_by=ending.replaced_by,
+            fault=ending.fault,
+        )
