@@ -61,7 +61,7 @@ LAYERS = {
     "services": "commandline > collaboration console control generation hostile realizer recognition simulation study"
     " > client > requests > runtime > bus > tangram",
     "services/bus": "memory zenoh > interface",
-    "services/control": "service > torso > voice > actions waiting > body > variability > config",
+    "services/control": "service > bodies > torso > voice > actions waiting > body > variability > config",
     "services/generation": "service > conductor > performance > body_link fragment_check pipeline > block head"
     " > references turns > permits > config",
     "services/realizer": "export service > perform > decide > plan > net > config points",

@@ -36,3 +36,16 @@ def test_names_that_are_not_there_are_said() -> None:
 def test_it_loads_nothing_by_itself() -> None:
     code = "import engage_hri, sys; print([name for name in sys.modules if name.startswith('engage_hri.')])"
     assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout == "[]\n"
+
+
+def test_a_service_that_drives_a_robot_loads_no_simulation() -> None:
+    """Its configuration is data; the torso is loaded when control is given no other body."""
+    code = (
+        "import sys; from engage_hri.services.commandline import roster; "
+        "from engage_hri.services.commandline.config import Config; "
+        "[roster.service(name, Config()) for name in roster.ROBOT]; "
+        "print(*sorted(name for name in sys.modules if 'services.simulation.' in name or 'torso' in name))"
+    )
+    loaded = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split()
+
+    assert loaded == ["engage_hri.services.simulation.config"]

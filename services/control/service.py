@@ -34,6 +34,7 @@ from engage_hri.schemas.world import World
 from engage_hri.services.bus.interface import Bus, Received, is_asked_to_stop
 from engage_hri.services.control import variability
 from engage_hri.services.control.actions import ActionMessage, Deeds
+from engage_hri.services.control.bodies import simulated
 from engage_hri.services.control.body import (
     Arrived,
     Authority,
@@ -46,7 +47,6 @@ from engage_hri.services.control.body import (
     Spoke,
 )
 from engage_hri.services.control.config import ControlConfig
-from engage_hri.services.control.torso.body import SimulatedBody
 from engage_hri.services.requests.ends import RequestDesk
 from engage_hri.services.runtime.service import Ready
 
@@ -57,7 +57,7 @@ IDLE: Seconds = 1.0
 async def embody(bus: Bus, ready: Ready, config: ControlConfig, body: Body | None = None) -> None:
     """Serve until cancelled. body: the simulated one unless given."""
     async with asyncio.TaskGroup() as tasks:
-        control = _Control(bus, config, body or SimulatedBody(config.no_point_zones, config.variability), tasks)
+        control = _Control(bus, config, body or simulated(config), tasks)
         with bus.subscribe(*RequestDesk.patterns("control"), keys.WORLD) as inbox:
             bus.answer(keys.ESTIMATE, control.estimate)
             bus.answer(keys.DESCRIBE, control.describe)
