@@ -12,19 +12,12 @@ from itertools import pairwise
 from msgspec import Struct
 from msgspec.structs import replace
 
+from engage_hri.schemas.behavior_types import canonical_sync
 from engage_hri.schemas.behaviors import Behavior, Event, Head, Reference, Speech, Wait
 from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.fragments import TurnFragment
 from engage_hri.schemas.references import AnyInput, Input, disambiguated, marks, sites
-from engage_hri.schemas.syncref import (
-    BLOCK_ITSELF,
-    LONGEST_ID,
-    SYNC_POINTS,
-    SyncRef,
-    canonical_sync,
-    is_id,
-    is_sync_point,
-)
+from engage_hri.schemas.syncref import BLOCK_ITSELF, LONGEST_ID, SYNC_POINTS, SyncRef, is_id, is_sync_point
 
 MOST_NODS = 1000
 _SYNC_ADVICE = "write behavior:sync, behavior:sync+seconds, or seconds from the block's start"

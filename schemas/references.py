@@ -5,10 +5,11 @@ from typing import Literal, NamedTuple, TypeVar
 
 from msgspec.structs import replace
 
+from engage_hri.schemas.behavior_types import canonical_sync
 from engage_hri.schemas.behaviors import Behavior, Constraint, Event, Reference, Speech, Synchronize, Timing
 from engage_hri.schemas.blocks import Block
 from engage_hri.schemas.fragments import TurnFragment
-from engage_hri.schemas.syncref import SyncRef, canonical_sync
+from engage_hri.schemas.syncref import SyncRef
 
 Input = Block | TurnFragment
 AnyInput = TypeVar("AnyInput", Block, TurnFragment)

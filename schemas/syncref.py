@@ -1,4 +1,4 @@
-"""References to sync points, as text and as data, and the names that the dialects give to sync points.
+"""References to sync points, as text and as data.
 
     [block:]behavior:sync[:n][±offset]      speech-1:end + 0.5     g:stroke:2-1     block-2:gaze-1:start
     [block:]number                          seconds after the block's start
@@ -15,7 +15,7 @@ import math
 import re
 from collections.abc import Collection
 from decimal import Decimal
-from typing import Literal, Self
+from typing import Self
 
 from msgspec import Struct
 
@@ -135,41 +135,3 @@ def _plain(number: float) -> str:
 def _bad(text: str, reason: str) -> ValueError:
     shown = text if len(text) <= 80 else f"{text[:77]}..."
     return ValueError(f"sync reference {shown!r}: {reason}")
-
-
-_FROM_CAMEL = {"strokeStart": "stroke_start", "strokeEnd": "stroke_end", "attackPeak": "ready"}
-_TO_CAMEL = {"stroke_start": "strokeStart", "stroke_end": "strokeEnd"}
-_ON_TARGET = ("gaze", "posture")
-"""Types whose BML 1.0 `ready` is the arrival, which the drafts call `stroke`."""
-_FACES = ("face", "faceLexeme", "faceFacs")
-_WITH_STROKE = ("gesture", "pointing", "head")
-
-
-def canonical_sync(name: str, type: str = "", dialect: Literal["draft", "bml-1.0"] = "draft") -> str:
-    """The system's own (draft, snake_case) spelling of a sync point; marks and unknown names stay as they are.
-
-    type: the behavior's element name. It matters in BML 1.0, where `ready` of a gaze or posture is what the
-    drafts call `stroke`, and in speech, whose marks are nobody's to rename.
-    """
-    if type == "speech":
-        return name
-    if dialect == "bml-1.0" and type in _ON_TARGET and name == "ready":
-        return "stroke"
-    return _FROM_CAMEL.get(name, name)
-
-
-def dialect_sync(name: str, type: str = "", dialect: Literal["draft", "bml-1.0"] = "draft") -> str | None:
-    """The spelling that feedback uses for canonical `name`; None where the dialect does not report the point.
-
-    The drafts report all of `SYNC_POINTS`. BML 1.0 has four for gaze and posture (start ready relax end) and
-    for faces (start attackPeak relax end); all seven, in camelCase, for what has a stroke.
-    """
-    if dialect == "draft" or name not in SYNC_POINTS or type == "speech":
-        return name
-    if type in _ON_TARGET:
-        return {"stroke": "ready", "start": "start", "relax": "relax", "end": "end"}.get(name)
-    if type in _FACES:
-        return {"ready": "attackPeak", "start": "start", "relax": "relax", "end": "end"}.get(name)
-    if type in _WITH_STROKE or not type:
-        return _TO_CAMEL.get(name, name)
-    return name if name in ("start", "end") else None

@@ -7,34 +7,23 @@ from collections.abc import Callable, Collection, Iterator, Mapping
 
 from msgspec.structs import replace
 
+from engage_hri.schemas.behavior_types import ROWS, dialect_sync, same_instant
 from engage_hri.schemas.behaviors import (
     After,
     Before,
     Behavior,
     Constraint,
-    Event,
-    Reference,
     Speech,
     Synchronize,
     Timing,
-    TurnSignal,
-    Unknown,
 )
 from engage_hri.schemas.blocks import Block, Dialect
 from engage_hri.schemas.references import in_draft_spelling, respelled, sites
-from engage_hri.schemas.syncref import BLOCK_ITSELF, SYNC_POINTS, SyncRef, dialect_sync
+from engage_hri.schemas.syncref import BLOCK_ITSELF, SYNC_POINTS, SyncRef
 
-EXTENSIONS = (Event, TurnSignal, Reference, Unknown)
+EXTENSIONS = tuple([row.kind for row in ROWS if not row.is_standard])
 """What no other realizer knows."""
 Operator = Synchronize | Before | After
-
-_FACE = {"stroke_start": "ready", "stroke": "ready", "stroke_end": "relax"}
-_SAME_INSTANT: dict[str, Mapping[str, str]] = {
-    "gaze": {"ready": "start", "stroke_start": "start", "stroke_end": "relax"},
-    "posture": {"ready": "stroke", "stroke_start": "stroke", "stroke_end": "relax"},
-    "face": _FACE, "faceLexeme": _FACE, "faceFacs": _FACE,
-}  # fmt: skip
-"""Points of the drafts that BML 1.0 has no name for, and the one of the same instant that it has: thesis 4.1.2."""
 
 
 def core(block: Block) -> Block:
@@ -105,8 +94,7 @@ def spelled(block: Block, dialect: Dialect, elsewhere: Mapping[str, Block] | Non
 def _bml_1_0(sync: str, type: str) -> str:
     if sync not in SYNC_POINTS or type == "speech":
         return sync
-    sync = _SAME_INSTANT.get(type, {}).get(sync, sync)
-    return dialect_sync(sync, type, "bml-1.0") or sync
+    return dialect_sync(same_instant(sync, type), type, "bml-1.0") or sync
 
 
 def _inline(behavior: Behavior) -> tuple[Timing, ...]:

@@ -5,22 +5,12 @@ from collections.abc import Iterator
 from lxml import etree
 
 from engage_hri.schemas import behaviors as of
+from engage_hri.schemas.behavior_types import ROWS
 from engage_hri.schemas.documents.xml_names import ours
 from engage_hri.schemas.documents.xml_source import CORE, EBML, split
 
-CORE_BEHAVIORS: dict[str, type[of.Behavior]] = {
-    str(kind.__struct_config__.tag): kind
-    for kind in (
-        of.Gaze, of.GazeShift, of.Pointing, of.Gesture, of.Head, of.HeadDirectionShift, of.Face, of.FaceLexeme,
-        of.FaceFacs, of.FaceShift, of.Posture, of.PostureShift, of.Pose, of.Locomotion, of.Speech, of.Wait, of.Emit,
-    )
-}  # fmt: skip
-EXTENSIONS: dict[str, type[of.Behavior]] = {
-    "reference": of.Reference,
-    "event": of.Event,
-    "turn": of.TurnSignal,
-    "unknown": of.Unknown,
-}
+CORE_BEHAVIORS = {row.name: row.kind for row in ROWS if row.is_standard}
+EXTENSIONS = {row.name: row.kind for row in ROWS if not row.is_standard}
 OPERATORS: dict[str, type[of.Synchronize | of.Before | of.After]] = {
     "synchronize": of.Synchronize,
     "before": of.Before,

@@ -11,6 +11,7 @@ from lxml import etree
 from msgspec import NODEFAULT, structs
 
 from engage_hri.schemas import behaviors as of
+from engage_hri.schemas.behavior_types import TYPES
 from engage_hri.schemas.blocks import Block
 from engage_hri.schemas.documents.xml_source import BML_1_0, DRAFT, EBML
 from engage_hri.schemas.documents.xml_speech import fill, ties
@@ -19,7 +20,6 @@ from engage_hri.schemas.fragments import TurnFragment
 from engage_hri.schemas.references import type_name
 from engage_hri.schemas.syncref import SYNC_POINTS
 
-_EXTENSIONS = ("reference", "event", "turn", "unknown")
 _ELSEWHERE = frozenset({
     "id", "line", "timing", "required", "marks", "text", "markup", "options", "objects", "anchors", "distractors",
     "behaviors", "constraints", "operators", "syncs", "dialect", "unread",
@@ -83,7 +83,7 @@ def _required(root: etree._Element, namespace: str, required: bool) -> etree._El
 def _behavior(root: etree._Element, namespace: str, behavior: of.Behavior) -> None:
     local = type_name(behavior)
     points = isinstance(behavior, of.Pointing) and namespace == DRAFT
-    tag = f"{{{EBML if local in _EXTENSIONS else namespace}}}{'gesture' if points else local}"
+    tag = f"{{{namespace if TYPES[local].is_standard else EBML}}}{'gesture' if points else local}"
     element = etree.SubElement(root, tag, {"id": behavior.id})
     if points:
         element.set("type", "POINT")

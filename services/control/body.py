@@ -11,36 +11,16 @@ from typing import Literal
 
 from msgspec import Struct
 
+from engage_hri.schemas.behavior_types import sync_points
 from engage_hri.schemas.behaviors import (
     BlockBehavior,
-    Face,
-    FaceFacs,
-    FaceLexeme,
-    Gaze,
-    Gesture,
-    Head,
-    Pointing,
-    Posture,
-    Speech,
 )
 from engage_hri.schemas.body import BodyPose, Capabilities, Estimate, Ray
 from engage_hri.schemas.faults import EngageError
 from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.world import World
 
-SEVEN = ("start", "ready", "stroke_start", "stroke", "stroke_end", "relax", "end")
 How = Literal["relax", "freeze"]
-
-
-def sync_points(behavior: BlockBehavior) -> tuple[str, ...]:
-    """The sync points a body reports for `behavior`, in their order and in the draft's spelling."""
-    match behavior:
-        case Speech(marks=marks):
-            return ("start", *(mark.id for mark in sorted(marks, key=lambda mark: mark.position)), "end")
-        case Gaze() | Pointing() | Gesture() | Head() | Face() | FaceLexeme() | FaceFacs() | Posture():
-            return SEVEN
-        case _:
-            return ("start", "end")
 
 
 class Arrived(Struct, frozen=True):

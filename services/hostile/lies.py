@@ -5,21 +5,18 @@ from typing import Literal
 
 from msgspec import Struct
 
+from engage_hri.schemas.behavior_types import sync_points
 from engage_hri.schemas.behaviors import (
     BlockBehavior,
     Face,
     FaceFacs,
     FaceLexeme,
-    Gaze,
     Gesture,
-    Head,
     Pointing,
-    Posture,
     Speech,
 )
 from engage_hri.schemas.body import Estimate, Phase
 from engage_hri.schemas.faults import Fault
-from engage_hri.schemas.syncref import SYNC_POINTS
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.hostile.chance import Chance, happens
 
@@ -62,18 +59,9 @@ class Lie(Struct, frozen=True, kw_only=True):
     afterwards: tuple[Step, ...] = ()
 
 
-def points_of(behavior: BlockBehavior) -> tuple[str, ...]:
-    match behavior:
-        case Speech(marks=marks):
-            return ("start", *(mark.id for mark in sorted(marks, key=lambda mark: mark.position)), "end")
-        case Gaze() | Pointing() | Gesture() | Head() | Face() | FaceLexeme() | FaceFacs() | Posture():
-            return SYNC_POINTS
-    return ("start", "end")
-
-
 def lie(chance: Chance, behavior: BlockBehavior) -> Lie:
     """Half of them are honest."""
-    points = points_of(behavior)
+    points = sync_points(behavior)
     if happens(chance, 0.5):
         return Lie(steps=_steps(chance, points, 1.0))
     match chance.randrange(0, 11):
@@ -131,7 +119,7 @@ def _pause(chance: Chance) -> Seconds:
 
 def estimate(chance: Chance, behavior: BlockBehavior) -> Estimate:
     """Mostly what it will do."""
-    points = points_of(behavior)
+    points = sync_points(behavior)
     natural = [chance.uniform(0.0, 0.6) for _ in points[1:]]
     what = chance.randrange(0, 40)
     if what == 0:

@@ -4,6 +4,7 @@ import asyncio
 from random import Random
 
 from engage_hri.schemas import keys
+from engage_hri.schemas.behavior_types import sync_points
 from engage_hri.schemas.body import (
     AbortBehavior,
     BehaviorAborted,
@@ -23,7 +24,7 @@ from engage_hri.schemas.messages import Message
 from engage_hri.schemas.requests import Cancel, Request
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.interface import Bus
-from engage_hri.services.hostile.lies import Lie, Status, Step, estimate, lie, points_of
+from engage_hri.services.hostile.lies import Lie, Status, Step, estimate, lie
 from engage_hri.services.requests.ends import RequestDesk
 from engage_hri.services.runtime.service import Ready
 
@@ -150,7 +151,7 @@ class _Act:
         self.request = request
         self.lie = plan
         self.task: asyncio.Task[None] | None = None
-        self._points = points_of(request.behavior)
+        self._points = sync_points(request.behavior)
         self._extended = asyncio.Event()
 
     def extend(self, request: PerformBehavior) -> None:

@@ -1,16 +1,16 @@
-"""Which sync points each type of behavior has, which of them are one instant, and at which it can wait.
+"""Sync points as the realizer needs them: what each can wait for, and the seconds between them.
 
-Thesis 4.1.2, with BML 1.0's types. Everything here uses the drafts' names; `schemas/syncref.py` knows the dialects.
+What a type of behavior is stands in schemas/behavior_types.py.
 """
 
 from functools import lru_cache
 from itertools import pairwise
 from typing import Literal, NamedTuple
 
-from engage_hri.schemas.behaviors import Behavior, Event, Mark, Speech, TurnSignal, Wait
+from engage_hri.schemas.behavior_types import TYPES, Performer, named, sync_points
+from engage_hri.schemas.behaviors import Behavior, Event, Speech, Wait
 from engage_hri.schemas.body import Estimate
 from engage_hri.schemas.references import type_name
-from engage_hri.schemas.syncref import SYNC_POINTS
 from engage_hri.schemas.units import Seconds
 
 
@@ -27,34 +27,18 @@ class Point(NamedTuple):
 ORIGIN = Point("", "start")
 """The start of the block itself."""
 
-Performer = Literal["body", "recognition", "clock"]
 Gate = Literal["start", "hold", "prompt", "passive"]
 """How an instant of a behavior can be made to wait: not yet begun, holding there, or not at all.
 
 prompt: holding there too, but it sets out so late that it need not. Who looks too early misleads.
 """
 
-WITH_STROKE = frozenset({"gesture", "pointing", "head"})
-ON_TARGET = frozenset({"gaze", "face", "faceLexeme", "faceFacs", "posture"})
+WITH_STROKE = named(has_stroke=True)
+ON_TARGET = named(lasts=True, performer="body")
 """They last: having arrived, they stay until something ends them."""
-BENEATH = frozenset({"gazeShift", "headDirectionShift"})
+BENEATH = named(turns_base=True)
 """They turn what a gaze returns to: one that starts during a gaze moves nothing, and ends at once."""
-_FAMILY = {
-    "faceLexeme": "face", "faceFacs": "face", "faceShift": "face", "postureShift": "posture", "pose": "posture",
-    "gazeShift": "gaze", "headDirectionShift": "gaze",
-}  # fmt: skip
-_PERFORMERS: dict[str, Performer] = {
-    "event": "recognition", "turn": "recognition", "wait": "clock", "emit": "clock", "unknown": "clock"
-}  # fmt: skip
 
-_ONE_INSTANT = {"gaze": (("start", "ready", "stroke_start"), ("stroke_end", "relax"))}
-_LASTING_INSTANT = (("ready", "stroke_start", "stroke"), ("stroke_end", "relax"))
-
-NOMINAL_STROKE: tuple[Seconds, ...] = (0.5, 0.1, 0.3, 0.2, 0.1, 0.6)
-"""Seconds per phase of a behavior with all seven points, where no body says better."""
-NOMINAL_GAZE: tuple[Seconds, ...] = (0.0, 0.0, 0.4, 0.0, 0.0, 0.4)
-NOMINAL_ON_TARGET: tuple[Seconds, ...] = (0.4, 0.0, 0.0, 0.0, 0.0, 0.4)
-NOMINAL_SHIFT: Seconds = 0.5
 NOMINAL_PER_CHARACTER: Seconds = 0.07
 GUESSED_SHORTEST: Seconds = 0.01
 NOMINAL_DELAY: dict[str, Seconds] = {
@@ -74,38 +58,22 @@ class Segment(NamedTuple):
 
 
 def performer(behavior: Behavior) -> Performer:
-    return _PERFORMERS.get(type_name(behavior), "body")
+    return TYPES[type_name(behavior)].performer
 
 
 def family(type: str) -> str:
     """Types of one family take each other's place: a later gaze takes over from an earlier one."""
-    return _FAMILY.get(type, type)
+    return TYPES[type].family or type
 
 
-def marks_in_order(speech: Speech) -> tuple[Mark, ...]:
-    return tuple(sorted(speech.marks, key=lambda mark: mark.position))
-
-
-def sync_points(behavior: Behavior) -> tuple[str, ...]:
-    """The default points of a behavior, in order."""
-    if isinstance(behavior, Speech):
-        return ("start", *(mark.id for mark in marks_in_order(behavior)), "end")
-    type = type_name(behavior)
-    return SYNC_POINTS if type in WITH_STROKE or type in ON_TARGET else ("start", "end")
-
-
-def hold_points(type: str) -> frozenset[str]:
+def hold_points(type: str) -> tuple[str, ...]:
     """Where it can wait for as long as it must, once begun. `start` of everything can wait too: it isn't sent."""
-    if type in WITH_STROKE:
-        return frozenset({"stroke_start", "stroke_end"})
-    if type in ON_TARGET:
-        return frozenset({"stroke", "relax"})
-    return frozenset({"end"}) if type == "wait" else frozenset()
+    return TYPES[type].holds
 
 
 def one_instant(type: str) -> tuple[tuple[str, ...], ...]:
     """Points of a type that always coincide."""
-    return _ONE_INSTANT.get(type, _LASTING_INSTANT if type in ON_TARGET else ())
+    return TYPES[type].one_instant
 
 
 @lru_cache(maxsize=1024)
@@ -152,16 +120,11 @@ def segments(behavior: Behavior, estimate: Estimate | None) -> tuple[Segment, ..
 def _nominal(behavior: Behavior, points: tuple[str, ...]) -> tuple[Seconds, ...]:
     match behavior:
         case Speech(text=text):
-            places = [0, *(mark.position for mark in marks_in_order(behavior)), len(text)]
+            marks = sorted(mark.position for mark in behavior.marks)
+            places = [0, *marks, len(text)]
             return tuple(max(0, to - since) * NOMINAL_PER_CHARACTER for since, to in pairwise(places))
         case Wait(duration=duration):
             return (duration or 0.0,)
         case Event(kind=kind):
             return (NOMINAL_DELAY[kind],)
-        case TurnSignal():
-            return (0.0,)
-    if len(points) == 2:
-        return (0.0 if type_name(behavior) == "emit" else NOMINAL_SHIFT,)
-    if type_name(behavior) == "gaze":
-        return NOMINAL_GAZE
-    return NOMINAL_ON_TARGET if type_name(behavior) in ON_TARGET else NOMINAL_STROKE
+    return TYPES[type_name(behavior)].nominal

@@ -10,20 +10,20 @@ import pytest
 from msgspec import Struct, field
 
 from engage_hri.schemas import keys
+from engage_hri.schemas.behavior_types import canonical_sync, dialect_sync, sync_points
 from engage_hri.schemas.behaviors import Event
 from engage_hri.schemas.blocks import Block, BlockOutcome, PerformBlock
 from engage_hri.schemas.documents.json_codec import read
 from engage_hri.schemas.faults import InputRefused
 from engage_hri.schemas.feedback import BlockProgress, PredictionFeedback, SyncPointProgress, WarningFeedback
 from engage_hri.schemas.references import type_name
-from engage_hri.schemas.syncref import SyncRef, canonical_sync, dialect_sync
+from engage_hri.schemas.syncref import SyncRef
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.interface import Bus
 from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.commandline.config import Config, load
 from engage_hri.services.commandline.roster import service
 from engage_hri.services.commandline.sources import still
-from engage_hri.services.realizer.points import sync_points
 from engage_hri.services.requests.ends import Requester, RequestRefused
 from engage_hri.services.runtime.service import Service, running
 from engage_hri.services.simulation.still import tangram_world

@@ -9,13 +9,14 @@ from hypothesis import strategies as st
 from msgspec import structs
 
 from engage_hri.schemas import behaviors as of
+from engage_hri.schemas.behavior_types import dialect_sync
 from engage_hri.schemas.blocks import Block
 from engage_hri.schemas.documents.dialects import spelled
 from engage_hri.schemas.documents.json_codec import encode_json, read
 from engage_hri.schemas.documents.xml_decode import encode_xml
 from engage_hri.schemas.faults import InputRefused
 from engage_hri.schemas.references import type_name, without_lines
-from engage_hri.schemas.syncref import SYNC_POINTS, SyncRef, dialect_sync
+from engage_hri.schemas.syncref import SYNC_POINTS, SyncRef
 from engage_hri.services.realizer.plan.planner import Plan, plan_block
 from tests.conformance.case import Case, cases
 from tests.schemas.grammar import violations

@@ -14,6 +14,7 @@ from itertools import pairwise
 import msgspec
 import pytest
 
+from engage_hri.schemas.behavior_types import TYPES, sync_points
 from engage_hri.schemas.behaviors import (
     BlockBehavior,
     FaceLexeme,
@@ -31,16 +32,7 @@ from engage_hri.schemas.behaviors import (
 )
 from engage_hri.schemas.references import type_name
 from engage_hri.schemas.world import Entity, World
-from engage_hri.services.control.body import (
-    Arrived,
-    Authority,
-    BehaviorRefused,
-    Body,
-    Progress,
-    Reached,
-    Spoke,
-    sync_points,
-)
+from engage_hri.services.control.body import Arrived, Authority, BehaviorRefused, Body, Progress, Reached, Spoke
 from tests.control.motions import recorded, violations
 
 WORLD = World(
@@ -63,18 +55,9 @@ BEHAVIORS: tuple[BlockBehavior, ...] = (
     Speech(id="speech", text="This piece, please.", marks=(Mark("m", 5),)),
     Wait(id="wait", duration=0.5),
 )
-HOLDS = {
-    "gaze": ("stroke", "relax"), "faceLexeme": ("stroke", "relax"), "posture": ("stroke", "relax"), "wait": ("end",),
-    "pointing": ("stroke_start", "stroke_end"), "gesture": ("stroke_start", "stroke_end"),
-    "head": ("stroke_start", "stroke_end"),
-}  # fmt: skip
+HOLDS = {name: row.holds for name, row in TYPES.items() if row.holds}
 """Where each type can wait, as the realizer knows it."""
-_LASTING = (("ready", "stroke_start", "stroke"), ("stroke_end", "relax"))
-ONE_INSTANT = {
-    "gaze": (("start", "ready", "stroke_start"), ("stroke_end", "relax")),
-    "faceLexeme": _LASTING,
-    "posture": _LASTING,
-}
+ONE_INSTANT = {name: row.one_instant for name, row in TYPES.items() if row.one_instant}
 """Points of a type that always coincide, as the realizer knows it."""
 PATIENCE = 30.0
 

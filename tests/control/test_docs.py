@@ -6,6 +6,7 @@ import types
 from collections.abc import AsyncIterator
 from pathlib import Path
 
+from engage_hri.schemas.behavior_types import TYPES
 from engage_hri.services.control.body import Body
 from engage_hri.services.control.torso.motion import Leg, Motion, resting
 from engage_hri.services.control.torso.motion import Path as Way
@@ -62,3 +63,16 @@ def test_a_newcomers_driver_is_short():
     code = re.findall(r"```python\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL)[0]
 
     assert len([line for line in code.splitlines() if line.strip()]) < 120
+
+
+def test_the_table_of_types_is_as_the_rows_have_it() -> None:
+    told: dict[str, tuple[str, ...]] = {}
+    for line in PAGE.read_text(encoding="utf-8").splitlines():
+        cells = [cell.strip() for cell in line.strip("|").split("|")]
+        if line.startswith("|") and all(name in TYPES for name in cells[0].split(", ")):
+            told |= {name: tuple(filter(None, cells[2].split(", "))) for name in cells[0].split(", ")}
+    by_bodies = {name: row.holds for name, row in TYPES.items() if row.performer == "body" and row.name != "speech"}
+
+    assert {name: told.get(name) for name in (*by_bodies, "wait")} == {
+        name: TYPES[name].holds for name in (*by_bodies, "wait")
+    }

@@ -6,10 +6,11 @@ import math
 import msgspec
 import pytest
 
+from engage_hri.schemas.behavior_types import sync_points
 from engage_hri.schemas.behaviors import Gaze, GazeShift, Head, PostureShift
 from engage_hri.schemas.units import Vector
 from engage_hri.schemas.world import World
-from engage_hri.services.control.body import Arrived, Reached, sync_points
+from engage_hri.services.control.body import Arrived, Reached
 from engage_hri.services.control.torso.body import SimulatedBody
 from tests.control.contract import WORLD, Stage, performed, times
 from tests.control.motions import recorded, stops, violations

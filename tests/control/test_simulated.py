@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from engage_hri.schemas.behavior_types import sync_points
 from engage_hri.schemas.behaviors import (
     BlockBehavior,
     FaceFacs,
@@ -26,7 +27,7 @@ from engage_hri.schemas.behaviors import (
 )
 from engage_hri.schemas.body import NoPointZone
 from engage_hri.schemas.world import Entity, World
-from engage_hri.services.control.body import Arrived, Authority, BehaviorRefused, sync_points
+from engage_hri.services.control.body import Arrived, Authority, BehaviorRefused
 from engage_hri.services.control.torso.body import SimulatedBody
 from engage_hri.services.control.waiting import Bell
 from engage_hri.services.runtime.virtual_time import run_virtual

@@ -7,9 +7,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from engage_hri.schemas.behavior_types import sync_points
 from engage_hri.schemas.behaviors import BlockBehavior, Gaze, Gesture, Head, Pointing
 from engage_hri.schemas.body import Estimate
-from engage_hri.services.control.body import Authority, Body, sync_points
+from engage_hri.services.control.body import Authority, Body
 from engage_hri.services.control.config import Slow, Variability
 from engage_hri.services.control.torso.body import SimulatedBody
 from engage_hri.services.control.torso.sizing import SIZES

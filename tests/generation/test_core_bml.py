@@ -8,6 +8,7 @@ from msgspec.structs import replace
 
 from engage_hri.schemas import behaviors as of
 from engage_hri.schemas import keys
+from engage_hri.schemas.behavior_types import dialect_sync, sync_points
 from engage_hri.schemas.blocks import Block, BlockOutcome, PerformBlock
 from engage_hri.schemas.documents.dialects import core, spelled
 from engage_hri.schemas.documents.xml_decode import decode_xml, encode_xml
@@ -16,7 +17,7 @@ from engage_hri.schemas.faults import InputRefused
 from engage_hri.schemas.feedback import BlockProgress, Feedback, SyncPointProgress, WarningFeedback
 from engage_hri.schemas.fragments import TurnFragment
 from engage_hri.schemas.references import type_name
-from engage_hri.schemas.syncref import SyncRef, dialect_sync
+from engage_hri.schemas.syncref import SyncRef
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.commandline.config import Config, load
@@ -26,7 +27,7 @@ from engage_hri.services.commandline.roster import service
 from engage_hri.services.commandline.sources import still
 from engage_hri.services.realizer.plan.planner import Plan, plan_block
 from engage_hri.services.realizer.plan.schedule import EPSILON
-from engage_hri.services.realizer.points import Point, sync_points
+from engage_hri.services.realizer.points import Point
 from engage_hri.services.requests.ends import Requester
 from engage_hri.services.runtime.service import Service, running
 from engage_hri.services.runtime.virtual_time import run_virtual

@@ -14,6 +14,7 @@ from msgspec import Struct
 from msgspec.structs import replace
 
 from engage_hri.schemas import keys
+from engage_hri.schemas.behavior_types import sync_points
 from engage_hri.schemas.behaviors import (
     After,
     Before,
@@ -34,7 +35,6 @@ from engage_hri.schemas.behaviors import (
 from engage_hri.schemas.blocks import BehaviorInterrupted, Block, BlockOutcome, InterruptBehavior
 from engage_hri.schemas.feedback import BlockProgress, SyncPointProgress
 from engage_hri.schemas.syncref import SyncRef
-from engage_hri.services.realizer.points import sync_points
 from engage_hri.services.requests.ends import Pending, Requester, RequestRefused
 from engage_hri.services.runtime.virtual_time import run_virtual
 from tests.realizer.fake_body import FakeBody, Script, parts_of

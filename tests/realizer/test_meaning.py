@@ -3,6 +3,7 @@
 import pytest
 from msgspec.structs import replace
 
+from engage_hri.schemas.behavior_types import sync_points
 from engage_hri.schemas.behaviors import (
     After,
     Constraint,
@@ -18,7 +19,6 @@ from engage_hri.schemas.blocks import Block
 from engage_hri.services.realizer.net.petri_net import is_live, is_safe
 from engage_hri.services.realizer.plan.planner import plan_block
 from engage_hri.services.realizer.plan.relations import BlockRefused
-from engage_hri.services.realizer.points import sync_points
 from tests.realizer.fake_body import FakeBody, Script
 from tests.realizer.planning import GAZE, LEFT, OTHER, SPEECH, at, elastic, plan, timed, warnings
 from tests.realizer.stage import after, before, block, together

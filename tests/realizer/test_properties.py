@@ -10,6 +10,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from msgspec import Struct
 
+from engage_hri.schemas.behavior_types import sync_points
 from engage_hri.schemas.behaviors import (
     After,
     Before,
@@ -30,7 +31,7 @@ from engage_hri.services.realizer.config import RealizerConfig
 from engage_hri.services.realizer.net.petri_net import enabled, fire, is_live
 from engage_hri.services.realizer.plan.planner import Plan, plan_block
 from engage_hri.services.realizer.plan.relations import BlockRefused
-from engage_hri.services.realizer.points import Point, sync_points
+from engage_hri.services.realizer.points import Point
 from engage_hri.services.requests.ends import RequestRefused
 from engage_hri.services.runtime.virtual_time import run_virtual
 from tests.realizer.fake_body import HOLDS, FakeBody, Script, natural_durations, type_of

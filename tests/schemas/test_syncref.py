@@ -4,7 +4,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from engage_hri.schemas.syncref import SyncRef, canonical_sync, dialect_sync
+from engage_hri.schemas.behavior_types import canonical_sync, dialect_sync
+from engage_hri.schemas.syncref import SyncRef
 
 names = st.from_regex(r"[A-Za-z_][A-Za-z0-9_.-]{0,8}", fullmatch=True)
 ids = names.filter(lambda name: name != "bml")

@@ -34,7 +34,6 @@ from engage_hri.services.control.torso.head import Attention
 from engage_hri.services.control.torso.motion import Motion, Path, resting
 from engage_hri.services.control.torso.runs import OVERHEAT, STALL, Run
 from engage_hri.services.control.torso.tracks import Track
-from engage_hri.services.control.torso.vocabulary import TYPES
 from engage_hri.services.control.voice import speaking
 from engage_hri.services.control.voice.timeline import utter
 from engage_hri.services.control.waiting import Bell
@@ -48,7 +47,7 @@ class SimulatedBody(Body):
 
     def __init__(self, zones: tuple[NoPointZone, ...] = (), deviations: Variability | None = None) -> None:
         self.capabilities = Capabilities(
-            body="simulated", types=tuple(map(type_name, TYPES)), parts=(*kinematics.PARTS, "voice"),
+            body="simulated", types=tuple(map(type_name, choreography.TYPES)), parts=(*kinematics.PARTS, "voice"),
             joints=kinematics.JOINTS, reach=kinematics.REACH, no_point_zones=zones,
         )  # fmt: skip
         self._deviations = deviations or Variability()

@@ -26,11 +26,13 @@ from engage_hri.schemas.behaviors import (
     Pose,
     Posture,
     PostureShift,
+    Speech,
+    Wait,
 )
 from engage_hri.schemas.body import Ray
+from engage_hri.schemas.syncref import SYNC_POINTS
 from engage_hri.schemas.units import Degrees, Seconds
 from engage_hri.schemas.world import Entity, World
-from engage_hri.services.control.body import SEVEN
 from engage_hri.services.control.torso import kinematics
 from engage_hri.services.control.torso.course import Course, Impossible, Point, Scene
 from engage_hri.services.control.torso.kinematics import Side, Unreachable
@@ -47,6 +49,11 @@ SHAPED = 0.04
 """The same of a face, as a share of its joints' ranges."""
 SETTLE: Seconds = 0.08
 SLIDE: Seconds = 0.2
+TYPES: tuple[type[BlockBehavior], ...] = (
+    Gaze, GazeShift, HeadDirectionShift, Pointing, Gesture, Head, Face, FaceLexeme, FaceFacs, FaceShift, Posture,
+    PostureShift, Pose, Speech, Wait,
+)  # fmt: skip
+"""What this body performs."""
 
 
 def plan(behavior: BlockBehavior, scene: Scene) -> Course:
@@ -134,7 +141,7 @@ def _glance(goal: tuple[float, float], scene: Scene) -> Course:
     settle = SETTLE if any(drift) else 0.0
     before = tuple(angle - speed * settle for angle, speed in zip(goal, drift, strict=True))
     legs = (
-        Leg(goal=before, velocity=drift, seconds=out, marks=(*_at(0.0, *SEVEN[:3]), ("stroke", 1.0))),
+        Leg(goal=before, velocity=drift, seconds=out, marks=(*_at(0.0, *SYNC_POINTS[:3]), ("stroke", 1.0))),
         Leg(goal=goal, velocity=drift, seconds=settle, marks=_at(1.0, "stroke_end", "relax")),
         Leg(goal=base, seconds=back, marks=_at(1.0, "end")),
     )
@@ -334,7 +341,7 @@ def _sides(mode: str | None, rank: Callable[[Side], float], scene: Scene) -> lis
 
 def _held_on_target(*arrival: str) -> tuple[Point, ...]:
     """arrival: points at which it is first on target."""
-    before = SEVEN[: SEVEN.index("stroke_end")]
+    before = SYNC_POINTS[: SYNC_POINTS.index("stroke_end")]
     return (
         *(Point(sync, "stroke", stands_at="relax") if sync in arrival else Point(sync) for sync in before),
         *(Point("stroke_end", "relax"), Point("relax", "relax"), Point("end")),
@@ -343,8 +350,8 @@ def _held_on_target(*arrival: str) -> tuple[Point, ...]:
 
 def _held_around_stroke(strokes: Sequence[str] = ()) -> tuple[Point, ...]:
     """strokes: the repetitions of the first."""
-    number = SEVEN.index("stroke_end")
-    syncs = (*SEVEN[:number], *strokes, *SEVEN[number:])
+    number = SYNC_POINTS.index("stroke_end")
+    syncs = (*SYNC_POINTS[:number], *strokes, *SYNC_POINTS[number:])
     return tuple(Point(sync, sync if sync in ("stroke_start", "stroke_end") else "") for sync in syncs)
 
 

@@ -3,11 +3,11 @@
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
 
+from engage_hri.schemas.behavior_types import sync_points
 from engage_hri.schemas.behaviors import BlockBehavior, Speech, Wait
 from engage_hri.schemas.body import BodyPose, Estimate, Phase
 from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.units import Seconds
-from engage_hri.services.control.body import sync_points
 from engage_hri.services.control.torso.course import Course, Point
 from engage_hri.services.control.torso.motion import SLOWEST, Path
 from engage_hri.services.control.torso.sizing import quickest

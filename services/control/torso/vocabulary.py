@@ -1,31 +1,6 @@
-"""What the simulated torso knows: types of behavior, gestures, faces and postures."""
+"""What the simulated torso knows: gestures, faces and postures."""
 
 from collections.abc import Mapping
-
-from engage_hri.schemas.behaviors import (
-    BlockBehavior,
-    Face,
-    FaceFacs,
-    FaceLexeme,
-    FaceShift,
-    Gaze,
-    GazeShift,
-    Gesture,
-    Head,
-    HeadDirectionShift,
-    Pointing,
-    Pose,
-    Posture,
-    PostureShift,
-    Speech,
-    Wait,
-)
-
-TYPES: tuple[type[BlockBehavior], ...] = (
-    Gaze, GazeShift, HeadDirectionShift, Pointing, Gesture, Head, Face, FaceLexeme, FaceFacs, FaceShift, Posture,
-    PostureShift, Pose, Speech, Wait,
-)  # fmt: skip
-"""What this body performs."""
 
 GESTURES: Mapping[str, tuple[tuple[float, float, float], ...]] = {
     "BEAT": ((0, 22, 112), (4, 16, 82), (8, 2, 92)),

@@ -10,6 +10,7 @@ from collections.abc import Mapping, Sequence
 import msgspec
 from msgspec import Struct
 
+from engage_hri.schemas.behavior_types import TYPES
 from engage_hri.schemas.behaviors import (
     After,
     BlockBehavior,
@@ -37,9 +38,6 @@ from engage_hri.services.generation.config import GenerationConfig
 from engage_hri.services.generation.permits import Permits
 from engage_hri.services.generation.turns.policy import TurnPlan
 from engage_hri.services.generation.turns.trail import NOTHING, Stroke, Trail, first_met, stroke
-
-_LASTING = frozenset({"gaze", "face", "faceLexeme", "faceFacs", "posture", "event", "turn"})
-"""Types whose behaviors last as long as the rest of the block, or end when recognition says so."""
 
 
 class Emission(Struct, frozen=True):
@@ -362,4 +360,4 @@ class _Emitter:
 
 
 def _ends_by_itself(behavior: BlockBehavior) -> bool:
-    return type_name(behavior) not in _LASTING
+    return not TYPES[type_name(behavior)].lasts

@@ -4,6 +4,7 @@ from collections.abc import Iterable, Mapping
 from math import inf
 
 from engage_hri.schemas import keys
+from engage_hri.schemas.behavior_types import dialect_sync
 from engage_hri.schemas.blocks import SpokenText
 from engage_hri.schemas.feedback import (
     BlockProgress,
@@ -15,7 +16,6 @@ from engage_hri.schemas.feedback import (
     WarningKind,
 )
 from engage_hri.schemas.references import type_name
-from engage_hri.schemas.syncref import dialect_sync
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.interface import Bus
 from engage_hri.services.realizer.decide.authority import Authority

@@ -9,6 +9,7 @@ from functools import partial
 
 from msgspec.structs import replace
 
+from engage_hri.schemas.behavior_types import sync_points
 from engage_hri.schemas.behaviors import BlockBehavior, Event, TurnSignal, Wait
 from engage_hri.schemas.blocks import Block, BlockOutcome
 from engage_hri.schemas.body import BehaviorOutcome, SyncPointArrived, SyncPointReached
@@ -28,7 +29,7 @@ from engage_hri.services.realizer.perform.spoken import Spoken
 from engage_hri.services.realizer.perform.surroundings import Surroundings
 from engage_hri.services.realizer.plan.planner import Plan, plan_block
 from engage_hri.services.realizer.plan.relations import DROPPED
-from engage_hri.services.realizer.points import Point, performer, sync_points
+from engage_hri.services.realizer.points import Point, performer
 from engage_hri.services.requests.ends import NeverEnded, Pending, RequestRefused
 from engage_hri.services.runtime.alarm import Timer
 

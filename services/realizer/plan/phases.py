@@ -4,16 +4,15 @@ from collections.abc import Mapping
 
 from msgspec import Struct
 
+from engage_hri.schemas.behavior_types import TYPES
 from engage_hri.schemas.behaviors import BlockBehavior, Gesture, Head, Pointing
 from engage_hri.schemas.body import Estimate
 from engage_hri.schemas.references import type_name
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.realizer.plan.relations import Relations
-from engage_hri.services.realizer.points import BENEATH, ON_TARGET, Point, Segment, family, segments
+from engage_hri.services.realizer.points import ON_TARGET, Point, Segment, family, segments
 
 _ARMS = {"LEFT_HAND": ("left_arm",), "RIGHT_HAND": ("right_arm",), "BOTH_HANDS": ("left_arm", "right_arm")}
-_SHARED = ON_TARGET | BENEATH | {"pointing", "gesture", "head", "speech", "faceShift", "postureShift", "pose"}
-"""Types of which another behavior of the same part takes the place."""
 
 
 class Chain(Struct, frozen=True):
@@ -62,7 +61,7 @@ def _stroke_by_stroke(parts: tuple[Segment, ...], estimate: Estimate) -> tuple[S
 
 def _parts(behavior: BlockBehavior, estimate: Estimate | None) -> tuple[str, ...]:
     type = type_name(behavior)
-    if type not in _SHARED:
+    if not TYPES[type].takes_over:
         return ()
     if isinstance(behavior, Pointing | Gesture) and behavior.mode is not None:
         return _ARMS[behavior.mode]

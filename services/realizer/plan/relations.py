@@ -9,6 +9,7 @@ from functools import cached_property
 from msgspec import Struct
 from msgspec.structs import replace
 
+from engage_hri.schemas.behavior_types import canonical_sync, dialect_sync, sync_points
 from engage_hri.schemas.behaviors import (
     After,
     Before,
@@ -24,10 +25,10 @@ from engage_hri.schemas.blocks import Block
 from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.feedback import WarningKind
 from engage_hri.schemas.references import type_name
-from engage_hri.schemas.syncref import BLOCK_ITSELF, SyncRef, canonical_sync, dialect_sync
+from engage_hri.schemas.syncref import BLOCK_ITSELF, SyncRef
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.realizer.plan.steps import PORTION, Steps, finished, portions
-from engage_hri.services.realizer.points import ORIGIN, Point, sync_points
+from engage_hri.services.realizer.points import ORIGIN, Point
 
 
 class BlockRefused(InputRefused):

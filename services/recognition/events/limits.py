@@ -3,7 +3,8 @@
 import math
 from collections.abc import Iterable
 
-from engage_hri.schemas.syncref import BLOCK_ITSELF, SyncRef, canonical_sync
+from engage_hri.schemas.behavior_types import canonical_sync
+from engage_hri.schemas.syncref import BLOCK_ITSELF, SyncRef
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.recognition.events.latest import Latest
 
