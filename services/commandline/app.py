@@ -49,14 +49,15 @@ Listen = Annotated[
     list[str] | None, typer.Option(metavar="ENDPOINT", help="Zenoh endpoint to listen on; may be repeated.")
 ]
 Human = Annotated[
-    Literal["appendix-b", "misplacing", "listening", "stochastic"] | None,
-    typer.Option(help="How the scripted human behaves: the transcript, or one who misplaces a piece."),
+    Literal["appendix-b", "misplacing", "listening", "stochastic", "attentive"] | None,
+    typer.Option(help="How the simulated human behaves: docs/commands.md tells of each.", show_default=False),
 ]
 Resolution = Annotated[
     Literal["table", "object"] | None,
     typer.Option(help="How finely perception tells what people look at."),
 ]
 Seed = Annotated[int | None, typer.Option(metavar="N", help="Of all chance in the simulated body.")]
+Strict = Annotated[bool, typer.Option("--strict", help="Exit 2 if there was any warning.")]
 WorldFile = Annotated[
     Path | None, typer.Option("--world", metavar="FILE", help="JSON of the entities; without it the tangram table.")
 ]
@@ -160,6 +161,12 @@ def play(
         Path | None,
         typer.Option(metavar="FILE", help="Write what became of each fragment, for a language model; - as above."),
     ] = None,
+    human: Annotated[
+        Literal["attentive", "none"],
+        typer.Option(help="With --embedded: one who follows the robot's gaze and answers, or nobody who does."),
+    ] = "attentive",
+    strict: Strict = False,
+    verbose: Annotated[bool, typer.Option("--verbose", "-v", help="Print each sync point, too.")] = False,
     robot: Robot = None,
     connect: Connect = None,
     config: ConfigFile = None,
@@ -171,8 +178,9 @@ def play(
 
     where = run.Where(config, robot, tuple(connect or ()), settings=tuple(settings or ()))
     options = play.Options(
-        tuple(files), where, embedded, world, virtual_time, at, events, feedback, quiet, feedback_format, outcomes
-    )
+        tuple(files), where, embedded, world, virtual_time, at, events, feedback, quiet, feedback_format, outcomes,
+        human == "attentive", verbose, strict,
+    )  # fmt: skip
     raise typer.Exit(play.main(options))
 
 
@@ -183,6 +191,7 @@ def plan(
         Literal["text", "json", "dot", "pnml"], typer.Option("--format", help="How to print the net.")
     ] = "text",
     world: WorldFile = None,
+    strict: Strict = False,
     config: ConfigFile = None,
     settings: Settings = None,
 ) -> None:
@@ -190,7 +199,7 @@ def plan(
     from engage_hri.services.commandline import plan, run
 
     where = run.Where(config, settings=tuple(settings or ()))
-    raise typer.Exit(plan.main(file, format, world, where))
+    raise typer.Exit(plan.main(file, format, world, where, strict=strict))
 
 
 @app.command()

@@ -20,7 +20,8 @@ from engage_hri.services.console.log import Telling
 
 DEFAULTS = ("recognition.gaze_resolution=table",)
 """The transcript was annotated by people who saw that a look went to the table, rarely to which piece."""
-HUMANS = {"appendix-b": "scripted", "misplacing": "misplacing", "listening": "listening", "stochastic": "stochastic"}
+HUMANS = {"appendix-b": "scripted"}
+"""Those whom the configuration calls otherwise."""
 
 
 class Options(NamedTuple):
@@ -36,7 +37,7 @@ def choices(seed: int | None, human: str | None, resolution: str | None) -> tupl
     chosen = {
         "control.variability.seed": seed,
         "simulation.seed": seed,
-        "simulation.human": HUMANS[human] if human else None,
+        "simulation.human": HUMANS.get(human, human) if human else None,
         "recognition.gaze_resolution": resolution,
     }
     return tuple(f"{key}={value}" for key, value in chosen.items() if value is not None)

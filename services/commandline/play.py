@@ -15,7 +15,6 @@ from engage_hri.schemas.faults import EngageError, Fault, InputRefused, NoReply,
 from engage_hri.schemas.fragments import FragmentOutcome, TurnFragment
 from engage_hri.schemas.messages import Message
 from engage_hri.schemas.status import AskStatus
-from engage_hri.schemas.summary import summary
 from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.world import World
 from engage_hri.services.bus.interface import Hub
@@ -25,9 +24,10 @@ from engage_hri.services.client.robot import Robot, connect
 from engage_hri.services.commandline import checking, roster
 from engage_hri.services.commandline.config import Config
 from engage_hri.services.commandline.errors import readable
-from engage_hri.services.commandline.outputs import FeedbackFormat, Outputs
+from engage_hri.services.commandline.outputs import FeedbackFormat, Outputs, Terminal
 from engage_hri.services.commandline.played import Played
 from engage_hri.services.commandline.process import DONE, FAILED, REFUSED, run
+from engage_hri.services.commandline.prose import Prose, Warnings, not_strict
 from engage_hri.services.commandline.run import Where, unique
 from engage_hri.services.commandline.sources import Source, Thing, read_world, still
 from engage_hri.services.console.follow import Sink, following
@@ -53,16 +53,25 @@ class Options(NamedTuple):
     quiet: bool = False
     feedback_format: FeedbackFormat | None = None
     outcomes: Path | None = None
+    is_attentive: bool = True
+    verbose: bool = False
+    strict: bool = False
 
 
 class Job(NamedTuple):
-    """times: when to submit each source, seconds from the start; None: one after the other."""
+    """times: when to submit each source, seconds from the start; None: one after the other. verbose: tell of sync
+    points, too.
+    """
 
     sources: tuple[Source, ...]
     times: tuple[Seconds, ...] | None
     played: Played
     outputs: Outputs
     console: Console
+    prose: Prose
+    warnings: Warnings
+    is_attentive: bool
+    verbose: bool
 
     @property
     def servers(self) -> frozenset[str]:
@@ -92,9 +101,14 @@ def main(options: Options) -> int:
         played = Played(thing for source in sources for thing in source.things)
         outputs.wanted = played.concerns
         console = outputs.console(quiet=options.quiet)
-        job = Job(sources, times, played, outputs, console)
+        warnings = Warnings(Terminal(stderr=True))
+        prose = Prose(console, outputs)
+        job = Job(sources, times, played, outputs, console, prose, warnings, options.is_attentive, options.verbose)
         performing = _embedded(job, config, world) if options.embedded else _remote(job, config, options.where)
-        return run(performing, virtual_time=options.virtual_time)
+        code = run(performing, virtual_time=options.virtual_time)
+    if options.strict and warnings.count and code == DONE:
+        raise not_strict(warnings.count)
+    return code
 
 
 def submission_times(text: str | None, files: int) -> tuple[Seconds, ...] | None:
@@ -124,7 +138,8 @@ async def _private(job: Job, config: Config, world: World) -> AsyncIterator[Hub]
     if job.has_fragments:
         names.append("generation")
     services: dict[str, Service] = {name: roster.service(name, config) for name in names}
-    async with MemoryHub(config.robot) as hub, running(hub, {"simulation": still(world), **services}):
+    perception = still(world, is_attentive=job.is_attentive)
+    async with MemoryHub(config.robot) as hub, running(hub, {"simulation": perception, **services}):
         yield hub
 
 
@@ -159,16 +174,20 @@ async def _somebody_there(hub: Hub, servers: frozenset[str]) -> None:
 async def _perform_all(job: Job, hub: Hub, patience: Seconds | None) -> int:
     """The worst exit code of all sources. patience: how long a service may take to answer at all."""
     bus = hub.join(unique("play-log"))
-    log = Log(job.console, hub.robot, bus.now(), Telling(head=False))
+    log = Log(job.console, hub.robot, bus.now(), Telling(head=False, points=job.verbose, warnings=False))
 
     def tell(message: Message, at: Seconds) -> None:
         if job.played.concerns(message):
             log(message, at)
+            job.warnings(message, at)
+            job.prose(message, at)
 
     sinks: tuple[Sink, ...] = (job.played, tell, job.outputs)
     async with following(bus, sinks, past=False), connect(hub=hub) as robot:
         code = await _perform_each(job, robot, patience)
         await job.played.settle()
+    job.prose.finish()
+    job.warnings.finish()
     return code
 
 
@@ -195,13 +214,20 @@ async def _perform(job: Job, source: Source, robot: Robot, patience: Seconds | N
         try:
             outcome = await _submit(thing, robot, patience)
         except EngageError as error:
+            if isinstance(error, InputRefused):
+                job.warnings.refused(thing.id)
             print(readable(error.fault, source.path), file=sys.stderr)
             worst = max(worst, REFUSED if isinstance(error, InputRefused) else FAILED)
             if isinstance(thing, TurnFragment):
                 job.outputs.outcome(thing.id, summary_of(error))
             continue
         if isinstance(outcome, FragmentOutcome):
-            job.outputs.outcome(thing.id, summary(outcome))
+            job.prose.expect(outcome)
+        elif outcome.dropped:
+            print(
+                f"{source.path}: {thing.id} was {outcome.status} without {', '.join(outcome.dropped)}",
+                file=sys.stderr,
+            )
         code = job.played.exit_code(outcome)
         if code != DONE:
             print(f"{source.path}: {thing.id} was {outcome.status}", file=sys.stderr)

@@ -60,11 +60,11 @@ def read_world(path: Path | None) -> World:
     return world if world.people else World(entities=(*world.entities, *tangram_world().people))
 
 
-def still(world: World) -> Service:
-    """Perception for a world in which nothing moves by itself."""
+def still(world: World, *, is_attentive: bool = False) -> Service:
+    """Perception for a world in which nothing moves by itself. is_attentive: its person minds the robot."""
     from engage_hri.services.simulation.still import show_world
 
-    return partial(show_world, world=world)
+    return partial(show_world, world=world, is_attentive=is_attentive)
 
 
 def _bytes(path: Path) -> bytes:

@@ -20,6 +20,8 @@ from engage_hri.services.commandline.supervisor import Child, supervised
 from engage_hri.services.console import tally
 from engage_hri.services.console.follow import following
 
+WITHOUT_TASK = ("simulation.human=attentive",)
+"""Whoever tries the robot finds somebody who minds it."""
 STYLES = ("cyan", "magenta", "green", "yellow", "blue", "red")
 
 
@@ -34,7 +36,8 @@ class Options(NamedTuple):
 
 
 def main(options: Options) -> int:
-    config = options.where.load(defaults=DEFAULTS if options.task else ())  # refused here, not by every child
+    # A bad one is refused here, not by every child.
+    config = options.where.load(defaults=DEFAULTS if options.task else WITHOUT_TASK)
     with Outputs(options.events, options.feedback) as outputs:
         console = outputs.console(quiet=options.quiet)
         run_until_signal(_up(options, config, outputs, console))
@@ -86,7 +89,11 @@ def _children(options: Options, config: Config, console: Console, arrivals: "Arr
 def command(name: str, where: Where, config: Config) -> list[str]:
     """The child's command line: `engage run NAME`, by our interpreter, on our bus, configured as we are."""
     # What was decided here, by default or by option, is told in full, so that all children agree.
-    settings = (*where.settings, f"recognition.gaze_resolution={config.recognition.gaze_resolution}")
+    settings = (
+        *where.settings,
+        f"recognition.gaze_resolution={config.recognition.gaze_resolution}",
+        f"simulation.human={config.simulation.human}",
+    )
     endpoints = (*where.listen, *where.connect)
     return [
         *(sys.executable, "-P", "-m", "engage_hri", "run", name, "--attended", "--robot", config.robot),

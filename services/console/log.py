@@ -26,13 +26,14 @@ AT: dict[Action, str] = {"look": "at ", "point": "at ", "nod": "to ", "shake": "
 
 class Telling(Struct, frozen=True, kw_only=True):
     """What the log tells. actions: what people and the robot do; points: sync points; head: who owns the head;
-    standings: statistics.
+    standings: statistics; warnings: of the realizer and of the policies.
     """
 
     actions: bool = True
     points: bool = True
     head: bool = True
     standings: bool = False
+    warnings: bool = True
 
 
 def told(message: Message, before: Scene, after: Scene, at: Seconds, telling: Telling) -> str | None:
@@ -60,7 +61,7 @@ def _text(message: Message, before: Scene, after: Scene, telling: Telling) -> st
             return f"head: {wording.claim(message.owner)}" + (f"; waiting: {waiting}" if waiting else "")
         case BlockProgress(progress="end", block=str() as block) if not block.startswith(OWN_BLOCKS):
             return f"block {block}: {message.status}"
-        case WarningFeedback():
+        case WarningFeedback() if telling.warnings:
             place = ":".join(part for part in (message.block, message.behavior) if part)
             return f"! {message.kind} {place}: {message.message}"
         case Fault():

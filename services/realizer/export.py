@@ -29,7 +29,6 @@ def as_text(plan: Plan) -> str:
     ties += [_tie(plan, bound) for bound in plan.bounds if bound.kind != "phase"]
     lines += ["", *ties] if ties else []
     lines += [f"ends when something takes its place, or with the block: {id}" for id in sorted(plan.natural)]
-    lines += [f"{problem.kind} {problem.behavior or plan.block.id}: {problem.message}" for problem in plan.problems]
     return "\n".join(lines) + "\n"
 
 

@@ -7,7 +7,7 @@ from msgspec import Struct
 
 from engage_hri.schemas.units import Degrees, Meters, Probability, Seconds
 
-HumanKind = Literal["scripted", "misplacing", "listening", "stochastic", "none"]
+HumanKind = Literal["scripted", "misplacing", "listening", "stochastic", "attentive", "none"]
 
 
 class PerceptionFaults(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -124,7 +124,8 @@ class Habits(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
 class SimulationConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """human: `scripted` follows Appendix B by the ids of the robot's blocks; `misplacing` does too, but lays one
     piece wrongly; `listening` does what the robot's words say, whatever the manager's plan; `stochastic` too, with
-    the habits, pace and mistakes of `stochastic`; `none` leaves the table alone.
+    the habits, pace and mistakes of `stochastic`; `attentive` looks where the robot looks, meets its eyes, and nods
+    when it has spoken or does what it asks for; `none` leaves the table alone.
     """
 
     human: HumanKind = "scripted"

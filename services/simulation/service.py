@@ -12,6 +12,7 @@ from engage_hri.schemas.world import World
 from engage_hri.services.bus.interface import Bus, Subscription
 from engage_hri.services.runtime.service import Ready
 from engage_hri.services.simulation.appendix_b import misplacing_rules, rules
+from engage_hri.services.simulation.attentive import AttentiveHuman
 from engage_hri.services.simulation.cameras import Cameras
 from engage_hri.services.simulation.config import SimulationConfig
 from engage_hri.services.simulation.head import Sightlines
@@ -77,6 +78,10 @@ def _human(config: SimulationConfig, robot: str, chance: random.Random) -> Human
             return ListeningHuman(tangram_table(), robot, vary)
         case "stochastic":
             return StochasticHuman(tangram_table(), config.stochastic, chance, robot)
+        case "attentive":
+            table = tangram_table()
+            pieces = frozenset(piece.id for piece in table.pieces)
+            return AttentiveHuman(table.person.id, pieces, robot, vary, table)
         case "none":
             return Human((), robot, vary)
 

@@ -1,6 +1,7 @@
-"""A world in which nothing happens: from a file, or the tangram table with a person who just sits there."""
+"""A world in which nothing moves: from a file, or the tangram table. Whoever is in it sits there, or attends."""
 
 import asyncio
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Literal
 
@@ -8,14 +9,16 @@ import msgspec
 from msgspec import Struct
 
 from engage_hri.schemas import keys
-from engage_hri.schemas.actions import ActorFound
+from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound
 from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.units import FARTHEST, Stamp
 from engage_hri.schemas.utf8 import utf8
 from engage_hri.schemas.world import Entity, World
 from engage_hri.services.bus.interface import Bus
 from engage_hri.services.runtime.service import Ready
+from engage_hri.services.simulation.attentive import AttentiveHuman
 from engage_hri.services.simulation.config import SimulationConfig
+from engage_hri.services.simulation.human import FACE, Act, LookAt, Pause, Start, Stop
 from engage_hri.services.simulation.table import Table
 from engage_hri.services.tangram.table import tangram_table
 
@@ -31,13 +34,54 @@ class _File(Struct, frozen=True, forbid_unknown_fields=True):
     at: Stamp | None = None
 
 
-async def show_world(bus: Bus, ready: Ready, world: World) -> None:
-    """Be perception in a world that never changes, until cancelled. Its people are found at once."""
-    ready()
-    bus.publish(keys.WORLD, msgspec.structs.replace(world, at=bus.stamp()))
-    for person in world.people:
-        bus.publish(keys.PERCEIVED_ACTION, ActorFound(actor=person.id, at=bus.stamp()))
-    await asyncio.get_running_loop().create_future()
+async def show_world(bus: Bus, ready: Ready, world: World, *, is_attentive: bool = False) -> None:
+    """Be perception in a world in which nothing moves, until cancelled. Its people are found at once.
+
+    is_attentive: the first of them follows the robot's gaze and answers it; else they sit there.
+    """
+    with bus.subscribe(keys.ROBOT_ACTION, keys.SYNC_POINT, keys.FEEDBACK) as inbox:
+        ready()
+        bus.publish(keys.WORLD, msgspec.structs.replace(world, at=bus.stamp()))
+        for person in world.people:
+            bus.publish(keys.PERCEIVED_ACTION, ActorFound(actor=person.id, at=bus.stamp()))
+        if not (is_attentive and world.people):
+            await asyncio.get_running_loop().create_future()
+        sees = frozenset(entity.id for entity in world.objects)
+        human = AttentiveHuman(world.people[0].id, sees, bus.robot)
+        body = Bystander(world.people[0].id, bus.robot)
+        human.go_on((LookAt(FACE),), bus.now())
+        while not inbox.is_over:
+            received = await inbox.next(human.deadline)
+            if received is not None:
+                human.feed(received.message, bus.now())
+            while acts := human.due(bus.now()):
+                for message in body.does(acts[0], bus.stamp()):
+                    bus.publish(keys.PERCEIVED_ACTION, message)
+                human.go_on(acts[1:], bus.now() + (acts[0].seconds if isinstance(acts[0], Pause) else 0.0))
+
+
+class Bystander:
+    """What others see of a person who looks, gestures and speaks, and moves nothing. Pure."""
+
+    def __init__(self, person: str, robot: str) -> None:
+        self._person = person
+        self._robot = robot
+        self._look: tuple[str, ...] | None = None
+
+    def does(self, act: Act, at: Stamp) -> Iterator[ActionBegan | ActionEnded]:
+        match act:
+            case LookAt(target=target):
+                look = (self._robot if target == FACE else target,) if target else ()
+                if look == self._look:
+                    return
+                if self._look is not None:
+                    yield ActionEnded(actor=self._person, action="look", targets=self._look, at=at)
+                self._look = look
+                yield ActionBegan(actor=self._person, action="look", targets=look, at=at)
+            case Start(action=action, target=target):
+                yield ActionBegan(actor=self._person, action=action, targets=(target,) if target else (), at=at)
+            case Stop(action=action, target=target):
+                yield ActionEnded(actor=self._person, action=action, targets=(target,) if target else (), at=at)
 
 
 def tangram_world() -> World:

@@ -1,6 +1,7 @@
 """`engage play --embedded --virtual-time`: the whole way from a file to what the body did, in no time."""
 
 import json
+import re
 from pathlib import Path
 from typing import Any
 
@@ -79,7 +80,7 @@ def test_the_events_of_a_fragment_are_followed_to_their_ends(engage: Engage, tmp
     path = tmp_path / "ready.xml"
     path.write_text(QUESTION)
 
-    result = engage(*PLAY, "--events", "-", path)
+    result = engage(*PLAY, "--human", "none", "--events", "-", path)
 
     assert result.code == 0, result.err
     states = [(line["kind"], line["state"]) for line in map(json.loads, result.out.splitlines())]
@@ -100,7 +101,7 @@ def test_the_events_of_a_block_are_followed_to_their_ends(engage: Engage, tmp_pa
            "timing": [{"sync": "start", "ref": "g:end"}]}]}"""
     )
 
-    result = engage(*PLAY, "--events", "-", path)
+    result = engage(*PLAY, "--human", "none", "--events", "-", path)
 
     assert result.code == 0, result.err
     (started,) = lines(result.out, type="connection_event", state="started")
@@ -168,8 +169,9 @@ def test_failing_at_run_time_is_exit_code_3(engage: Engage, files: dict[str, Pat
     result = engage(*PLAY, "--set", "control.variability.overheated=['left_arm','right_arm']", path, files["hello"])
 
     assert result.code == 3
-    assert result.err.startswith(f"{path}")
-    assert result.err.count("\n") == 1
+    warning, failed = result.err.splitlines()
+    assert warning.startswith("! EXECUTION_FAILURE must:p: ")
+    assert failed.startswith(f"{path}: must: ")
 
 
 def test_what_only_pointing_could_mean_fails_if_it_is_out_of_reach(engage: Engage, tmp_path: Path) -> None:
@@ -200,7 +202,7 @@ def test_the_log_says_what_happens(engage: Engage, files: dict[str, Path]) -> No
 
 def test_an_id_that_names_an_emoji_is_printed_as_it_is(engage: Engage, tmp_path: Path) -> None:
     (tmp_path / "x.xml").write_text('<bml id="b"><wait id="x" duration="0.1"/></bml>')
-    result = engage(*PLAY, tmp_path / "x.xml")
+    result = engage(*PLAY, "-v", tmp_path / "x.xml")
 
     assert "b:x:start" in result.out
 
@@ -269,3 +271,31 @@ def test_a_full_disk_ends_it_in_one_line(engage: Engage, files: dict[str, Path])
 
     assert result.code == 3
     assert result.err == "/dev/full: cannot write: No space left on device\n"
+
+
+def test_the_person_minds_the_robot_and_a_line_of_prose_says_so(engage: Engage, tmp_path: Path) -> None:
+    path = tmp_path / "ask.xml"
+    path.write_text(FRAGMENT)
+
+    result = engage(*PLAY, "--events", tmp_path / "events.jsonl", path)
+
+    states = [line["state"] for line in map(json.loads, (tmp_path / "events.jsonl").read_text().splitlines())]
+    assert result.code == 0, result.err
+    assert "failed" not in states
+    assert states.count("succeeded") == states.count("started") == 3
+    last = result.out.splitlines()[-1]
+    assert re.search(r'Said: "Please move the blue piece".* they looked after .* Answered by: nod', last)
+    assert " (planned" not in result.out
+
+
+def test_a_misspelt_target_is_said_on_standard_error_and_fails_a_strict_play(engage: Engage, tmp_path: Path) -> None:
+    path = tmp_path / "look.xml"
+    path.write_text('<bml id="x"><gaze id="g" target="nobody"/><wait id="w" duration="0.1"/></bml>')
+
+    lenient, strict = engage(*PLAY, path), engage(*PLAY, "--strict", path)
+
+    assert (lenient.code, strict.code) == (0, 2)
+    assert "! NO_SUCH_TARGET x:g: " in lenient.err
+    assert f"{path}: x was done without g" in lenient.err
+    assert "!" not in lenient.out
+    assert "1 warning; --strict allows none" in strict.err

@@ -229,7 +229,7 @@ async def test_a_second_one_of_a_robot_is_refused_and_the_first_goes_on(endpoint
     up = await start("up", "--robot", "only", "--listen", endpoint)
     try:
         await line(up, "all services are up", log=False)
-        play = await start("play", *where, tmp_path / "wait.xml")
+        play = await start("play", "-v", *where, tmp_path / "wait.xml")
         await line(play, "w:p:start", log=False)
         second = [await start("up", *where), await start("run", "realizer", *where)]
         async with asyncio.timeout(PATIENCE):

@@ -41,7 +41,7 @@ def test_a_world_leaves_only_its_ids(engage: Engage, tmp_path: Path) -> None:
 
 
 def test_a_tool_call_plays_and_its_outcome_is_compact(engage: Engage, call: Path) -> None:
-    result = engage(*PLAY, call)
+    result = engage(*PLAY, call, "--human", "none")
 
     (line,) = result.out.splitlines()
     assert (result.code, len(line) < 300) == (0, True)

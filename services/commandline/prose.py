@@ -1,0 +1,89 @@
+"""What became of each fragment, in a line of prose, once all that it began is decided: words, looks, answers."""
+
+from msgspec.structs import replace
+from rich.console import Console
+
+from engage_hri.schemas.faults import Fault, InputRefused
+from engage_hri.schemas.feedback import BlockProgress, WarningFeedback
+from engage_hri.schemas.fragments import FragmentOutcome
+from engage_hri.schemas.messages import Message
+from engage_hri.schemas.recognition import ConnectionEvent
+from engage_hri.schemas.summary import summary
+from engage_hri.schemas.units import Seconds
+from engage_hri.services.commandline.outputs import Outputs
+
+
+class Prose:
+    """A sink, on a console and in `--outcomes`. A fragment that has ended waits here for the answer to its turn."""
+
+    def __init__(self, console: Console, outputs: Outputs) -> None:
+        self._console = console
+        self._outputs = outputs
+        self._waiting: list[FragmentOutcome] = []
+        self._events: dict[str, ConnectionEvent] = {}
+
+    def __call__(self, message: Message, at: Seconds) -> None:
+        if isinstance(message, ConnectionEvent):
+            self._events[message.id] = message
+            self._tell_decided()
+
+    def expect(self, outcome: FragmentOutcome) -> None:
+        """It has ended; told now, or when its last event is decided."""
+        self._waiting.append(outcome)
+        self._tell_decided()
+
+    def finish(self) -> None:
+        """Nobody waits any longer: tell the rest as it is."""
+        while self._waiting:
+            self._tell(self._waiting.pop(0))
+
+    def _tell_decided(self) -> None:
+        while self._waiting and all(event.state != "started" for event in self._now(self._waiting[0]).events):
+            self._tell(self._waiting.pop(0))
+
+    def _now(self, outcome: FragmentOutcome) -> FragmentOutcome:
+        return replace(outcome, events=tuple(self._events.get(event.id, event) for event in outcome.events))
+
+    def _tell(self, outcome: FragmentOutcome) -> None:
+        told = summary(self._now(outcome))
+        self._outputs.outcome(outcome.fragment, told)
+        text = f"{outcome.fragment}: {told.text}"
+        self._console.print(text, style="bold", markup=False, highlight=False, soft_wrap=True)
+
+
+class Warnings:
+    """A sink that tells warnings, and counts them. Those of a block that is then refused say the refusal."""
+
+    def __init__(self, console: Console) -> None:
+        self._console = console
+        self._begun: set[str] = set()
+        self._held: list[WarningFeedback] = []
+        self.count = 0
+
+    def __call__(self, message: Message, at: Seconds) -> None:
+        match message:
+            case WarningFeedback(block=block):
+                self.count += 1
+                self._held.append(message)
+                if not block or block in self._begun:
+                    self.finish()
+            case BlockProgress(progress="start", block=str() as block):
+                self._begun.add(block)
+                self.finish()
+
+    def refused(self, block: str) -> None:
+        """That is told already."""
+        self._held = [each for each in self._held if each.block != block]
+
+    def finish(self) -> None:
+        """Tell what there is to tell."""
+        for each in self._held:
+            place = ":".join(part for part in (each.block, each.behavior) if part)
+            text = f"! {each.kind} {place}: {each.message}"
+            self._console.print(text, markup=False, highlight=False, soft_wrap=True)
+        self._held.clear()
+
+
+def not_strict(warnings: int) -> InputRefused:
+    """Why `--strict` fails."""
+    return InputRefused(Fault(reason=f"{warnings} warning{'s' * (warnings > 1)}; --strict allows none"))

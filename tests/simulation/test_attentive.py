@@ -1,0 +1,91 @@
+"""The attentive person: follows looks and points at what there is, meets the robot's eyes, answers what it has said."""
+
+import pytest
+
+from engage_hri.schemas.actions import ActionBegan, ActionEnded
+from engage_hri.schemas.behaviors import Action
+from engage_hri.schemas.body import WordSpoken
+from engage_hri.schemas.feedback import BlockProgress
+from engage_hri.schemas.units import Stamp
+from engage_hri.services.simulation.attentive import ANSWERS, FOLLOWS, AttentiveHuman
+from engage_hri.services.simulation.human import FACE, Act, Grab, Lay, LookAt, Start, Stop
+from engage_hri.services.simulation.still import Bystander
+from engage_hri.services.tangram.table import TangramTable, tangram_table
+
+AT = Stamp("loop", 0.0)
+
+
+def person(table: TangramTable | None = None) -> AttentiveHuman:
+    return AttentiveHuman("ann", frozenset({"cup", "ball"}), "robot", table=table)
+
+
+def robot_does(action: Action, target: str) -> ActionBegan:
+    return ActionBegan(actor="robot", action=action, targets=(target,), at=AT)
+
+
+def says(human: AttentiveHuman, text: str, now: float) -> None:
+    for number, word in enumerate(text.split()):
+        human.feed(WordSpoken(block="b", behavior="s", word=word, position=number, at=AT), now)
+    human.feed(BlockProgress(block="b", progress="end", at=AT, status="done"), now)
+
+
+def acts(human: AttentiveHuman, now: float) -> tuple[Act, ...]:
+    found: tuple[Act, ...] = ()
+    while some := human.due(now):
+        found += some
+    return found
+
+
+@pytest.mark.parametrize("action", ["look", "point"])
+@pytest.mark.parametrize(("target", "where"), [("cup", "cup"), ("ann", FACE)])
+def test_they_look_where_the_robot_looks_and_points(action: Action, target: str, where: str) -> None:
+    human = person()
+    human.feed(robot_does(action, target), 1.0)
+
+    assert human.deadline == 1.0 + FOLLOWS
+    assert acts(human, 1.0 + FOLLOWS) == (LookAt(where),)
+
+
+def test_they_see_only_what_there_is_and_mind_only_the_robot() -> None:
+    human = person()
+    human.feed(robot_does("look", "somewhere"), 1.0)
+    human.feed(ActionBegan(actor="carl", action="look", targets=("cup",), at=AT), 1.0)
+
+    assert human.deadline is None
+
+
+def test_they_nod_when_it_has_spoken_but_not_when_it_only_thinks() -> None:
+    human = person()
+    says(human, "ummmm", 1.0)
+    assert human.deadline is None
+
+    says(human, "Is that a cup?", 2.0)
+
+    assert human.deadline == 2.0 + ANSWERS
+    answer = acts(human, 3.0)
+    assert (answer[0], answer[2], answer[-1]) == (Start("nod"), Stop("nod"), LookAt(FACE))
+
+
+def test_at_the_tangram_table_they_do_what_is_asked() -> None:
+    says(
+        human := person(tangram_table()), "Move the blue square so that it is touching the top of the rectangle", 1.0
+    )
+
+    done = acts(human, 3.0)
+    assert [type(each) for each in done if isinstance(each, Grab | Lay)] == [Grab, Lay]
+
+
+def test_what_others_see_of_them_has_an_end_for_each_beginning() -> None:
+    body = Bystander("ann", "robot")
+    seen = [
+        message
+        for act in (LookAt("cup"), LookAt("cup"), LookAt(FACE), Start("nod"), Stop("nod"), LookAt("cup"))
+        for message in body.does(act, AT)
+    ]
+
+    told = [("+" if isinstance(each, ActionBegan) else "-", each.action, *each.targets) for each in seen]
+    assert told == [
+        ("+", "look", "cup"), ("-", "look", "cup"), ("+", "look", "robot"), ("+", "nod"), ("-", "nod"),
+        ("-", "look", "robot"), ("+", "look", "cup"),
+    ]  # fmt: skip
+    assert all(isinstance(each, ActionBegan | ActionEnded) for each in seen)
