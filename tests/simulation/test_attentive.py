@@ -1,4 +1,4 @@
-"""The attentive person: follows looks and points at what there is, meets the robot's eyes, answers what it has said."""
+"""The attentive person: follows looks and points, meets the robot's eyes, answers what it has said."""
 
 import pytest
 
