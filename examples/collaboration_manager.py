@@ -1,11 +1,11 @@
-"""A collaboration manager of one's own: `.venv/bin/python examples/collaboration_manager.py [ENDPOINT]`.
+"""A collaboration manager: `.venv/bin/python examples/collaboration_manager.py [ENDPOINT] [--robot NAME]`.
 
 Run it beside `.venv/bin/engage up` (before or after), or on another machine with the endpoint of one of its services.
 It waits for the robot and for a person, says one thing, and tells how it went.
 """
 
+import argparse
 import asyncio
-import sys
 
 from engage_hri import Reference, Speech, SpeechOption, TurnFragment, connect
 
@@ -23,8 +23,8 @@ PUZZLE = TurnFragment(
 )
 
 
-async def main(endpoints: list[str]) -> None:
-    async with connect(connect=endpoints) as robot:
+async def main(name: str, endpoints: list[str]) -> None:
+    async with connect(name, connect=endpoints) as robot:
         await robot.person()
         outcome = await robot.perform(PUZZLE)
         for choice in outcome.choices:
@@ -34,4 +34,8 @@ async def main(endpoints: list[str]) -> None:
 
 
 if __name__ == "__main__":
-    asyncio.run(main(sys.argv[1:]))
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("endpoints", nargs="*", metavar="ENDPOINT")
+    parser.add_argument("--robot", default="robot", metavar="NAME")
+    options = parser.parse_args()
+    asyncio.run(main(options.robot, options.endpoints))

@@ -69,6 +69,10 @@ ROLES = ("manager", "generation", "realizer", "recognition", "control", "percept
 """What a participant may be to the others. Rules for access are given by role, not by name."""
 
 
+SERVICES = ROLES[1:5]
+"""What a robot is made of."""
+
+
 def commands(server: str) -> str:
     """Every command for `server`; cancellations too, and whatever is sent there that is no command's key."""
     return f"{PREFIX}/cmd/{server}/**"

@@ -298,17 +298,25 @@ async def connect(
 ) -> AsyncIterator[Robot]:
     """Join a robot's bus as a collaboration manager.
 
-    connect, listen: Zenoh endpoints. hub: use this one instead; it stays open.
+    connect, listen: Zenoh endpoints. hub: use this one instead; it stays open. If there is no such robot after 3 s, a
+    warning in the log `engage` names those that are there.
     name: the participant's, unique on the robot's bus; made up when empty.
     """
     if hub is not None:
         async with _joined(hub, name) as client:
             yield client
         return
-    from engage_hri.services.bus.zenoh.hub import open_hub  # only here: a client on an existing hub needs no Zenoh
+    # Only here: a client on an existing hub needs no Zenoh.
+    from engage_hri.services.bus.zenoh.hub import open_hub
+    from engage_hri.services.bus.zenoh.neighbors import tell_if_alone
 
     async with await open_hub(robot, connect=connect, listen=listen) as opened, _joined(opened, name) as client:
-        yield client
+        hint = asyncio.create_task(tell_if_alone(client._bus, connect), name="hint")
+        try:
+            yield client
+        finally:
+            hint.cancel()
+            await asyncio.gather(hint, return_exceptions=True)
 
 
 @asynccontextmanager

@@ -1,5 +1,6 @@
 """`engage watch`: follow a running system, as text or as JSON lines."""
 
+import asyncio
 from collections.abc import Collection
 from typing import NamedTuple, get_args
 
@@ -80,6 +81,8 @@ def main(where: Where, json: bool, wanted: Wanted) -> int:
 
 
 async def _watch(where: Where, config: Config, json: bool, wanted: Wanted) -> None:
+    from engage_hri.services.bus.zenoh.neighbors import tell_if_alone
+
     async with await where.open(config.robot) as hub:
         bus = hub.join(unique("watch"))
         # As text everything includes what people do and say, but statistics would drown it.
@@ -93,7 +96,9 @@ async def _watch(where: Where, config: Config, json: bool, wanted: Wanted) -> No
 
         async with following(bus, (tell,), patterns=wanted.patterns, kinds=wanted.kinds):
             bus.declare_alive()
-            await forever()
+            async with asyncio.TaskGroup() as group:
+                group.create_task(tell_if_alone(bus, where.connect), name="hint")
+                await forever()
 
 
 def as_json(message: Message, at: Seconds) -> None:

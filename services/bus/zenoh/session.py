@@ -46,12 +46,12 @@ STREAM_QOS: dict[str, Any] = {
 
 
 def open_session(
-    robot: str, connect: Sequence[str], listen: Sequence[str], rendezvous: str | None, mode: str = "peer"
+    robot: str | None, connect: Sequence[str], listen: Sequence[str], rendezvous: str | None, mode: str = "peer"
 ) -> tuple[zenoh.Session, bool]:
     """A session in the robot's namespace, and whether it calls others. Blocks for some milliseconds.
 
     An endpoint where nobody is costs nothing. rendezvous None: only the endpoints given. Raises InputRefused when one
-    is misspelled, RunFailed when it is taken, or not ours.
+    is misspelled, RunFailed when it is taken, or not ours. robot None: in nobody's namespace.
     """
     for endpoint in (*connect, *listen):
         match = ENDPOINT.fullmatch(endpoint)
@@ -72,11 +72,10 @@ def open_session(
         raise RunFailed(Fault(reason=f"cannot open the bus: {reason}", where=where, advice=ADVICE)) from error
 
 
-def _config(robot: str, connect: Sequence[str], listen: Sequence[str], mode: str) -> zenoh.Config:
+def _config(robot: str | None, connect: Sequence[str], listen: Sequence[str], mode: str) -> zenoh.Config:
     config = zenoh.Config()
     settings: dict[str, object] = {
         "mode": mode,
-        "namespace": robot,
         "listen/endpoints": list(listen),
         "listen/exit_on_failure": True,
         # A background retry of listening makes close() hang for 10 s (1.10.2).
@@ -94,6 +93,8 @@ def _config(robot: str, connect: Sequence[str], listen: Sequence[str], mode: str
         "transport/link/tx/queue/congestion_control/block/wait_before_close": STALL_US,
         "transport/shared_memory/enabled": False,
     }
+    if robot is not None:
+        settings["namespace"] = robot
     for key, value in settings.items():
         config.insert_json5(key, json.dumps(value))
     return config
