@@ -42,9 +42,9 @@ if TYPE_CHECKING:
     from engage_hri.services.client.robot import Robot as Robot
     from engage_hri.services.client.robot import connect as connect
     from engage_hri.services.control.body import Arrived as Arrived
-    from engage_hri.services.control.body import Authority as Authority
     from engage_hri.services.control.body import BehaviorRefused as BehaviorRefused
     from engage_hri.services.control.body import Body as Body
+    from engage_hri.services.control.body import MovementAuthority as MovementAuthority
     from engage_hri.services.control.body import Reached as Reached
 
 _PLACES = {
@@ -57,14 +57,13 @@ _PLACES = {
     "engage_hri.schemas.tool": ("tool_definition",),
     "engage_hri.schemas.world": ("Entity", "World"),
     "engage_hri.services.client.robot": ("PerformFailed", "Robot", "connect"),
-    "engage_hri.services.control.body": ("Arrived", "Authority", "BehaviorRefused", "Body", "Reached"),
+    "engage_hri.services.control.body": ("Arrived", "MovementAuthority", "BehaviorRefused", "Body", "Reached"),
     "engage_hri.services.client.language_models": ("perform_call", "stream"),
 }
 _MODULES = {name: module for module, names in _PLACES.items() for name in names}
 
 __all__ = [
     "Arrived",
-    "Authority",
     "BehaviorRefused",
     "Block",
     "Body",
@@ -75,6 +74,7 @@ __all__ = [
     "FragmentOutcome",
     "Gaze",
     "InputRefused",
+    "MovementAuthority",
     "PerformFailed",
     "Pointing",
     "Reached",

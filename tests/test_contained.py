@@ -19,7 +19,7 @@ from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.client.robot import PerformFailed, Robot, connect
 from engage_hri.services.commandline import roster
 from engage_hri.services.commandline.config import load
-from engage_hri.services.control.body import Authority
+from engage_hri.services.control.body import MovementAuthority
 from engage_hri.services.runtime.service import running
 from tests.cancelling import whole_robot
 from tests.test_lives_and_late_answers import HOME, _serve_until, everything, says
@@ -42,11 +42,11 @@ def breaking(attribute: str) -> Callable[..., Any]:
         ("engage_hri.services.generation.pipeline.plan", "perform"),
         ("engage_hri.services.generation.conductor.plan", "perform"),
         ("engage_hri.services.realizer.service.plan_steps", "realize"),
-        ("engage_hri.services.realizer.perform.performance.Authority", "realize"),
-        ("engage_hri.services.realizer.decide.authority.Authority.advance", "realize"),
-        ("engage_hri.services.realizer.decide.authority.Authority.reach", "realize"),
+        ("engage_hri.services.realizer.perform.performance.Decisions", "realize"),
+        ("engage_hri.services.realizer.decide.decisions.Decisions.advance", "realize"),
+        ("engage_hri.services.realizer.decide.decisions.Decisions.reach", "realize"),
         ("engage_hri.services.realizer.perform.feedback.Reporter.reached", "realize"),
-        ("engage_hri.services.realizer.perform.performance.Performance._by_body", "realize"),
+        ("engage_hri.services.realizer.perform.performance.BlockPerformance._by_body", "realize"),
         ("engage_hri.services.control.service._Control._begin", "realize"),
         ("engage_hri.services.control.service._Control._report", "realize"),
         ("engage_hri.services.control.torso.body.SimulatedBody.perform", "realize"),
@@ -227,15 +227,15 @@ async def test_a_new_life_of_a_server_leaves_what_a_client_asked_for_that_has_le
 async def test_a_driver_that_breaks_as_it_is_told_to_stop_is_taken_home_all_the_same(
     hub: MemoryHub, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    real = Authority._tell
+    real = MovementAuthority._tell
 
-    def broken(authority: Authority) -> None:
+    def broken(authority: MovementAuthority) -> None:
         real(authority)
         if authority.revoked:
             raise ZeroDivisionError("watcher broke")
 
     async with whole_robot(hub) as robot:
-        monkeypatch.setattr(Authority, "_tell", broken)
+        monkeypatch.setattr(MovementAuthority, "_tell", broken)
         asking = asyncio.create_task(
             robot.realize("b", [Pointing(id="p", target="blue-square"), Wait(id="w", duration=9.0)])
         )

@@ -61,7 +61,7 @@ class Revoked(Exception):
     """The behavior was aborted while it waited for its authority."""
 
 
-class Authority:
+class MovementAuthority:
     """How far a behavior may go. It is extended, never shrunk; revoking it is how a behavior is aborted.
 
     A simple body awaits `granted(sync)` before it leaves a hold point. One that plans ahead asks `covers` and
@@ -155,7 +155,7 @@ class Body(ABC):
         """What `behavior` would take from `pose` (None: from where the body is). Quick, and changes nothing."""
 
     @abstractmethod
-    def perform(self, behavior: BlockBehavior, authority: Authority) -> AsyncGenerator[Progress, None]:
+    def perform(self, behavior: BlockBehavior, authority: MovementAuthority) -> AsyncGenerator[Progress, None]:
         """Do it: every sync point once, in order, at the measured time, and never past the authority.
 
         Ending after `end` means done; ending earlier means that the authority was revoked. Raises BehaviorRefused

@@ -37,11 +37,11 @@ from engage_hri.services.control.actions import ActionMessage, Deeds
 from engage_hri.services.control.bodies import simulated
 from engage_hri.services.control.body import (
     Arrived,
-    Authority,
     BehaviorRefused,
     Body,
     BodyFailed,
     How,
+    MovementAuthority,
     Progress,
     Reached,
     Spoke,
@@ -71,10 +71,10 @@ async def embody(bus: Bus, ready: Ready, config: ControlConfig, body: Body | Non
                 control.close()
 
 
-class _Performance:
+class _UnderWay:
     """A `PerformBehavior` that is under way."""
 
-    def __init__(self, request: PerformBehavior, id: str, authority: Authority) -> None:
+    def __init__(self, request: PerformBehavior, id: str, authority: MovementAuthority) -> None:
         """id: what the requester calls it, unlike `request.id`, which is its name here."""
         self.request = request
         self.id = id
@@ -107,7 +107,7 @@ class _Control:
         self._deeds = Deeds(bus.robot, bus.clock)
         self._world = World(entities=())
         self._objects = CoveredObjects(config.covered_for)
-        self._live: dict[str, _Performance] = {}
+        self._live: dict[str, _UnderWay] = {}
         self._ways: dict[str, asyncio.Task[None]] = {}
         """Home, as somebody has asked for."""
         self._sent = 0
@@ -175,7 +175,7 @@ class _Control:
     def _begin(self, request: PerformBehavior) -> None:
         try:
             check_behavior(request.behavior)  # before a motor sees it
-            authority = Authority(request.behavior, request.through, self._pace(request))
+            authority = MovementAuthority(request.behavior, request.through, self._pace(request))
         except InputRefused as error:
             self.desk.refuse(request.id, error.fault)
             return
@@ -183,7 +183,7 @@ class _Control:
             self.desk.refuse(request.id, Fault(reason=str(error), where=request.behavior.id, service="control"))
             return
         id = self.desk.asked(request.id).id
-        live = self._live[request.id] = _Performance(request, id, authority)
+        live = self._live[request.id] = _UnderWay(request, id, authority)
         self._tasks.create_task(self._perform(live), name=f"behavior {request.id}")
 
     def _abort(self, request: AbortBehavior) -> None:
@@ -198,7 +198,7 @@ class _Control:
             self._revoke(live, request.how)
             live.aborts.append(request.id)
 
-    def _revoke(self, live: _Performance, how: How = "relax") -> None:
+    def _revoke(self, live: _UnderWay, how: How = "relax") -> None:
         """What a driver does on hearing of it may go wrong; the authority is gone all the same."""
         with self._bus.containing(f"the end of behavior {live.label}"):
             live.authority.revoke(how)
@@ -206,7 +206,7 @@ class _Control:
     def _pace(self, request: PerformBehavior) -> dict[str, Seconds]:
         return {planned.sync: self._bus.local(planned.at) for planned in request.pace}
 
-    def _extend(self, live: _Performance, request: PerformBehavior) -> None:
+    def _extend(self, live: _UnderWay, request: PerformBehavior) -> None:
         live.authority.set_pace(self._pace(request))
         try:
             live.authority.extend(request.through)
@@ -214,7 +214,7 @@ class _Control:
             where = live.request.behavior.id
             self._bus.publish(keys.fault("control"), Fault(reason=str(error), where=where, service="control"))
 
-    async def _perform(self, live: _Performance) -> None:
+    async def _perform(self, live: _UnderWay) -> None:
         """From the request to its one terminal state."""
         request, fault = live.request, None
         accepted = False
@@ -243,7 +243,7 @@ class _Control:
             self._end(live, fault)
         self._end_aborts(live)
 
-    def _end(self, live: _Performance, fault: Fault | None) -> None:
+    def _end(self, live: _UnderWay, fault: Fault | None) -> None:
         request, at = live.request, self._bus.now()
         self._publish(self._deeds.ended(request.id, at))
         self.note_look()
@@ -260,7 +260,7 @@ class _Control:
             )
         )
 
-    def _end_aborts(self, live: _Performance) -> None:
+    def _end_aborts(self, live: _UnderWay) -> None:
         """Of several behaviors that one request means, the last to end ends it."""
         awaited = {id for other in self._live.values() for id in other.aborts}
         for id in live.aborts:
@@ -285,7 +285,7 @@ class _Control:
 
     # -- reports ------------------------------------------------------------------------------------------------
 
-    def _report(self, live: _Performance, progress: Progress) -> None:
+    def _report(self, live: _UnderWay, progress: Progress) -> None:
         request = live.request
         id, block, behavior, requester = live.id, request.block, request.behavior.id, request.requester
         match progress:
@@ -325,7 +325,7 @@ class _Control:
         for action in actions:
             self._bus.publish(keys.ROBOT_ACTION, action)
 
-    def note_look(self, live: _Performance | None = None, at: Seconds | None = None) -> None:
+    def note_look(self, live: _UnderWay | None = None, at: Seconds | None = None) -> None:
         """Publish what the eyes rest on, if that has changed."""
         of_head = live is not None and isinstance(live.request.behavior, Gaze | GazeShift | HeadDirectionShift)
         label = live.label if live is not None and of_head else ""

@@ -22,7 +22,7 @@ from engage_hri.services.generation.config import GenerationConfig
 from engage_hri.services.generation.fragment_check import check_world, checked
 from engage_hri.services.generation.head.arbiter import Arbiter
 from engage_hri.services.generation.head.inhibitions import Leases
-from engage_hri.services.generation.performance import GazesOfFragments, Performance
+from engage_hri.services.generation.performance import FragmentPerformance, GazesOfFragments
 from engage_hri.services.generation.pipeline import glance, plan, targets
 from engage_hri.services.generation.references.discourse import SILENCE, Discourse
 from engage_hri.services.generation.turns.events import TurnEvents, TurnOutcomes
@@ -60,9 +60,9 @@ class Conductor:
         self._body = BodyLink(bus, config.body_patience)
         self._world: World | None = None
         self._discourse = SILENCE
-        self._live: dict[str, Performance] = {}
+        self._live: dict[str, FragmentPerformance] = {}
         """By request id: from acceptance to outcome."""
-        self._line: asyncio.Queue[Performance] = asyncio.Queue()
+        self._line: asyncio.Queue[FragmentPerformance] = asyncio.Queue()
         self._blocks: dict[asyncio.Task[None], str] = {}
         """What waits for the end of a fragment's block, and of which turn that is."""
         self._session = f"{bus.name}@{bus.now():.6f}"
@@ -80,7 +80,7 @@ class Conductor:
             raise InputRefused(Fault(reason=reason, where=request.fragment.id, advice=advice))
         fragment = checked(request.fragment, world, self._bus.robot, self._config.utterance)
         turn = self._turns.accept(fragment, fragment.addressee)
-        performance = Performance(request, fragment, turn, self._config.decision_patience)
+        performance = FragmentPerformance(request, fragment, turn, self._config.decision_patience)
         if (displaced := self._outcomes.expect(fragment.id, turn)) is not None:
             self._bus.publish(keys.TURN_CLOSED, displaced)
         self._events.expect(fragment.id, turn.turn)
@@ -90,7 +90,7 @@ class Conductor:
         self._live[request.id] = performance
         self._line.put_nowait(performance)
 
-    def _accept(self, performance: Performance) -> None:
+    def _accept(self, performance: FragmentPerformance) -> None:
         if not performance.accepted:
             performance.accepted = True
             self._desk.accept(performance.request.id)
@@ -140,7 +140,7 @@ class Conductor:
             self._turns.turn_ended(performance.turn.turn)
         self._follow_gaze(performance)
 
-    def _follow_gaze(self, performance: Performance) -> None:
+    def _follow_gaze(self, performance: FragmentPerformance) -> None:
         before = self._gazes.holder
         self._gazes.follow(performance)
         gaze = self._gazes.holder
@@ -185,7 +185,7 @@ class Conductor:
         self._events.forget({*going, *self._outcomes.turns})
         return refused
 
-    def _enforce_inhibitions(self, performance: Performance) -> None:
+    def _enforce_inhibitions(self, performance: FragmentPerformance) -> None:
         block = performance.fragment.id
         for behavior in performance.forbid(self._leases.permits()):
             how: Literal["freeze", "relax"] = "freeze" if self._leases.holds_head else "relax"
@@ -209,7 +209,7 @@ class Conductor:
                 with self._bus.containing(f"what follows the beginning of fragment {performance.fragment.id}"):
                     self._changed(self._bus.now())
 
-    async def _begin(self, performance: Performance) -> Pending | None:
+    async def _begin(self, performance: FragmentPerformance) -> Pending | None:
         """The request for its block, accepted; None if nothing comes of it."""
         fragment, turn = performance.fragment, performance.turn
         self._arbiter.stop_thinking()
@@ -258,7 +258,7 @@ class Conductor:
         """What was referred to before, as `turn` finds it. A backchannel is said in the other's."""
         return self._discourse if turn.backchannel else self._discourse.in_turn(turn.turn, turn.addressee)
 
-    async def _send_block(self, performance: Performance, company: Iterable[Performance]) -> Pending:
+    async def _send_block(self, performance: FragmentPerformance, company: Iterable[FragmentPerformance]) -> Pending:
         """company: what must not go wrong, or it is not performed, either."""
         assert performance.plan is not None
         request = PerformBlock(
@@ -275,7 +275,7 @@ class Conductor:
             self._bus.publish(keys.FRAGMENT_FEEDBACK, warning)
         return pending
 
-    async def _await_end(self, performance: Performance, pending: Pending) -> None:
+    async def _await_end(self, performance: FragmentPerformance, pending: Pending) -> None:
         try:
             outcome = await pending.outcome
             if not isinstance(outcome, BlockOutcome):
@@ -288,7 +288,7 @@ class Conductor:
             self._block_ended(performance)
             self._changed(self._bus.now())
 
-    def _block_ended(self, performance: Performance) -> None:
+    def _block_ended(self, performance: FragmentPerformance) -> None:
         """Or there will be none."""
         now, fragment = self._bus.now(), performance.fragment
         self._follow_gaze(performance)

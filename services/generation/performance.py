@@ -43,7 +43,7 @@ class Ended(Struct, frozen=True):
     fault: Fault | None = None
 
 
-class Performance:
+class FragmentPerformance:
     """block_id: of the request for its block."""
 
     def __init__(self, request: PerformFragment, fragment: TurnFragment, turn: TurnPlan, patience: Seconds) -> None:
@@ -107,7 +107,7 @@ class Performance:
         behavior = self._behaviors.get(self._gaze) if self._ended is None else None
         return behavior if isinstance(behavior, Looks) else None
 
-    def goes_on_with(self, other: "Performance") -> bool:
+    def goes_on_with(self, other: "FragmentPerformance") -> bool:
         """Is it another fragment of the same turn, and its block on its way or being performed?"""
         return self is not other and self.turn.turn == other.turn.turn and self.plan is not None and not self.is_over
 
@@ -234,7 +234,7 @@ class GazesOfFragments:
         self._gazes: dict[str, Looks | None] = {}
         """By request, in the order of their starts; None once it has ended and its block has not."""
 
-    def follow(self, performance: Performance) -> None:
+    def follow(self, performance: FragmentPerformance) -> None:
         gaze, id = performance.gaze, performance.request.id
         if performance.is_over:
             self._gazes.pop(id, None)

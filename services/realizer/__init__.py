@@ -1,9 +1,12 @@
 """The realizer: a block of behaviors and constraints goes in, a closed-loop performance comes out.
 
-    points     which sync points a behavior has, and where it can wait        classes   points that are one instant
-    planner    block + estimates -> plan: net, earliest schedule              net       the Petri net, as data
-    authority  what may move now, given what has been measured                export    a plan as text, JSON, DOT
-    executor   one live block on the event loop                               service   the realizer's life on the bus
+    service   the realizer's life on the bus
+    perform   live blocks on the event loop: one task for each behavior, and what is said about it
+    decide    what may move now, given what has been measured; no clock
+    plan      from a block and estimates to a net and its earliest schedule; no clock
+    net       the Petri net as data, and as PNML
+    points    sync points, and what each can wait for
+    export    a plan as text, JSON or DOT
 
-All but the last two are pure. A sync point is what the body reports, never what the clock says.
+Each may use those below it. A sync point is what the body reports, never what the clock says.
 """

@@ -30,7 +30,7 @@ from engage_hri.services.realizer.config import RealizerConfig
 from engage_hri.services.realizer.perform.control_link import LONGEST_WAY
 from engage_hri.services.realizer.perform.ledger import Ledger
 from engage_hri.services.realizer.perform.live import Ending, Live
-from engage_hri.services.realizer.perform.performance import Performance
+from engage_hri.services.realizer.perform.performance import BlockPerformance
 from engage_hri.services.realizer.perform.presence import Presence
 from engage_hri.services.realizer.perform.surroundings import Moving, Surroundings
 from engage_hri.services.realizer.perform.unhurried import unhurried
@@ -51,7 +51,7 @@ class _Realizer:
         self.requests = Requester(bus, Patience(pulse=config.pulse, lease=config.lease, cancel=config.abort))
         self.desk = RequestDesk(bus, "realizer", self.cancel)
         self.live: dict[str, Live] = {}
-        self.performances: dict[str, Performance] = {}
+        self.performances: dict[str, BlockPerformance] = {}
         """By the id of the request: of those of `live` that are being performed."""
         self.routes: dict[str, Moving] = {}
         self.peers = Presence()
@@ -103,7 +103,7 @@ class _Realizer:
             with performance.containing():
                 performance.feed(report)
 
-    def performing(self) -> list[Performance]:
+    def performing(self) -> list[BlockPerformance]:
         return list(self.performances.values())
 
     def cancel(self, cancel: Cancel) -> None:
@@ -182,7 +182,7 @@ class _Realizer:
                 return
             named = {point.behavior.partition(":")[0] for point in plan.foreign}
             tied_to = {id: elsewhere[id] for id in named}
-            performance = self.performances[live.request.id] = Performance(live, plan, self.around, tied_to)
+            performance = self.performances[live.request.id] = BlockPerformance(live, plan, self.around, tied_to)
             await self._end(live, await performance.run())
 
     async def _plan(self, block: Block, elsewhere: Mapping[str, Block]) -> Plan:
@@ -216,7 +216,7 @@ class _Realizer:
 
     def _left_for(self, plan: Plan) -> dict[str, BodyPose]:
         """How the blocks that `plan` is tied to will leave the body for it, by part: the last of them says."""
-        others = {each.plan.block.id: each.authority for each in self.performing()}
+        others = {each.plan.block.id: each.decisions for each in self.performing()}
         named = {point: point.behavior.partition(":")[0::2] for point in plan.foreign}
         times = {block: others[block].times() for block, _ in named.values() if block in others}
         ties = [
@@ -278,7 +278,7 @@ class _Realizer:
             live.stop(Ending("failed", error.fault))
             return plan
 
-    def _send_home(self, live: Live, replaced: list[Performance]) -> None:
+    def _send_home(self, live: Live, replaced: list[BlockPerformance]) -> None:
         parts = {part for other in replaced for part in other.parts_used}
         parts = parts.difference(*(other.parts_moving for other in self.performing() if other not in replaced))
         if parts:

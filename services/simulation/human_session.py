@@ -194,7 +194,7 @@ def observations(plan: Sequence[Planned], clock: str = "loop") -> list[tuple[Obs
     """What happens in the session, in order, each with its time. clock: of the stamps."""
     seen = [*_arrival(clock)]
     for number, event in enumerate(plan, start=1):
-        seen += _Performance(event, number, clock).observations()
+        seen += _Acting(event, number, clock).observations()
     return sorted(seen, key=lambda observation: observation[1])
 
 
@@ -206,7 +206,7 @@ def _arrival(clock: str) -> Iterator[tuple[Observation, Seconds]]:
     yield ActorFound(actor=LISTENER, at=Stamp(clock, 0.0)), 0.0
 
 
-class _Performance:
+class _Acting:
     """How one planned event looks to recognition. Gazes come from and go back to nowhere."""
 
     def __init__(self, event: Planned, number: int, clock: str) -> None:

@@ -32,7 +32,15 @@ from engage_hri.schemas.behaviors import (
 )
 from engage_hri.schemas.references import type_name
 from engage_hri.schemas.world import Entity, World
-from engage_hri.services.control.body import Arrived, Authority, BehaviorRefused, Body, Progress, Reached, Spoke
+from engage_hri.services.control.body import (
+    Arrived,
+    BehaviorRefused,
+    Body,
+    MovementAuthority,
+    Progress,
+    Reached,
+    Spoke,
+)
 from tests.control.motions import recorded, violations
 
 WORLD = World(
@@ -73,7 +81,7 @@ def times(progress: Sequence[Progress]) -> dict[str, float]:
 
 
 async def performed(body: Body, behavior: BlockBehavior, through: str = "end") -> list[Progress]:
-    authority = Authority(behavior, through)
+    authority = MovementAuthority(behavior, through)
     return [progress async for progress in body.perform(behavior, authority)]
 
 
@@ -81,7 +89,7 @@ class Stage:
     """A behavior under way, with the authority in the test's hand."""
 
     def __init__(self, body: Body, behavior: BlockBehavior, through: str = "start") -> None:
-        self.authority = Authority(behavior, through)
+        self.authority = MovementAuthority(behavior, through)
         self.progress: list[Progress] = []
         self._body, self._behavior = body, behavior
         self.task = asyncio.create_task(self._perform(), name=f"stage {behavior.id}")

@@ -27,7 +27,7 @@ from engage_hri.schemas.behaviors import (
 )
 from engage_hri.schemas.body import NoPointZone
 from engage_hri.schemas.world import Entity, World
-from engage_hri.services.control.body import Arrived, Authority, BehaviorRefused
+from engage_hri.services.control.body import Arrived, BehaviorRefused, MovementAuthority
 from engage_hri.services.control.torso.body import SimulatedBody
 from engage_hri.services.control.waiting import Bell
 from engage_hri.services.runtime.virtual_time import run_virtual
@@ -356,10 +356,10 @@ async def test_an_instant_that_rounding_puts_behind_its_timer_is_waited_for_once
 async def test_words_wait_for_the_word_that_an_aborted_utterance_ends_with() -> None:
     body = body_in()
     long, short = Speech(id="a", text="extraordinarily long words"), Speech(id="b", text="next")
-    first, second = Authority(long, "end"), Authority(short, "end")
+    first, second = MovementAuthority(long, "end"), MovementAuthority(short, "end")
     told: list[str] = []
 
-    async def say(speech: Speech, authority: Authority) -> None:
+    async def say(speech: Speech, authority: MovementAuthority) -> None:
         async for progress in body.perform(speech, authority):
             told.append(f"{speech.id} {type(progress).__name__}")
 
@@ -374,7 +374,7 @@ async def test_words_wait_for_the_word_that_an_aborted_utterance_ends_with() -> 
 async def test_words_that_wait_for_the_voice_are_given_up_when_they_are_aborted() -> None:
     body = body_in()
     long, short = Speech(id="a", text="extraordinarily long words"), Speech(id="b", text="next")
-    first, second = Authority(long, "end"), Authority(short, "end")
+    first, second = MovementAuthority(long, "end"), MovementAuthority(short, "end")
     aborted = asyncio.create_task(anext(body.perform(long, first)))
     await aborted
     first.revoke()

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from engage_hri.schemas.behavior_types import sync_points
 from engage_hri.schemas.behaviors import BlockBehavior, Gaze, Gesture, Head, Pointing
 from engage_hri.schemas.body import Estimate
-from engage_hri.services.control.body import Authority, Body
+from engage_hri.services.control.body import Body, MovementAuthority
 from engage_hri.services.control.config import Slow, Variability
 from engage_hri.services.control.torso.body import SimulatedBody
 from engage_hri.services.control.torso.sizing import SIZES
@@ -46,7 +46,7 @@ def paced(estimate: Estimate, haste: float) -> dict[str, float]:
 async def hurried(body: Body, behavior: BlockBehavior, haste: float) -> tuple[float, Recording]:
     """How late the worst of its points is, and what it looked like."""
     pace = paced(body.estimate(behavior, None, WORLD), haste)
-    authority = Authority(behavior, "end", pace)
+    authority = MovementAuthority(behavior, "end", pace)
     async with recorded(body) as recording:
         at = times([progress async for progress in body.perform(behavior, authority)])
     return max(at[sync] - pace[sync] for sync in pace), recording
@@ -92,7 +92,7 @@ async def test_it_is_of_full_size_as_long_as_being_faster_does():
 async def test_what_has_a_target_is_never_smaller(behavior: BlockBehavior):
     _, full = await hurried(body_in(), behavior, 0.0)
     body = body_in()
-    authority = Authority(behavior, "end", {"stroke": asyncio.get_running_loop().time() + 0.05})
+    authority = MovementAuthority(behavior, "end", {"stroke": asyncio.get_running_loop().time() + 0.05})
 
     async with recorded(body) as recording:
         async for _ in body.perform(behavior, authority):
@@ -107,7 +107,7 @@ async def test_told_to_hurry_on_its_way_it_goes_on_smaller_from_where_it_is():
     now = asyncio.get_running_loop().time()
     natural = {phase.to: phase.natural for phase in body.estimate(BEAT, None, WORLD).phases}
     due = now + sum(natural.values()) - 0.25
-    authority = Authority(BEAT, "end")
+    authority = MovementAuthority(BEAT, "end")
     asyncio.get_running_loop().call_at(now + natural["ready"], authority.set_pace, {"end": due})
 
     async with recorded(body) as recording:
@@ -140,7 +140,7 @@ def test_no_pace_breaks_limits_or_loses_a_point(
 ):
     async def play() -> tuple[list[str], list[str]]:
         body, loop = body_in(), asyncio.get_running_loop()
-        authority = Authority(behavior, "start" if held else "end")
+        authority = MovementAuthority(behavior, "start" if held else "end")
         for wait, sync, ahead in paces:
             loop.call_later(wait, lambda sync=sync, ahead=ahead: authority.set_pace({sync: loop.time() + ahead}))
         loop.call_later(1.0, authority.extend, "end")

@@ -7,14 +7,14 @@ from engage_hri.schemas.behaviors import BlockBehavior, Gaze, Speech
 from engage_hri.schemas.blocks import Block
 from engage_hri.services.bus.interface import Hub
 from engage_hri.services.client.robot import connect
-from engage_hri.services.control.body import Authority, Progress, Reached
+from engage_hri.services.control.body import MovementAuthority, Progress, Reached
 from engage_hri.services.control.torso.body import SimulatedBody
 
 
 class CarelessBody(SimulatedBody):
     """Forgets, now and then, that a list may be empty."""
 
-    async def perform(self, behavior: BlockBehavior, authority: Authority) -> AsyncGenerator[Progress, None]:
+    async def perform(self, behavior: BlockBehavior, authority: MovementAuthority) -> AsyncGenerator[Progress, None]:
         now = asyncio.get_running_loop().time()
         yield Reached("start", now, now)
         raise IndexError("list index out of range")

@@ -4,7 +4,7 @@ import heapq
 from collections.abc import Callable
 
 from engage_hri.services.realizer.config import RealizerConfig
-from engage_hri.services.realizer.decide.authority import Authority
+from engage_hri.services.realizer.decide.decisions import Decisions
 from engage_hri.services.realizer.decide.effects import Begin, Extend
 from engage_hri.services.realizer.plan.planner import Plan
 
@@ -16,11 +16,11 @@ class Player:
         self,
         plan: Plan,
         slow: Callable[[str], float] = lambda id: 1.0,
-        after_each: Callable[[Authority], None] = lambda authority: None,
+        after_each: Callable[[Decisions], None] = lambda authority: None,
     ) -> None:
-        self.authority = Authority(plan, 0.0, RealizerConfig(stall=1e6))
+        self.decisions = Decisions(plan, 0.0, RealizerConfig(stall=1e6))
         self.now = 0.0
-        self.decisions = 0
+        self.asked = 0
         self._plan = plan
         self._slow = slow
         self._after_each = after_each
@@ -32,12 +32,12 @@ class Player:
 
     def play(self) -> float:
         """To the end; returns how long it took."""
-        while not self.authority.is_over:
+        while not self.decisions.is_over:
             while self._decide():
                 pass
-            if self.authority.is_over:
+            if self.decisions.is_over:
                 break
-            deadline = self.authority.deadline
+            deadline = self.decisions.deadline
             if self._coming and (deadline is None or self._coming[0][0] <= deadline):
                 self.now, _, behavior = heapq.heappop(self._coming)
                 self._come(behavior)
@@ -49,8 +49,8 @@ class Player:
     def _decide(self) -> bool:
         """Whether that made new facts at once."""
         is_news = False
-        self.decisions += 1
-        for effect in self.authority.advance(self.now):
+        self.asked += 1
+        for effect in self.decisions.advance(self.now):
             if isinstance(effect, Begin | Extend):
                 points = [point.sync for point in self._plan.chains[effect.behavior].points]
                 self._through[effect.behavior] = points.index(effect.through)
@@ -62,18 +62,18 @@ class Player:
                     self._waiting.discard(effect.behavior)
                     self._come(effect.behavior)
                     is_news = True
-        self._after_each(self.authority)
+        self._after_each(self.decisions)
         return is_news
 
     def _come(self, behavior: str) -> None:
         chain, number = self._plan.chains[behavior], self._next[behavior]
         point = chain.points[number]
-        member = self.authority.member(point)
+        member = self.decisions.member(point)
         if member.kind == "hold" and self._through[behavior] < chain.points.index(member.point):
             self._waiting.add(behavior)
-            self.authority.arrive(member.point, self.now)
+            self.decisions.arrive(member.point, self.now)
             return
-        self.authority.reach(point, self.now)
+        self.decisions.reach(point, self.now)
         self._next[behavior] = number + 1
         if number + 1 < len(chain.points):
             self._count += 1

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from engage_hri.schemas.behaviors import After, Constraint, Mark, Pointing, Speech, Synchronize
 from engage_hri.schemas.blocks import Block
-from engage_hri.services.realizer.decide.authority import Authority
+from engage_hri.services.realizer.decide.decisions import Decisions
 from engage_hri.services.realizer.decide.experience import Experience
 from engage_hri.services.realizer.plan.planner import Plan, plan_block
 from engage_hri.services.realizer.plan.relations import BlockRefused
@@ -39,7 +39,7 @@ def test_the_forecast_that_is_kept_is_the_one_from_scratch(
     if plan is None:
         return
 
-    def compare(authority: Authority) -> None:
+    def compare(authority: Decisions) -> None:
         kept = authority.forecast
         if kept is None or authority.not_before:
             return
@@ -74,7 +74,7 @@ def test_a_decision_costs_the_same_in_a_block_sixteen_times_as_long() -> None:
         player = Player(phrases(count), lambda id: 1.5 if id.startswith("p") else 1.0)
         began = process_time()
         player.play()
-        costs.append((process_time() - began) / player.decisions)
+        costs.append((process_time() - began) / player.asked)
 
     assert costs[1] < 3 * costs[0]
 

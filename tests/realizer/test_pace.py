@@ -5,7 +5,7 @@ import pytest
 from engage_hri.schemas.behaviors import Gaze, GazeShift, Gesture, Mark, Pointing, Speech
 from engage_hri.schemas.feedback import PredictionFeedback
 from engage_hri.services.realizer.config import RealizerConfig
-from engage_hri.services.realizer.decide.authority import Authority
+from engage_hri.services.realizer.decide.decisions import Decisions
 from engage_hri.services.realizer.decide.effects import Extend
 from engage_hri.services.realizer.plan.planner import plan_block
 from engage_hri.services.realizer.points import Point
@@ -162,7 +162,7 @@ def test_nobody_is_told_to_be_slower_than_its_body_can() -> None:
     words = Speech(id="s", text="one two three four", marks=(Mark("a", 3), Mark("b", 7), Mark("c", 13)))
     body = FakeBody(elastic=(0.5, 1.5), estimates={"shift": (3.0,)})
     made = block((words, SHIFT), together("shift:end", "s:end"))
-    authority = Authority(plan_block(made, [body.estimate(each) for each in made.behaviors]), 0.0, RealizerConfig())
+    authority = Decisions(plan_block(made, [body.estimate(each) for each in made.behaviors]), 0.0, RealizerConfig())
     told = []
     for now, point in (
         (0.0, "s:start"),

@@ -2,7 +2,7 @@
 
 from engage_hri.schemas.behaviors import Gesture
 from engage_hri.services.realizer.config import RealizerConfig
-from engage_hri.services.realizer.decide.authority import Authority
+from engage_hri.services.realizer.decide.decisions import Decisions
 from engage_hri.services.realizer.decide.effects import Extend
 from engage_hri.services.realizer.decide.patience import Late, Patience, Stalled
 from engage_hri.services.realizer.plan.planner import plan_block
@@ -38,7 +38,7 @@ def test_who_holds_where_it_may_pass_is_late_from_when_it_was_told_that() -> Non
     """Not from when something else about it was looked at again."""
     body = FakeBody()
     beat = Gesture(id="g", lexeme="BEAT", mode="RIGHT_HAND")
-    authority = Authority(plan_block(block((beat,)), [body.estimate(beat)]), 0.0, CONFIG)
+    authority = Decisions(plan_block(block((beat,)), [body.estimate(beat)]), 0.0, CONFIG)
     authority.follow([Point("g", "end")])
     authority.advance(0.0)
     authority.reach(Point("g", "start"), 0.0)

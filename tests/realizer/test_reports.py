@@ -14,7 +14,7 @@ from engage_hri.schemas.blocks import BlockOutcome
 from engage_hri.schemas.body import SyncPointArrived, SyncPointReached
 from engage_hri.schemas.feedback import BlockProgress, SyncPointProgress, WarningFeedback
 from engage_hri.services.realizer.config import RealizerConfig
-from engage_hri.services.realizer.decide.authority import Authority
+from engage_hri.services.realizer.decide.decisions import Decisions
 from engage_hri.services.realizer.plan.planner import plan_block
 from engage_hri.services.realizer.points import ORIGIN, Point
 from engage_hri.services.runtime.virtual_time import run_virtual
@@ -33,7 +33,7 @@ def test_no_sequence_of_reports_ends_the_authority_or_makes_it_tell_a_point_twic
     plan = planned(block)
     if plan is None:
         return
-    authority, now, told = Authority(plan, 0.0, RealizerConfig()), 0.0, []
+    authority, now, told = Decisions(plan, 0.0, RealizerConfig()), 0.0, []
     points = [*(point for chain in plan.chains.values() for point in chain.points), *NOWHERE]
     for _ in range(data.draw(st.integers(1, 40))):
         point = data.draw(st.sampled_from(points))
@@ -62,7 +62,7 @@ def test_no_sequence_of_reports_ends_the_authority_or_makes_it_tell_a_point_twic
 
 def test_what_has_not_begun_can_be_nowhere() -> None:
     made = block((Gaze(id="g", target="a"), Wait(id="w", duration=3.0)), after("w:end", "g:start"))
-    authority = Authority(plan_block(made, [estimate(made.behaviors[0])]), 0.0, RealizerConfig())
+    authority = Decisions(plan_block(made, [estimate(made.behaviors[0])]), 0.0, RealizerConfig())
     authority.advance(0.0)
 
     assert authority.reach(Point("g", "stroke"), 0.5) == ()
@@ -72,7 +72,7 @@ def test_what_has_not_begun_can_be_nowhere() -> None:
 
 def test_an_arrival_where_the_behavior_has_passed_is_not_counted_again() -> None:
     made = block((Gaze(id="g", target="a"), Gaze(id="h", target="b"), Wait(id="w", duration=3.0)))
-    authority = Authority(plan_block(made, [estimate(each) for each in made.behaviors[:2]]), 0.0, RealizerConfig())
+    authority = Decisions(plan_block(made, [estimate(each) for each in made.behaviors[:2]]), 0.0, RealizerConfig())
     authority.advance(0.0)
     authority.reach(Point("g", "stroke"), 0.5)
     authority.arrive(Point("g", "stroke"), 0.6)

@@ -18,11 +18,11 @@ from engage_hri.schemas.world import World
 from engage_hri.services.control import variability
 from engage_hri.services.control.body import (
     Arrived,
-    Authority,
     BehaviorRefused,
     Body,
     BodyFailed,
     BodyState,
+    MovementAuthority,
     Progress,
     Reached,
 )
@@ -58,7 +58,7 @@ class SimulatedBody(Body):
         self._runs: dict[str, Run] = {}
         self._world = World(entities=())
         self._attention = Attention()
-        self._utterance: Authority | None = None
+        self._utterance: MovementAuthority | None = None
         self._saying = ""
         self._hushed = asyncio.Event()
         self._occasions = 0
@@ -71,7 +71,7 @@ class SimulatedBody(Body):
         except Impossible as impossible:
             return infeasible(behavior, impossible.kind, _fault(behavior, impossible.reason))
 
-    def perform(self, behavior: BlockBehavior, authority: Authority) -> AsyncGenerator[Progress, None]:
+    def perform(self, behavior: BlockBehavior, authority: MovementAuthority) -> AsyncGenerator[Progress, None]:
         match behavior:
             case Speech():
                 return self._speak(behavior, authority)
@@ -154,7 +154,7 @@ class SimulatedBody(Body):
 
     # -- motion -------------------------------------------------------------------------------------------------
 
-    async def _move(self, behavior: BlockBehavior, authority: Authority) -> AsyncGenerator[Progress, None]:
+    async def _move(self, behavior: BlockBehavior, authority: MovementAuthority) -> AsyncGenerator[Progress, None]:
         try:
             course = choreography.plan(behavior, self._scene(self._world, true=True))
             self._occasions += 1
@@ -304,7 +304,9 @@ class SimulatedBody(Body):
     def _is_overlaid(self) -> bool:
         return "head" in self._runs and isinstance(self._runs["head"].behavior, Gaze)
 
-    async def _shift_beneath(self, behavior: BlockBehavior, authority: Authority) -> AsyncGenerator[Progress, None]:
+    async def _shift_beneath(
+        self, behavior: BlockBehavior, authority: MovementAuthority
+    ) -> AsyncGenerator[Progress, None]:
         """A new base while a gaze lies over it: nothing moves until that gaze ends. As slow as it is asked to be."""
         try:
             self._attention.shift(behavior, choreography.plan(behavior, self._scene(self._world)))
@@ -343,7 +345,7 @@ class SimulatedBody(Body):
 
     # -- voice --------------------------------------------------------------------------------------------------
 
-    async def _speak(self, behavior: Speech, authority: Authority) -> AsyncGenerator[Progress, None]:
+    async def _speak(self, behavior: Speech, authority: MovementAuthority) -> AsyncGenerator[Progress, None]:
         if self._deviations.mute == "refuse":
             raise BehaviorRefused(_fault(behavior, "the voice is mute"))
         await self._silence(authority)
@@ -365,7 +367,7 @@ class SimulatedBody(Body):
                 self._utterance, self._saying = None, ""
             self._hushed.set()
 
-    async def _silence(self, authority: Authority) -> None:
+    async def _silence(self, authority: MovementAuthority) -> None:
         """Aborted words end with the word that is being said: wait for that, as long as these are wanted."""
         unwatch = authority.watch(self._hushed.set)
         try:

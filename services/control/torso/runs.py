@@ -7,7 +7,7 @@ from msgspec.structs import replace
 from engage_hri.schemas.behaviors import BlockBehavior
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.control import variability
-from engage_hri.services.control.body import Authority
+from engage_hri.services.control.body import MovementAuthority
 from engage_hri.services.control.config import Stall, Variability
 from engage_hri.services.control.torso.course import Course, Point
 from engage_hri.services.control.torso.motion import Leg, Motion, Path
@@ -25,7 +25,12 @@ class Run:
     """
 
     def __init__(
-        self, behavior: BlockBehavior, course: Course, authority: Authority, deviations: Variability, occasion: int
+        self,
+        behavior: BlockBehavior,
+        course: Course,
+        authority: MovementAuthority,
+        deviations: Variability,
+        occasion: int,
     ) -> None:
         self.behavior = behavior
         self.course = course

@@ -5,12 +5,12 @@ from math import inf
 
 from engage_hri.schemas.behaviors import Speech, Wait
 from engage_hri.schemas.units import Seconds
-from engage_hri.services.control.body import Arrived, Authority, Progress, Reached, Spoke
+from engage_hri.services.control.body import Arrived, MovementAuthority, Progress, Reached, Spoke
 from engage_hri.services.control.voice.timeline import Utterance, utter
 from engage_hri.services.control.waiting import Bell
 
 
-async def speak(behavior: Speech, authority: Authority, pace: float = 1.0) -> AsyncGenerator[Progress, None]:
+async def speak(behavior: Speech, authority: MovementAuthority, pace: float = 1.0) -> AsyncGenerator[Progress, None]:
     """Say it word by word, with a pause at a mark between two words that it may not pass yet.
 
     Revoked, it finishes the word that it is in. pace: 2 takes twice as long.
@@ -50,7 +50,7 @@ def _at(progress: Reached | Spoke, at: Seconds, arrived: Seconds) -> Progress:
     return Spoke(progress.word, progress.position, at)
 
 
-async def wait(behavior: Wait, authority: Authority) -> AsyncGenerator[Progress, None]:
+async def wait(behavior: Wait, authority: MovementAuthority) -> AsyncGenerator[Progress, None]:
     """Let its duration pass, and then hold until its end may be passed."""
     bell = Bell()
     begin = bell.now()

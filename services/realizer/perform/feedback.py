@@ -18,7 +18,7 @@ from engage_hri.schemas.feedback import (
 from engage_hri.schemas.references import type_name
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.interface import Bus
-from engage_hri.services.realizer.decide.authority import Authority
+from engage_hri.services.realizer.decide.decisions import Decisions
 from engage_hri.services.realizer.plan.planner import Plan
 from engage_hri.services.realizer.points import Point
 
@@ -86,14 +86,14 @@ class Reporter:
         self._say(prediction)
 
     def reached(
-        self, first_plan: Plan, authority: Authority, point: Point, *, arrived: Seconds | None, by_body: bool
+        self, first_plan: Plan, decisions: Decisions, point: Point, *, arrived: Seconds | None, by_body: bool
     ) -> None:
         """Report a point, and how much later it was than the first of its instant, as measured.
 
         first_plan: the one the block began with, which said when the point was to be.
         """
-        plan, at = authority.plan, authority.reached[point]
-        together = (authority.reached.get(member.point, at) for member in plan.members[plan.at[point]])
+        plan, at = decisions.plan, decisions.reached[point]
+        together = (decisions.reached.get(member.point, at) for member in plan.members[plan.at[point]])
         skew = at - min(at, *together)
         if (sync := self._spelled(point, plan)) is not None:
             told = self._no_earlier(at)
@@ -103,16 +103,16 @@ class Reporter:
                     behavior=point.behavior,
                     sync=sync,
                     at=self._bus.stamp(told),
-                    time=told - authority.began,
+                    time=told - decisions.began,
                     predicted=first_plan.predicted(point),
-                    arrived=None if arrived is None or arrived == at else arrived - authority.began,
+                    arrived=None if arrived is None or arrived == at else arrived - decisions.began,
                     skew=skew,
                     source="body" if by_body else "clock",
                     character_id=self._character,
                 )
             )
-        if (late := max(skew, authority.lateness(point))) > self._tolerance:
-            self.late(authority.member(point).point, f"{point.sync} came {late:.2f} s later than it should")
+        if (late := max(skew, decisions.lateness(point))) > self._tolerance:
+            self.late(decisions.member(point).point, f"{point.sync} came {late:.2f} s later than it should")
 
     def late(self, instant: Point, message: str) -> None:
         """Once for each instant of a behavior."""

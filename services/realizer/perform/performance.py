@@ -1,6 +1,6 @@
 """One live block on the event loop: one task per behavior, one future per beginning, one timer.
 
-Decides nothing: what was measured goes to the `Authority`, and what that says is sent to whoever performs.
+Decides nothing: what was measured goes to the `Decisions`, and what that says is sent to whoever performs.
 """
 
 import asyncio
@@ -18,7 +18,7 @@ from engage_hri.schemas.feedback import WarningKind
 from engage_hri.schemas.syncref import BLOCK_ITSELF
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.interface import Containing
-from engage_hri.services.realizer.decide.authority import Authority
+from engage_hri.services.realizer.decide.decisions import Decisions
 from engage_hri.services.realizer.decide.effects import Begin, Effect, Extend
 from engage_hri.services.realizer.decide.patience import Late, Stalled
 from engage_hri.services.realizer.perform.control_link import BodyLink
@@ -34,7 +34,7 @@ from engage_hri.services.requests.ends import NeverEnded, Pending, RequestRefuse
 from engage_hri.services.runtime.alarm import Timer
 
 
-class Performance:
+class BlockPerformance:
     """A block being performed."""
 
     def __init__(self, live: Live, plan: Plan, around: Surroundings, elsewhere: Mapping[str, Block]) -> None:
@@ -83,7 +83,7 @@ class Performance:
     async def run(self) -> BlockOutcome:
         """Perform the block to its end, whatever that is. Ends everything it began."""
         began = self._bus.now()
-        self.authority = Authority(self.plan, began, self._config)
+        self.decisions = Decisions(self.plan, began, self._config)
         self._report.started(self.plan, began)
         for problem in self.plan.problems:
             self._report.warn(problem.kind, problem.message, problem.behavior)
@@ -119,7 +119,7 @@ class Performance:
 
     def is_going_on(self, behavior: str) -> bool:
         """Is it of this block, and has it neither ended nor been dropped?"""
-        return not self._ending.done() and behavior in self._running and not self.authority.has_ended(behavior)
+        return not self._ending.done() and behavior in self._running and not self.decisions.has_ended(behavior)
 
     async def interrupt(self, behavior: str) -> bool:
         """End one behavior on request; the others go on. Returns once it has ended: had it come to its end before?"""
@@ -133,7 +133,7 @@ class Performance:
             self._requests.cancel(self._body.id(behavior), "interrupted")
             self._lose(behavior, Fault(reason="interrupted"))
             self._advance()
-        return behavior not in self._dropped and self.authority.has_ended(behavior)
+        return behavior not in self._dropped and self.decisions.has_ended(behavior)
 
     def feed(self, message: SyncPointArrived | SyncPointReached) -> None:
         """A body's report about a behavior of this block."""
@@ -141,11 +141,11 @@ class Performance:
         if pending is None or pending.request.id != message.id or pending.outcome.done():
             return
         point = Point(message.behavior, message.sync)
-        at = self.authority.plausible(point, self._bus.local(message.at), self._bus.now())
+        at = self.decisions.plausible(point, self._bus.local(message.at), self._bus.now())
         if isinstance(message, SyncPointArrived):
-            self.authority.arrive(point, at)
+            self.decisions.arrive(point, at)
         else:
-            arrived = self.authority.plausible(point, self._bus.local(message.arrived), at)
+            arrived = self.decisions.plausible(point, self._bus.local(message.arrived), at)
             self._reach(point, at, arrived=arrived, by_body=True)
         self._advance()
 
@@ -154,21 +154,21 @@ class Performance:
     def hear(self, point: Point, at: Seconds) -> None:
         """A point of another block is reached."""
         if point in self._foreign:
-            self._take_in(partial(self.authority.reach, point, at))
+            self._take_in(partial(self.decisions.reach, point, at))
 
     def foresee(self, point: Point, at: Seconds) -> None:
         """A point of another block is expected at `at` now."""
         if point in self._foreign:
-            self._take_in(partial(self.authority.foresee, point, at))
+            self._take_in(partial(self.decisions.foresee, point, at))
 
     def follow(self, points: Iterable[Point]) -> None:
         """Other blocks are tied to these."""
         if points:
-            self._take_in(partial(self.authority.follow, points))
+            self._take_in(partial(self.decisions.follow, points))
 
     def miss(self, behaviors: Iterable[str]) -> None:
         """What has not been reached of these, in other blocks, never will be."""
-        lost = {point.behavior for point in self._foreign - self.authority.reached.keys()}.intersection(behaviors)
+        lost = {point.behavior for point in self._foreign - self.decisions.reached.keys()}.intersection(behaviors)
         lost -= self._vanished
         if lost:
             self._vanished |= lost
@@ -207,30 +207,30 @@ class Performance:
         for future in self._begun.values():
             future.cancel()
 
-    # -- decisions, as the authority makes them ----------------------------------------------------------------------
+    # -- what is decided, carried out --------------------------------------------------------------------------------
 
     def _advance(self) -> None:
         if self._is_stale and not self._ending.done():
             self._replan()
         again = True
         while again and not self._ending.done():
-            made_facts = [self._apply(effect) for effect in self.authority.advance(self._bus.now())]
+            made_facts = [self._apply(effect) for effect in self.decisions.advance(self._bus.now())]
             again = any(made_facts)
-        if self.authority.is_surprised and self._report.may_expect() and not self._ending.done():
-            self._report.expect(self.authority.plan, self.authority.began, self.authority.expected(self._bus.now()))
-        self._around.ledger.foresee(self.plan.block.id, self.authority.ahead)
-        if self.authority.is_over:
+        if self.decisions.is_surprised and self._report.may_expect() and not self._ending.done():
+            self._report.expect(self.decisions.plan, self.decisions.began, self.decisions.expected(self._bus.now()))
+        self._around.ledger.foresee(self.plan.block.id, self.decisions.ahead)
+        if self.decisions.is_over:
             self._live.stop(Ending("done"))
-        self._timer.set(None if self._ending.done() else self.authority.deadline)
+        self._timer.set(None if self._ending.done() else self.decisions.deadline)
 
     def _apply(self, effect: Effect) -> bool:
-        """Do what the authority says; whether that made new facts at once."""
+        """Do what was decided; whether that made new facts at once."""
         match effect:
             case Extend(behavior=id):
                 self._asked[id] = effect
                 behavior, end = self._performed.get(id), Point(id, "end")
-                if isinstance(behavior, Wait) and end in self.authority.arrived:
-                    self._reach(end, self._bus.now(), arrived=self.authority.arrived[end])
+                if isinstance(behavior, Wait) and end in self.decisions.arrived:
+                    self._reach(end, self._bus.now(), arrived=self.decisions.arrived[end])
                     return True
                 if behavior is not None and id in self._pending and performer(behavior) == "body":
                     self._send(behavior)
@@ -239,9 +239,9 @@ class Performance:
                 self._begun[id].set_result(None)
             case Late(behavior=id, sync=sync, overdue=overdue):
                 if not self._around.peers.has_left("control"):
-                    instant = self.authority.member(Point(id, sync)).point
+                    instant = self.decisions.member(Point(id, sync)).point
                     self._report.late(instant, f"{sync} is {overdue:.1f} s overdue")
-                self.authority.is_surprised = True
+                self.decisions.is_surprised = True
             case Stalled(behavior=id, sync=sync, overdue=overdue):
                 self._body.abort(id)
                 self._lose(id, Fault(reason=f"stalled before {sync}, {overdue:.1f} s overdue"))
@@ -249,9 +249,9 @@ class Performance:
         return False
 
     def _reach(self, point: Point, at: Seconds, *, arrived: Seconds | None = None, by_body: bool = False) -> None:
-        for each in self.authority.reach(point, at):
-            came = self.authority.arrived.get(each, arrived if each == point else None)
-            self._report.reached(self.plan, self.authority, each, arrived=came, by_body=by_body)
+        for each in self.decisions.reach(point, at):
+            came = self.decisions.arrived.get(each, arrived if each == point else None)
+            self._report.reached(self.plan, self.decisions, each, arrived=came, by_body=by_body)
             self.spoken.reach(each)
             self._around.ledger.reach(self.plan.block.id, each, at)
 
@@ -265,7 +265,7 @@ class Performance:
             self._report.interrupted(id, self.spoken.of(id))
         else:
             self._report.warn(kind, str(fault), id)
-            if id in self.authority.begun and not at_rest:
+            if id in self.decisions.begun and not at_rest:
                 self._go_home(self._parts(id), id)
             if id in self.plan.required:
                 self._live.stop(Ending("failed", Fault(reason=fault.reason, where=f"{self.plan.block.id}: {id}")))
@@ -281,7 +281,7 @@ class Performance:
         except InputRefused as error:
             self._live.stop(Ending("failed", error.fault))
             return
-        self.authority.replan(plan)
+        self.decisions.replan(plan)
         for id in self._dropped:  # Only now that it goes on without: else those that follow it end with it.
             self._around.ledger.lose(self.plan.block.id, id)
         for problem in plan.problems:
@@ -295,7 +295,7 @@ class Performance:
 
     async def _perform(self, behavior: BlockBehavior) -> None:
         await self._begun[behavior.id]
-        behavior = self._performed[behavior.id] = self.authority.plan.chains[behavior.id].behavior
+        behavior = self._performed[behavior.id] = self.decisions.plan.chains[behavior.id].behavior
         match behavior:
             case Wait(duration=duration):
                 await self._wait(behavior.id, duration or 0.0)
@@ -331,7 +331,7 @@ class Performance:
         self.spoken.end(outcome)
         if is_done:
             end = Point(behavior.id, sync_points(behavior)[-1])
-            at = self.authority.plausible(end, self._bus.local(outcome.at), self._bus.now())
+            at = self.decisions.plausible(end, self._bus.local(outcome.at), self._bus.now())
             self._reach(end, at, by_body=True)
             self._advance()
         else:
@@ -351,13 +351,13 @@ class Performance:
     @property
     def parts_used(self) -> set[str]:
         """Of the body, by what has begun so far."""
-        return {part for id in self.authority.begun for part in self._parts(id)}
+        return {part for id in self.decisions.begun for part in self._parts(id)}
 
     @property
     def parts_moving(self) -> set[str]:
         """By what has begun and not ended."""
         moving = self._performed.keys() - set(self._dropped)
-        return {part for id in moving if not self.authority.has_ended(id) for part in self._parts(id)}
+        return {part for id in moving if not self.decisions.has_ended(id) for part in self._parts(id)}
 
     def _parts(self, id: str) -> set[str]:
         estimate = self.plan.estimates.get(id)
@@ -372,7 +372,7 @@ class Performance:
         if self._asked[id].through == "end":
             self._reach(Point(id, "end"), self._bus.now())
         else:
-            self.authority.arrive(Point(id, "end"), self._bus.now())
+            self.decisions.arrive(Point(id, "end"), self._bus.now())
         self._advance()
 
     def _at_once(self, id: str) -> None:
@@ -389,7 +389,7 @@ class Performance:
             self._pending[event.id] = pending
         self._advance()
         try:
-            decision = await self._recognition.decision(event, self.plan.block, pending, self.authority.reached)
+            decision = await self._recognition.decision(event, self.plan.block, pending, self.decisions.reached)
         except RequestRefused as error:
             self._lose(event.id, error.fault, kind="CANNOT_CREATE_BEHAVIOR")
         else:

@@ -26,7 +26,7 @@ NOTICEABLE: Seconds = 0.02
 """Planned instants that differ by less are not worth a message."""
 
 
-class Authority(Outlook):
+class Decisions(Outlook):
     """The state of one performance. began: loop time of the block's start; all times are of that clock."""
 
     def __init__(self, plan: Plan, began: Seconds, config: RealizerConfig) -> None:
@@ -335,14 +335,14 @@ class Authority(Outlook):
             self.forecast.require(self.plan.at[point])
 
 
-def pace(behavior: str, authority: "Authority", now: Seconds) -> Pace:
+def pace(behavior: str, decisions: "Decisions", now: Seconds) -> Pace:
     """When it is to come to its points, up to the next where it must ask; empty if that is when it comes anyway."""
-    forecast, plan = authority.forecast, authority.plan
+    forecast, plan = decisions.forecast, decisions.plan
     if forecast is None or behavior not in plan.chains:
         return ()
     points = plan.chains[behavior].points
-    number = authority.next_number(behavior)
-    at = authority.reached[points[number - 1]] if number else now
+    number = decisions.next_number(behavior)
+    at = decisions.reached[points[number - 1]] if number else now
     is_paced = forecast.is_hurried(behavior)
     planned: list[tuple[str, Seconds]] = []
     before = plan.at[points[number - 1]] if number else -1
@@ -350,15 +350,15 @@ def pace(behavior: str, authority: "Authority", now: Seconds) -> Pace:
         here = plan.at[point]
         if here != before:
             natural, latest = at + forecast.phase(behavior, here), at + forecast.longest(behavior, here)
-            if point is points[number] and not authority.paces.get(behavior):
-                natural = max(natural, authority.not_before.get(behavior, natural))  # overdue, not slower on purpose
-            at = max(natural, now) if authority.holds(point) else natural
-            if forecast.times[here] > natural + NOTICEABLE and authority.member(point).kind == "passive":
+            if point is points[number] and not decisions.paces.get(behavior):
+                natural = max(natural, decisions.not_before.get(behavior, natural))  # overdue, not slower on purpose
+            at = max(natural, now) if decisions.holds(point) else natural
+            if forecast.times[here] > natural + NOTICEABLE and decisions.member(point).kind == "passive":
                 at = max(natural, min(forecast.times[here], latest))
                 is_paced = is_paced or at > natural + NOTICEABLE
         before = here
         planned.append((point.sync, at))
-        if not authority.may_pass(point):
+        if not decisions.may_pass(point):
             break
     return tuple(planned) if is_paced else ()
 
