@@ -65,12 +65,10 @@ def of_class(kind: KeyClass) -> str:
     return f"{PREFIX}/{kind}/**"
 
 
-ROLES = ("manager", "generation", "realizer", "recognition", "control", "perception", "observer")
-"""What a participant may be to the others. Rules for access are given by role, not by name."""
-
-
-SERVICES = ROLES[1:5]
+SERVICES = ("generation", "realizer", "recognition", "control")
 """What a robot is made of."""
+ROLES = ("manager", *SERVICES, "perception", "observer")
+"""What a participant may be to the others. Rules for access are given by role, not by name."""
 
 
 def commands(server: str) -> str:

@@ -1,4 +1,4 @@
-"""The bus, as services see it: one interface, two implementations (`memory_bus`, `zenoh_bus`), one contract suite.
+"""The bus, as services see it: one interface, two implementations (`memory`, `zenoh`), one contract suite.
 
 A `Hub` is what a process opens once; each service joins it under its own name and gets a `Bus`. Delivery is by
 the class of the key (`schemas/keys.py`). Messages are frozen structs. Nothing here starts a thread.

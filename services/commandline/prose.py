@@ -11,6 +11,7 @@ from engage_hri.schemas.recognition import ConnectionEvent
 from engage_hri.schemas.summary import summary
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.commandline.outputs import Outputs
+from engage_hri.services.console import wording
 
 
 class Prose:
@@ -78,9 +79,7 @@ class Warnings:
     def finish(self) -> None:
         """Tell what there is to tell."""
         for each in self._held:
-            place = ":".join(part for part in (each.block, each.behavior) if part)
-            text = f"! {each.kind} {place}: {each.message}"
-            self._console.print(text, markup=False, highlight=False, soft_wrap=True)
+            self._console.print(wording.warning(each), markup=False, highlight=False, soft_wrap=True)
         self._held.clear()
 
 

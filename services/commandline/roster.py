@@ -3,13 +3,14 @@
 from functools import partial
 from typing import Literal, get_args
 
+from engage_hri.schemas import keys
 from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.services.commandline.config import Config
 from engage_hri.services.runtime.service import Service
 
 ServiceName = Literal["generation", "realizer", "recognition", "control", "simulation", "collaboration"]
 NAMES: tuple[str, ...] = get_args(ServiceName)
-ROBOT: tuple[str, ...] = ("generation", "realizer", "recognition", "control")
+ROBOT: tuple[str, ...] = keys.SERVICES
 """What runs with a robot; the others stand in for the person, the table and the task."""
 
 

@@ -62,8 +62,7 @@ def _text(message: Message, before: Scene, after: Scene, telling: Telling) -> st
         case BlockProgress(progress="end", block=str() as block) if not block.startswith(OWN_BLOCKS):
             return f"block {block}: {message.status}"
         case WarningFeedback() if telling.warnings:
-            place = ":".join(part for part in (message.block, message.behavior) if part)
-            return f"! {message.kind} {place}: {message.message}"
+            return wording.warning(message)
         case Fault():
             return f"! {message.service or 'fault'}: {message}"
     return None

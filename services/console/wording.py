@@ -4,6 +4,7 @@ from collections.abc import Sequence
 
 from engage_hri.schemas.attention import Claim
 from engage_hri.schemas.behaviors import EventKind
+from engage_hri.schemas.feedback import WarningFeedback
 from engage_hri.schemas.recognition import ConnectionEvent, Statistics
 from engage_hri.schemas.units import Seconds
 
@@ -54,6 +55,12 @@ def decision(event: ConnectionEvent) -> str:
     else:
         text = event.state
     return f"{text} (optional)" if event.optional and event.state == "failed" else text
+
+
+def warning(message: WarningFeedback) -> str:
+    """`! NO_SUCH_TARGET block:behavior: what is wrong`."""
+    place = ":".join(part for part in (message.block, message.behavior) if part)
+    return f"! {message.kind} {place}: {message.message}"
 
 
 def standing(statistics: Statistics) -> str:

@@ -48,6 +48,7 @@ from engage_hri.services.control.body import (
 )
 from engage_hri.services.control.config import ControlConfig
 from engage_hri.services.requests.ends import RequestDesk
+from engage_hri.services.runtime.alarm import Timer
 from engage_hri.services.runtime.service import Ready
 
 IDLE: Seconds = 1.0
@@ -111,9 +112,7 @@ class _Control:
         self._ways: dict[str, asyncio.Task[None]] = {}
         """Home, as somebody has asked for."""
         self._sent = 0
-        self._loop = asyncio.get_running_loop()
-        self._next_state: asyncio.TimerHandle | None = None
-        self._next_state_at = inf
+        self._next_state = Timer(self.publish_state)
         self._published: Seconds = -inf
 
     # -- reads --------------------------------------------------------------------------------------------------
@@ -335,7 +334,7 @@ class _Control:
 
     def publish_state(self) -> None:
         """Tell how the body stands, and once more after a while: soon if it moves."""
-        self._schedule_state(self._bus.now() + IDLE)
+        self._next_state.set(self._bus.now() + IDLE)
         with self._bus.containing("the state of the body"):
             self._publish_state()
 
@@ -350,19 +349,13 @@ class _Control:
                 right_arm=state.right_arm, looking_at=state.looking_at, speaking=state.speaking,
             ),
         )  # fmt: skip
-        self._schedule_state(now + (1.0 / self._config.state_rate if state.moving else IDLE))
+        self._next_state.set(now + (1.0 / self._config.state_rate if state.moving else IDLE))
 
     def _keep_publishing(self) -> None:
         """Something has begun to move."""
         due = self._published + 1.0 / self._config.state_rate
-        if self._next_state_at > due:
-            self._schedule_state(due)
-
-    def _schedule_state(self, at: Seconds) -> None:
-        if self._next_state is not None:
-            self._next_state.cancel()
-        self._next_state_at = at  # uvloop's handles do not tell their time when it has passed
-        self._next_state = self._loop.call_at(at, self.publish_state)
+        if self._next_state.at is None or self._next_state.at > due:
+            self._next_state.set(due)
 
     # -- dead man -----------------------------------------------------------------------------------------------
 
@@ -378,5 +371,4 @@ class _Control:
 
     def close(self) -> None:
         self.desk.close()
-        if self._next_state is not None:
-            self._next_state.cancel()
+        self._next_state.set(None)

@@ -22,7 +22,6 @@ from engage_hri.services.hostile.chance import Chance, happens
 from engage_hri.services.hostile.markup import document
 from engage_hri.services.hostile.typed import SURROGATE, Typed, distorted
 
-SERVERS = tuple(dict.fromkeys(map(keys.server_of, COMMANDS)))
 BROKEN = 0.05
 """Of the payloads have bits flipped, or end early."""
 DISTORTED = 0.15
@@ -94,7 +93,7 @@ class Payloads:
             return self.right_key(message)
         if where < 0.95:
             return self.right_key(self._typed.message(0.0))
-        server = self._chance.choice((*SERVERS, "nobody"))
+        server = self._chance.choice((*keys.SERVICES, "nobody"))
         kind = self._chance.choice(("cmd", "evt", "state", "stream", "rpc"))
         tail = self._chance.choice(
             ("", "/block", "/a/b", "/manager/mallory/block/more", "/manager//block", "/*/*/block")
@@ -103,7 +102,7 @@ class Payloads:
 
     def right_key(self, message: Message) -> str:
         """Where this message belongs; what is sent to nobody in particular goes to any server."""
-        server = HOME.get(type(message)) or self._chance.choice(SERVERS)
+        server = HOME.get(type(message)) or self._chance.choice(keys.SERVICES)
         match message:
             case KeepAlive():
                 return self._command(keys.keep_alive(server))

@@ -29,7 +29,6 @@ from engage_hri.schemas.requests import (
 from engage_hri.schemas.units import Seconds, Stamp
 from engage_hri.services.hostile import plausible
 from engage_hri.services.hostile.chance import Chance, happens
-from engage_hri.services.hostile.payloads import SERVERS
 from engage_hri.services.hostile.typed import NASTY_FLOATS, NASTY_INTS, Typed, Words
 
 IDS = ("1", "2", "3", "same", "1~2")
@@ -105,7 +104,7 @@ class Schemer:
             server, id, kind, life = keys.server_of(sent.expression), sent.request.id, kind_of(sent.request), ""
             life, who = sent.request.life, sent.who
         else:
-            server, id, kind, life = self._chance.choice(SERVERS), self._id(), "perform_block", self._lives[who]
+            server, id, kind, life = self._chance.choice(keys.SERVICES), self._id(), "perform_block", self._lives[who]
         of = self._chance.choice((kind, kind, kind, "", "inhibit", "nothing"))
         return Deed(who, Cancel(id=id, life=life, of=of, reason="why not"), keys.cancel(server))
 
@@ -127,7 +126,7 @@ class Schemer:
         clock = self._chance.choice(("loop", "loop", "sundial"))
         at = Stamp(clock, now + self._chance.choice((0.0, -5.0, 1e9, 1e308)))
         life = self._chance.choice((self._lives[who], *[request.life for request in requests]))
-        server = self._chance.choice(SERVERS)
+        server = self._chance.choice(keys.SERVICES)
         return Deed(who, KeepAlive(live=tuple(kept), at=at, life=life), keys.keep_alive(server))
 
     def _answer(self, who: int, now: Seconds) -> Deed:
@@ -147,7 +146,7 @@ class Schemer:
             life=self._word("life"),
             kind=self._chance.choice(("perform_block", "perform_behavior", "perform_fragment", "request_event", "")),
         )
-        return Deed(who, _told(answer), keys.request_state(self._chance.choice((*SERVERS, "nobody"))))
+        return Deed(who, _told(answer), keys.request_state(self._chance.choice((*keys.SERVICES, "nobody"))))
 
     def _new_life(self, who: int, now: Seconds) -> Deed:
         self._lives[who] = self._chance.choice(("", "life-1", f"life-{now:.3f}"))

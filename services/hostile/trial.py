@@ -27,7 +27,7 @@ from engage_hri.schemas.world import World
 from engage_hri.services.bus.interface import LOG, Hub, Received, read_payload
 from engage_hri.services.bus.memory import MemoryBus, MemoryHub
 from engage_hri.services.hostile.audit import REFUSED, Book, Entry
-from engage_hri.services.hostile.payloads import SERVERS, Payload, Payloads
+from engage_hri.services.hostile.payloads import Payload, Payloads
 from engage_hri.services.hostile.schemes import Deed, Schemer
 from engage_hri.services.hostile.service import NAME as BODY
 from engage_hri.services.hostile.service import LyingBody
@@ -350,7 +350,7 @@ class _Trial:
         self.counts["honest requests"] += len(visitor.asked)
         self.counts.update({f"honest: {end}": count for end, count in visitor.ends().items()})
         lies = "body" in self.attack.kinds and not self.attack.own_body
-        judged = set(SERVERS) & set(self.services) - ({BODY} if lies else set())
+        judged = set(keys.SERVICES) & set(self.services) - ({BODY} if lies else set())
         ended = [f"{name}: {_why(task)}" for name, task in self.running.items() if task.done()]
         self._note("services that ended", ended)
         self._note("requests without outcome", visitor.hung)

@@ -42,6 +42,11 @@ class Timer:
         self._at: Seconds | None = None
         """Kept here: the handles of uvloop do not tell their time when it has come."""
 
+    @property
+    def at(self) -> Seconds | None:
+        """When it is to ring."""
+        return None if self._handle is None else self._at
+
     def set(self, at: Seconds | None) -> None:
         if self._handle is not None:
             if self._at == at:

@@ -19,6 +19,8 @@ REQUEST = re.compile(
     r"(?:move|fix|put) (?P<piece>.+?) so that it is touching the (?P<side>[a-z ]+?) of (?P<landmark>.+)"
 )
 POINTED = ("this", "that")
+THINKING = "ummmm"
+"""Said by a robot that will go on: nothing to answer."""
 
 
 class Utterance(Struct, frozen=True):

@@ -35,10 +35,19 @@ def moves(lay: Lay) -> tuple[Act, ...]:
 
 class ListeningHuman(Human):
     """Looks where the robot points and at its face in between; answers each request by a placement. Leaves after
-    "goodbye".
+    "goodbye". table: whose pieces they move; None: none.
     """
 
-    def __init__(self, table: TangramTable, robot: str = "robot", vary: Callable[[], Seconds] = lambda: 0.0) -> None:
+    ANSWERS: Seconds = 0.5
+    """From the end of the robot's words to what they do about them."""
+    FOLLOWS: Seconds = 0.3
+    """From its point, or look, to theirs."""
+    ACKNOWLEDGES: tuple[Act, ...] = (LookAt(FACE),)
+    """What they do about words that ask for nothing."""
+
+    def __init__(
+        self, table: TangramTable | None, robot: str = "robot", vary: Callable[[], Seconds] = lambda: 0.0
+    ) -> None:
         super().__init__((), robot, vary)
         self._table = table
         self._hearing = Hearing(robot)
@@ -49,10 +58,13 @@ class ListeningHuman(Human):
     def feed(self, message: Message, now: Seconds) -> None:
         match message:
             case ActionBegan(actor=self._robot, action="point", targets=(target,)):
-                self._react((LookAt(target),), 0.3, now)
+                self._react((LookAt(target),), self.FOLLOWS, now)
+        self._listen(message, now)
+
+    def _listen(self, message: Message, now: Seconds) -> None:
         utterance = self._hearing.feed(message)
-        if utterance is not None:
-            self._react(self._answer(utterance), 0.5, now)
+        if utterance is not None and (acts := self._answer(utterance)):
+            self._react(acts, self.ANSWERS, now)
 
     def _react(self, acts: tuple[Act, ...], delay: Seconds, now: Seconds) -> None:
         self.go_on(acts, max(now, now + delay + self._vary()))
@@ -61,5 +73,5 @@ class ListeningHuman(Human):
         """What the words of a whole block make the person do."""
         if "goodbye" in utterance.words:
             return GOES
-        lay = wanted(utterance, self._table)
-        return (LookAt(FACE),) if lay is None else (*moves(lay), Pause(0.2), LookAt(FACE))
+        lay = None if self._table is None else wanted(utterance, self._table)
+        return self.ACKNOWLEDGES if lay is None else (*moves(lay), Pause(0.2), LookAt(FACE))

@@ -16,7 +16,7 @@ from engage_hri.schemas.messages import Message
 from engage_hri.schemas.units import Probability, Seconds
 from engage_hri.services.simulation.chance import Chance, Delays
 from engage_hri.services.simulation.config import Habits
-from engage_hri.services.simulation.hearing import Hearing, Utterance, wanted
+from engage_hri.services.simulation.hearing import THINKING, Hearing, Utterance, wanted
 from engage_hri.services.simulation.human import (
     FACE,
     TABLE,
@@ -41,8 +41,6 @@ QUESTION: Seconds = 1.0
 """ "Which one?" """
 GLANCE_UP: Seconds = 0.2
 """From laying a piece down to looking up."""
-THINKING = "ummmm"
-"""Said by a robot that will go on: nothing to answer."""
 
 
 class _Thought(Struct, order=True):

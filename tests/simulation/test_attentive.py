@@ -7,7 +7,7 @@ from engage_hri.schemas.behaviors import Action
 from engage_hri.schemas.body import WordSpoken
 from engage_hri.schemas.feedback import BlockProgress
 from engage_hri.schemas.units import Stamp
-from engage_hri.services.simulation.attentive import ANSWERS, FOLLOWS, AttentiveHuman
+from engage_hri.services.simulation.attentive import AttentiveHuman
 from engage_hri.services.simulation.human import FACE, Act, Grab, Lay, LookAt, Start, Stop
 from engage_hri.services.simulation.still import Bystander
 from engage_hri.services.tangram.table import TangramTable, tangram_table
@@ -42,8 +42,8 @@ def test_they_look_where_the_robot_looks_and_points(action: Action, target: str,
     human = person()
     human.feed(robot_does(action, target), 1.0)
 
-    assert human.deadline == 1.0 + FOLLOWS
-    assert acts(human, 1.0 + FOLLOWS) == (LookAt(where),)
+    assert human.deadline == 1.0 + AttentiveHuman.FOLLOWS
+    assert acts(human, 1.0 + AttentiveHuman.FOLLOWS) == (LookAt(where),)
 
 
 def test_they_see_only_what_there_is_and_mind_only_the_robot() -> None:
@@ -61,7 +61,7 @@ def test_they_nod_when_it_has_spoken_but_not_when_it_only_thinks() -> None:
 
     says(human, "Is that a cup?", 2.0)
 
-    assert human.deadline == 2.0 + ANSWERS
+    assert human.deadline == 2.0 + AttentiveHuman.ANSWERS
     answer = acts(human, 3.0)
     assert (answer[0], answer[2], answer[-1]) == (Start("nod"), Stop("nod"), LookAt(FACE))
 

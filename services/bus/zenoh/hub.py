@@ -1,6 +1,6 @@
 """The bus over Zenoh: one session per process, its participants beside each other on it.
 
-Zenoh carries; what it leaves open is settled here and in `zenoh_order`: order across keys, history for late
+Zenoh carries; what it leaves open is settled here and in `order`: order across keys, history for late
 subscribers, loss in a cut (it never raises), who is there, and answers that do not come.
 """
 

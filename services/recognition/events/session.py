@@ -8,7 +8,8 @@ Everything is decided by the times of the observations, not of their arrival: wh
 happens before it, at its own time. An answer at the very limit still counts.
 """
 
-from collections.abc import Callable, Set
+from collections.abc import Callable, Container, Set
+from typing import get_args
 
 from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost
 from engage_hri.schemas.attention import HeadOwner
@@ -209,18 +210,15 @@ class Session:
             self._heard_at = at
         elif self._heard_at is not None and at > self._heard_at + SILENCE:
             self._heard_at = None
-            for began in [began for (_, action), began in self._robot_does.items() if action == "speak"]:
-                self._robot_ends(
-                    ActionEnded(actor=self.robot, action="speak", at=began.at, behavior=began.behavior), at
-                )
+            self._robot_stops(at, actions=("speak",))
 
-    def _robot_stops(self, at: Seconds, behaviors: str = "") -> None:
+    def _robot_stops(self, at: Seconds, behaviors: str = "", actions: Container[Action] = get_args(Action)) -> None:
         """Whatever ends have been lost: what the robot says and does with its hands and head is over.
 
-        behaviors: what their ids begin with.
+        behaviors: what their ids begin with. actions: of these only.
         """
         for began in list(self._robot_does.values()):
-            if began.behavior.startswith(behaviors):
+            if began.behavior.startswith(behaviors) and began.action in actions:
                 ended = ActionEnded(
                     actor=self.robot, action=began.action, at=began.at, targets=began.targets, behavior=began.behavior
                 )
