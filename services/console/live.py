@@ -31,7 +31,7 @@ class LiveView:
             self._due = asyncio.get_running_loop().call_later(REDRAW, self._draw)
 
     def _picture(self) -> RenderableType:
-        return render(self.scene, self._console.height)
+        return render(self.scene, self._console.width, self._console.height)
 
     def _draw(self) -> None:
         self._due = None

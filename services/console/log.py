@@ -4,7 +4,6 @@ from msgspec import Struct
 
 from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost
 from engage_hri.schemas.attention import HeadOwner
-from engage_hri.schemas.behaviors import Action
 from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.feedback import BlockProgress, SyncPointProgress, WarningFeedback
 from engage_hri.schemas.messages import Message
@@ -12,16 +11,6 @@ from engage_hri.schemas.recognition import ConnectionEvent, Statistics
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.console import wording
 from engage_hri.services.console.view import OWN_BLOCKS, Scene
-
-VERBS: dict[Action, str] = {
-    "look": "looks",
-    "point": "points",
-    "nod": "nods",
-    "shake": "shakes the head",
-    "speak": "speaks",
-    "act": "moves",
-}
-AT: dict[Action, str] = {"look": "at ", "point": "at ", "nod": "to ", "shake": "to ", "speak": "to ", "act": ""}
 
 
 class Telling(Struct, frozen=True, kw_only=True):
@@ -77,13 +66,12 @@ def _action(message: ActionBegan | ActionEnded | ActorFound | ActorLost, before:
             return f"{actor} has left"
         case ActionEnded(action="speak"):
             # An utterance is told once its last word is out; of people the words are not known.
-            said = [u.text for u in before.said if u.open and u.actor == actor and u.text]
-            return f'{actor}: "{said[-1]}"' if said else None
+            said = [u for u in before.said if u.open and u.actor == actor and u.text]
+            return (
+                f'{actor}: "{said[-1].text}" (from {wording.clock(said[-1].began - before.began)})' if said else None
+            )
         case ActionBegan(action="speak") if actor == before.robot:
             return None
-        case ActionBegan(action="look", targets=targets):
-            return f"{actor} looks {'at ' if targets else ''}{wording.look(targets, before.robot)}"
         case ActionBegan(action=action, targets=targets):
-            to = f" {AT[action]}{wording.look(targets, before.robot)}" if targets else ""
-            return f"{actor} {VERBS[action]}{to}"
+            return " ".join((actor, *filter(None, wording.deed(action, targets, before.robot))))
     return None

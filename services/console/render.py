@@ -1,4 +1,4 @@
-"""Draw a scene with rich. No state: the same scene gives the same picture."""
+"""Draw a scene with rich, as large as the terminal is. No state: the same scene gives the same picture."""
 
 from math import inf
 
@@ -11,118 +11,161 @@ from rich.text import Text
 
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.console import wording
-from engage_hri.services.console.view import EventInView, Point, Scene
+from engage_hri.services.console.view import Actor, EventInView, Point, Scene
 
-POINTS_SHOWN = 11
+HEIGHT = 30
+"""In lines, where nothing says how high the terminal is."""
+SMALL = (72, 20)
+"""Columns and lines below which there are no frames, and no plan beside the people."""
+WIDE = 100
+"""Columns from which a connection event needs no cutting."""
+FRAME = 2
+"""Lines that a frame takes."""
 AHEAD = 4
-"""At least so many of the planned points are among them."""
-UTTERANCES_SHOWN = 5
-EVENTS_SHOWN = 8
-UPPER = POINTS_SHOWN + 4
-"""How high what stands above the connection events is."""
-PEOPLE = 7
-EVENTS_FRAME = 3
+"""At least so many of the planned points are shown."""
 NOTICED: Seconds = 0.1
 """People notice when speech and gesture are further apart."""
-STATE_STYLES = {
-    "started": "yellow",
-    "succeeded": "green",
-    "completed": "green",
-    "failed": "red",
-    "preempted": "dim",
-    "withdrawn": "dim",
-    "superseded": "dim",
-    "lost": "red",
+MARKS = {
+    "started": ("…", "bold yellow"),
+    "succeeded": ("✓", "green"),
+    "completed": ("✓", "green"),
+    "failed": ("✗", "red"),
+    "lost": ("✗", "red"),
+    "preempted": ("-", "dim"),
+    "withdrawn": ("-", "dim"),
+    "superseded": ("-", "dim"),
 }
 
 
-def render(scene: Scene, height: int | None = None) -> RenderableType:
-    """The whole live view. height: of the terminal, 19 lines or more; without it some 30 are taken."""
-    upper = Table.grid(expand=True)
-    upper.add_column(ratio=4)
-    upper.add_column(ratio=5)
-    upper.add_row(Group(_people(scene), _said(scene)), _points(scene))
-    events = EVENTS_SHOWN if height is None else height - UPPER - EVENTS_FRAME - len(scene.notes)
-    parts: list[RenderableType] = [upper, _events(scene, max(1, min(events, EVENTS_SHOWN)))]
-    parts += [Text(f"! {note}", style="yellow", no_wrap=True, overflow="ellipsis") for note in scene.notes]
-    return Group(*parts)
+def render(scene: Scene, width: int = 80, height: int | None = None) -> RenderableType:
+    """The whole live view. width, height: of the terminal, in columns and lines; all of it is used."""
+    height = height or HEIGHT
+    notes: list[RenderableType] = [
+        Text(f"! {n}", style="yellow", no_wrap=True, overflow="ellipsis") for n in scene.notes
+    ]
+    small = width < SMALL[0] or height < SMALL[1]
+    notes = notes[-1:] if small else notes
+    draw = _small if small else _framed
+    return Group(*draw(scene, width, height - len(notes)), *notes)
 
 
-def _people(scene: Scene) -> Panel:
-    table = Table.grid(padding=(0, 1))
-    for actor in sorted(scene.actors, key=lambda actor: actor.id != scene.robot):
-        style = "cyan" if actor.id == scene.robot else "magenta"
-        if not actor.present:
-            table.add_row(Text(actor.id, style=style), Text("has left", style="dim"))
-            continue
-        look = actor.look
-        doing = Text("looks at " if look and look.targets else "looks ")
-        doing += Text(wording.look(look.targets, scene.robot) if look else "around", style="bold")
-        for action in actor.doing:
-            if action.action == "point":
-                doing += Text("  points ") + Text(wording.names(action.targets), style="bold")
-            elif action.action == "act":
-                doing += Text("  moves ") + Text(wording.names(action.targets), style="bold")
-            elif action.action in ("nod", "shake", "speak"):
-                doing += Text(f"  {action.action}s")
-        table.add_row(Text(actor.id, style=style), doing)
+def _small(scene: Scene, width: int, height: int) -> list[RenderableType]:
+    people = _people(scene)[: max(1, height // 4)]
+    rest = height - 1 - len(people)
+    words = min(3, rest // 3)
+    return [_title(scene), *people, _LastLines(_said(scene), words), _events(scene, width, rest - words)]
+
+
+def _framed(scene: Scene, width: int, height: int) -> list[RenderableType]:
+    """People and words on the left, the plan on the right, and below what this is about."""
+    upper = max(11, height * 2 // 5)
+    people = _people(scene)
+    doing = min(max(5, len(people) + FRAME), upper // 2)
+    left = Group(
+        _panel(_LastLines(Group(*people[: doing - FRAME]), doing - FRAME), _title(scene)),
+        _panel(_LastLines(_said(scene), upper - doing - FRAME), Text("said")),
+    )
+    top = Table.grid(expand=True)
+    top.add_column(ratio=4)
+    top.add_column(ratio=5)
+    top.add_row(left, _plan(scene, upper - FRAME))
+    shown = height - upper - FRAME
+    return [top, _panel(_events(scene, width - 4, shown), _often(scene))]
+
+
+def _panel(inner: RenderableType, title: Text) -> Panel:
+    return Panel(inner, title=title, title_align="left", box=box.ROUNDED)
+
+
+def _title(scene: Scene) -> Text:
+    return Text(f"engage {wording.clock(scene.now - scene.began)}", style="bold")
+
+
+def _often(scene: Scene) -> Text:
+    often = scene.session.mtbce if scene.session else None
+    return Text("connection events" if often is None else f"connection events, one every {wording.seconds(often)}")
+
+
+def _style(scene: Scene, actor: str) -> str:
+    return "cyan" if actor == scene.robot else "magenta"
+
+
+def _people(scene: Scene) -> list[Text]:
+    """A line for each person, the robot first; then who owns its head."""
+    actors = sorted(scene.actors, key=lambda actor: actor.id != scene.robot)
+    wide = max((len(actor.id) for actor in actors), default=0)
+    lines = [
+        Text(actor.id.ljust(wide) + " ", style=_style(scene, actor.id)) + _doing(scene, actor) for actor in actors
+    ]
     if scene.owner is not None:
-        table.add_row(Text("head", style="dim"), Text(wording.claim(scene.owner)))
+        line = Text(f"{'head'.ljust(wide)} ", style="dim") + Text(wording.claim(scene.owner))
         if scene.waiting:
-            waiting = ", ".join(claim.kind for claim in scene.waiting)
-            table.add_row("", Text(f"waiting: {waiting}", style="dim"))
-    mtbce = wording.seconds(scene.session.mtbce if scene.session else None)
-    title = Text(f"engage {wording.clock(scene.now - scene.began)}  MTBCE {mtbce}", style="bold")
-    return Panel(table, title=title, title_align="left", box=box.ROUNDED, height=PEOPLE)
+            line += Text(f"; waiting: {', '.join(claim.kind for claim in scene.waiting)}", style="dim")
+        lines.append(line)
+    for line in lines:
+        line.no_wrap, line.overflow = True, "ellipsis"
+    return lines
 
 
-def _said(scene: Scene) -> Panel:
+def _doing(scene: Scene, actor: Actor) -> Text:
+    if not actor.present:
+        return Text("has left", style="dim")
+    look = actor.look
+    doing = Text.assemble("looks ", ("around", "bold")) if look is None else Text()
+    for action in sorted(actor.doing, key=lambda doing: doing.action != "look"):
+        if doing:
+            doing += Text(", ")
+        verb, target = wording.deed(action.action, action.targets, scene.robot)
+        doing += Text(verb) + Text(f" {target}" if target else "", style="bold")
+    return doing
+
+
+def _said(scene: Scene) -> RenderableType:
+    """Words as they are said; of people the words are not known."""
     lines = []
-    for utterance in scene.said[-UTTERANCES_SHOWN:]:
-        style = "cyan" if utterance.actor == scene.robot else "magenta"
-        text = Text(f"{utterance.actor}: ", style=style)
-        text.append(utterance.text or "…", style="" if utterance.open else "dim")
+    for utterance in scene.said:
+        text = Text(f"{utterance.actor}: ", style=_style(scene, utterance.actor))
+        text.append(utterance.text or "…", style="bold" if utterance.open else "dim")
         if utterance.open:
             text.append("▌", style="blink")
         lines.append(text)
-    height = UPPER - PEOPLE
-    newest = _LastLines(Group(*lines), height - 2)
-    return Panel(newest, title="said", title_align="left", box=box.ROUNDED, height=height)
+    return Group(*lines)
 
 
 class _LastLines:
-    """The end of what may be too high: a panel would cut that off, and the newest stands there."""
+    """Exactly `height` lines: the end of what is higher, where the newest stands."""
 
     def __init__(self, whole: RenderableType, height: int) -> None:
         self._whole = whole
         self._height = height
 
     def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
-        for line in console.render_lines(self._whole, options.update(height=None))[-self._height :]:
+        lines = console.render_lines(self._whole, options.update(height=None))[-self._height :]
+        for line in (*lines, *([Segment(" ")] for _ in range(self._height - len(lines)))):
             yield from line
             yield Segment.line()
 
 
-def _points(scene: Scene) -> Panel:
+def _plan(scene: Scene, height: int) -> Panel:
+    """The block that runs: when each of its points was planned, and when the body reported it."""
     block = scene.block
     table = Table(box=None, expand=True, pad_edge=False)
-    table.add_column("sync points (s)", no_wrap=True, overflow="ellipsis", ratio=1)
-    for name in ("plan", "real", "slip"):
+    table.add_column("seconds", no_wrap=True, overflow="ellipsis", ratio=1)
+    for name in ("planned", "measured", "late"):
         table.add_column(name, justify="right", no_wrap=True, min_width=5)
-    for points in _window(_together(block.points)) if block else ():
+    for points in _window(_together(block.points), height - 1) if block else ():
         first = points[0]
-        came, slip = first.realised is not None, first.slip
-        late = slip is not None and abs(slip) >= NOTICED
-        name = f"{first.behavior}:{' '.join(point.sync for point in points)}"
+        came, late = first.realised is not None, first.slip
+        noticed = late is not None and abs(late) >= NOTICED
         table.add_row(
-            Text(name, style="" if came else "dim"),
+            Text(f"{first.behavior}: {', '.join(point.sync for point in points)}", style="" if came else "dim"),
             wording.number(first.planned),
             Text(wording.number(first.realised), style="green" if came else "dim"),
-            Text(wording.number(slip, sign=True), style="yellow" if late else "dim"),
+            Text(wording.number(late, sign=True), style="yellow" if noticed else "dim"),
         )
     # Ids are other people's: as Text, so that brackets in them are not read as markup.
-    title = Text(f"block {block.id} {block.status or 'running'}" if block else "no block yet")
-    return Panel(table, title=title, title_align="left", box=box.ROUNDED, height=UPPER)
+    title = Text(f"{block.id}: {block.status or 'running'}" if block else "the robot does nothing yet")
+    return _panel(_LastLines(table, height), title)
 
 
 def _together(points: tuple[Point, ...]) -> list[list[Point]]:
@@ -143,33 +186,41 @@ def _ms(value: float | None) -> int | None:
     return None if value is None else round(1000 * value)
 
 
-def _window(rows: list[list[Point]]) -> list[list[Point]]:
+def _window(rows: list[list[Point]], shown: int) -> list[list[Point]]:
     """The newest realised rows and the next planned ones, by time."""
     came = sorted((row for row in rows if row[0].realised is not None), key=lambda row: row[0].realised or 0.0)
     to_come = [row for row in rows if row[0].realised is None]
     to_come.sort(key=lambda row: inf if row[0].planned is None else row[0].planned)
-    ahead = min(len(to_come), max(AHEAD, POINTS_SHOWN - len(came)))
-    behind = POINTS_SHOWN - ahead
+    ahead = min(len(to_come), max(min(AHEAD, shown // 2), shown - len(came)))
+    behind = shown - ahead
     return [*(came[-behind:] if behind else ()), *to_come[:ahead]]
 
 
-def _events(scene: Scene, shown: int) -> Panel:
+def _events(scene: Scene, width: int, height: int) -> RenderableType:
+    """The newest last, a line each; as many as there is room for. Narrow: without why each was begun."""
+    narrow, wide = width < SMALL[0] - 2 * FRAME, width >= WIDE - 2 * FRAME
     table = Table(box=None, expand=True, pad_edge=False, padding=(0, 1, 0, 0))
-    for name, width in (("at", 6), ("connection event", 18), ("who", 11), ("about", 8), ("cause", 5)):
-        table.add_column(name, no_wrap=True, overflow="ellipsis", min_width=width)
-    table.add_column("outcome", no_wrap=True, ratio=1, min_width=16)
-    for row in scene.events[-shown:]:
-        table.add_row(*_event(row, scene))
-    return Panel(table, title="connection events", title_align="left", box=box.ROUNDED, height=shown + EVENTS_FRAME)
+    for name, least in (("", 1), ("at", 6), ("event", 13), ("who", 11), ("about", 5), ("why", 5), ("outcome", 9)):
+        if not (narrow and name == "why"):
+            # What is left over goes to the last column, or where that would be cut, is taken from the objects.
+            ratio = 1 if name == ("outcome" if wide else "about") else None
+            most = None if wide or name != "outcome" else 10 if narrow else 17
+            table.add_column(name, no_wrap=True, overflow="ellipsis", min_width=least, max_width=most, ratio=ratio)
+    for row in scene.events[-max(1, height - 1) :]:
+        *cells, why, outcome = _event(row, scene)
+        table.add_row(*cells, *(() if narrow else (why,)), outcome)
+    return _LastLines(table, height)
 
 
 def _event(row: EventInView, scene: Scene) -> tuple[RenderableType, ...]:
     event = row.event
+    mark, style = MARKS[event.state]
     return (
-        wording.clock(row.began - scene.began),
-        Text(wording.KINDS[event.kind]),
+        Text(mark, style=style),
+        Text(wording.clock(row.began - scene.began), style="dim"),
+        Text(wording.KINDS[event.kind], style="bold" if event.state == "started" else ""),
         Text(f"{event.initiator}→{event.responder}"),
         Text(wording.names(event.objects)),
-        Text(event.cause),
-        Text(wording.decision(event), style=STATE_STYLES[event.state]),
+        Text(event.cause, style="dim"),
+        Text(wording.decision(event), style=style),
     )

@@ -108,7 +108,7 @@ def render(tally: Tally, robot: str) -> RenderableType:
             if row.count:
                 numbers = (row.count, row.succeeded, row.failed, row.failed_optional, row.other + row.open)
                 table.add_row(Text(who), name, *map(str, numbers), _delays(row.delays))
-    return Group(table, Text(_NOTE, style="dim"), Text(_last_line(tally)))
+    return Group(table, Text(_NOTE, style="dim"), Text(_last_lines(tally)))
 
 
 _NOTE = (
@@ -123,10 +123,10 @@ def _delays(delays: tuple[Seconds, ...]) -> str:
     return " ".join(f"{value:.2f}" for value in (min(delays), sum(delays) / len(delays), max(delays)))
 
 
-def _last_line(tally: Tally) -> str:
-    parts = [f"duration {wording.clock(tally.duration)}"]
+def _last_lines(tally: Tally) -> str:
+    count = f"{tally.fragments} fragments" + (f", {tally.unfinished} not finished" if tally.unfinished else "")
+    lines = [f"duration {wording.clock(tally.duration)}; {count}"]
     if tally.session is not None:
-        parts.append(f"MTBCE {wording.seconds(tally.session.mtbce)}")
-        parts.append(f"longest gap {wording.seconds(tally.session.max_gap)}")
-    parts.append(f"{tally.fragments} fragments" + (f", {tally.unfinished} not finished" if tally.unfinished else ""))
-    return "; ".join(parts)
+        mean, longest = wording.seconds(tally.session.mtbce), wording.seconds(tally.session.max_gap)
+        lines.append(f"mean time between connection events (MTBCE) {mean}; longest gap {longest}")
+    return "\n".join(lines)

@@ -21,8 +21,8 @@ from engage_hri.schemas.recognition import ConnectionEvent, Statistics, WindowSt
 from engage_hri.schemas.speakable import joined
 from engage_hri.schemas.units import Seconds
 
-UTTERANCES_KEPT = 8
-EVENTS_KEPT = 12
+UTTERANCES_KEPT = 40
+EVENTS_KEPT = 100
 NOTES_KEPT = 3
 ENDED_BLOCKS_KEPT = 2
 OWN_BLOCKS = ("maintenance-", "response-")

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 
 from engage_hri.schemas.attention import Claim
-from engage_hri.schemas.behaviors import EventKind
+from engage_hri.schemas.behaviors import Action, EventKind
 from engage_hri.schemas.feedback import WarningFeedback
 from engage_hri.schemas.recognition import ConnectionEvent, Statistics
 from engage_hri.schemas.units import Seconds
@@ -38,12 +38,25 @@ def clock(value: Seconds) -> str:
     return f"{int(minutes)}:{rest:04.1f}"
 
 
-def look(targets: Sequence[str], robot: str) -> str:
-    """What someone looks at. An actor's id as a target means its face."""
+VERBS: dict[Action, tuple[str, str]] = {
+    "look": ("looks", "at "),
+    "point": ("points", "at "),
+    "nod": ("nods", "to "),
+    "shake": ("shakes the head", "to "),
+    "speak": ("speaks", "to "),
+    "act": ("moves", ""),
+}
+
+
+def deed(action: Action, targets: Sequence[str], robot: str) -> tuple[str, str]:
+    """What someone does, and at, to or with what: `looks`, `at the robot`. An actor's id as a target means its face.
+
+    A look without targets is a look away; other actions may have none.
+    """
+    verb, preposition = VERBS[action]
     if not targets:
-        return "away"
-    names = ["the robot" if target == robot else target for target in targets]
-    return " and ".join(names)
+        return verb, "away" if action == "look" else ""
+    return verb, preposition + " and ".join("the robot" if target == robot else target for target in targets)
 
 
 def decision(event: ConnectionEvent) -> str:

@@ -195,7 +195,7 @@ def test_what_only_pointing_could_mean_fails_if_it_is_out_of_reach(engage: Engag
 def test_the_log_says_what_happens(engage: Engage, files: dict[str, Path]) -> None:
     result = engage(*PLAY, files["hello"])
 
-    assert 'robot: "A rectangle."' in result.out
+    assert 'robot: "A rectangle." (from ' in result.out
     assert "robot looks at rectangle" in result.out
     assert "block hello: done" in result.out
 

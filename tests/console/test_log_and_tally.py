@@ -32,7 +32,7 @@ def test_the_log_tells_the_scene_in_order() -> None:
         "0:00.6  b:s:start at 0.60 s (planned 0.50 s)",
         "0:01.0  * directed gaze, robot → human about rectangle (reference): waiting",
         "0:01.9  * directed gaze, robot → human about rectangle (reference): succeeded 0.90 s",
-        '0:02.0  robot: "a rectangle"',
+        '0:02.0  robot: "a rectangle" (from 0:00.6)',
     ]
 
 
@@ -89,9 +89,8 @@ def test_the_summary_names_kinds_outcomes_delays_and_pace() -> None:
     for expected in (
         "directed gaze",
         "0.90 0.90 0.90",
-        "MTBCE 4.20 s",
-        "duration 0:02.5",
-        "1 fragments, 1 not finished",
+        "(MTBCE) 4.20 s",
+        "duration 0:02.5; 1 fragments, 1 not finished",
     ):
         assert expected in text
 

@@ -22,7 +22,7 @@ def scene() -> view.Scene:
 
 def drawn(scene: view.Scene, width: int = 120, height: int | None = None) -> str:
     console = Console(width=width, record=True, file=StringIO())
-    console.print(render(scene, height))
+    console.print(render(scene, width, height))
     return console.export_text()
 
 
@@ -111,19 +111,64 @@ def test_the_view_says_who_speaks_who_looks_where_and_who_owns_the_head(scene: v
     text = drawn(scene)
 
     for expected in (
-        "robot: a rectangle", "looks at rectangle", "looks at the robot", "fragment: rectangle", "MTBCE 4.20 s",
-        "s:start", "0.60", "+0.10", "directed gaze", "robot→human", "succeeded 0.90 s",
+        "robot: a rectangle", "looks at rectangle", "looks at the robot", "fragment: rectangle", "one every 4.20 s",
+        "s: start", "0.60", "+0.10", "directed gaze", "robot→human", "succeeded 0.90 s",
     ):  # fmt: skip
         assert expected in text
 
 
-@pytest.mark.parametrize("width", [80, 100, 200])
-def test_the_view_fits_the_terminal(scene: view.Scene, width: int) -> None:
-    assert max(map(len, drawn(scene, width).splitlines())) <= width
+SIZES = [(60, 15), (80, 24), (100, 32), (120, 40), (200, 60), (40, 10)]
+
+
+@pytest.mark.parametrize("empty", [True, False])
+@pytest.mark.parametrize(("width", "height"), SIZES)
+def test_the_view_is_exactly_as_large_as_the_terminal(
+    scene: view.Scene, width: int, height: int, empty: bool
+) -> None:
+    lines = drawn(view.empty("robot", 0.0) if empty else scene, width, height).splitlines()
+
+    assert max(map(len, lines)) <= width
+    assert len(lines) == height
+
+
+@pytest.mark.parametrize(("width", "height"), SIZES)
+def test_events_fill_the_height_there_is(width: int, height: int) -> None:
+    scene = view.empty("robot", 0.0)
+    for number in range(99):
+        scene = view.feed(
+            scene, *event(f"e{number}", "succeeded", float(number), objects=(f"p{number}",), delay=0.25)
+        )
+
+    shown = [line for line in drawn(scene, width, height).splitlines() if "✓" in line]
+
+    assert "1:38.0" in shown[-1]
+    assert width < 60 or "p98" in shown[-1]
+    assert width < 60 or "succeeded" in shown[-1]
+    frames = 0 if width < 72 or height < 20 else 3
+    assert len(shown) >= height // 2 - frames, "half of the picture at least"
+
+
+def test_a_small_view_has_who_does_what_the_words_and_the_newest_event(scene: view.Scene) -> None:
+    text = drawn(scene, 60, 15)
+
+    for expected in ("robot looks at rectangle", "human looks at the robot", "robot: a rectangle", "✓", "succeeded"):
+        assert expected in text
+
+
+def test_what_somebody_does_beside_looking_is_told_after_it(scene: view.Scene) -> None:
+    for action in ("point", "nod"):
+        scene = view.feed(scene, ActionBegan(actor="human", action=action, at=at(12.0), targets=("cup",)), 12.0)
+    scene = view.feed(scene, ActionBegan(actor="human", action="look", at=at(12.0)), 12.0)
+
+    assert "human looks away, points at cup, nods to cup" in drawn(scene, 200)
+
+
+def test_the_view_has_no_word_that_a_visitor_must_look_up(scene: view.Scene) -> None:
+    assert not [word for word in ("MTBCE", "slip", "sync point") if word in drawn(scene)]
 
 
 def test_an_empty_scene_can_be_drawn() -> None:
-    assert "no block yet" in drawn(view.empty("robot", 0.0))
+    assert "does nothing yet" in drawn(view.empty("robot", 0.0))
 
 
 def test_brackets_in_ids_are_not_markup() -> None:
@@ -139,7 +184,7 @@ def test_brackets_in_ids_are_not_markup() -> None:
 
 def test_the_newest_event_and_words_are_there_on_a_small_terminal() -> None:
     scene = view.empty("robot", 0.0)
-    for number in range(9):
+    for number in range(30):
         scene = view.feed(scene, *event(f"e{number}", "started", float(number), objects=(f"piece-{number}",)))
     said = tuple(view.Utterance(actor="robot", began=0.0, text="so many words " * 6 + str(n)) for n in range(5))
     scene = msgspec.structs.replace(scene, said=said, notes=("beware",))
@@ -147,10 +192,10 @@ def test_the_newest_event_and_words_are_there_on_a_small_terminal() -> None:
     text = drawn(scene, width=80, height=24)
 
     assert len(text.rstrip("\n").splitlines()) == 24
-    assert "piece-8" in text
+    assert "piece-29" in text
     assert "words 4" in text
     assert "! beware" in text
-    assert "piece-3" not in text
+    assert "piece-9" not in text
 
 
 def test_people_look_at_things_away_or_around(scene: view.Scene) -> None:
