@@ -60,7 +60,7 @@ LAYERS = {
     "schemas": "documents > *",
     "services": "commandline > collaboration console control generation hostile realizer recognition simulation study"
     " > client > requests > runtime > bus > tangram",
-    "services/bus": "memory zenoh > interface",
+    "services/bus": "memory zenoh > interface payloads > journal",
     "services/control": "service > bodies > torso > voice > actions waiting > body > variability > config",
     "services/generation": "service > conductor > performance > body_link fragment_check pipeline > block head"
     " > references turns > permits > config",

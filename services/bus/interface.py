@@ -13,19 +13,15 @@ from enum import Enum, auto
 from types import TracebackType
 from typing import Generic, Self, TypeVar
 
-import msgspec
 from msgspec import Struct
 
 from engage_hri.schemas import keys
-from engage_hri.schemas.blocks import Block, PerformBlock
-from engage_hri.schemas.documents.xml_decode import decode_xml
-from engage_hri.schemas.faults import EngageError, Fault, InputRefused
-from engage_hri.schemas.fragments import PerformFragment
-from engage_hri.schemas.messages import Message, decode
-from engage_hri.schemas.presence import PeerAlive, PeerGone
-from engage_hri.schemas.requests import Request, Unreadable, kind_of, life_of
+from engage_hri.schemas.faults import EngageError, Fault
+from engage_hri.schemas.messages import Message
+from engage_hri.schemas.requests import Request, kind_of, life_of
 from engage_hri.schemas.status import BusHealth
 from engage_hri.schemas.units import Seconds, Stamp
+from engage_hri.services.bus import journal
 
 LOG = logging.getLogger("engage")
 """What is written here at level ERROR is a bug, and fails a test that did not expect it."""
@@ -183,6 +179,7 @@ class Bus(ABC):
     role: what it may be to the others, one of `keys.ROLES`; stands in the keys of its commands.
     clock: the clock that `now` reads, the same for all processes that can compare their times directly.
     run: which life of the participant this is. failures: how often something went wrong here that was contained.
+    log: where it tells what happens (`services/bus/journal.py`).
     """
 
     robot: str
@@ -191,6 +188,7 @@ class Bus(ABC):
     clock: str
     run: str
     failures: int = 0
+    log: logging.Logger
     _life_numbers: Iterator[int]
     """What no former participant of this name in this run has used."""
 
@@ -232,25 +230,30 @@ class Bus(ABC):
             reason=reason, where=_told(what), advice="this is a bug: the log has its traceback", service=self.name
         )
         self.failures += 1
-        LOG.error("%s: %s", self.name, fault, exc_info=error)
+        self.log.error("%s: %s", self.name, fault, exc_info=error)
         self._complain(fault)
         return fault
 
     def report(self, fault: Fault) -> None:
         """Log, count and tell a mistake of this participant."""
         self.failures += 1
-        LOG.error("%s: %s", self.name, fault)
+        self.log.error("%s: %s", self.name, fault)
         self._complain(fault)
 
     def _complain(self, fault: Fault) -> None:
         try:
             self.publish(keys.fault(self.name), fault)
         except Exception:
-            LOG.exception("%s: the fault could not be told", self.name)
+            self.log.exception("%s: the fault could not be told", self.name)
 
-    @abstractmethod
     def publish(self, key: str, message: Message) -> None:
         """Send to all subscribers of `key`, this process' own included. Never raises for want of a listener."""
+        journal.note(self.log, key, message)
+        self._send(key, message)
+
+    @abstractmethod
+    def _send(self, key: str, message: Message) -> None:
+        """Publish; nothing after the participant has left."""
 
     @abstractmethod
     def subscribe(self, *patterns: str, keep: Keep = Keep.EVERY, capacity: int = 4096) -> Subscription:
@@ -352,46 +355,3 @@ class Hub(ABC):
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         await self.close()
-
-
-LOCAL = (PeerAlive, PeerGone, Unreadable)
-"""Messages that no payload may hold: who could send them could end what others have asked for."""
-
-
-def read_payload(payload: bytes, encoding: str, key: str, source: str) -> Message:
-    """The message that another program sent, in any encoding. Raises InputRefused.
-
-    XML holds a block or a fragment; the request for it goes by its id.
-    """
-    if encoding.partition(";")[0] not in ("application/xml", "text/xml"):
-        message = decode(payload, encoding)
-        if isinstance(message, LOCAL):
-            reason = f"{type(message).__name__} is what each bus makes for its own subscribers; it is never sent"
-            raise InputRefused(Fault(reason=reason))
-        return message
-    thing = decode_xml(payload, key)
-    requester = keys.requester_of(key) or source
-    if isinstance(thing, Block):
-        return PerformBlock(id=thing.id, requester=requester, block=thing)
-    return PerformFragment(id=thing.id, requester=requester, fragment=thing)
-
-
-class _Head(Struct):
-    """As much of a request as its answer needs."""
-
-    id: str = ""
-    life: str = ""
-    type: str = ""
-
-
-def unreadable(error: EngageError, key: str, payload: bytes = b"", encoding: str = "") -> Unreadable | None:
-    """What the server of `key` gets to hear of a bad payload: it owes an answer. None on keys that have no server."""
-    if keys.key_class(key) != "cmd":
-        return None
-    codec = msgspec.json if encoding.startswith("application/json") else msgspec.msgpack
-    try:
-        head = codec.decode(payload, type=_Head)
-    except (msgspec.DecodeError, UnicodeDecodeError, RecursionError):
-        head = _Head()
-    id = getattr(error, "block", None) or head.id
-    return Unreadable(id=id, life=head.life, kind=head.type, fault=error.fault)

@@ -15,17 +15,16 @@ from engage_hri.schemas.messages import Message, decode, encode, published
 from engage_hri.schemas.presence import PeerAlive, PeerGone
 from engage_hri.schemas.status import BusHealth
 from engage_hri.schemas.units import Probability, Seconds, Stamp
+from engage_hri.services.bus import journal
 from engage_hri.services.bus.interface import (
-    LOCAL,
     Answer,
     Bus,
     Hub,
     Keep,
     Received,
     Subscription,
-    read_payload,
-    unreadable,
 )
+from engage_hri.services.bus.payloads import LOCAL, read_payload, unreadable
 
 
 class Faults(Struct, frozen=True, kw_only=True):
@@ -173,6 +172,7 @@ class MemoryHub(Hub):
         return tuple(sorted(bus.name for bus in self._buses.values() if bus.is_alive))
 
     def announce(self, name: str, message: PeerAlive | PeerGone) -> None:
+        journal.note_presence(message)
         for bus in list(self._buses.values()):
             bus.deliver(Received(keys.alive(name), message, name, self._loop.time()), self.sent + 1)
 
@@ -211,6 +211,7 @@ class MemoryBus(Bus):
         self.robot = hub.robot
         self.name = name
         self.role = role
+        self.log = journal.logger(role)
         self.run = run
         self._life_numbers = count(1)
         self.is_alive = False
@@ -233,7 +234,7 @@ class MemoryBus(Bus):
     def local(self, stamp: Stamp) -> Seconds:
         return stamp.seconds
 
-    def publish(self, key: str, message: Message) -> None:
+    def _send(self, key: str, message: Message) -> None:
         if not self._gone:
             self._hub.send(self.name, key, message)
 

@@ -24,8 +24,9 @@ from engage_hri.schemas.requests import Cancel
 from engage_hri.schemas.status import AskStatus, Status
 from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.world import World
-from engage_hri.services.bus.interface import LOG, Hub, Received, read_payload
+from engage_hri.services.bus.interface import LOG, Hub, Received
 from engage_hri.services.bus.memory import MemoryBus, MemoryHub
+from engage_hri.services.bus.payloads import read_payload
 from engage_hri.services.hostile.audit import REFUSED, Book, Entry
 from engage_hri.services.hostile.payloads import Payload, Payloads
 from engage_hri.services.hostile.schemes import Deed, Schemer

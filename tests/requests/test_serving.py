@@ -15,8 +15,8 @@ from engage_hri.schemas.messages import encode_json
 from engage_hri.schemas.presence import PeerAlive, PeerGone
 from engage_hri.schemas.requests import Accepted, Cancel, Heard, KeepAlive, Kept, Outdated, Refused, Request
 from engage_hri.schemas.units import Stamp
-from engage_hri.services.bus.interface import read_payload
 from engage_hri.services.bus.memory import MemoryHub
+from engage_hri.services.bus.payloads import read_payload
 from engage_hri.services.requests.asking import Asking, RequestRefused, TellEnd
 from engage_hri.services.requests.asking import Publish as AskedToPublish
 from engage_hri.services.requests.names import Names

@@ -19,6 +19,7 @@ from engage_hri.schemas.faults import EngageError, Fault, InputRefused, NoReply
 from engage_hri.schemas.messages import Message, decode, encode, encoding_of, published
 from engage_hri.schemas.status import BusHealth
 from engage_hri.schemas.units import Seconds, Stamp
+from engage_hri.services.bus import journal
 from engage_hri.services.bus.interface import LOG, Answer, Bus, Hub, Keep, Received, Subscription
 from engage_hri.services.bus.zenoh.clocks import Clocks
 from engage_hri.services.bus.zenoh.order import Envelope, Ledger, Pulse
@@ -174,6 +175,7 @@ class ZenohBus(Bus):
         self.robot = hub.robot
         self.name = name
         self.role = role
+        self.log = journal.logger(role)
         self._life_numbers = hub.life_numbers
         self.clock = hub.clocks.own
         self.run = hub.run
@@ -199,7 +201,7 @@ class ZenohBus(Bus):
     def local(self, stamp: Stamp) -> Seconds:
         return self._hub.clocks.local(stamp)
 
-    def publish(self, key: str, message: Message) -> None:
+    def _send(self, key: str, message: Message) -> None:
         if not self._gone:
             self._hub.publish(self, key, message)
 

@@ -12,7 +12,9 @@ from engage_hri.schemas.faults import EngageError
 from engage_hri.schemas.messages import Message
 from engage_hri.schemas.presence import PeerAlive, PeerGone
 from engage_hri.schemas.requests import Unreadable
-from engage_hri.services.bus.interface import Bus, Received, Subscription, read_payload, unreadable
+from engage_hri.services.bus import journal
+from engage_hri.services.bus.interface import Bus, Received, Subscription
+from engage_hri.services.bus.payloads import read_payload, unreadable
 from engage_hri.services.bus.zenoh.order import Envelope, Follower, Ledger, Missing, Past, Pulse, Written
 from engage_hri.services.bus.zenoh.peers import BAD, Peers, finish
 from engage_hri.services.bus.zenoh.session import Doorway
@@ -240,6 +242,7 @@ class Readers:
 
     def participant_changed(self, name: str, run: str, there: bool) -> None:
         message = PeerAlive(participant=name, run=run) if there else PeerGone(participant=name)
+        journal.note_presence(message)
         for reader in self._readers:
             self._offer_presence(reader, message)
 

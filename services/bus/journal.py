@@ -1,0 +1,120 @@
+"""What the log tells of a message as it is published, and of who comes and goes: one line, without the words spoken.
+
+A line for each block, fragment and turn that has ended, each connection event that is decided, each person and peer
+that comes or goes, each warning and refusal; at level DEBUG one for every message but the streams. Loggers are named
+`engage.<service>`, or `engage.<role>` for who is no service; peers are told by `engage.bus`.
+"""
+
+import logging
+from collections.abc import Callable
+from typing import Any
+
+from engage_hri.schemas import keys
+from engage_hri.schemas.actions import ActorFound, ActorLost
+from engage_hri.schemas.faults import Fault
+from engage_hri.schemas.feedback import BlockProgress, WarningFeedback
+from engage_hri.schemas.fragments import FragmentOutcome, TurnClosed
+from engage_hri.schemas.messages import Message
+from engage_hri.schemas.presence import PeerAlive, PeerGone
+from engage_hri.schemas.recognition import ENDINGS, ConnectionEvent
+from engage_hri.schemas.requests import Refused
+from engage_hri.schemas.units import Seconds
+
+DEBUG, INFO, WARNING = logging.DEBUG, logging.INFO, logging.WARNING
+Entry = tuple[int, str]
+"""Level and text."""
+
+
+def logger(name: str) -> logging.Logger:
+    """Of a service, or of all participants of a role."""
+    return logging.getLogger(f"engage.{name}")
+
+
+def entry(message: Message) -> Entry:
+    """The line for a message that is published."""
+    tell = _TOLD.get(type(message))
+    return tell(message) if tell else _any(message)
+
+
+def presence(message: PeerAlive | PeerGone) -> Entry:
+    """The line for a participant that has come or gone."""
+    if isinstance(message, PeerGone):
+        return INFO, f"peer {message.participant}: gone"
+    return INFO, f"peer {message.participant}: here, life {message.run or 'unknown'}"
+
+
+def _any(message: Message) -> Entry:
+    config = message.__struct_config__
+    about = getattr(message, "id", "") or getattr(message, "block", "")
+    return DEBUG, f"{config.tag} {about}".rstrip()
+
+
+def _block(message: BlockProgress) -> Entry:
+    if message.progress == "start":
+        return DEBUG, f"block {message.block}: started"
+    return INFO, f"block {message.block}: {message.status} after {_seconds(message.time)}"
+
+
+def _warning(message: WarningFeedback) -> Entry:
+    place = ":".join(part for part in (message.block, message.behavior) if part)
+    return WARNING, f"block {place}: {message.kind}: {message.message}"
+
+
+def _fragment(message: FragmentOutcome) -> Entry:
+    more = (
+        f": {message.fault}" if message.fault else f", replaced by {message.replaced_by}" * bool(message.replaced_by)
+    )
+    return INFO, f"fragment {message.fragment} of {message.requester}: {message.status}{more}"
+
+
+def _turn(message: TurnClosed) -> Entry:
+    reason = f" ({message.reason})" if message.reason else ""
+    return INFO, f"turn {message.turn} to {message.addressee}: {message.status}{reason}"
+
+
+def _event(message: ConnectionEvent) -> Entry:
+    level = INFO if message.state == "succeeded" or message.state in ENDINGS - {"completed"} else DEBUG
+    delay = "" if message.delay is None else f" after {_seconds(message.delay)}"
+    about = f" about {', '.join(message.objects)}" if message.objects else ""
+    who = f"{message.initiator} to {message.responder}"
+    return level, f"event {message.id}: {message.kind} from {who}{about}: {message.state}{delay}"
+
+
+def _refused(message: Refused) -> Entry:
+    return WARNING, f"refused {message.kind} {message.id} of {message.requester}: {message.fault}"
+
+
+def _fault(message: Fault) -> Entry:
+    return DEBUG, "fault told"  # who tells of one has logged it, with its traceback
+
+
+def _actor(message: ActorFound | ActorLost) -> Entry:
+    return INFO, f"person {message.actor}: {'here' if isinstance(message, ActorFound) else 'gone'}"
+
+
+def _seconds(value: Seconds) -> str:
+    return f"{value:.2f} s"
+
+
+_TOLD: dict[type, Callable[[Any], Entry]] = {
+    BlockProgress: _block,
+    WarningFeedback: _warning,
+    FragmentOutcome: _fragment,
+    TurnClosed: _turn,
+    ConnectionEvent: _event,
+    Refused: _refused,
+    Fault: _fault,
+    ActorFound: _actor,
+    ActorLost: _actor,
+}
+
+
+def note(log: logging.Logger, key: str, message: Message) -> None:
+    """Write the line of a message that is published under the key. What no log wants costs a look at its level."""
+    if type(message) in _TOLD or (log.isEnabledFor(DEBUG) and keys.key_class(key) != "stream"):
+        log.log(*entry(message))
+
+
+def note_presence(message: PeerAlive | PeerGone) -> None:
+    """Write the line of a participant that has come or gone, as this process sees it."""
+    logger("bus").log(*presence(message))

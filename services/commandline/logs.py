@@ -1,0 +1,64 @@
+"""Where the log goes: bugs to standard error, and with `--log FILE` a line for each thing that happens to a file.
+
+Each line is appended whole, so that the services of one machine may share a file.
+"""
+
+import logging
+from collections.abc import Sequence
+from datetime import datetime
+from pathlib import Path
+
+from engage_hri.schemas import keys
+from engage_hri.schemas.faults import Fault, InputRefused
+
+LEVELS = {name.lower(): getattr(logging, name) for name in ("DEBUG", "INFO", "WARNING", "ERROR")}
+SOURCES = (*keys.ROLES, "simulation", "collaboration", "bus")
+"""Whose level can be set: services, the roles of other participants, and the bus, which tells who comes and goes."""
+
+OURS = "engage"
+"""The name of the handlers made here, of which there is one set."""
+
+
+class Line(logging.Formatter):
+    """`2026-11-22T13:09:35.123+01:00 INFO realizer: block ask: done after 3.20 s`, whatever ids hold."""
+
+    def format(self, record: logging.LogRecord) -> str:
+        at = datetime.fromtimestamp(record.created).astimezone().isoformat(timespec="milliseconds")
+        source = record.name.removeprefix("engage.")
+        text = record.getMessage()
+        line = f"{at} {record.levelname} {source}: " + "".join(c if c.isprintable() else repr(c)[1:-1] for c in text)
+        if record.exc_info:
+            line += "\n  " + self.formatException(record.exc_info).replace("\n", "\n  ")
+        return line
+
+
+def configure(path: Path | None = None, levels: Sequence[str] = ()) -> None:
+    """Set the log of this process up. path: appended to; None: no file.
+
+    levels: `debug` for all, or `realizer=debug` for one source. Raises InputRefused for an unknown level or source,
+    and for a file that cannot be written.
+    """
+    chosen = {source: name for source, _, name in (level.rpartition("=") for level in levels)}
+    for source, name in chosen.items():
+        if name not in LEVELS or source not in ("", *SOURCES):
+            advice = f"LEVEL or SOURCE=LEVEL; levels: {', '.join(LEVELS)}; sources: {', '.join(SOURCES)}"
+            bad = name if name not in LEVELS else source
+            raise InputRefused(Fault(reason=f"unknown {bad!r}", where="--log-level", advice=advice))
+    told = logging.StreamHandler()
+    told.addFilter(lambda record: record.levelno >= logging.ERROR or record.name == "engage")
+    handlers: list[logging.Handler] = [told]
+    if path is not None:
+        try:
+            handlers.append(logging.FileHandler(path, encoding="utf-8", errors="backslashreplace"))
+        except OSError as error:
+            raise InputRefused(Fault(reason=f"cannot be written: {error.strerror}", where=f"--log {path}")) from error
+        handlers[-1].setFormatter(Line())
+    root = logging.getLogger()
+    for handler in [handler for handler in root.handlers if handler.name == OURS]:
+        root.removeHandler(handler)
+        handler.close()
+    for handler in handlers:
+        handler.name = OURS
+        root.addHandler(handler)
+    for source, name in ({"": "info" if path else "warning"} | chosen).items():
+        logging.getLogger(f"engage.{source}" if source else "engage").setLevel(LEVELS[name])
