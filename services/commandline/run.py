@@ -8,9 +8,9 @@ from typing import Annotated
 import typer
 
 from engage_hri.services.commandline import roster
-from engage_hri.services.commandline.config import Config
 from engage_hri.services.commandline.options import Listening
 from engage_hri.services.commandline.process import DONE, run_until_signal
+from engage_hri.services.commandline.settings import RobotConfig, read
 from engage_hri.services.runtime.service import serve
 
 
@@ -29,11 +29,13 @@ def is_ready(name: str) -> str:
 
 def main(options: Options) -> int:
     """Serve until a signal."""
-    run_until_signal(_serve(options, options.load()))
+    on_robot = options.service in roster.ROBOT
+    config = read(RobotConfig, options.config, settings=options.given) if on_robot else options.load()
+    run_until_signal(_serve(options, config))
     return DONE
 
 
-async def _serve(options: Options, config: Config) -> None:
+async def _serve(options: Options, config: RobotConfig) -> None:
     name = options.service
     service = roster.service(name, config)
 
