@@ -24,6 +24,7 @@ on the command line, stronger than the file: `--set recognition.gaze_resolution=
 
 ```toml
 robot = "melvin"                 # the namespace on the bus, and the robot's actor id
+covered_for = 10.0               # s: so long an object that the world leaves out is taken to be covered, where it was
 
 [recognition]
 gaze_resolution = "table"

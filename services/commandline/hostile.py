@@ -110,7 +110,7 @@ async def _embody(bus: Bus, ready: Ready, config: Config, make: Making) -> None:
         name = getattr(make, "__name__", str(make))
         reason = f"the body {name} could not be made: {type(error).__name__}: {error}"
         raise InputRefused(Fault(reason=reason, advice="it is made without arguments, on a simulated SDK")) from error
-    await embody(bus, ready, config.control, body)
+    await embody(bus, ready, config.control, body, covered_for=config.covered_for)
 
 
 def body_class(name: str) -> Making:

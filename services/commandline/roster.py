@@ -25,4 +25,5 @@ def service(name: str, config: RobotConfig) -> Service:
     if name not in NAMES:
         raise InputRefused(Fault(reason=f"no service {name!r}", advice=f"one of {', '.join(NAMES)}"))
     module = import_module(f"engage_hri.services.{name}.service")
-    return partial(getattr(module, DOES[name]), config=getattr(config, name))
+    shared = {"covered_for": config.covered_for} if name in ("generation", "control") else {}
+    return partial(getattr(module, DOES[name]), config=getattr(config, name), **shared)

@@ -13,7 +13,9 @@ from typing import Any, Literal, TypeVar, get_args, get_origin, get_type_hints
 import msgspec
 from msgspec import Struct
 
+from engage_hri.schemas.covered import COVERED_FOR
 from engage_hri.schemas.faults import Fault, InputRefused
+from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.utf8 import is_utf8, utf8
 from engage_hri.services.control.config import ControlConfig
 from engage_hri.services.generation.config import GenerationConfig
@@ -26,9 +28,14 @@ _ADVICE = "see docs/configuration.md"
 
 
 class RobotConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """robot: the namespace on the bus and the robot's actor id. One section (TOML table) for each service."""
+    """One section (TOML table) for each service, and what several of them must agree on.
+
+    robot: the namespace on the bus and the robot's actor id. covered_for: how long an object that the world no longer
+    reports is taken to be covered, and spoken of and looked at where it was.
+    """
 
     robot: str = "robot"
+    covered_for: Seconds = COVERED_FOR
     generation: GenerationConfig = GenerationConfig()
     realizer: RealizerConfig = RealizerConfig()
     recognition: RecognitionConfig = RecognitionConfig()
@@ -38,6 +45,8 @@ class RobotConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
         if not self.robot or not set(self.robot).isdisjoint("/*$#?@ "):
             reason = "it has one of / * $ # ? @ or a space" if self.robot else "it is empty"
             raise ValueError(f"robot {self.robot!r} cannot be part of a key: {reason}")
+        if not self.covered_for >= 0:
+            raise ValueError(f"covered_for must not be negative, not {self.covered_for}")
 
 
 Kind = TypeVar("Kind", bound=RobotConfig)

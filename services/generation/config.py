@@ -75,9 +75,6 @@ class GenerationConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=
     """How many fragments may be waiting or performed at once; one more is refused. Ours."""
     utterance: int = 5000
     """Characters of one speech, some five minutes; a longer one is refused. Ours."""
-    covered_for: Seconds = 10.0
-    """How long an object that the world no longer reports is taken to be covered, and spoken of and looked at where
-    it was. Ours."""
     body_patience: Seconds = 5.0
     """How long a reference waits for a body to say what motions cost. Ours."""
 
@@ -165,5 +162,5 @@ _POSITIVE = (
 _NOT_NEGATIVE = (
     "seconds_per_head_degree", "seconds_per_arm_degree", "seconds_per_word", "wait_weight", "expected_delay",
     "figure_lead", "this_within", "dwell", "hand_speed", "hand_onset", "hand_stillness", "face_lost",
-    "mtbce_events", "body_patience", "covered_for",
+    "mtbce_events", "body_patience",
 )  # fmt: skip
