@@ -41,19 +41,19 @@ class Terminal(Console):
 class Outputs:
     """A sink that writes what is public. A bad path is refused before anything starts.
 
-    wanted: which messages to write; all by default. format: of the feedback; None: as its file's name ends.
+    format: of the feedback; None: as its file's name ends.
     """
 
     def __init__(
         self,
         events: Path | None,
         feedback: Path | None,
-        wanted: Callable[[Message], bool] = lambda message: True,
         format: FeedbackFormat | None = None,
         outcomes: Path | None = None,
     ) -> None:
         self._paths = (events, feedback, outcomes)
-        self.wanted = wanted
+        self.wanted: Callable[[Message], bool] = lambda message: True
+        """Which messages to write."""
         named_xml = feedback is not None and feedback.suffix.lower() == ".xml"
         self._is_xml = format == "xml" or (format is None and named_xml)
         self._files = ExitStack()

@@ -25,7 +25,7 @@ from engage_hri.services.client.language_models import summary_of
 from engage_hri.services.client.robot import Robot, connect
 from engage_hri.services.commandline import checking, roster
 from engage_hri.services.commandline.config import Config
-from engage_hri.services.commandline.errors import readable
+from engage_hri.services.commandline.ends import readable
 from engage_hri.services.commandline.options import Connected, Strict, VirtualTime, WorldFile, Written
 from engage_hri.services.commandline.outputs import FeedbackFormat, Outputs, Terminal
 from engage_hri.services.commandline.played import Played
