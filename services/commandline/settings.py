@@ -15,6 +15,7 @@ from msgspec import Struct
 
 from engage_hri.schemas.covered import COVERED_FOR
 from engage_hri.schemas.faults import Fault, InputRefused
+from engage_hri.schemas.ranges import not_negative
 from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.utf8 import is_utf8, utf8
 from engage_hri.services.control.config import ControlConfig
@@ -45,8 +46,7 @@ class RobotConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
         if not self.robot or not set(self.robot).isdisjoint("/*$#?@ "):
             reason = "it has one of / * $ # ? @ or a space" if self.robot else "it is empty"
             raise ValueError(f"robot {self.robot!r} cannot be part of a key: {reason}")
-        if not self.covered_for >= 0:
-            raise ValueError(f"covered_for must not be negative, not {self.covered_for}")
+        not_negative(self, ("covered_for",))
 
 
 Kind = TypeVar("Kind", bound=RobotConfig)
