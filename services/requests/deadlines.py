@@ -49,16 +49,16 @@ class Deadlines(Generic[K]):
         return self._at.get(name)
 
     @property
-    def first(self) -> K | None:
-        """The name of the earliest instant."""
+    def earliest(self) -> Seconds | None:
         heap = self._heap
         while heap and self._at.get(heap[0][-1]) != heap[0][0]:
             heapq.heappop(heap)
-        return heap[0][-1] if heap else None
+        return heap[0][0] if heap else None
 
     @property
-    def earliest(self) -> Seconds | None:
-        return None if self.first is None else self._heap[0][0]
+    def first(self) -> K | None:
+        """The name of the earliest instant."""
+        return None if self.earliest is None else self._heap[0][-1]
 
     def due(self, now: Seconds) -> K | None:
         """The name of the earliest instant that has come, which is cleared; None if there is none."""
