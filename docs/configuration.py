@@ -20,10 +20,12 @@ HEAD = """\
 One TOML file configures all services: `engage run SERVICE --config engage.toml`, and the same option of `demo`,
 `up`, `play`, `plan` and `watch`. Each table below is a table of that file. Everything has a default; an unknown key,
 a wrong type or a value out of range is refused at start, with the file and the key. One setting can also be given
-on the command line, stronger than the file: `--set recognition.gaze_resolution=table`.
+on the command line, stronger than the file: `--set recognition.gaze_resolution=table`. What drives a robot loads
+nothing of the simulation: `engage run` of its services passes over `[simulation]` and `[collaboration]`.
 
 ```toml
 robot = "melvin"                 # the namespace on the bus, and the robot's actor id
+covered_for = 10.0               # s: so long an object that the world leaves out is taken to be covered, where it was
 
 [recognition]
 gaze_resolution = "table"

@@ -7,11 +7,14 @@ from msgspec.structs import replace
 from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.world import Entity, World
 
+COVERED_FOR: Seconds = 10.0
+"""How long one stays missing until it is taken to be gone, unless the configuration says otherwise."""
+
 
 class CoveredObjects:
     """Adds to reports of the world the objects that they leave out, where they were seen last.
 
-    patience: how long one stays missing until it is taken to be gone.
+    patience: as `COVERED_FOR`.
     """
 
     def __init__(self, patience: Seconds) -> None:

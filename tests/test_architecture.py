@@ -36,8 +36,6 @@ SHELLS = {
     "services/realizer/perform/feedback.py",  # publishes feedback
     "services/realizer/perform/surroundings.py",  # what performances share: the bus, too
     "services/realizer/perform/live.py",  # resolved when a block has ended
-    "services/realizer/perform/presence.py",  # resolved when it changes
-    "services/realizer/perform/unhurried.py",  # lets the loop go on between slices of planning
     "services/generation/body_link.py",  # asks the body
     "services/generation/conductor.py",  # awaits the blocks of fragments
     "services/control/body.py",  # the interface of bodies: coroutines
@@ -49,7 +47,7 @@ SHELLS = {
     "services/console/follow.py",  # subscribes
     "services/console/live.py",  # draws
 }
-"""Files beside `service.py` and `__main__.py` that are not pure. Each is a decision: keep the list short."""
+"""Files beside `service.py` that are not pure. Each is a decision: keep the list short."""
 VISITOR = "examples/plain_zenoh_events.py"
 """Shows how to do without Engage: it may import nothing of it."""
 COMPOSERS = {"commandline"}
@@ -61,7 +59,7 @@ LAYERS = {
     "services": "commandline > collaboration console control generation hostile realizer recognition simulation study"
     " > client > requests > runtime > bus > tangram",
     "services/bus": "memory zenoh > interface payloads > journal",
-    "services/control": "service > bodies > torso > voice > actions waiting > body > variability > config",
+    "services/control": "service > torso > voice > actions waiting > body > variability > config",
     "services/generation": "service > conductor > performance > body_link fragment_check pipeline > block head"
     " > references turns > permits > config",
     "services/realizer": "export service > perform > decide > plan > net > config points",
@@ -140,8 +138,7 @@ def _import(place: PurePosixPath, module: str) -> Iterator[str]:
     elsewhere = first == "services" and second not in ("", package) and (ROOT / "services" / second).is_dir()
     if package and package not in COMPOSERS | SHARED and elsewhere and second not in SHARED:
         yield "services do not import one another"
-    if place.name != "__main__.py":  # ways in: they start at the top
-        yield from _layering(place, module)
+    yield from _layering(place, module)
     if package in ON_A_ROBOT and module.startswith("services.simulation"):
         yield "simulation has no business on a robot"
 
@@ -176,7 +173,7 @@ def _is_pure(place: PurePosixPath) -> bool:
         place.parts[0] == "services"
         and len(place.parts) > 2
         and place.parts[1] not in COMPOSERS | SHARED
-        and place.name not in ("service.py", "__main__.py")
+        and place.name != "service.py"
         and str(place) not in SHELLS
     )
 

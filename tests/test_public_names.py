@@ -1,16 +1,22 @@
 """What `import engage_hri` gives: the names it promises, typed, and nothing else loaded before it is used."""
 
 import ast
+import asyncio
 import inspect
 import subprocess
 import sys
+from asyncio.subprocess import PIPE
 from pathlib import Path
 
 import pytest
 
 import engage_hri
+from engage_hri.services.commandline.roster import ROBOT
+from tests.bus.places import free_endpoint
 
 SOURCE = Path(engage_hri.__file__).read_text(encoding="utf-8")
+STAND_INS = ("engage_hri.services.simulation", "engage_hri.services.collaboration", "engage_hri.services.tangram")
+"""Services and data of what a robot does without: a simulated person and table, and the task."""
 
 
 @pytest.mark.parametrize("name", engage_hri.__all__)
@@ -38,14 +44,25 @@ def test_it_loads_nothing_by_itself() -> None:
     assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout == "[]\n"
 
 
-def test_a_service_that_drives_a_robot_loads_no_simulation() -> None:
-    """Its configuration is data; the torso is loaded when control is given no other body."""
-    code = (
-        "import sys; from engage_hri.services.commandline import roster; "
-        "from engage_hri.services.commandline.config import Config; "
-        "[roster.service(name, Config()) for name in roster.ROBOT]; "
-        "print(*sorted(name for name in sys.modules if 'services.simulation.' in name or 'torso' in name))"
-    )
-    loaded = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split()
+@pytest.mark.parametrize("service", ROBOT)
+@pytest.mark.real_time
+async def test_a_process_that_drives_a_robot_loads_no_simulation(service: str) -> None:
+    """From its start until it serves. Python itself tells what it imports."""
+    process = await asyncio.create_subprocess_exec(
+        *(sys.executable, "-v", "-m", "engage_hri", "run", service, "--attended"),
+        *("--robot", f"lean-{service}", "--listen", free_endpoint()),
+        stdin=PIPE, stderr=PIPE,
+    )  # fmt: skip
+    assert process.stdin is not None
+    assert process.stderr is not None
+    told = []
+    async with asyncio.timeout(60):
+        while line := await process.stderr.readline():
+            told.append(line.decode().partition(" #")[0].strip().removeprefix("import ").strip("'"))
+            if told[-1] == f"{service} is ready":
+                process.stdin.close()
+        await process.wait()
 
-    assert loaded == ["engage_hri.services.simulation.config"]
+    assert f"{service} is ready" in told
+    assert f"engage_hri.services.{service}.service" in told
+    assert [name for name in told if name.startswith(STAND_INS)] == []

@@ -1,20 +1,18 @@
-"""The bus inside one process: same classes and guarantees as Zenoh, on the loop's clock, with faults on demand."""
+"""The bus inside one process: same classes and guarantees as Zenoh, on the loop's clock."""
 
 import asyncio
-import random
 from collections import deque
 from itertools import count
 from typing import NamedTuple
 
 import msgspec
-from msgspec import Struct
 
 from engage_hri.schemas import keys
 from engage_hri.schemas.faults import EngageError, Fault, InputRefused, NoReply
 from engage_hri.schemas.messages import Message, decode, encode, published
 from engage_hri.schemas.presence import PeerAlive, PeerGone
 from engage_hri.schemas.status import BusHealth
-from engage_hri.schemas.units import Probability, Seconds, Stamp
+from engage_hri.schemas.units import Seconds, Stamp
 from engage_hri.services.bus import journal
 from engage_hri.services.bus.interface import (
     Answer,
@@ -27,18 +25,7 @@ from engage_hri.services.bus.interface import (
 from engage_hri.services.bus.payloads import LOCAL, read_payload, unreadable
 
 
-class Faults(Struct, frozen=True, kw_only=True):
-    """What goes wrong with a message between different participants. delay: longest extra latency; order holds."""
-
-    loss: Probability = 0.0
-    duplicate: Probability = 0.0
-    delay: Seconds = 0.0
-
-
-NONE = Faults()
-
-
-class _Past(NamedTuple):
+class Past(NamedTuple):
     """A message that late subscribers still get. number: of all that were sent, so states keep their place."""
 
     number: int
@@ -46,21 +33,18 @@ class _Past(NamedTuple):
 
 
 class MemoryHub(Hub):
-    """seed: of the faults. Messages go through their encoding, so what works here works on a wire."""
+    """Messages go through their encoding, so what works here works on a wire."""
 
-    def __init__(self, robot: str = "robot", *, faults: Faults | None = None, seed: int = 0) -> None:
+    def __init__(self, robot: str = "robot") -> None:
         self.robot = robot
-        self.faults = faults or NONE
-        self._chance = random.Random(seed)
         self._loop = asyncio.get_running_loop()
         self._buses: dict[str, MemoryBus] = {}
         self.sent = 0
         self._lives = 0
-        self._state: dict[str, _Past] = {}
-        self._past: deque[_Past] = deque(maxlen=4096)
+        self._state: dict[str, Past] = {}
+        self._past: deque[Past] = deque(maxlen=4096)
         self._askers: list[asyncio.Future[None]] = []
         self._cut: set[str] = set()
-        self._last_arrival: dict[tuple[str, str], Seconds] = {}
 
     def join(self, name: str, role: str = "manager") -> "MemoryBus":
         if name in self._buses:
@@ -122,34 +106,18 @@ class MemoryHub(Hub):
 
     def _pass_on(self, sender: str, received: Received) -> None:
         self.sent += 1
-        past = _Past(self.sent, received)
+        past = Past(self.sent, received)
         kind = keys.key_class(received.key)
         if kind == "state":
             self._state[received.key] = past
         elif kind in ("cmd", "evt"):
             self._past.append(past)
-        is_sound = self.faults == NONE
         for bus in tuple(self._buses.values()):
-            if self._cut and self._is_cut(sender, bus.name):
-                continue
-            if is_sound or bus.name == sender:
-                bus.deliver(received, past.number)
-            else:
+            if not (self._cut and self._is_cut(sender, bus.name)):
                 self._carry(past, sender, bus)
 
-    def _carry(self, past: _Past, sender: str, bus: "MemoryBus") -> None:
-        """As well as the faults let it."""
-        if self._chance.random() < self.faults.loss:
-            return
-        copies = 2 if self._chance.random() < self.faults.duplicate else 1
-        for _ in range(copies):
-            arrival = self._loop.time() + self._chance.uniform(0.0, self.faults.delay)
-            link = (sender, bus.name)
-            self._last_arrival[link] = arrival = max(arrival, self._last_arrival.get(link, 0.0))
-            self._loop.call_at(arrival, self._arrive, bus, past, arrival)
-
-    def _arrive(self, bus: "MemoryBus", past: _Past, at: Seconds) -> None:
-        bus.deliver(msgspec.structs.replace(past.received, at=at), past.number)
+    def _carry(self, past: Past, sender: str, bus: "MemoryBus") -> None:
+        bus.deliver(past.received, past.number)
 
     def _is_cut(self, one: str, other: str) -> bool:
         return (one in self._cut) != (other in self._cut)

@@ -4,6 +4,7 @@ from typing import Literal
 
 from msgspec import Struct
 
+from engage_hri.schemas.ranges import inner_shares, not_negative
 from engage_hri.schemas.units import Probability, Seconds
 
 
@@ -35,11 +36,8 @@ class CollaborationConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fiel
     """Rmin of a landmark, and of the rectangle when introduced."""
 
     def __post_init__(self) -> None:
-        for name in ("placement", "steady", "patience", "settle", "pause", "thinking", "arrival", "farewell"):
-            if getattr(self, name) < 0:
-                raise ValueError(f"collaboration.{name} must not be negative, not {getattr(self, name)}")
+        times = ("placement", "steady", "patience", "settle", "pause", "thinking", "arrival", "farewell")
+        not_negative(self, times, "collaboration.")
         if self.attempts < 1:
             raise ValueError(f"collaboration.attempts must be at least 1, not {self.attempts}")
-        for name in ("piece_reliability", "landmark_reliability"):
-            if not 0 < getattr(self, name) < 1:
-                raise ValueError(f"collaboration.{name} must be in (0, 1), not {getattr(self, name)}")
+        inner_shares(self, ("piece_reliability", "landmark_reliability"), "collaboration.")

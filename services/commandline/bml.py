@@ -3,29 +3,45 @@
 import re
 import sys
 from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated
+
+import typer
 
 from engage_hri.schemas.blocks import Block, Dialect
 from engage_hri.schemas.documents.dialects import core, spelled
 from engage_hri.schemas.documents.xml_decode import encode_xml
 from engage_hri.services.commandline.generating import generated
+from engage_hri.services.commandline.options import Configured, WorldFile
 from engage_hri.services.commandline.process import DONE
-from engage_hri.services.commandline.run import Where
 from engage_hri.services.commandline.sources import read_source, read_world
 
 _XML_NAME = re.compile(r"[^\W\d][\w.-]*")
 
 
-def main(path: Path, dialect: Dialect, only_core: bool, world: Path | None, where: Where) -> int:
-    config = where.load()
-    source = read_source(path)
-    around = read_world(world)
+@dataclass(frozen=True, kw_only=True)
+class Options(Configured):
+    file: Annotated[
+        Path, typer.Argument(metavar="FILE", help="A turn fragment or a BML block (XML), or JSON of one or several.")
+    ]
+    dialect: Annotated[Dialect, typer.Option(help="How to spell it.")] = "bml-1.0"
+    core: Annotated[
+        bool, typer.Option("--core", help="Without connection events and all else that only Engage knows.")
+    ] = False
+    world: WorldFile = None
+
+
+def main(options: Options) -> int:
+    config = options.load()
+    source = read_source(options.file)
+    around = read_world(options.world)
     documents, warnings = [], []
     with source.blamed():
-        plans = generated(source.things, around, config, str(path))
+        plans = generated(source.things, around, config, str(options.file))
         blocks = {plan.block.id: plan.block for plan in plans}
         for plan in plans:
-            block = spelled(core(plan.block) if only_core else plan.block, dialect, blocks)
+            block = spelled(core(plan.block) if options.core else plan.block, options.dialect, blocks)
             documents.append(encode_xml(block).decode())
             warnings += [*plan.warnings, *(each.message for each in block.unread), *_unusual_ids(block)]
     print("\n".join(documents), end="")

@@ -9,7 +9,7 @@ from engage_hri.schemas.feedback import WarningFeedback, WarningKind
 from engage_hri.schemas.references import sites
 from engage_hri.schemas.syncref import SyncRef
 from engage_hri.schemas.world import World
-from engage_hri.services.commandline.errors import readable
+from engage_hri.services.commandline.ends import readable
 from engage_hri.services.commandline.outputs import Outputs
 from engage_hri.services.commandline.sources import Source, read_source
 

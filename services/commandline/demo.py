@@ -1,17 +1,16 @@
 """`engage demo`: the whole system in this process, playing the anchor tangram with a simulated person."""
 
 import asyncio
-from pathlib import Path
-from typing import NamedTuple
+from dataclasses import dataclass
 
 from rich.console import Console
 
 from engage_hri.schemas.messages import Message
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.commandline.config import Config
+from engage_hri.services.commandline.options import Simulated, VirtualTime, Written
 from engage_hri.services.commandline.outputs import Outputs
 from engage_hri.services.commandline.process import DONE, run
-from engage_hri.services.commandline.run import Where
 from engage_hri.services.commandline.tangram import play_tangram
 from engage_hri.services.console import tally
 from engage_hri.services.console.follow import Sink
@@ -20,27 +19,11 @@ from engage_hri.services.console.log import Telling
 
 DEFAULTS = ("recognition.gaze_resolution=table",)
 """The transcript was annotated by people who saw that a look went to the table, rarely to which piece."""
-HUMANS = {"appendix-b": "scripted"}
-"""Those whom the configuration calls otherwise."""
 
 
-class Options(NamedTuple):
-    where: Where = Where()
-    virtual_time: bool = False
-    events: Path | None = None
-    feedback: Path | None = None
-    quiet: bool = False
-
-
-def choices(seed: int | None, human: str | None, resolution: str | None) -> tuple[str, ...]:
-    """The command line's choices about the simulation as settings of the configuration."""
-    chosen = {
-        "control.variability.seed": seed,
-        "simulation.seed": seed,
-        "simulation.human": HUMANS.get(human, human) if human else None,
-        "recognition.gaze_resolution": resolution,
-    }
-    return tuple(f"{key}={value}" for key, value in chosen.items() if value is not None)
+@dataclass(frozen=True, kw_only=True)
+class Options(Written, Simulated):
+    virtual_time: VirtualTime = False
 
 
 class Tallying:
@@ -54,7 +37,7 @@ class Tallying:
 
 
 def main(options: Options) -> int:
-    config = options.where.load(defaults=DEFAULTS)
+    config = options.load(defaults=DEFAULTS)
     with Outputs(options.events, options.feedback) as outputs:
         console = outputs.console(quiet=options.quiet)
         live = console.is_terminal and not options.virtual_time and not options.quiet

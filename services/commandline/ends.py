@@ -3,12 +3,12 @@
 import errno
 import sys
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
 import typer
 
 from engage_hri.schemas.faults import EngageError, Fault, InputRefused, RunFailed
-from engage_hri.services.commandline.errors import readable
 from engage_hri.services.commandline.process import DONE, FAILED, REFUSED, UNREAD, interrupted, silence
 
 UsageError: type[Exception] = next(kind for kind in typer.BadParameter.__mro__ if kind.__name__ == "UsageError")
@@ -65,6 +65,23 @@ def _misused(error: Any) -> int:
         command = error.ctx.command_path if error.ctx else "engage"
         print(f"{command}: {message} (see {command} --help)", file=sys.stderr)
     return REFUSED
+
+
+def readable(fault: Fault, source: Path | str = "") -> str:
+    """`turn.xml:14: block-1: gaze-9: reason (advice)`. source: the file it is about, if known."""
+    file, rest = _split(fault.where, str(source))
+    place = f"{file}:{fault.line}" if fault.line else file
+    text = ": ".join(part for part in (place, rest, fault.reason) if part)
+    text = f"{text} ({fault.advice})" if fault.advice else text
+    return " ".join(text.split()).encode(errors="backslashreplace").decode()  # a file name need not be UTF-8
+
+
+def _split(where: str, source: str) -> tuple[str, str]:
+    """The file and what stands behind it. The line number goes between the two."""
+    if source:
+        return source, where.removeprefix(source).removeprefix(": ")
+    file, _, rest = where.partition(": ")
+    return file, rest
 
 
 def _leaves(group: BaseExceptionGroup[Any]) -> list[BaseException]:

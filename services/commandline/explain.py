@@ -2,9 +2,12 @@
 
 import sys
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated, Literal
 
 import msgspec
+import typer
 from msgspec.structs import asdict
 from rich.console import Console
 from rich.table import Table
@@ -13,9 +16,9 @@ from rich.text import Text
 from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.fragments import GestureChoice, PairConsidered, ReferenceChoice, TurnFragment
 from engage_hri.services.commandline.generating import Unplanned, generated
+from engage_hri.services.commandline.options import Configured, WorldFile
 from engage_hri.services.commandline.outputs import Terminal
 from engage_hri.services.commandline.process import DONE
-from engage_hri.services.commandline.run import Where
 from engage_hri.services.commandline.sources import read_source, read_world
 from engage_hri.services.generation.pipeline import Plan
 
@@ -31,22 +34,31 @@ NAMED = 4
 """Distractors in a row; of more the rest is counted."""
 
 
-def main(path: Path, format: str, world: Path | None, where: Where) -> int:
-    config = where.load()
-    source = read_source(path)
-    around = read_world(world)
+@dataclass(frozen=True, kw_only=True)
+class Options(Configured):
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="EBML turn fragment (XML), or JSON of one or several.")]
+    format: Annotated[
+        Literal["text", "json"], typer.Option(help="A table for each reference, or a list of all pairs.")
+    ] = "text"
+    world: WorldFile = None
+
+
+def main(options: Options) -> int:
+    config = options.load()
+    source = read_source(options.file)
+    around = read_world(options.world)
     fragments = [thing for thing in source.things if isinstance(thing, TurnFragment)]
     if not fragments:
         advice = "only turn fragments refer to objects; for a block: engage plan"
-        raise InputRefused(Fault(reason="holds no turn fragment", where=str(path), advice=advice))
+        raise InputRefused(Fault(reason="holds no turn fragment", where=str(options.file), advice=advice))
     failure: Unplanned | None = None
     with source.blamed():
         try:
-            plans = generated(fragments, around, config, str(path))
+            plans = generated(fragments, around, config, str(options.file))
         except Unplanned as error:
             failure, plans = error, error.plans
     impossible = failure.choices if failure else ()
-    if format == "json":
+    if options.format == "json":
         print(as_json([*(choice for plan in plans for choice in plan.choices), *impossible]))
         for warning in (warning for plan in plans for warning in plan.warnings):
             print(f"warning: {warning}", file=sys.stderr)

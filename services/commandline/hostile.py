@@ -2,11 +2,13 @@
 
 import sys
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
+from dataclasses import dataclass
 from functools import partial
 from importlib import import_module
-from typing import NamedTuple
+from typing import Annotated
 
+import typer
 from rich.console import Console
 from rich.table import Table
 
@@ -15,8 +17,8 @@ from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.interface import Bus
 from engage_hri.services.commandline import roster
 from engage_hri.services.commandline.config import Config
+from engage_hri.services.commandline.options import Configured, Quiet
 from engage_hri.services.commandline.process import DONE
-from engage_hri.services.commandline.run import Where
 from engage_hri.services.commandline.sources import still
 from engage_hri.services.control.body import Body
 from engage_hri.services.control.service import embody
@@ -29,21 +31,23 @@ WRONG = 1
 Making = Callable[[], Body]
 
 
-class Options(NamedTuple):
+@dataclass(frozen=True, kw_only=True)
+class Options(Configured):
     """body: `package.module:Class`, somebody's own, made without arguments."""
 
-    where: Where = Where()
-    seed: int = 0
-    runs: int = 20
-    seconds: Seconds = 20.0
-    only: tuple[str, ...] = ()
-    body: str = ""
-    quiet: bool = False
+    runs: Annotated[int, typer.Option(metavar="N", min=1, help="Attacks, each with the next seed.")] = 20
+    seed: Annotated[int, typer.Option(metavar="S", help="Of the first.")] = 0
+    seconds: Annotated[Seconds, typer.Option(min=1, max=3600, help="How long each lasts, in its own time.")] = 20.0
+    only: Annotated[
+        list[str] | None, typer.Option(metavar="messages|requests|body", help="Repeatable; else all three.")
+    ] = None
+    body: Annotated[str, typer.Option(metavar="MODULE:CLASS", help="Your own body, in place of the lying one.")] = ""
+    quiet: Quiet = False
 
 
 def main(options: Options) -> int:
-    kinds = _kinds(options.only)
-    config = options.where.load()
+    kinds = _kinds(options.only or ())
+    config = options.load()
     make = body_class(options.body) if options.body else None
     console = Console(quiet=options.quiet)
     counts: Counter[str] = Counter()
@@ -57,7 +61,7 @@ def main(options: Options) -> int:
     return WRONG if bad else DONE
 
 
-def _kinds(only: tuple[str, ...]) -> tuple[Kind, ...]:
+def _kinds(only: Collection[str]) -> tuple[Kind, ...]:
     """Raises InputRefused for one that there is not."""
     if unknown := set(only) - set(KINDS):
         fault = Fault(
@@ -106,7 +110,7 @@ async def _embody(bus: Bus, ready: Ready, config: Config, make: Making) -> None:
         name = getattr(make, "__name__", str(make))
         reason = f"the body {name} could not be made: {type(error).__name__}: {error}"
         raise InputRefused(Fault(reason=reason, advice="it is made without arguments, on a simulated SDK")) from error
-    await embody(bus, ready, config.control, body)
+    await embody(bus, ready, config.control, body, covered_for=config.covered_for)
 
 
 def body_class(name: str) -> Making:
@@ -125,10 +129,10 @@ def body_class(name: str) -> Making:
 
 
 def _tell(console: Console, report: Report, options: Options) -> None:
-    only = "".join(f" --only {kind}" for kind in options.only)
+    only = "".join(f" --only {kind}" for kind in options.only or ())
     body = f" --body {options.body}" if options.body else ""
-    config = f" --config {options.where.config}" if options.where.config else ""
-    settings = config + "".join(f" --set {setting}" for setting in options.where.settings)
+    config = f" --config {options.config}" if options.config else ""
+    settings = config + "".join(f" --set {setting}" for setting in options.given)
     again = f"engage hostile --seed {report.attack.seed} --runs 1 --seconds {options.seconds:g}{only}{body}{settings}"
     console.print(f"seed {report.attack.seed}: {again}", style="bold", highlight=False, soft_wrap=True)
     for line in report.wrong:

@@ -6,7 +6,6 @@ import sys
 from collections.abc import Callable
 from contextlib import ExitStack
 from pathlib import Path
-from types import TracebackType
 from typing import Any, Literal, Self, TextIO
 
 import msgspec
@@ -41,19 +40,19 @@ class Terminal(Console):
 class Outputs:
     """A sink that writes what is public. A bad path is refused before anything starts.
 
-    wanted: which messages to write; all by default. format: of the feedback; None: as its file's name ends.
+    format: of the feedback; None: as its file's name ends.
     """
 
     def __init__(
         self,
         events: Path | None,
         feedback: Path | None,
-        wanted: Callable[[Message], bool] = lambda message: True,
         format: FeedbackFormat | None = None,
         outcomes: Path | None = None,
     ) -> None:
         self._paths = (events, feedback, outcomes)
-        self.wanted = wanted
+        self.wanted: Callable[[Message], bool] = lambda message: True
+        """Which messages to write."""
         named_xml = feedback is not None and feedback.suffix.lower() == ".xml"
         self._is_xml = format == "xml" or (format is None and named_xml)
         self._files = ExitStack()
@@ -75,9 +74,7 @@ class Outputs:
             self._feedback.write(HEAD)
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, kind: object, error: object, trace: object) -> None:
         try:
             if self._is_xml and self._feedback is not None:
                 self._feedback.write(TAIL)

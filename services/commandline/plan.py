@@ -1,38 +1,50 @@
 """`engage plan FILE`: check a block, or the block that a fragment becomes, and print its net. Nothing moves."""
 
 import sys
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated, Literal
+
+import typer
 
 from engage_hri.schemas.blocks import Block
 from engage_hri.schemas.body import Estimate
 from engage_hri.schemas.world import World
 from engage_hri.services.commandline.config import Config
 from engage_hri.services.commandline.generating import generated
+from engage_hri.services.commandline.options import Configured, Strict, WorldFile
 from engage_hri.services.commandline.process import DONE
 from engage_hri.services.commandline.prose import not_strict
-from engage_hri.services.commandline.run import Where
 from engage_hri.services.commandline.sources import read_source, read_world
 from engage_hri.services.runtime.virtual_time import run_virtual
 
 
-def main(path: Path, format: str, world: Path | None, where: Where, *, strict: bool = False) -> int:
+@dataclass(frozen=True, kw_only=True)
+class Options(Configured):
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="A BML block (XML or JSON).", show_default=False)]
+    format: Annotated[Literal["text", "json", "dot", "pnml"], typer.Option(help="How to print the net.")] = "text"
+    world: WorldFile = None
+    strict: Strict = False
+
+
+def main(options: Options) -> int:
     from engage_hri.services.realizer import export
 
-    config = where.load()
-    source = read_source(path)
-    around = read_world(world)
-    write = {"text": export.as_text, "json": export.as_json, "dot": export.as_dot, "pnml": export.as_pnml}[format]
+    config = options.load()
+    source = read_source(options.file)
+    around = read_world(options.world)
+    writers = {"text": export.as_text, "json": export.as_json, "dot": export.as_dot, "pnml": export.as_pnml}
     texts, warnings = [], 0
     with source.blamed():
-        for plan in generated(source.things, around, config, str(path)):
+        for plan in generated(source.things, around, config, str(options.file)):
             estimates = run_virtual(estimated(plan.block, around, config))
             planned = export.plan_block(plan.block, estimates)
-            texts.append(write(planned))
+            texts.append(writers[options.format](planned))
             for problem in planned.problems:
                 warnings += 1
                 print(f"! {problem.kind} {problem.behavior or plan.block.id}: {problem.message}", file=sys.stderr)
     print("\n".join(text.rstrip("\n") for text in texts))
-    if strict and warnings:
+    if options.strict and warnings:
         raise not_strict(warnings)
     return DONE
 

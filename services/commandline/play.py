@@ -4,9 +4,11 @@ import asyncio
 import sys
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager, suppress
+from dataclasses import dataclass
 from pathlib import Path
-from typing import NamedTuple
+from typing import Annotated, Literal, NamedTuple
 
+import typer
 from rich.console import Console
 
 from engage_hri.schemas import keys
@@ -23,12 +25,12 @@ from engage_hri.services.client.language_models import summary_of
 from engage_hri.services.client.robot import Robot, connect
 from engage_hri.services.commandline import checking, roster
 from engage_hri.services.commandline.config import Config
-from engage_hri.services.commandline.errors import readable
+from engage_hri.services.commandline.ends import readable
+from engage_hri.services.commandline.options import Connected, Strict, VirtualTime, WorldFile, Written
 from engage_hri.services.commandline.outputs import FeedbackFormat, Outputs, Terminal
 from engage_hri.services.commandline.played import Played
-from engage_hri.services.commandline.process import DONE, FAILED, REFUSED, run
+from engage_hri.services.commandline.process import DONE, FAILED, REFUSED, run, unique
 from engage_hri.services.commandline.prose import Prose, Warnings, not_strict
-from engage_hri.services.commandline.run import Where, unique
 from engage_hri.services.commandline.sources import Source, Thing, read_world, still
 from engage_hri.services.console.follow import Sink, following
 from engage_hri.services.console.live import Log
@@ -41,28 +43,40 @@ A_DAY: Seconds = 86_400.0
 """The latest time of `--at`. Even on a clock that jumps every second of a robot's life costs something."""
 
 
-class Options(NamedTuple):
-    files: tuple[Path, ...]
-    where: Where = Where()
-    embedded: bool = False
-    world: Path | None = None
-    virtual_time: bool = False
-    at: str | None = None
-    events: Path | None = None
-    feedback: Path | None = None
-    quiet: bool = False
-    feedback_format: FeedbackFormat | None = None
-    outcomes: Path | None = None
-    is_attentive: bool = True
-    verbose: bool = False
-    strict: bool = False
+@dataclass(frozen=True, kw_only=True)
+class Options(Written, Connected):
+    files: Annotated[
+        list[Path],
+        typer.Argument(metavar="FILE...", help="EBML turn fragments or BML blocks (XML), or JSON of either."),
+    ]
+    embedded: Annotated[
+        bool, typer.Option("--embedded", help="In a private system with a simulated body, instead of a running one.")
+    ] = False
+    world: WorldFile = None
+    virtual_time: VirtualTime = False
+    at: Annotated[
+        str | None,
+        typer.Option(metavar="S,S,...", help="When to submit each file, seconds; else one after the other."),
+    ] = None
+    feedback_format: Annotated[
+        FeedbackFormat | None, typer.Option(help="Form of the feedback, whatever its file is called.")
+    ] = None
+    outcomes: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Write what became of each fragment, for a language model; - as above."),
+    ] = None
+    human: Annotated[
+        Literal["attentive", "none"],
+        typer.Option(help="With --embedded: one who follows the robot's gaze and answers, or nobody who does."),
+    ] = "attentive"
+    strict: Strict = False
+    verbose: Annotated[bool, typer.Option("--verbose", "-v", help="Print each sync point, too.")] = False
 
 
 class Job(NamedTuple):
-    """times: when to submit each source, seconds from the start; None: one after the other. verbose: tell of sync
-    points, too.
-    """
+    """times: when to submit each source, seconds from the start; None: one after the other."""
 
+    options: Options
     sources: tuple[Source, ...]
     times: tuple[Seconds, ...] | None
     played: Played
@@ -70,8 +84,6 @@ class Job(NamedTuple):
     console: Console
     prose: Prose
     warnings: Warnings
-    is_attentive: bool
-    verbose: bool
 
     @property
     def servers(self) -> frozenset[str]:
@@ -88,9 +100,9 @@ def main(options: Options) -> int:
     for given, option in ((options.world, "--world"), (options.virtual_time, "--virtual-time")):
         if given and not options.embedded:
             raise InputRefused(Fault(reason=f"{option} is for a private system", advice="add --embedded"))
-    if options.where.connect and options.embedded:
+    if options.connect and options.embedded:
         raise InputRefused(Fault(reason="--connect is for a running system", advice="leave out --embedded"))
-    config = options.where.load()
+    config = options.load()
     times = submission_times(options.at, len(options.files))
     with Outputs(
         options.events, options.feedback, format=options.feedback_format, outcomes=options.outcomes
@@ -103,8 +115,8 @@ def main(options: Options) -> int:
         console = outputs.console(quiet=options.quiet)
         warnings = Warnings(Terminal(stderr=True))
         prose = Prose(console, outputs)
-        job = Job(sources, times, played, outputs, console, prose, warnings, options.is_attentive, options.verbose)
-        performing = _embedded(job, config, world) if options.embedded else _remote(job, config, options.where)
+        job = Job(options, sources, times, played, outputs, console, prose, warnings)
+        performing = _embedded(job, config, world) if options.embedded else _remote(job, config)
         code = run(performing, virtual_time=options.virtual_time)
     if options.strict and warnings.count and code == DONE:
         raise not_strict(warnings.count)
@@ -138,7 +150,7 @@ async def _private(job: Job, config: Config, world: World) -> AsyncIterator[Hub]
     if job.has_fragments:
         names.append("generation")
     services: dict[str, Service] = {name: roster.service(name, config) for name in names}
-    perception = still(world, is_attentive=job.is_attentive)
+    perception = still(world, is_attentive=job.options.human == "attentive")
     async with MemoryHub(config.robot) as hub, running(hub, {"simulation": perception, **services}):
         yield hub
 
@@ -148,8 +160,8 @@ async def _embedded(job: Job, config: Config, world: World) -> int:
         return await _perform_all(job, hub, None)
 
 
-async def _remote(job: Job, config: Config, where: Where) -> int:
-    async with await where.open(config.robot) as hub:
+async def _remote(job: Job, config: Config) -> int:
+    async with await job.options.open(config.robot) as hub:
         await _somebody_there(hub, job.servers)
         if job.has_fragments:
             async with connect(hub=hub) as robot:
@@ -174,7 +186,7 @@ async def _somebody_there(hub: Hub, servers: frozenset[str]) -> None:
 async def _perform_all(job: Job, hub: Hub, patience: Seconds | None) -> int:
     """The worst exit code of all sources. patience: how long a service may take to answer at all."""
     bus = hub.join(unique("play-log"))
-    log = Log(job.console, hub.robot, bus.now(), Telling(head=False, points=job.verbose, warnings=False))
+    log = Log(job.console, hub.robot, bus.now(), Telling(head=False, points=job.options.verbose, warnings=False))
 
     def tell(message: Message, at: Seconds) -> None:
         if job.played.concerns(message):

@@ -4,6 +4,7 @@ import asyncio
 import os
 import signal
 import sys
+import uuid
 from collections.abc import Coroutine
 from importlib import import_module
 from typing import Any, TypeVar
@@ -38,6 +39,16 @@ def run_until_signal(main: Coroutine[Any, Any, None]) -> None:
         pass
     except* BrokenPipeError:
         silence()
+
+
+def unique(name: str) -> str:
+    """A participant name that no other process on the bus has."""
+    return f"{name}-{uuid.uuid4().hex[:8]}"
+
+
+async def forever() -> None:
+    """Until cancelled."""
+    await asyncio.get_running_loop().create_future()
 
 
 def _terminate(number: int, frame: object) -> None:

@@ -1,7 +1,6 @@
 """How far a study has come: a bar on a terminal, a line for each session anywhere else."""
 
 from contextlib import ExitStack
-from types import TracebackType
 from typing import Self
 
 from rich.console import Console
@@ -27,9 +26,7 @@ class Following:
             self._open.enter_context(self._bar)
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *raised: object) -> None:
         self._open.close()
 
     def __call__(self, record: SessionRecord) -> None:

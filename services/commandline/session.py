@@ -8,6 +8,7 @@ import asyncio
 import random
 import sys
 import traceback
+from dataclasses import dataclass
 
 import msgspec
 from msgspec import Struct
@@ -50,7 +51,12 @@ class Played(Struct, frozen=True, kw_only=True):
     trace: str = ""
 
 
-def serve() -> int:
+@dataclass(frozen=True, kw_only=True)
+class Options:
+    """There is nothing to choose."""
+
+
+def main(options: Options) -> int:
     """Play what standard input orders, until it ends."""
     orders = msgspec.json.Decoder(Order)
     for line in sys.stdin.buffer:

@@ -3,11 +3,13 @@
 import os
 import platform
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import NamedTuple
+from typing import Annotated, Literal
 
 import msgspec
 import numpy as np
+import typer
 from msgspec import Struct
 from rich import box
 from rich.console import Group, RenderableType
@@ -17,13 +19,13 @@ from rich.text import Text
 
 from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.units import Seconds
-from engage_hri.services.commandline import demo
 from engage_hri.services.commandline.config import Config
+from engage_hri.services.commandline.demo import DEFAULTS
 from engage_hri.services.commandline.folder import Folder
+from engage_hri.services.commandline.options import Configured, Quiet, Resolution, choices
 from engage_hri.services.commandline.outputs import Terminal
 from engage_hri.services.commandline.process import DONE, FAILED, interrupted, run
 from engage_hri.services.commandline.progress import Following
-from engage_hri.services.commandline.run import Where
 from engage_hri.services.commandline.session import Order, Played
 from engage_hri.services.commandline.validation import beside_table_2_1
 from engage_hri.services.commandline.workers import play_all
@@ -55,20 +57,32 @@ FILES = ("study.json", "events.csv", "sessions.csv", "hypotheses.csv", "summary.
 Draw = Callable[[Sequence[SessionRecord], Sequence[EventRecord]], dict[str, bytes]]
 
 
-class Options(NamedTuple):
-    """conditions: none means all. jobs: processes; None: one for each processor. limit: see `Order`."""
-
-    sessions: int
-    seed: int
-    out: Path
-    conditions: tuple[str, ...] = ()
-    human: str = "stochastic"
-    resolution: str | None = None
-    jobs: int | None = None
-    limit: Seconds = 3600.0
-    overwrite: bool = False
-    where: Where = Where()
-    quiet: bool = False
+@dataclass(frozen=True, kw_only=True)
+class Options(Configured):
+    out: Annotated[Path, typer.Option(metavar="DIR", help="Where the results go.", show_default=False)]
+    sessions: Annotated[int, typer.Option(metavar="N", min=1, help="In each condition.")] = 20
+    seed: Annotated[int, typer.Option(metavar="S", help="Session k has the seed S + k, in each condition.")] = 0
+    condition: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="operational|degraded-generation|degraded-recognition",
+            help="Repeatable; else all three.",
+        ),
+    ] = None
+    human: Annotated[
+        Literal["stochastic", "listening", "appendix-b", "misplacing", "table-2-1"],
+        typer.Option(help="How the simulated human behaves; table-2-1: two people and no robot."),
+    ] = "stochastic"
+    resolution: Resolution = None
+    jobs: Annotated[
+        int | None, typer.Option(metavar="J", min=1, help="Processes; as many as processors.", show_default=False)
+    ] = None
+    limit: Annotated[
+        Seconds,
+        typer.Option(metavar="SECONDS", min=1, max=86_400, help="Break a session off after so long in its own time."),
+    ] = 3600.0
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace the results that are there.")] = False
+    quiet: Quiet = False
 
 
 def main(options: Options) -> int:
@@ -118,15 +132,15 @@ def _plotting() -> Draw:
 
 def orders_of(options: Options) -> list[Order]:
     """By condition, then by number. The same number is the same seed in each condition. Raises InputRefused."""
-    for setting in options.where.settings:
+    for setting in options.given:
         key = setting.partition("=")[0].strip()
         if key in DECIDED:
             raise InputRefused(Fault(reason=f"a study decides {key!r} itself", advice=f"use {DECIDED[key]}"))
     if options.human == PEOPLE:
-        if options.conditions:
+        if options.condition:
             raise InputRefused(Fault(reason=f"--human {PEOPLE} has no conditions", advice="leave out --condition"))
         return [_order(options, TWO_PEOPLE, number) for number in range(options.sessions)]
-    conditions = dict.fromkeys(options.conditions or CONDITIONS)
+    conditions = dict.fromkeys(options.condition or CONDITIONS)
     for condition in conditions:
         if condition not in CONDITIONS:
             advice = f"one of {', '.join(CONDITIONS)}"
@@ -137,13 +151,12 @@ def orders_of(options: Options) -> list[Order]:
 def _order(options: Options, condition: str, number: int) -> Order:
     """Weaker than the user's settings: what makes a condition worse. Stronger: seed and condition themselves."""
     seed, people = options.seed + number, options.human == PEOPLE
-    defaults = [*USUAL.get(options.human, demo.DEFAULTS)]
-    chosen = [*demo.choices(seed, None if people else options.human, options.resolution)]
+    defaults = [*USUAL.get(options.human, DEFAULTS)]
+    chosen = [*choices(seed, None if people else options.human, options.resolution)]
     if not people:
         defaults += WORSE[condition]
         chosen.append(f"generation.condition={condition}")
-    where = options.where._replace(settings=(*options.where.settings, *chosen))
-    config = where.load(defaults=defaults)
+    config = replace(options, settings=[*options.given, *chosen]).load(defaults=defaults)
     return Order(session=number, condition=condition, seed=seed, limit=options.limit, config=config, people=people)
 
 
@@ -211,7 +224,7 @@ def _study(options: Options, orders: Sequence[Order], played: int) -> Study:
     return Study(
         versions={"engage": installed_version(), "python": platform.python_version(), "numpy": np.__version__},
         human=options.human, conditions=tuple(first), sessions=options.sessions, seed=options.seed,
-        limit=options.limit, ordered=len(orders), played=played, settings=options.where.settings,
+        limit=options.limit, ordered=len(orders), played=played, settings=options.given,
         configurations=first,
     )  # fmt: skip
 

@@ -3,19 +3,21 @@
 import asyncio
 import sys
 from collections.abc import Iterable
-from pathlib import Path
-from typing import NamedTuple
+from dataclasses import dataclass
+from typing import Annotated
 
+import typer
 from rich.console import Console
 from rich.text import Text
 
 from engage_hri.services.commandline.claim import claiming
 from engage_hri.services.commandline.config import Config
 from engage_hri.services.commandline.demo import DEFAULTS, Tallying, shown
+from engage_hri.services.commandline.options import Listening, Simulated, Written
 from engage_hri.services.commandline.outputs import Outputs
-from engage_hri.services.commandline.process import DONE, run_until_signal
+from engage_hri.services.commandline.process import DONE, forever, run_until_signal
 from engage_hri.services.commandline.roster import ROBOT
-from engage_hri.services.commandline.run import Where, forever, is_ready
+from engage_hri.services.commandline.run import is_ready
 from engage_hri.services.commandline.supervisor import Child, supervised
 from engage_hri.services.console import tally
 from engage_hri.services.console.follow import following
@@ -25,19 +27,14 @@ WITHOUT_TASK = ("simulation.human=attentive",)
 STYLES = ("cyan", "magenta", "green", "yellow", "blue", "red")
 
 
-class Options(NamedTuple):
-    """task: also run the tangram task, and end with it."""
-
-    where: Where
-    task: bool = False
-    events: Path | None = None
-    feedback: Path | None = None
-    quiet: bool = False
+@dataclass(frozen=True, kw_only=True)
+class Options(Written, Simulated, Listening):
+    task: Annotated[bool, typer.Option("--task", help="Also run the tangram task, and end when it ends.")] = False
 
 
 def main(options: Options) -> int:
     # A bad one is refused here, not by every child.
-    config = options.where.load(defaults=DEFAULTS if options.task else WITHOUT_TASK)
+    config = options.load(defaults=DEFAULTS if options.task else WITHOUT_TASK)
     with Outputs(options.events, options.feedback) as outputs:
         console = outputs.console(quiet=options.quiet)
         run_until_signal(_up(options, config, outputs, console))
@@ -46,7 +43,7 @@ def main(options: Options) -> int:
 
 async def _up(options: Options, config: Config, outputs: Outputs, console: Console) -> None:
     # Our own session comes first and stays: children may crash, the place where all find one another does not.
-    async with await options.where.open(config.robot) as hub, claiming(hub) as claim:
+    async with await options.open(config.robot, options.listen or ()) as hub, claiming(hub) as claim:
         await claim.granted()
         await hub.vacant(*_names(options))
         bus = claim.bus
@@ -81,23 +78,21 @@ def _children(options: Options, config: Config, console: Console, arrivals: "Arr
         if line == is_ready(name):
             arrivals(name)
 
-    return {
-        name: Child(name, command(name, options.where, config), tell, once=name == "collaboration") for name in names
-    }
+    return {name: Child(name, command(name, options, config), tell, once=name == "collaboration") for name in names}
 
 
-def command(name: str, where: Where, config: Config) -> list[str]:
+def command(name: str, options: Options, config: Config) -> list[str]:
     """The child's command line: `engage run NAME`, by our interpreter, on our bus, configured as we are."""
     # What was decided here, by default or by option, is told in full, so that all children agree.
     settings = (
-        *where.settings,
+        *options.given,
         f"recognition.gaze_resolution={config.recognition.gaze_resolution}",
         f"simulation.human={config.simulation.human}",
     )
-    endpoints = (*where.listen, *where.connect)
+    endpoints = (*(options.listen or ()), *(options.connect or ()))
     return [
         *(sys.executable, "-P", "-m", "engage_hri", "run", name, "--attended", "--robot", config.robot),
-        *(("--config", str(where.config)) if where.config else ()),
+        *(("--config", str(options.config)) if options.config else ()),
         *(part for setting in settings for part in ("--set", setting)),
         *(part for endpoint in endpoints for part in ("--connect", endpoint)),
     ]

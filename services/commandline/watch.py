@@ -2,7 +2,10 @@
 
 import asyncio
 from collections.abc import Collection
-from typing import NamedTuple, get_args
+from dataclasses import dataclass
+from typing import Annotated, NamedTuple, get_args
+
+import typer
 
 from engage_hri.schemas import keys, lines
 from engage_hri.schemas.attention import HeadOwner
@@ -13,9 +16,9 @@ from engage_hri.schemas.messages import Message
 from engage_hri.schemas.recognition import ConnectionEvent, Statistics
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.commandline.config import Config
+from engage_hri.services.commandline.options import Connected
 from engage_hri.services.commandline.outputs import Terminal
-from engage_hri.services.commandline.process import DONE, run_until_signal
-from engage_hri.services.commandline.run import Where, forever, unique
+from engage_hri.services.commandline.process import DONE, forever, run_until_signal, unique
 from engage_hri.services.console.follow import FOLLOWED, Sink, following
 from engage_hri.services.console.live import Log
 from engage_hri.services.console.log import Telling
@@ -28,6 +31,19 @@ SUBJECTS: dict[str, tuple[type[Message], ...]] = {
     "head": (HeadOwner,),
     "faults": (Fault,),
 }
+
+
+@dataclass(frozen=True, kw_only=True)
+class Options(Connected):
+    json: Annotated[bool, typer.Option("--json", help="JSON lines instead of text.")] = False
+    only: Annotated[
+        list[str] | None,
+        typer.Option(metavar="WHAT", help="events, statistics, feedback, head or faults; may be repeated."),
+    ] = None
+    actor: Annotated[str, typer.Option(metavar="ID", help="Only what goes on with this person.")] = ""
+    kind: Annotated[
+        list[str] | None, typer.Option(metavar="KIND", help="Only these connection events; may be repeated.")
+    ] = None
 
 
 class Wanted(NamedTuple):
@@ -73,22 +89,23 @@ class Wanted(NamedTuple):
         return any(isinstance(message, SUBJECTS[subject]) for subject in self.subjects)
 
 
-def main(where: Where, json: bool, wanted: Wanted) -> int:
-    config = where.load()
+def main(options: Options) -> int:
+    config = options.load()
+    wanted = Wanted(tuple(options.only or ()), options.actor, tuple(options.kind or ()))
     wanted.check()
-    run_until_signal(_watch(where, config, json, wanted))
+    run_until_signal(_watch(options, config, wanted))
     return DONE
 
 
-async def _watch(where: Where, config: Config, json: bool, wanted: Wanted) -> None:
+async def _watch(options: Options, config: Config, wanted: Wanted) -> None:
     from engage_hri.services.bus.zenoh.neighbors import tell_if_alone
 
-    async with await where.open(config.robot) as hub:
+    async with await options.open(config.robot) as hub:
         bus = hub.join(unique("watch"))
         # As text everything includes what people do and say, but statistics would drown it.
-        everything = wanted.is_everything and not json
+        everything = wanted.is_everything and not options.json
         telling = Telling(standings=not everything)
-        show: Sink = as_json if json else Log(Terminal(), config.robot, bus.now(), telling)
+        show: Sink = as_json if options.json else Log(Terminal(), config.robot, bus.now(), telling)
 
         def tell(message: Message, at: Seconds) -> None:
             if everything or wanted.includes(message):
@@ -97,7 +114,7 @@ async def _watch(where: Where, config: Config, json: bool, wanted: Wanted) -> No
         async with following(bus, (tell,), patterns=wanted.patterns, kinds=wanted.kinds):
             bus.declare_alive()
             async with asyncio.TaskGroup() as group:
-                group.create_task(tell_if_alone(bus, where.connect), name="hint")
+                group.create_task(tell_if_alone(bus, options.connect or ()), name="hint")
                 await forever()
 
 

@@ -14,7 +14,7 @@ from engage_hri.services.commandline.session import Order, Played
 from engage_hri.services.commandline.supervisor import ending, killed, spawned, without_threads
 from engage_hri.services.study.records import SessionRecord
 
-WORKER = (sys.executable, "-P", "-m", "engage_hri", "play-sessions")
+WORKER = (sys.executable, "-P", "-m", "engage_hri", "session")
 PATIENCE: Seconds = 600.0
 """How long a session may take in real time. One that goes in circles without virtual time passing never ends."""
 LONGEST_ANSWER = 2**26

@@ -79,15 +79,12 @@ class ControlConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
     state_rate: `RobotState` messages per second while anything moves; once a second else.
     dead_man: seconds after which a behavior ends whose requester neither names a lease (`Request.lease`) nor sends
         it again, at least every 2 s. After the last one the body goes home by itself. Longer than two repetitions.
-    covered_for: how long an object that the world no longer reports is taken to be covered, and looked at where it
-        was.
     no_point_zones: spheres that are never pointed into.
     variability: of the simulated body.
     """
 
     state_rate: float = 20.0
     dead_man: Seconds = 5.0
-    covered_for: Seconds = 10.0
     no_point_zones: tuple[NoPointZone, ...] = ()
     variability: Variability = Variability()
 
@@ -96,5 +93,3 @@ class ControlConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
             raise ValueError(f"state_rate is {self.state_rate}: expected 1..200 per second")
         if self.dead_man < 4.5:
             raise ValueError(f"dead_man is {self.dead_man} s: expected >= 4.5, requests are repeated every 2 s")
-        if self.covered_for < 0.0:
-            raise ValueError(f"covered_for is {self.covered_for} s: expected >= 0")

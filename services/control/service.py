@@ -25,7 +25,7 @@ from engage_hri.schemas.body import (
     WordSpoken,
 )
 from engage_hri.schemas.check import check_behavior
-from engage_hri.schemas.covered import CoveredObjects
+from engage_hri.schemas.covered import COVERED_FOR, CoveredObjects
 from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.messages import Message
 from engage_hri.schemas.requests import Cancel, Request
@@ -34,7 +34,6 @@ from engage_hri.schemas.world import World
 from engage_hri.services.bus.interface import Bus, Received, is_asked_to_stop
 from engage_hri.services.control import variability
 from engage_hri.services.control.actions import ActionMessage, Deeds
-from engage_hri.services.control.bodies import simulated
 from engage_hri.services.control.body import (
     Arrived,
     BehaviorRefused,
@@ -55,10 +54,12 @@ IDLE: Seconds = 1.0
 """Between two `RobotState` while nothing moves."""
 
 
-async def embody(bus: Bus, ready: Ready, config: ControlConfig, body: Body | None = None) -> None:
-    """Serve until cancelled. body: the simulated one unless given."""
+async def embody(
+    bus: Bus, ready: Ready, config: ControlConfig, body: Body | None = None, *, covered_for: Seconds = COVERED_FOR
+) -> None:
+    """Serve until cancelled. body: the simulated one unless given. covered_for: see `CoveredObjects`."""
     async with asyncio.TaskGroup() as tasks:
-        control = _Control(bus, config, body or simulated(config), tasks)
+        control = _Control(bus, config, body or _simulated(config), tasks, CoveredObjects(covered_for))
         with bus.subscribe(*RequestDesk.patterns("control"), keys.WORLD) as inbox:
             bus.answer(keys.ESTIMATE, control.estimate)
             bus.answer(keys.DESCRIBE, control.describe)
@@ -70,6 +71,13 @@ async def embody(bus: Bus, ready: Ready, config: ControlConfig, body: Body | Non
                         control.take(received)
             finally:
                 control.close()
+
+
+def _simulated(config: ControlConfig) -> Body:
+    """The torso, which a robot with a body of its own never loads."""
+    from engage_hri.services.control.torso.body import SimulatedBody
+
+    return SimulatedBody(config.no_point_zones, config.variability)
 
 
 class _UnderWay:
@@ -99,7 +107,9 @@ class _UnderWay:
 class _Control:
     """What the loop of `embody` feeds."""
 
-    def __init__(self, bus: Bus, config: ControlConfig, body: Body, tasks: asyncio.TaskGroup) -> None:
+    def __init__(
+        self, bus: Bus, config: ControlConfig, body: Body, tasks: asyncio.TaskGroup, objects: CoveredObjects
+    ) -> None:
         self.desk = RequestDesk(bus, "control", self._requester_lost, on_extend=self.serve, term=config.dead_man)
         self._bus = bus
         self._config = config
@@ -107,7 +117,7 @@ class _Control:
         self._tasks = tasks
         self._deeds = Deeds(bus.robot, bus.clock)
         self._world = World(entities=())
-        self._objects = CoveredObjects(config.covered_for)
+        self._objects = objects
         self._live: dict[str, _UnderWay] = {}
         self._ways: dict[str, asyncio.Task[None]] = {}
         """Home, as somebody has asked for."""

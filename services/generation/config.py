@@ -1,10 +1,11 @@
 """Every parameter of engagement generation: unit, default, source. Refused at start when it contradicts itself."""
 
-from math import isfinite, pi
+from math import pi
 from typing import Literal
 
 from msgspec import Struct
 
+from engage_hri.schemas.ranges import inner_shares, not_negative, positive
 from engage_hri.schemas.units import Degrees, Meters, Probability, Radians, Seconds
 
 Channel = Literal["sum", "independent"]
@@ -75,9 +76,6 @@ class GenerationConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=
     """How many fragments may be waiting or performed at once; one more is refused. Ours."""
     utterance: int = 5000
     """Characters of one speech, some five minutes; a longer one is refused. Ours."""
-    covered_for: Seconds = 10.0
-    """How long an object that the world no longer reports is taken to be covered, and spoken of and looked at where
-    it was. Ours."""
     body_patience: Seconds = 5.0
     """How long a reference waits for a body to say what motions cost. Ours."""
 
@@ -118,33 +116,22 @@ class GenerationConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=
                 f"0 < gaze_reliability < directed_gaze_reliability < pointing_reliability < 1 does not hold: "
                 f"{gaze}, {directed}, {pointing}"
             )
-        if not 0 < self.phrase_reliability < 1:
-            raise ValueError(f"phrase_reliability {self.phrase_reliability} is not in (0, 1)")
-        if not 0 < self.minimum_reliability < 1:
-            raise ValueError(f"minimum_reliability {self.minimum_reliability} is not in (0, 1)")
+        inner_shares(self, ("phrase_reliability", "minimum_reliability"))
         if self.channel == "sum" and pointing + self.phrase_reliability >= 1:
             raise ValueError(
                 f"pointing_reliability {pointing} + phrase_reliability {self.phrase_reliability} reaches 1: "
                 'a channel cannot be certain; lower one or set channel = "independent"'
             )
-        for name in self.__struct_fields__:
-            value = getattr(self, name)
-            if isinstance(value, float) and not isfinite(value):
-                raise ValueError(f"{name} must be a finite number, not {value}")
-        for name in _POSITIVE:
-            if getattr(self, name) <= 0:
-                raise ValueError(f"{name} must be positive, not {getattr(self, name)}")
-        for name in _NOT_NEGATIVE:
-            if getattr(self, name) < 0:
-                raise ValueError(f"{name} must not be negative, not {getattr(self, name)}")
+        positive(self, _POSITIVE)
+        not_negative(self, _NOT_NEGATIVE)
         if len(set(self.phrase_attributes)) < len(self.phrase_attributes):
             raise ValueError(f"phrase_attributes names one twice: {', '.join(self.phrase_attributes)}")
         if self.mtbce_low > self.mtbce_high:
             raise ValueError(f"mtbce_low {self.mtbce_low} is above mtbce_high {self.mtbce_high}")
         if self.gaze_half_angle is not None and not 0 < self.gaze_half_angle < pi / 2:
             raise ValueError(f"gaze_half_angle must be between 0 and pi/2 radians, not {self.gaze_half_angle}")
-        if self.pointing_radius is not None and self.pointing_radius <= 0:
-            raise ValueError(f"pointing_radius must be positive, not {self.pointing_radius}")
+        if self.pointing_radius is not None:
+            positive(self, ("pointing_radius",))
 
     @property
     def speech_only(self) -> bool:
@@ -165,5 +152,5 @@ _POSITIVE = (
 _NOT_NEGATIVE = (
     "seconds_per_head_degree", "seconds_per_arm_degree", "seconds_per_word", "wait_weight", "expected_delay",
     "figure_lead", "this_within", "dwell", "hand_speed", "hand_onset", "hand_stillness", "face_lost",
-    "mtbce_events", "body_patience", "covered_for",
+    "mtbce_events", "body_patience",
 )  # fmt: skip

@@ -7,7 +7,7 @@ from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound, Act
 from engage_hri.schemas.attention import HeadOwner, Inhibit, InhibitionEnded
 from engage_hri.schemas.blocks import BlockOutcome, PerformBlock
 from engage_hri.schemas.body import RobotState
-from engage_hri.schemas.covered import CoveredObjects
+from engage_hri.schemas.covered import COVERED_FOR, CoveredObjects
 from engage_hri.schemas.faults import EngageError, Fault, InputRefused
 from engage_hri.schemas.feedback import SyncPointProgress, WarningFeedback, WarningKind
 from engage_hri.schemas.fragments import PerformFragment
@@ -33,10 +33,13 @@ PATTERNS = (
 )  # fmt: skip
 
 
-async def generate(bus: Bus, ready: Ready, config: GenerationConfig) -> None:
-    """Serve until cancelled. A bad fragment is refused with a fault; it never ends the service."""
+async def generate(bus: Bus, ready: Ready, config: GenerationConfig, *, covered_for: Seconds = COVERED_FOR) -> None:
+    """Serve until cancelled. A bad fragment is refused with a fault; it never ends the service.
+
+    covered_for: see `CoveredObjects`.
+    """
     with bus.subscribe(*PATTERNS) as inbox:
-        generation = _Generation(bus, config)
+        generation = _Generation(bus, config, CoveredObjects(covered_for))
         try:
             async with asyncio.TaskGroup() as tasks:
                 tasks.create_task(generation.perform(), name="fragments")
@@ -52,7 +55,7 @@ async def generate(bus: Bus, ready: Ready, config: GenerationConfig) -> None:
 class _Generation:
     """Decodes, feeds the policies, publishes what they say."""
 
-    def __init__(self, bus: Bus, config: GenerationConfig) -> None:
+    def __init__(self, bus: Bus, config: GenerationConfig, objects: CoveredObjects) -> None:
         self._bus = bus
         self._config = config
         self._desk = RequestDesk(bus, NAME, self._cancel)
@@ -60,7 +63,7 @@ class _Generation:
         self._arbiter = Arbiter(bus.robot, config)
         self._leases = Leases(config)
         self._conductor = Conductor(bus, config, self._desk, self._requests, self._arbiter, self._leases, self._after)
-        self._objects = CoveredObjects(config.covered_for)
+        self._objects = objects
         self._early: dict[str, tuple[PerformFragment, Seconds]] = {}
         """Fragments that came before the first report of the world, and when they give up."""
         self._changed = asyncio.Event()

@@ -3,6 +3,7 @@
 from msgspec import Struct
 
 from engage_hri.schemas.behaviors import EventKind
+from engage_hri.schemas.ranges import not_negative
 from engage_hri.schemas.units import Seconds
 
 
@@ -49,9 +50,7 @@ class RealizerConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
     backchannel_limit: Seconds = 0.8
 
     def __post_init__(self) -> None:
-        for name in self.__struct_fields__:
-            if not 0 <= getattr(self, name) < float("inf"):
-                raise ValueError(f"{name} must be a finite number of at least 0, not {getattr(self, name)}")
+        not_negative(self, self.__struct_fields__)
         if self.stall < self.late or self.stall_factor < self.late_factor:
             raise ValueError("stall and stall_factor must not be below late and late_factor")
         if not 0.0 < 3.0 * self.pulse <= self.lease:

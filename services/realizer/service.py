@@ -31,17 +31,18 @@ from engage_hri.services.realizer.perform.control_link import LONGEST_WAY
 from engage_hri.services.realizer.perform.ledger import Ledger
 from engage_hri.services.realizer.perform.live import Ending, Live
 from engage_hri.services.realizer.perform.performance import BlockPerformance
-from engage_hri.services.realizer.perform.presence import Presence
-from engage_hri.services.realizer.perform.surroundings import Moving, Surroundings
-from engage_hri.services.realizer.perform.unhurried import unhurried
+from engage_hri.services.realizer.perform.surroundings import Moving, Presence, Surroundings
 from engage_hri.services.realizer.plan.planner import Plan, plan_steps
 from engage_hri.services.realizer.plan.poses import poses_before, poses_left
 from engage_hri.services.realizer.plan.relations import BlockRefused, extent, relation_steps
+from engage_hri.services.realizer.plan.steps import Steps, T
 from engage_hri.services.realizer.points import Point, performer
 from engage_hri.services.requests.ends import Patience, RequestDesk, Requester
 from engage_hri.services.runtime.service import Ready
 
 Result = TypeVar("Result")
+SLICE = 512
+"""Elements, see `steps`: one to five milliseconds of processor. Counted, not timed: equal runs stay equal."""
 
 
 class _Realizer:
@@ -358,3 +359,22 @@ async def realize(bus: Bus, ready: Ready, config: RealizerConfig) -> None:
     finally:
         realizer.desk.close()
         realizer.requests.close()
+
+
+async def unhurried(steps: Steps[T]) -> T:
+    """What long work returns, done a slice at a time: whatever else is due comes in between.
+
+    A cancellation takes effect at the end of the slice.
+    """
+    done = 0
+    try:
+        while True:
+            done += next(steps)
+            if done >= SLICE:
+                done = 0
+                await asyncio.sleep(0)
+    except StopIteration as end:
+        result: T = end.value
+        return result
+    finally:
+        steps.close()

@@ -5,6 +5,7 @@ from typing import Literal
 from msgspec import Struct
 
 from engage_hri.schemas.behaviors import Action
+from engage_hri.schemas.ranges import not_negative, positive
 from engage_hri.schemas.units import Degrees, Meters, Probability, Seconds, Vector
 
 GazeResolution = Literal["object", "table"]
@@ -49,12 +50,11 @@ class Sensing(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     `event_grace`."""
 
     def __post_init__(self) -> None:
-        for name in ("gaze_half_angle", "face_radius", "memory", "voice_lost", "hand_reach", "rest", "oldest"):
-            if not getattr(self, name) > 0:
-                raise ValueError(f"sensing.{name} must be greater than 0, not {getattr(self, name)}")
-        for name in ("gaze_margin", "dwell", "voice_onset", "voice_pause", "smoothing", "settling"):
-            if not getattr(self, name) >= 0:
-                raise ValueError(f"sensing.{name} must not be negative, but is {getattr(self, name)}")
+        place = "sensing."
+        positive(
+            self, ("gaze_half_angle", "face_radius", "memory", "voice_lost", "hand_reach", "rest", "oldest"), place
+        )
+        not_negative(self, ("gaze_margin", "dwell", "voice_onset", "voice_pause", "smoothing", "settling"), place)
         if not self.gaze_half_angle + self.gaze_margin < 90:
             raise ValueError("sensing.gaze_half_angle and gaze_margin must be less than 90 degrees together")
         if not 0 <= self.tremor < self.moved:
@@ -116,17 +116,12 @@ class RecognitionConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields
     """How far the estimate passes a threshold before the level changes."""
 
     def __post_init__(self) -> None:
-        positive = (
+        positive(self, (
             "directed_gaze_limit", "mutual_facial_gaze_limit", "adjacency_pair_limit", "manipulation_limit",
             "turn_patience", "backchannel_limit", "direct_by_look", "window", "reference_mtbce",
             "longest_speech", "longest_gesture", "longest_manipulation",
-        )  # fmt: skip
-        for name in positive:
-            if not getattr(self, name) > 0:
-                raise ValueError(f"{name} must be greater than 0 s, not {getattr(self, name)}")
-        for name in ("after_robot_directed", "lost_face_grace", "hysteresis"):
-            if getattr(self, name) < 0:
-                raise ValueError(f"{name} must not be negative, but is {getattr(self, name)}")
+        ))  # fmt: skip
+        not_negative(self, ("after_robot_directed", "lost_face_grace", "hysteresis"))
         if not 0 <= self.disengaged_below + self.hysteresis <= self.engaged_from - self.hysteresis <= 1:
             raise ValueError("thresholds overlap: disengaged_below + hysteresis <= engaged_from - hysteresis")
         if not 0 <= self.look_break <= self.sensing.settling:

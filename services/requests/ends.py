@@ -14,7 +14,6 @@ A server leaves commands that it gets from history to their requester, which kno
 import asyncio
 from collections.abc import Callable
 from functools import partial
-from types import TracebackType
 from typing import Self
 
 from msgspec.structs import replace
@@ -228,9 +227,7 @@ class Requester:
         await asyncio.sleep(0)
         return self
 
-    async def __aexit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    async def __aexit__(self, *raised: object) -> None:
         self.close()
         if self._listening is not None:
             self._listening.cancel()

@@ -97,8 +97,7 @@ TABLE: Mapping[State, Mapping[Event, Row]] = {
         E.ACCEPT: (S.UNKNOWN, Do.WARN_ENDED),
         E.REFUSE: (S.UNKNOWN, Do.WARN_ENDED),
         E.END: (S.UNKNOWN, Do.WARN_ENDED),
-        E.GONE: None, E.BACK: None, E.REBORN: None, E.GRACE_OVER: None, E.LEASE_OVER: None,
-    }),
+    }, E.GONE, E.BACK, E.REBORN, E.GRACE_OVER, E.LEASE_OVER),
     S.TAKEN: rows(S.TAKEN, {
         E.CAME: (S.TAKEN, Do.RENEW, Do.REPEAT),
         E.CHANGED: (S.TAKEN, Do.RENEW, Do.HAND),
@@ -136,13 +135,10 @@ TABLE: Mapping[State, Mapping[Event, Row]] = {
         E.CHANGED: (S.CANCELLED, Do.REPEAT),
         E.DIFFERED: (S.CANCELLED, Do.REPEAT),
         E.CANCEL: (S.CANCELLED, Do.REPEAT),
-        E.NAMED: None,
-        E.EXTENDED: None,
         E.ACCEPT: (S.CANCELLED, Do.ANSWER),
         E.REFUSE: (S.ENDED, Do.ANSWER),
         E.END: (S.ENDED, Do.ANSWER),
-        E.GONE: None, E.BACK: None, E.REBORN: None, E.GRACE_OVER: None, E.LEASE_OVER: None,
-    }),
+    }, E.NAMED, E.EXTENDED, E.GONE, E.BACK, E.REBORN, E.GRACE_OVER, E.LEASE_OVER),
     S.ENDED: rows(S.ENDED, {
         E.CAME: (S.ENDED, Do.REPEAT),
         E.CHANGED: (S.ENDED, Do.REPEAT),
@@ -153,6 +149,5 @@ TABLE: Mapping[State, Mapping[Event, Row]] = {
         E.ACCEPT: (S.ENDED, Do.WARN_ENDED),
         E.REFUSE: (S.ENDED, Do.WARN_ENDED),
         E.END: (S.ENDED, Do.WARN_ENDED),
-        E.GONE: None, E.BACK: None, E.REBORN: None, E.GRACE_OVER: None, E.LEASE_OVER: None,
-    }),
+    }, E.GONE, E.BACK, E.REBORN, E.GRACE_OVER, E.LEASE_OVER),
 }  # fmt: skip

@@ -17,11 +17,8 @@ DoT = TypeVar("DoT", bound=Name)
 
 
 def rows(
-    state: StateT, brief: Mapping[EventT, tuple[StateT, *tuple[DoT, ...]] | None]
+    state: StateT, changes: Mapping[EventT, tuple[StateT, *tuple[DoT, ...]]], *ignored: EventT
 ) -> dict[EventT, tuple[StateT, tuple[DoT, ...]]]:
-    """What `state` becomes with each event, and what follows. For brevity None stands for: it changes nothing."""
-    whole: dict[EventT, tuple[StateT, tuple[DoT, ...]]] = {}
-    for event, row in brief.items():
-        after, *actions = row or (state,)
-        whole[event] = (after, tuple(actions))
-    return whole
+    """What `state` becomes with each event, and what follows. ignored: events that change nothing."""
+    unchanged: dict[EventT, tuple[StateT, tuple[DoT, ...]]] = dict.fromkeys(ignored, (state, ()))
+    return unchanged | {event: (after, tuple(actions)) for event, (after, *actions) in changes.items()}

@@ -5,6 +5,7 @@ from typing import Literal
 
 from msgspec import Struct
 
+from engage_hri.schemas.ranges import not_negative, positive, shares
 from engage_hri.schemas.units import Degrees, Meters, Probability, Seconds
 
 HumanKind = Literal["scripted", "misplacing", "listening", "stochastic", "attentive", "none"]
@@ -41,12 +42,8 @@ class PerceptionFaults(Struct, frozen=True, kw_only=True, forbid_unknown_fields=
     """How often an utterance of the person is not heard."""
 
     def __post_init__(self) -> None:
-        for name in ("gaze", "lost_faces", "occlusion", "position", "yaw"):
-            if not 0 <= getattr(self, name) < math.inf:
-                raise ValueError(f"simulation.faults.{name} must be 0 or more, and finite, not {getattr(self, name)}")
-        for name in ("wrong_look", "missed_look", "dropped_frames", "dropped_speech"):
-            if not 0 <= getattr(self, name) <= 1:
-                raise ValueError(f"simulation.faults.{name} must be in 0..1, not {getattr(self, name)}")
+        not_negative(self, ("gaze", "lost_faces", "occlusion", "position", "yaw"), "simulation.faults.")
+        shares(self, ("wrong_look", "missed_look", "dropped_frames", "dropped_speech"), "simulation.faults.")
         if not 0 <= self.lost_for[0] <= self.lost_for[1] < math.inf:
             raise ValueError(f"simulation.faults.lost_for must be shortest and longest, not {self.lost_for}")
 
@@ -109,16 +106,14 @@ class Habits(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     unanswered one toward 0. Our assumption, after hypothesis 11 of the thesis; 0: eye contact changes nothing."""
 
     def __post_init__(self) -> None:
-        for name in self.__struct_fields__:
-            value = getattr(self, name)
-            if isinstance(value, tuple):
-                if not 0 <= value[0] < value[1] < value[2] < math.inf:
-                    raise ValueError(f"simulation.stochastic.{name}: 0 <= least < mean < longest, not {value}")
-            elif name in ("looks_up_every", "directs_every", "glance"):
-                if not 0 < value < math.inf:
-                    raise ValueError(f"simulation.stochastic.{name} must be positive and finite, not {value}")
-            elif not 0 <= value <= 1:
-                raise ValueError(f"simulation.stochastic.{name} must be in 0..1, not {value}")
+        place, durations = "simulation.stochastic.", ("looks_up_every", "directs_every", "glance")
+        delays = [name for name in self.__struct_fields__ if isinstance(getattr(self, name), tuple)]
+        for name in delays:
+            least, mean, longest = getattr(self, name)
+            if not 0 <= least < mean < longest < math.inf:
+                raise ValueError(f"{place}{name}: 0 <= least < mean < longest, not {getattr(self, name)}")
+        positive(self, durations, place)
+        shares(self, [name for name in self.__struct_fields__ if name not in (*delays, *durations)], place)
 
 
 class SimulationConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -155,9 +150,5 @@ class SimulationConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=
     """A hand's movement takes at least this."""
 
     def __post_init__(self) -> None:
-        for name in ("frame", "hand_speed", "shortest_movement"):
-            if not 0 < getattr(self, name) < math.inf:
-                raise ValueError(f"simulation.{name} must be positive and finite, not {getattr(self, name)}")
-        for name in ("entrance", "jitter", "head_turn"):
-            if not 0 <= getattr(self, name) < math.inf:
-                raise ValueError(f"simulation.{name} must be 0 or more, and finite, not {getattr(self, name)}")
+        positive(self, ("frame", "hand_speed", "shortest_movement"), "simulation.")
+        not_negative(self, ("entrance", "jitter", "head_turn"), "simulation.")

@@ -22,7 +22,7 @@ from engage_hri.schemas.recognition import RequestEvent, SignalTurn
 from engage_hri.schemas.units import Probability, Seconds, Stamp
 from engage_hri.schemas.world import Entity, World
 from engage_hri.services.simulation.chance import Chance
-from engage_hri.services.simulation.table_2_1 import DELAYS, EVENTS, LONGEST_GAP, MTBCE, TABLE
+from engage_hri.services.simulation.table_2_1 import TABLE
 
 Observation = World | ActorFound | ActionBegan | ActionEnded | RequestEvent | SignalTurn
 
@@ -144,42 +144,6 @@ def _event(kind: EventKind, number: int, start: Seconds, chance: Chance, answers
         turn=_turn(turn, succeeds, delay),
         object=OBJECTS[number % len(OBJECTS)] if kind == "directed_gaze" else "",
     )
-
-
-def exactly() -> tuple[Planned, ...]:
-    """The session whose statistics are those of Table 2.1 to the last digit. Nothing is drawn.
-
-    Its events come evenly, but for one: a request that somebody busy with another does not answer for 7.4 s, and
-    nothing else for 70.
-    """
-    events = [(kind, ok, delay) for (kind, ok), delays in DELAYS.items() for delay in delays]
-    task, unanswered = events.index(("adjacency_pair", True, 0.4)), events.index(("adjacency_pair", False, 7.4))
-    two = [events[task], events[unanswered]]
-    rest: list[tuple[EventKind, bool, Seconds | None]] = [
-        event for index, event in enumerate(events) if index not in (task, unanswered)
-    ]
-    rest += [("backchannel", True, None)] * TABLE["backchannel"].count
-    # Kinds are mixed by a stride that is prime to their number.
-    mixed = [rest[index * 31 % len(rest)] for index in range(len(rest))]
-    middle = len(mixed) // 2
-    between = ((EVENTS - 1) * MTBCE - LONGEST_GAP) / (EVENTS - 2)
-    plan, start = [], 1.0
-    for number, (kind, ok, delay) in enumerate([*mixed[:middle], *two, *mixed[middle:]]):
-        answers_request = (ok and kind != "backchannel") or kind == "mutual_facial_gaze"
-        plan.append(
-            Planned(
-                kind=kind,
-                initiator=LISTENER if answers_request and number % 2 and number != middle else EXPLAINER,
-                start=start,
-                succeeds=ok,
-                delay=delay,
-                turn=_turn(TURN[0], ok, delay) if kind == "adjacency_pair" else 0.0,
-                object=OBJECTS[number % len(OBJECTS)] if kind == "directed_gaze" else "",
-                task_until=start + between + LONGEST_GAP - BETWEEN if number == middle else None,
-            )
-        )
-        start += LONGEST_GAP if number == middle + 1 else between
-    return tuple(plan)
 
 
 def _turn(drawn: Seconds, succeeds: bool, delay: Seconds | None) -> Seconds:

@@ -46,13 +46,3 @@ EVENTS = sum(row.count for row in TABLE.values())
 MTBCE: Seconds = 5.7
 """Mean time between the starts of successive connection events."""
 LONGEST_GAP: Seconds = 70.0
-
-DELAYS: Mapping[tuple[EventKind, bool], tuple[Seconds, ...]] = {
-    ("directed_gaze", True): (*[0.0] * 4, *[0.1] * 6, 0.65, 0.65, 2.0),
-    ("directed_gaze", False): (1.5,),
-    ("mutual_facial_gaze", True): (0.0, *[0.7] * 8, 0.6, 1.5),
-    ("mutual_facial_gaze", False): (0.3, *[0.5] * 10, 0.7, 1.8),
-    ("adjacency_pair", True): (0.0, *[0.4] * 27, 0.1, 1.1),
-    ("adjacency_pair", False): (0.1, *[0.7] * 11, 1.6, 7.4),
-}
-"""Single delays, by kind and success, that have the table's counts, extremes and means. They are ours."""

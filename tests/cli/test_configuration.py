@@ -7,6 +7,8 @@ import pytest
 
 from engage_hri.schemas.faults import InputRefused
 from engage_hri.services.commandline.config import Config, load
+from engage_hri.services.commandline.roster import NAMES, service
+from engage_hri.services.commandline.settings import ELSEWHERE, RobotConfig, read
 
 ROOT = Path(__file__).parents[2]
 
@@ -45,6 +47,28 @@ def test_a_setting_is_stronger_than_the_file_and_the_file_than_a_default(tmp_pat
     assert config.recognition.gaze_resolution == "object"
     assert config.generation.dwell == 0.7
     assert (config.control.variability.seed, config.control.variability.noise) == (3, 0.1)
+
+
+def test_a_robot_passes_over_the_sections_of_others_but_not_over_what_nobody_has(tmp_path: Path) -> None:
+    path = tmp_path / "engage.toml"
+    path.write_text("robot = 'file'\n[simulation]\nseed = 3\n[collaboration]\nmode = 'task'\n")
+
+    assert read(RobotConfig, path, settings=["simulation.human=none"]) == RobotConfig(robot="file")
+    assert {*ELSEWHERE} == {*Config.__struct_fields__} - {*RobotConfig.__struct_fields__}
+    path.write_text("[simulaton]\nseed = 3\n")
+    for kind in (RobotConfig, Config):
+        with pytest.raises(InputRefused, match="unknown key `simulaton`"):
+            read(kind, path)
+
+
+def test_all_who_remember_covered_objects_do_so_for_as_long() -> None:
+    config = load(settings=["covered_for=3"])
+
+    told = {name: getattr(service(name, config), "keywords", {}).get("covered_for") for name in NAMES}
+
+    assert {name for name, seconds in told.items() if seconds == 3.0} == {"generation", "control"}
+    with pytest.raises(InputRefused, match="covered_for must not be negative"):
+        load(settings=["covered_for=-1"])
 
 
 def test_the_example_on_the_page_is_good(tmp_path: Path) -> None:

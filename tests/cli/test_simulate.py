@@ -12,7 +12,7 @@ from rich.console import Console
 
 from engage_hri.services.commandline import session as playing
 from engage_hri.services.commandline import simulate, workers
-from engage_hri.services.commandline.config import Config
+from engage_hri.services.commandline.config import Config, load
 from engage_hri.services.commandline.session import Order, Played, play
 from engage_hri.services.commandline.workers import play_all
 from engage_hri.services.runtime.virtual_time import Deadlock
@@ -40,7 +40,10 @@ def order(number: int, config: Config | None = None) -> Order:
 def study(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Two whole sessions, the same seed in two conditions, each in a process of its own."""
     out = tmp_path_factory.mktemp("study")
-    options = simulate.Options(1, 3, out, ("operational", "degraded-generation"), "appendix-b", jobs=2, quiet=True)
+    options = simulate.Options(
+        sessions=1, seed=3, out=out, condition=["operational", "degraded-generation"], human="appendix-b", jobs=2,
+        quiet=True,
+    )  # fmt: skip
     assert simulate.main(options) == 0
     return out
 
@@ -108,7 +111,7 @@ def test_the_number_of_processes_changes_nothing(engage: Engage, tmp_path: Path)
 
 def test_another_process_plays_the_same_session_with_the_robot() -> None:
     """And again the same after another one. Broken off early, to be quick."""
-    orders = simulate.orders_of(simulate.Options(1, 7, Path(), limit=12.0))[:2]
+    orders = simulate.orders_of(simulate.Options(sessions=1, seed=7, out=Path(), limit=12.0))[:2]
     told: list[Played] = []
 
     asyncio.run(play_all([*orders, *orders], 1, told.append))
@@ -207,8 +210,8 @@ def test_bad_arguments_are_refused(arguments: tuple[str, ...], reason: str, enga
 def test_the_users_settings_are_stronger_than_a_conditions_but_not_than_its_name(tmp_path: Path) -> None:
     file = tmp_path / "engage.toml"
     file.write_text("[generation]\ncondition = 'operational'\n[simulation]\nseed = 9\n")
-    where = simulate.Where(config=file, settings=("simulation.faults.missed_look=0.1",))
-    options = simulate.Options(2, 40, Path(), where=where)
+    settings = ["simulation.faults.missed_look=0.1"]
+    options = simulate.Options(sessions=2, seed=40, out=Path(), config=file, settings=settings)
 
     orders = simulate.orders_of(options)
 
@@ -241,7 +244,7 @@ def test_tables_of_many_sessions_fit_a_narrow_terminal() -> None:
 
 
 def test_a_session_that_does_not_end_is_broken_off() -> None:
-    nobody = simulate.Where(settings=("simulation.human=none",)).load()
+    nobody = load(settings=["simulation.human=none"])
 
     record = play(order(0, nobody)).record
 

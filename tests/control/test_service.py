@@ -60,7 +60,7 @@ async def test_a_behavior_goes_from_request_to_outcome(hub: MemoryHub):
 
 async def test_a_covered_object_is_pointed_at_where_it_was_and_one_that_has_gone_is_not(hub: MemoryHub):
     without = World(entities=tuple(one for one in WORLD.entities if one.id != POINT.target))
-    async with robot(hub, covered_for=10.0) as client:
+    async with robot(hub) as client:
         client.bus.publish(keys.WORLD, without)
         await asyncio.sleep(9.0)
         outcome = await client.outcome(client.perform(POINT))

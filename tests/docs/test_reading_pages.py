@@ -4,12 +4,10 @@ import re
 import shlex
 import tomllib
 from collections.abc import Iterator
-from typing import Any
 
 import pytest
-import typer
 
-from engage_hri.services.commandline.app import app
+from engage_hri.services.commandline.app import COMMANDS, command
 from tests.docs.clone import ROOT
 from tests.docs.pages import (
     Shown,
@@ -97,30 +95,28 @@ def calls() -> Iterator[tuple[str, list[str]]]:
     for page, text in PAGES.items():
         shown = [(str(block), one.command) for block in blocks(page, text) if block.language in ("sh", "console")
                  for one in commands(block)]  # fmt: skip
-        for where, command in [*shown, *((str(span), span.text) for span in spans(page, text))]:
-            for call in re.findall(r"\bengage (.*?)(?: \| .*)?$", command.replace("\\\n", " "), re.MULTILINE):
-                yield where, shlex.split(call.replace("...", ""), comments=True)
+        for where, call in [*shown, *((str(span), span.text) for span in spans(page, text))]:
+            for words in re.findall(r"\bengage (.*?)(?: \| .*)?$", call.replace("\\\n", " "), re.MULTILINE):
+                yield where, shlex.split(words.replace("...", ""), comments=True)
 
 
 @pytest.mark.parametrize(("where", "words"), [*calls()])
 def test_what_a_page_calls_is_there_with_these_options(where: str, words: list[str]):
-    engage: Any = typer.main.get_command(app)
     if words[0] in ("--version", "COMMAND"):
         return
 
-    known = {option for param in engage.commands[words[0]].params for option in (*param.opts, *param.secondary_opts)}
+    known = {option for param in command(words[0]).params for option in (*param.opts, *param.secondary_opts)}
     assert {word for word in words if word.startswith("-") and len(word) > 1} <= known
 
 
 def test_every_option_of_the_page_on_commands_is_there():
-    engage: Any = typer.main.get_command(app)
     told = re.split(r"^## (\w[\w-]*)$", PAGES["docs/commands.md"], flags=re.MULTILINE)
     sections = dict(zip(told[1::2], told[2::2], strict=True))
 
-    public = {name: command for name, command in engage.commands.items() if not command.hidden}
+    public = [name for name, does in COMMANDS.items() if does]
     assert set(public) <= set(sections)
-    for name, command in public.items():
-        known = {option for param in command.params for option in param.opts}
+    for name in public:
+        known = {option for param in command(name).params for option in param.opts}
         heads = re.findall(r"^- (`--.*?):? *", sections[name], re.MULTILINE)
         assert {option for head in heads for option in re.findall(r"--[\w-]+", head)} <= known, name
 

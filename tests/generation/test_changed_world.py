@@ -4,9 +4,9 @@ import asyncio
 
 from msgspec.structs import replace
 
+from engage_hri.schemas.covered import COVERED_FOR
 from engage_hri.schemas.fragments import FragmentOutcome
 from engage_hri.services.bus.memory import MemoryHub
-from engage_hri.services.generation.config import GenerationConfig
 from tests.generation.partners import TABLE, stage
 from tests.generation.test_service import refers, says
 
@@ -20,7 +20,7 @@ async def test_what_has_left_the_world_while_the_fragment_waited_ends_it_with_it
         second = partners.send(refers("second"))
         await second.accepted
         partners.see(less)
-        await asyncio.sleep(GenerationConfig().covered_for + 1.0)
+        await asyncio.sleep(COVERED_FOR + 1.0)
         partners.see(less)
         await asyncio.sleep(0.1)
         partners.end(partners.request("first"))

@@ -26,7 +26,7 @@ BAD = [
     Bad("gaze_reliability = 0", "0 < gaze_reliability < directed_gaze_reliability"),
     Bad("gaze_reliability = 0.2", "does not hold: 0.2, 0.2, 0.28"),
     Bad("directed_gaze_reliability = 0.3", "does not hold: 0.1, 0.3, 0.28"),
-    Bad("phrase_reliability = 1.0", "phrase_reliability 1.0 is not in (0, 1)"),
+    Bad("phrase_reliability = 1.0", "phrase_reliability must be in (0, 1), not 1.0"),
     Bad("phrase_reliability = 1.5", "Expected `float` <= 1.0, in `generation.phrase_reliability`"),
     Bad("phrase_reliability = 0.72", "pointing_reliability 0.28 + phrase_reliability 0.72 reaches 1"),
     Bad("phrase_reliability = 0.72", 'or set channel = "independent"'),

@@ -62,7 +62,7 @@ def test_fewer_distractors_and_a_better_channel_are_more_reliable(count: int, on
         ({"turn_silence": 0.0}, "turn_silence"),
         ({"mtbce_low": 20.0}, "mtbce_low"),
         ({"gaze_half_angle": 0.0}, "gaze_half_angle"),
-        ({"gaze_half_angle": float("nan")}, "gaze_half_angle must be a finite number"),
+        ({"gaze_half_angle": float("nan")}, "gaze_half_angle must be between 0 and pi"),
         ({"seconds_per_head_degree": float("nan")}, "seconds_per_head_degree must be a finite number"),
         ({"expected_delay": float("inf")}, "expected_delay must be a finite number"),
     ],

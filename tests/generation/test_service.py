@@ -359,7 +359,7 @@ async def test_a_dead_manager_ends_what_it_asked_for(hub: MemoryHub) -> None:
 
 async def test_a_covered_piece_is_still_spoken_of_and_one_that_has_gone_is_not(hub: MemoryHub) -> None:
     without = World(entities=tuple(entity for entity in TABLE.entities if entity.id != "middle"))
-    async with stage(hub, GenerationConfig(covered_for=10.0)) as partners:
+    async with stage(hub, GenerationConfig()) as partners:
         partners.see(without)
         await asyncio.sleep(9.0)
         partners.send(refers("covered"))

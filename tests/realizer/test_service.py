@@ -8,9 +8,9 @@ from engage_hri.schemas import keys
 from engage_hri.schemas.behaviors import Gaze, GazeShift, Mark, Pointing, Speech, Timing, Wait
 from engage_hri.schemas.blocks import PerformBlock
 from engage_hri.schemas.feedback import BlockProgress, PredictionFeedback
-from engage_hri.services.bus.memory import Faults, MemoryHub
 from engage_hri.services.realizer.config import RealizerConfig
 from engage_hri.services.requests.ends import RequestRefused
+from tests.bus.faulty import Faults, FaultyHub
 from tests.realizer.fake_body import FakeBody, Script
 from tests.realizer.stage import after, block, stage, together
 
@@ -195,7 +195,7 @@ async def test_a_prediction_is_corrected_by_what_is_measured() -> None:
 
 @pytest.mark.parametrize("seed", range(5))
 async def test_a_bus_that_delays_and_doubles_loses_nothing(seed: int) -> None:
-    async with MemoryHub(faults=Faults(duplicate=0.3, delay=0.05), seed=seed) as hub, stage(hub=hub) as seen:
+    async with FaultyHub(Faults(duplicate=0.3, delay=0.05), seed) as hub, stage(hub=hub) as seen:
         outcome = await seen.perform(block((Gaze(id="g", target="a"), STORY), together("g:stroke", "s:start")))
 
     assert outcome.status == "done"

@@ -12,7 +12,6 @@ from engage_hri.schemas.actions import ActionBegan, ActorFound, ActorLost
 from engage_hri.schemas.recognition import ConnectionEvent, EventOutcome, Statistics
 from engage_hri.schemas.requests import Accepted, Refused
 from engage_hri.services.recognition.config import RecognitionConfig
-from engage_hri.services.recognition.events.agenda import SLACK, Agenda
 from engage_hri.services.recognition.events.machine import Forgotten
 from engage_hri.services.recognition.events.open_events import OpenBook
 from engage_hri.services.recognition.events.person import Person
@@ -186,20 +185,6 @@ def test_a_step_asks_no_more_than_one_of_many_who_are_here(monkeypatch: pytest.M
     log.until(2.0)
 
     assert asked == ["person-7"]
-
-
-def test_an_agenda_keeps_one_time_for_each_key_and_gives_them_in_order():
-    agenda: Agenda[str] = Agenda()
-    for at in range(1000):
-        agenda.set("a", 5000.0 - at)
-        agenda.set("b", 5000.0)
-    agenda.set("c", 4001.0)
-    agenda.set("b", None)
-
-    assert len(agenda._heap) <= 2 * 3 + SLACK
-    assert agenda.take_due(4000.0) == []
-    assert agenda.take_due(9000.0) == ["a", "c"]
-    assert agenda.deadline is None
 
 
 # -- what they change ---------------------------------------------------------------------------------------------

@@ -125,7 +125,7 @@ def test_ids_count_by_kind_and_carry_the_session():
 @pytest.mark.parametrize(
     ("setting", "value", "reason"),
     [
-        ("directed_gaze_limit", 0.0, "directed_gaze_limit must be greater than 0 s"),
+        ("directed_gaze_limit", 0.0, "directed_gaze_limit must be positive"),
         ("lost_face_grace", -0.1, "lost_face_grace must not be negative"),
         ("engaged_from", 0.2, "thresholds overlap"),
         ("enough_events", 1, "at least 2"),
@@ -140,7 +140,7 @@ def test_bad_configuration_is_refused(setting, value, reason):
 @pytest.mark.parametrize(
     ("setting", "value", "reason"),
     [
-        ("memory", 0.0, "sensing.memory must be greater than 0"),
+        ("memory", 0.0, "sensing.memory must be positive"),
         ("dwell", -0.1, "sensing.dwell must not be negative"),
         ("tremor", 0.025, "sensing.tremor must be less than sensing.moved"),
         ("gaze_half_angle", 89.0, "less than 90 degrees together"),

@@ -9,9 +9,9 @@ from engage_hri.schemas import keys
 from engage_hri.schemas.blocks import Block, PerformBlock
 from engage_hri.schemas.faults import EngageError
 from engage_hri.schemas.requests import Outcome
-from engage_hri.services.bus.memory import Faults, MemoryHub
 from engage_hri.services.requests.ends import Requester
 from engage_hri.services.runtime.virtual_time import run_virtual
+from tests.bus.faulty import Faults, FaultyHub
 from tests.bus.performer import Server, block
 
 
@@ -33,7 +33,7 @@ def test_every_request_ends_exactly_once_at_both_ends(
     loss: float, duplicate: float, delay: float, seed: int, script: list[tuple[str, float]]
 ):
     async def main() -> None:
-        hub = MemoryHub(faults=Faults(loss=loss, duplicate=duplicate, delay=delay), seed=seed)
+        hub = FaultyHub(Faults(loss=loss, duplicate=duplicate, delay=delay), seed)
         client = hub.join("client")
         client.declare_alive()
         lives: list[Server] = []

@@ -10,7 +10,7 @@ from engage_hri.schemas import keys
 from engage_hri.schemas.fragments import FragmentOutcome
 from engage_hri.schemas.recognition import ConnectionEvent
 from engage_hri.services.bus.interface import Bus, Received
-from engage_hri.services.bus.memory import Faults, MemoryHub
+from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.collaboration.config import CollaborationConfig
 from engage_hri.services.collaboration.service import collaborate
 from engage_hri.services.control.config import ControlConfig, Variability
@@ -24,6 +24,7 @@ from engage_hri.services.recognition.service import recognize
 from engage_hri.services.runtime.service import Ready, Service, running
 from engage_hri.services.simulation.config import Habits, SimulationConfig
 from engage_hri.services.simulation.service import simulate
+from tests.bus.faulty import Faults, FaultyHub
 
 LIMIT = 900.0
 """Seconds of virtual time: nothing in the scenario takes so long."""
@@ -88,7 +89,7 @@ async def play(
         "simulation": partial(simulate, config=person),
         "collaboration": collaboration,
     }
-    async with MemoryHub(faults=faults, seed=seed) as hub:
+    async with MemoryHub() if faults is None else FaultyHub(faults, seed) as hub:
         with hub.join("record").subscribe(
             f"{keys.PREFIX}/cmd/**", f"{keys.PREFIX}/evt/**", f"{keys.PREFIX}/state/**", capacity=10**6
         ) as inbox:

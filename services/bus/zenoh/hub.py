@@ -48,7 +48,6 @@ async def open_hub(
     connect: Sequence[str] = (),
     listen: Sequence[str] = (),
     rendezvous: str | None = RENDEZVOUS,
-    mode: str = "peer",
 ) -> "ZenohHub":
     """Join the bus of `robot`. Processes may start in any order: waits for nobody for longer than `OPENING`.
 
@@ -56,7 +55,7 @@ async def open_hub(
     at `rendezvous`. Raises InputRefused when an endpoint is misspelled, RunFailed when it is taken.
     """
     # Blocks the loop for milliseconds, before its work has started: Zenoh has no async API, and we start no thread.
-    session, calls = open_session(robot, connect, listen, None if connect or listen else rendezvous, mode)
+    session, calls = open_session(robot, connect, listen, None if connect or listen else rendezvous)
     hub = ZenohHub(robot, session)
     if calls:
         await hub.peers.settle(asyncio.get_running_loop().time() + OPENING)

@@ -28,10 +28,10 @@ Kept = tuple[Written, zenoh.Timestamp]
 class Visitors:
     """What this process has published, kept under the timestamps it was published with, and given to who asks."""
 
-    def __init__(self, session: zenoh.Session, doorway: Doorway, kept: int = KEPT) -> None:
+    def __init__(self, session: zenoh.Session, doorway: Doorway) -> None:
         self._loop = asyncio.get_running_loop()
         self._states: dict[str, Kept] = {}
-        self._recent: deque[Kept] = deque(maxlen=kept)
+        self._recent: deque[Kept] = deque(maxlen=KEPT)
         self._open = True
         self._declared = tuple(
             session.declare_queryable(keys.of_class(kind), doorway.entrance(self._asked))

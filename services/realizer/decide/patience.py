@@ -1,6 +1,5 @@
 """How long the realizer waits: for the next report of a behavior under way, and for the decision of an event."""
 
-import heapq
 from collections.abc import Mapping
 
 from msgspec import Struct
@@ -14,6 +13,7 @@ from engage_hri.schemas.units import Seconds
 from engage_hri.services.realizer.config import RealizerConfig
 from engage_hri.services.realizer.plan.schedule import EPSILON
 from engage_hri.services.realizer.points import Point
+from engage_hri.services.requests.deadlines import Deadlines
 
 
 class Late(Struct, frozen=True):
@@ -48,7 +48,7 @@ class Patience:
         self._config = config
         self._awaited: dict[str, _Awaited] = {}
         self._warned: set[str] = set()
-        self._alarms: list[tuple[Seconds, str]] = []
+        self._alarms: Deadlines[str] = Deadlines(str)
 
     def expect(self, behavior: str, sync: str, expected: Seconds, natural: Seconds) -> None:
         """Its next report is `sync`, about at `expected`; natural: the duration of the phase before."""
@@ -58,36 +58,28 @@ class Patience:
         awaited = _Awaited(sync, expected, late, stalled)
         if awaited != self._awaited.get(behavior):
             self._awaited[behavior] = awaited
-            heapq.heappush(self._alarms, (stalled if behavior in self._warned else late, behavior))
+            self._alarms.set(behavior, stalled if behavior in self._warned else late)
 
     def forget(self, behavior: str) -> None:
         """It owes no report: it has ended, or waits for us."""
         self._awaited.pop(behavior, None)
+        self._alarms.clear(behavior)
 
     @property
     def deadline(self) -> Seconds | None:
         """When to ask again."""
-        while self._alarms and not self._is_current(*self._alarms[0]):
-            heapq.heappop(self._alarms)
-        return self._alarms[0][0] if self._alarms else None
-
-    def _is_current(self, at: Seconds, behavior: str) -> bool:
-        awaited = self._awaited.get(behavior)
-        return awaited is not None and at in (awaited.late, awaited.stalled)
+        return self._alarms.earliest
 
     def overdue(self, now: Seconds) -> list[Late | Stalled]:
         """Who is late, once each, and who has been for too long."""
         found: list[Late | Stalled] = []
-        due = []
-        while (deadline := self.deadline) is not None and deadline <= now + EPSILON:
-            due.append(heapq.heappop(self._alarms)[1])
-        for behavior in dict.fromkeys(due):
+        for behavior in [*iter(lambda: self._alarms.due(now + EPSILON), None)]:
             awaited = self._awaited[behavior]
             if now >= awaited.stalled - EPSILON:
                 found.append(Stalled(behavior, awaited.sync, now - awaited.expected))
                 self.forget(behavior)
                 continue
-            heapq.heappush(self._alarms, (awaited.stalled, behavior))
+            self._alarms.set(behavior, awaited.stalled)
             if behavior not in self._warned:
                 self._warned.add(behavior)
                 found.append(Late(behavior, awaited.sync, now - awaited.expected))

@@ -15,7 +15,7 @@ from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.interface import Bus
 from engage_hri.services.realizer.config import RealizerConfig
 from engage_hri.services.realizer.decide.patience import event_deadline
-from engage_hri.services.realizer.perform.presence import Presence
+from engage_hri.services.realizer.perform.surroundings import Presence
 from engage_hri.services.realizer.plan.schedule import EPSILON
 from engage_hri.services.realizer.points import Point
 from engage_hri.services.requests.ends import Pending, Requester, RequestRefused, ServerRestarted

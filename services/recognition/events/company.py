@@ -9,10 +9,10 @@ from collections.abc import Callable
 from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.world import World
 from engage_hri.services.recognition.config import RecognitionConfig
-from engage_hri.services.recognition.events.agenda import Agenda
 from engage_hri.services.recognition.events.machine import Forgotten, Ledger, Mishap
 from engage_hri.services.recognition.events.person import Person
 from engage_hri.services.recognition.events.scene import Scene
+from engage_hri.services.requests.deadlines import Deadlines
 
 
 class Company:
@@ -22,7 +22,7 @@ class Company:
         self.persons: dict[str, Person] = {}
         self._here: dict[str, Person] = {}
         """In the order of acquaintance."""
-        self._agenda: Agenda[tuple[int, str]] = Agenda()
+        self._agenda: Deadlines[str] = Deadlines(lambda id: self.persons[id].number)
         self._unseen: dict[str, Seconds] = {}
         """Since when nobody has told of those who have gone, or of whom nobody says that they are there. The longest
         ago first."""
@@ -72,7 +72,7 @@ class Company:
             if person.presence.here:
                 person.presence.vanish(since)
                 self._let(person, now, lambda person: person.leave(now))
-            self._agenda.set((person.number, id), None)
+            self._agenda.clear(id)
             self._here.pop(id, None)
             del self.persons[id], self._unseen[id]
             self._ledger.effects.append(Forgotten(id))
@@ -95,13 +95,13 @@ class Company:
     @property
     def deadline(self) -> Seconds | None:
         """When something happens by itself."""
-        return self._agenda.deadline
+        return self._agenda.earliest
 
     def advance(self) -> None:
         """Let happen what is due first."""
-        first = self._agenda.first
-        assert first is not None
-        at, (_, id) = first
+        id, at = self._agenda.first, self._agenda.earliest
+        assert id is not None
+        assert at is not None
         self._let(self.persons[id], at, lambda person: person.pass_time(at))
         self._follow_speech(at)
 
@@ -142,7 +142,7 @@ class Company:
 
     def _arrange(self, person: Person) -> None:
         """Know when the person is due, and whether it is here."""
-        self._agenda.set((person.number, person.id), person.deadline)
+        self._agenda.set(person.id, person.deadline)
         here, was_here = person.presence.here, person.id in self._here
         if was_here and not here:
             del self._here[person.id]

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from engage_hri.schemas.behavior_types import canonical_sync
 from engage_hri.schemas.syncref import BLOCK_ITSELF, SyncRef
 from engage_hri.schemas.units import Seconds
-from engage_hri.services.recognition.events.latest import Latest
+from engage_hri.services.recognition.events.news import Latest
 
 ROUNDING: Seconds = 1e-6
 """Sums of times are off by less than this, on clocks that have run for decades, too."""

@@ -1,10 +1,28 @@
-"""Is an observed action news? It may come twice, or so late that something newer of its kind has been seen."""
+"""What is remembered of what was observed, but not for ever: enough to know what is news."""
+
+from typing import TypeVar
 
 from engage_hri.schemas.actions import ActionBegan, ActionEnded
 from engage_hri.schemas.behaviors import Action
 from engage_hri.schemas.units import Seconds
-from engage_hri.services.recognition.events.latest import Latest
 from engage_hri.services.recognition.events.presence import NEVER
+
+Key = TypeVar("Key")
+Value = TypeVar("Value")
+
+
+class Latest(dict[Key, Value]):
+    """Only the `size` entries that were set last are kept."""
+
+    def __init__(self, size: int) -> None:
+        super().__init__()
+        self._size = size
+
+    def __setitem__(self, key: Key, value: Value) -> None:
+        self.pop(key, None)
+        super().__setitem__(key, value)
+        if len(self) > self._size:
+            del self[next(iter(self))]
 
 
 class News:

@@ -24,10 +24,9 @@ from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.world import World
 from engage_hri.services.recognition.config import RecognitionConfig
 from engage_hri.services.recognition.events.company import Company
-from engage_hri.services.recognition.events.latest import Latest
 from engage_hri.services.recognition.events.limits import BLOCKS_KEPT, ROUNDING, Blocks, LimitClock
 from engage_hri.services.recognition.events.machine import Effect, Ledger, UnderWay
-from engage_hri.services.recognition.events.news import News
+from engage_hri.services.recognition.events.news import Latest, News
 from engage_hri.services.recognition.events.person import Person
 from engage_hri.services.recognition.events.scene import Covered, Scene
 

@@ -5,10 +5,10 @@ from collections.abc import Iterable, Set
 from engage_hri.schemas.recognition import ConnectionEvent, Statistics
 from engage_hri.schemas.units import Seconds, Stamp
 from engage_hri.services.recognition.config import RecognitionConfig
-from engage_hri.services.recognition.events.agenda import Agenda
 from engage_hri.services.recognition.events.machine import Forgotten
 from engage_hri.services.recognition.statistics.engagement import Engagement
 from engage_hri.services.recognition.statistics.tally import Tally
+from engage_hri.services.requests.deadlines import Deadlines
 
 EVERYBODY = ""
 
@@ -27,21 +27,21 @@ class Standings:
         self._config = config
         self._clock = clock
         self._standings: dict[str, _Standing] = {EVERYBODY: _Standing(config, clock)}
-        self._agenda: Agenda[str] = Agenda()
+        self._agenda: Deadlines[str] = Deadlines(str)
         self._busy: frozenset[str] = frozenset()
 
     @property
     def deadline(self) -> Seconds | None:
         """When somebody's statistics change by the passing of time."""
-        return self._agenda.deadline
+        return self._agenda.earliest
 
     def feed(self, changes: Iterable[ConnectionEvent | Forgotten], busy: Set[str], now: Seconds) -> list[Statistics]:
         """Count what happened, in its order; the statistics that are new. busy: persons with a task in hand."""
-        touched = set(self._agenda.take_due(now))
+        touched = set(iter(lambda: self._agenda.due(now), None))
         for change in changes:
             if isinstance(change, Forgotten):
                 self._standings.pop(change.actor, None)
-                self._agenda.set(change.actor, None)
+                self._agenda.clear(change.actor)
                 touched.discard(change.actor)
                 continue
             for name in (change.person(self._robot), EVERYBODY):

@@ -1,9 +1,0 @@
-"""`python -m engage_hri.services.collaboration`: the same as `engage run collaboration`."""
-
-import sys
-
-from engage_hri.services.__main__ import main
-
-if __name__ == "__main__":
-    sys.argv[1:1] = ["run", "collaboration"]
-    main()

@@ -1,0 +1,138 @@
+"""The options that several commands share: each is spelled here once, with its name, type, default and help.
+
+A command's own file has a class `Options` that is made of these groups and adds the command's own options.
+"""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Literal
+
+import typer
+from msgspec import json
+
+from engage_hri.schemas.faults import Fault, InputRefused
+from engage_hri.schemas.utf8 import is_utf8
+
+if TYPE_CHECKING:
+    from engage_hri.services.bus.interface import Hub
+    from engage_hri.services.commandline.config import Config
+
+Resolution = Annotated[
+    Literal["table", "object"] | None, typer.Option(help="How finely perception tells what people look at.")
+]
+Strict = Annotated[bool, typer.Option("--strict", help="Exit 2 if there was any warning.")]
+VirtualTime = Annotated[bool, typer.Option("--virtual-time", help="As fast as it goes, on a clock that jumps.")]
+Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")]
+WorldFile = Annotated[
+    Path | None, typer.Option("--world", metavar="FILE", help="JSON of the entities; without it the tangram table.")
+]
+HUMANS = {"appendix-b": "scripted"}
+"""Those whom the configuration calls otherwise."""
+
+
+def choices(seed: int | None, human: str | None, resolution: str | None) -> tuple[str, ...]:
+    """The command line's choices about the simulation as settings of the configuration."""
+    chosen = {
+        "control.variability.seed": seed,
+        "simulation.seed": seed,
+        "simulation.human": HUMANS.get(human, human) if human else None,
+        "recognition.gaze_resolution": resolution,
+    }
+    return tuple(f"{key}={value}" for key, value in chosen.items() if value is not None)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Configured:
+    """How the services are configured."""
+
+    config: Annotated[
+        Path | None,
+        typer.Option("--config", metavar="FILE", help="TOML; see docs/configuration.md.", show_default=False),
+    ] = None
+    settings: Annotated[
+        list[str] | None,
+        typer.Option("--set", metavar="KEY=VALUE", help="One setting, stronger than the file: realizer.late=1."),
+    ] = None
+
+    @property
+    def given(self) -> tuple[str, ...]:
+        """All that the command line says of the configuration, as settings: a later one is stronger."""
+        return tuple(self.settings or ())
+
+    def load(self, *, defaults: Iterable[str] = ()) -> "Config":
+        """The file's configuration with the command line's settings before it. Raises InputRefused."""
+        from engage_hri.services.commandline.config import load
+
+        return load(self.config, settings=self.given, defaults=defaults)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Connected(Configured):
+    """Which robot on which bus. Without endpoints the bus is this machine's own."""
+
+    robot: Annotated[
+        str | None, typer.Option(metavar="NAME", help="The robot's namespace on the bus.", show_default="robot")
+    ] = None
+    connect: Annotated[
+        list[str] | None, typer.Option(metavar="ENDPOINT", help="Zenoh endpoint to connect to; may be repeated.")
+    ] = None
+
+    @property
+    def given(self) -> tuple[str, ...]:
+        """The robot's name is stronger than a setting."""
+        if self.robot is None:
+            return super().given
+        if not is_utf8(self.robot):
+            raise InputRefused(Fault(reason=f"robot {self.robot!r} is not UTF-8"))
+        return (*super().given, f"robot={json.encode(self.robot).decode()}")
+
+    async def open(self, robot: str, listen: Sequence[str] = ()) -> "Hub":
+        """The Zenoh hub. Raises EngageError when an endpoint is bad or taken."""
+        from engage_hri.services.bus.zenoh.hub import open_hub
+
+        return await open_hub(robot, connect=self.connect or (), listen=listen)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Listening(Connected):
+    """For what others may connect to."""
+
+    listen: Annotated[
+        list[str] | None, typer.Option(metavar="ENDPOINT", help="Zenoh endpoint to listen on; may be repeated.")
+    ] = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Simulated(Configured):
+    """What the simulation is like."""
+
+    seed: Annotated[int | None, typer.Option(metavar="N", help="Of all chance in the simulated body.")] = None
+    human: Annotated[
+        Literal["appendix-b", "misplacing", "listening", "stochastic", "attentive"] | None,
+        typer.Option(help="How the simulated human behaves: docs/commands.md tells of each.", show_default=False),
+    ] = None
+    resolution: Resolution = None
+
+    @property
+    def given(self) -> tuple[str, ...]:
+        """Settings are stronger."""
+        return (*choices(self.seed, self.human, self.resolution), *super().given)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Written:
+    """What is written and printed."""
+
+    events: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Write connection events as JSON lines; - for standard output."),
+    ] = None
+    feedback: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE",
+            help="Write the blocks' feedback as JSON lines, into FILE.xml as XML; - for standard output.",
+        ),
+    ] = None
+    quiet: Quiet = False
