@@ -2,7 +2,7 @@
 
 A line for each block, fragment and turn that has ended, each connection event that is decided, each person and peer
 that comes or goes, each warning and refusal; at level DEBUG one for every message but the streams. Loggers are named
-`engage.<service>`, or `engage.<role>` for who is no service; peers are told by `engage.bus`.
+`engage.<service>`, or `engage.<role>` for who is no service.
 """
 
 import logging
@@ -115,6 +115,6 @@ def note(log: logging.Logger, key: str, message: Message) -> None:
         log.log(*entry(message))
 
 
-def note_presence(message: PeerAlive | PeerGone) -> None:
-    """Write the line of a participant that has come or gone, as this process sees it."""
-    logger("bus").log(*presence(message))
+def note_presence(log: logging.Logger, message: PeerAlive | PeerGone) -> None:
+    """Write the line of a participant that has come or gone, as whoever writes this log sees it."""
+    log.log(*presence(message))

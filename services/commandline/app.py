@@ -11,6 +11,7 @@ from typing import Annotated, Any, NoReturn
 import typer
 from typer.core import TyperGroup
 
+from engage_hri.services.commandline import logs
 from engage_hri.services.commandline.ends import exit_code
 
 COMMANDS = {
@@ -40,6 +41,7 @@ def command(name: str) -> Any:
     names = [option for kind in module.Options.__mro__ for option in inspect.get_annotations(kind)]
 
     def run(**given: Any) -> None:
+        logs.configure(given.get("log"), given.get("log_level") or ())
         raise typer.Exit(module.main(module.Options(**given)))
 
     run.__signature__ = inspect.Signature([taken[option] for option in names])  # type: ignore[attr-defined]

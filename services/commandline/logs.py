@@ -4,6 +4,7 @@ Each line is appended whole, so that the services of one machine may share a fil
 """
 
 import logging
+import sys
 from collections.abc import Sequence
 from datetime import datetime
 from pathlib import Path
@@ -12,8 +13,8 @@ from engage_hri.schemas import keys
 from engage_hri.schemas.faults import Fault, InputRefused
 
 LEVELS = {name.lower(): getattr(logging, name) for name in ("DEBUG", "INFO", "WARNING", "ERROR")}
-SOURCES = (*keys.ROLES, "simulation", "collaboration", "bus")
-"""Whose level can be set: services, the roles of other participants, and the bus, which tells who comes and goes."""
+SOURCES = (*keys.ROLES, "simulation", "collaboration", "bus", "up")
+"""Whose level can be set: services, roles of others, the bus in memory (who comes and goes), and `engage up`."""
 
 OURS = "engage"
 """The name of the handlers made here, of which there is one set."""
@@ -32,6 +33,14 @@ class Line(logging.Formatter):
         return line
 
 
+class Told(logging.Handler):
+    """Bugs, and what Engage says without a service's name, to standard error as it is at that moment."""
+
+    def emit(self, record: logging.LogRecord) -> None:
+        if record.levelno >= logging.ERROR or record.name == "engage":
+            print(self.format(record), file=sys.stderr)
+
+
 def configure(path: Path | None = None, levels: Sequence[str] = ()) -> None:
     """Set the log of this process up. path: appended to; None: no file.
 
@@ -44,9 +53,7 @@ def configure(path: Path | None = None, levels: Sequence[str] = ()) -> None:
             advice = f"LEVEL or SOURCE=LEVEL; levels: {', '.join(LEVELS)}; sources: {', '.join(SOURCES)}"
             bad = name if name not in LEVELS else source
             raise InputRefused(Fault(reason=f"unknown {bad!r}", where="--log-level", advice=advice))
-    told = logging.StreamHandler()
-    told.addFilter(lambda record: record.levelno >= logging.ERROR or record.name == "engage")
-    handlers: list[logging.Handler] = [told]
+    handlers: list[logging.Handler] = [Told()]
     if path is not None:
         try:
             handlers.append(logging.FileHandler(path, encoding="utf-8", errors="backslashreplace"))
@@ -60,5 +67,6 @@ def configure(path: Path | None = None, levels: Sequence[str] = ()) -> None:
     for handler in handlers:
         handler.name = OURS
         root.addHandler(handler)
-    for source, name in ({"": "info" if path else "warning"} | chosen).items():
-        logging.getLogger(f"engage.{source}" if source else "engage").setLevel(LEVELS[name])
+    logging.getLogger("engage").setLevel(LEVELS[chosen.get("", "info" if path else "warning")])
+    for source in SOURCES:
+        logging.getLogger(f"engage.{source}").setLevel(LEVELS.get(chosen.get(source, ""), logging.NOTSET))

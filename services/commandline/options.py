@@ -54,6 +54,14 @@ class Configured:
         list[str] | None,
         typer.Option("--set", metavar="KEY=VALUE", help="One setting, stronger than the file: realizer.late=1."),
     ] = None
+    log: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Add a line for each block, fragment, connection event and peer to FILE."),
+    ] = None
+    log_level: Annotated[
+        list[str] | None,
+        typer.Option(metavar="[SOURCE=]LEVEL", help="debug, info, warning or error; of one service: realizer=debug."),
+    ] = None
 
     @property
     def given(self) -> tuple[str, ...]:

@@ -5,6 +5,7 @@ we die without a word, so that nothing outlives its supervisor.
 """
 
 import asyncio
+import logging
 import sys
 from asyncio.subprocess import PIPE, STDOUT, Process
 from collections.abc import AsyncIterator, Awaitable, Callable, Coroutine, Iterator, Mapping, Sequence
@@ -14,6 +15,7 @@ from typing import Any
 from engage_hri.schemas.faults import Fault, RunFailed
 from engage_hri.schemas.units import Seconds
 
+LOG = logging.getLogger("engage.up")
 Tell = Callable[[str, str], None]
 """Takes a child's name and a line of its log."""
 FIRST_PAUSE: Seconds = 0.5
@@ -125,7 +127,9 @@ class Child:
             if code == 2:
                 raise ChildRefused(self.name)
             pause = pause_after(pause, loop.time() - began)
-            self._tell(self.name, f"ended with {ending(code)}; starting it again in {pause:g} s")
+            news = f"ended with {ending(code)}; starting it again in {pause:g} s"
+            self._tell(self.name, news)
+            LOG.warning("%s %s", self.name, news)
             await asyncio.sleep(pause)
 
     async def _life(self) -> int:

@@ -93,6 +93,8 @@ def command(name: str, options: Options, config: Config) -> list[str]:
     return [
         *(sys.executable, "-P", "-m", "engage_hri", "run", name, "--attended", "--robot", config.robot),
         *(("--config", str(options.config)) if options.config else ()),
+        *(("--log", str(options.log)) if options.log else ()),
+        *(part for level in options.log_level or () for part in ("--log-level", level)),
         *(part for setting in settings for part in ("--set", setting)),
         *(part for endpoint in endpoints for part in ("--connect", endpoint)),
     ]

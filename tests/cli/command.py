@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 import pytest
 
+from engage_hri.services.commandline import logs
 from engage_hri.services.commandline.app import main
 
 GOOD_BLOCK = """\
@@ -43,6 +44,7 @@ def engage(capsys: pytest.CaptureFixture[str]) -> Engage:
     def run(*arguments: object) -> Result:
         with pytest.raises(SystemExit) as exit:
             main([str(argument) for argument in arguments])
+        logs.configure()  # a file that it has logged to is closed
         captured = capsys.readouterr()
         return Result(int(exit.value.code or 0), captured.out, captured.err)
 

@@ -242,7 +242,7 @@ class Readers:
 
     def participant_changed(self, name: str, run: str, there: bool) -> None:
         message = PeerAlive(participant=name, run=run) if there else PeerGone(participant=name)
-        journal.note_presence(message)
+        journal.note_presence(self._readers[0].bus.log if self._readers else journal.logger("bus"), message)
         for reader in self._readers:
             self._offer_presence(reader, message)
 
