@@ -25,9 +25,15 @@ Entry = tuple[int, str]
 """Level and text."""
 
 
-def logger(name: str) -> logging.Logger:
-    """Of a service, or of all participants of a role."""
-    return logging.getLogger(f"engage.{name}")
+NAMED = (*keys.SERVICES, "simulation", "collaboration")
+"""Services, each with a log of its own. The others, who come and go, share one by role."""
+BUS = logging.getLogger("engage.bus")
+"""Of a process, before anybody has joined, and of the bus in memory, where all see the same."""
+
+
+def logger(name: str, role: str) -> logging.Logger:
+    """Of a participant."""
+    return logging.getLogger(f"engage.{name if name in NAMED else role}")
 
 
 def entry(message: Message) -> Entry:

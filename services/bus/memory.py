@@ -140,7 +140,7 @@ class MemoryHub(Hub):
         return tuple(sorted(bus.name for bus in self._buses.values() if bus.is_alive))
 
     def announce(self, name: str, message: PeerAlive | PeerGone) -> None:
-        journal.note_presence(journal.logger("bus"), message)
+        journal.note_presence(journal.BUS, message)
         for bus in list(self._buses.values()):
             bus.deliver(Received(keys.alive(name), message, name, self._loop.time()), self.sent + 1)
 
@@ -179,7 +179,7 @@ class MemoryBus(Bus):
         self.robot = hub.robot
         self.name = name
         self.role = role
-        self.log = journal.logger(role)
+        self.log = journal.logger(name, role)
         self.run = run
         self._life_numbers = count(1)
         self.is_alive = False

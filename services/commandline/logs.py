@@ -11,10 +11,11 @@ from pathlib import Path
 
 from engage_hri.schemas import keys
 from engage_hri.schemas.faults import Fault, InputRefused
+from engage_hri.services.bus import journal
 
 LEVELS = {name.lower(): getattr(logging, name) for name in ("DEBUG", "INFO", "WARNING", "ERROR")}
-SOURCES = (*keys.ROLES, "simulation", "collaboration", "bus", "up")
-"""Whose level can be set: services, roles of others, the bus in memory (who comes and goes), and `engage up`."""
+SOURCES = tuple(dict.fromkeys((*journal.NAMED, *keys.ROLES, "bus", "up")))
+"""Whose level can be set: services, the roles of others, the bus in memory, and `engage up`."""
 
 OURS = "engage"
 """The name of the handlers made here, of which there is one set."""
@@ -37,7 +38,7 @@ class Told(logging.Handler):
     """Bugs, and what Engage says without a service's name, to standard error as it is at that moment."""
 
     def emit(self, record: logging.LogRecord) -> None:
-        if record.levelno >= logging.ERROR or record.name == "engage":
+        if record.levelno >= (logging.WARNING if record.name == "engage" else logging.ERROR):
             print(self.format(record), file=sys.stderr)
 
 

@@ -21,11 +21,13 @@ _stopping = [signal.SIGINT]
 def run(main: Coroutine[Any, Any, T], *, virtual_time: bool = False) -> T:
     """Run to the end, on uvloop where it is installed (it measured a fifth faster on Zenoh), or in virtual time.
 
-    Ctrl-C and SIGTERM cancel `main`; when it has ended KeyboardInterrupt is raised. The second Ctrl-C doesn't wait.
+    Ctrl-C and SIGTERM cancel `main`; when it has ended KeyboardInterrupt is raised. The second Ctrl-C doesn't wait;
+    a second SIGTERM says nothing new.
     """
     # asyncio.Runner cancels `main` only if it finds this handler. A shell that starts us in the background has had
     # Ctrl-C ignored.
     signal.signal(signal.SIGINT, signal.default_int_handler)
+    del _stopping[1:]
     signal.signal(signal.SIGTERM, _terminate)
     with asyncio.Runner(loop_factory=VirtualTimeLoop if virtual_time else _fastest_loop()) as runner:
         return runner.run(main)
@@ -52,8 +54,9 @@ async def forever() -> None:
 
 
 def _terminate(number: int, frame: object) -> None:
-    _stopping.append(signal.SIGTERM)
-    signal.raise_signal(signal.SIGINT)
+    if _stopping[-1] != signal.SIGTERM:  # `timeout` sends it twice, to the process and to its group
+        _stopping.append(signal.SIGTERM)
+        signal.raise_signal(signal.SIGINT)
 
 
 def interrupted() -> int:

@@ -15,7 +15,6 @@ from engage_hri.schemas import keys
 from engage_hri.schemas.messages import Message
 from engage_hri.schemas.status import AskStatus, Status
 from engage_hri.schemas.units import Stamp
-from engage_hri.services.bus import journal
 from engage_hri.services.bus.interface import Bus, Hub
 
 Ready = Callable[[], None]
@@ -27,7 +26,6 @@ async def serve(hub: Hub, name: str, service: Service, ready: Ready = lambda: No
     """Run one service on the hub until it is cancelled or fails. Raises InputRefused if another one is there."""
     await hub.vacant(name)
     bus = hub.join(name, role=name if name in keys.ROLES else "manager")
-    bus.log = journal.logger(name)
     joined = bus.stamp()
     since: Stamp | None = None
 

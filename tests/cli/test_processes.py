@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from engage_hri.services.commandline.roster import NAMES
+from engage_hri.services.commandline.roster import NAMES, ROBOT
 from tests.bus.places import free_endpoint
 from tests.cli.command import FRAGMENT, GOOD_BLOCK, start, threads
 
@@ -122,6 +122,23 @@ async def test_a_signal_ends_what_was_started_with_ctrl_c_ignored(how: signal.Si
         _, err = await demo.communicate()
 
     assert (demo.returncode, err) == (128 + how, b"")
+
+
+async def test_a_second_sigterm_says_nothing_new(tmp_path: Path, endpoint: str) -> None:
+    log = tmp_path / "log"
+    up = await start("up", "--listen", endpoint, "--log", log)
+    try:
+        await line(up, "all services are up", log=False)
+        for _ in range(3):
+            up.send_signal(signal.SIGTERM)
+        async with asyncio.timeout(PATIENCE):
+            _, err = await up.communicate()
+    finally:
+        await stopped(up, signal.SIGKILL)
+
+    assert (up.returncode, err) == (0, b"")
+    assert "ERROR" not in log.read_text()
+    assert {f"INFO {name}: peer {name}: here" in log.read_text() for name in ROBOT} == {True}
 
 
 @pytest.mark.parametrize(

@@ -95,6 +95,7 @@ class ZenohHub(Hub):
         if name in self._buses:
             raise ValueError(f"participant {name!r} is on the bus already")
         self._buses[name] = bus = ZenohBus(self, name, role)
+        self.readers.log = next(iter(self._buses.values())).log
         return bus
 
     async def vacant(self, *names: str) -> None:
@@ -174,7 +175,7 @@ class ZenohBus(Bus):
         self.robot = hub.robot
         self.name = name
         self.role = role
-        self.log = journal.logger(role)
+        self.log = journal.logger(name, role)
         self._life_numbers = hub.life_numbers
         self.clock = hub.clocks.own
         self.run = hub.run

@@ -38,10 +38,11 @@ class _Reader:
 
 
 class Readers:
-    """All subscriptions of the process. refused: how many payloads were bad."""
+    """All subscriptions of the process. refused: how many payloads were bad. log: tells who comes and goes."""
 
     def __init__(self, session: zenoh.Session, doorway: Doorway, ledger: Ledger, peers: Peers) -> None:
         self.refused = 0
+        self.log = journal.BUS
         self._loop = asyncio.get_running_loop()
         self._session = session
         self._doorway = doorway
@@ -242,7 +243,7 @@ class Readers:
 
     def participant_changed(self, name: str, run: str, there: bool) -> None:
         message = PeerAlive(participant=name, run=run) if there else PeerGone(participant=name)
-        journal.note_presence(self._readers[0].bus.log if self._readers else journal.logger("bus"), message)
+        journal.note_presence(self.log, message)
         for reader in self._readers:
             self._offer_presence(reader, message)
 
