@@ -1,0 +1,198 @@
+"""Stories: what is observed, and what becomes of each connection event, written as text. One claim a story.
+
+    a person answers within the limit
+        1 robot +speak; 1 asks ap turn=turn-1; 2 robot -speak; 2 turn ended; 2.4 human +nod; 3.4 human -nod
+        robot's ap-1: started 1, succeeded 2.4 after 0.4 by nod, completed 3.4 lasting 1
+
+The first line is the claim, by which the story is called: `pytest -k a_person_answers_within_the_limit`. Lines that
+begin with a time hold the steps; all others say what becomes of every event, in the order in which they started.
+
+| step | says |
+|---|---|
+| `1 human +act blue`, `2 human -act blue` | an action begins, ends; last comes its target (of speech: its behavior) |
+| `1 asks dg blue cause=reference` | the realizer requests an event: `ap`, `dg`, `mfg` or `bc` |
+| `1 cancels 2` | the second request is cancelled |
+| `1 turn ended turn=turn-9` | a turn (turn-1) ended, or `aborted`, `answered`, `repaired` |
+| `1 passes gaze-1:stroke`, `1 block done` | feedback of block-1: a sync point, the end |
+| `1 owner fragment blue` | who has the robot's head, and where |
+| `1 lost human` | the person is gone |
+| `9 time` | nothing happens |
+| `1 asked nod` | the robot asks at 1 for a nod, its turn ends at 2 or `until=4`; `asking`: goes on |
+
+`told 2.3` behind a change: it became known only then. `deadline 4.5`: when time alone changes something next.
+`WORD in a b c` makes one story of each word, in the place of `WORD`; `with gaze_resolution=table` configures.
+"""
+
+from collections.abc import Iterator
+from itertools import groupby
+from typing import Any, NamedTuple
+
+import pytest
+
+from engage_hri.schemas.recognition import ConnectionEvent
+from tests.recognition.observations import HUMAN, ROBOT, Log
+
+KINDS = {"ap": "adjacency_pair", "dg": "directed_gaze", "mfg": "mutual_facial_gaze", "bc": "backchannel"}
+NAMES = {
+    "blue": "blue-square", "pink": "pink-square", "words": "block-1:speech-1", "next-words": "block-2:speech-1",
+}  # fmt: skip
+MEASURES = {"started": "since", "completed": "lasting"}
+
+
+class Story(NamedTuple):
+    claim: str
+    config: dict[str, Any]
+    steps: list[str]
+    becomes: list[str]
+
+
+def each(text: str) -> pytest.MarkDecorator:
+    """Parametrizes a test with every story of the text."""
+    told = list(_stories(text))
+    return pytest.mark.parametrize("story", told, ids=[story.claim.replace(" ", "_") for story in told])
+
+
+def check(story: Story) -> None:
+    """Play the story: all its events become what it says, and each request is answered as its event was decided."""
+    log = Log(**story.config)
+    known = play(log, story.steps)
+    becomes = lives(log, known)
+    if any(line.startswith("deadline") for line in story.becomes):
+        becomes.append(f"deadline {_number(log.session.deadline)}")
+
+    assert (becomes or ["nothing"]) == story.becomes
+    assert all({event.initiator, event.responder} == {ROBOT, HUMAN} for event in log.events)
+    decided = _decisions(log)
+    for answer in log.outcomes:
+        assert (answer.state, answer.delay, answer.response) == decided[answer.event]
+    assert {event.id for event in log.events if event.block} & decided.keys() <= {each.event for each in log.outcomes}
+
+
+def play(log: Log, steps: list[str]) -> list[tuple[float, float]]:
+    """Of each effect: when it was told, and when something could have been told before that."""
+    known: list[tuple[float, float]] = []
+    before = now = 0.0
+
+    def reach(time: float) -> None:
+        nonlocal before, now
+        known.extend([(now, before)] * (len(log.effects) - len(known)))
+        if time > now:
+            before, now = now, time
+
+    for step in steps:
+        time, *words = step.split()
+        if words == ["time"]:
+            while (due := log.session.deadline) is not None and due < float(time):
+                reach(due)
+                log.until(now)
+                assert log.session.deadline != due, "a deadline that stays would spin"
+        reach(float(time))
+        _take(log, float(time), *words)
+    reach(now)
+    return known
+
+
+def lives(log: Log, known: list[tuple[float, float]]) -> list[str]:
+    """A line for each event."""
+    lines: dict[str, str] = {}
+    short = {name: word for word, name in NAMES.items()}
+    for effect, (now, before) in zip(log.effects, known, strict=True):
+        if isinstance(effect, ConnectionEvent):
+            at = " at " + " ".join(short.get(each, each) for each in effect.objects) if effect.objects else ""
+            line = lines.get(effect.id, f"{effect.initiator}'s {effect.id}{at}:")
+            in_time = before < effect.at.seconds <= now or effect.at.seconds == now
+            lines[effect.id] = f"{line} {_change(effect)}{'' if in_time else f' told {_number(now)}'},"
+    return [line.rstrip(",") for line in lines.values()]
+
+
+def _change(event: ConnectionEvent) -> str:
+    at, measured = event.at.seconds, event.delay
+    if event.state == "started":
+        measured = None if at == event.started.seconds else event.started.seconds
+    elif event.state == "completed":
+        measured = event.duration
+    text = f"{event.state} {_number(at)}"
+    if measured is not None:
+        text += f" {MEASURES.get(event.state, 'after')} {_number(measured)}"
+    return text + (f" by {event.response}" if event.state == "succeeded" and event.response else "")
+
+
+def _decisions(log: Log) -> dict[str, tuple[object, ...]]:
+    """What came next after the start of each event, if anything did."""
+    changes: dict[str, list[ConnectionEvent]] = {}
+    for event in log.events:
+        changes.setdefault(event.id, []).append(event)
+    return {id: (life[1].state, life[1].delay, life[1].response) for id, life in changes.items() if life[1:]}
+
+
+def _take(log: Log, at: float, verb: str, *words: str) -> None:
+    plain = [NAMES.get(word, word) for word in words if "=" not in word]
+    named: dict[str, Any] = dict(word.split("=") for word in words if "=" in word)
+    match verb:
+        case "human" | "robot":
+            act, what = plain[0][0], plain[0][1:]
+            about = {"behavior" if what == "speak" else "target": plain[1] if plain[1:] else ""}
+            (log.begins if act == "+" else log.ends)(verb, what, at, **about)  # type: ignore[arg-type]
+        case "asks":
+            for name in ("accept", "anchors"):
+                named[name] = tuple(filter(None, named.get(name, "").split(",")))
+            if "limit" in named:
+                named["limit"] = float(named["limit"])
+            log.requests_event(KINDS[plain[0]], at, *plain[1:], **named)  # type: ignore[arg-type]
+        case "cancels":
+            log.cancels(f"request-{plain[0]}", at)
+        case "turn":
+            log.signals(plain[0], at, **named)
+        case "passes":
+            log.passes(plain[0], at)
+        case "block":
+            log.block_ends(at, *plain)
+        case "owner":
+            log.owner(plain[0], plain[1].replace("person", HUMAN), at)  # type: ignore[arg-type]
+        case "lost":
+            log.lost(plain[0], at)
+        case "time":
+            log.until(at)
+        case _:
+            raise ValueError(f"no step begins with {verb!r}")
+
+
+def _stories(text: str) -> Iterator[Story]:
+    for filled, lines in groupby(text.splitlines(), key=lambda line: bool(line.strip())):
+        if filled:
+            claim, *body = (line.strip() for line in lines)
+            yield from _variants(claim, body)
+
+
+def _variants(claim: str, body: list[str]) -> Iterator[Story]:
+    for line in body:
+        word, is_in, *values = [*line.split(), ""]
+        if word.isupper() and is_in == "in":
+            rest = [other for other in body if other != line]
+            for value in filter(None, values):
+                yield from _variants(f"{claim}: {value}", [other.replace(word, value) for other in rest])
+            return
+    with_config = [line for line in body if line.startswith("with ")]
+    config = dict(word.split("=") for line in with_config for word in line.split()[1:])
+    steps = [step for line in body if line[0].isdigit() for step in _steps(line)]
+    becomes = [line for line in body if not line[0].isdigit() and line not in with_config]
+    if not steps or not becomes:
+        raise ValueError(f"{claim}: a story needs steps, and what becomes of them, or `nothing`")
+    yield Story(claim, config, steps, becomes)
+
+
+def _steps(line: str) -> Iterator[str]:
+    for step in filter(None, map(str.strip, line.split(";"))):
+        time, verb, *accepted = step.split()
+        if verb not in ("asked", "asking"):
+            yield step
+            continue
+        end = next((word.removeprefix("until=") for word in accepted if word.startswith("until=")), "2")
+        accept = ",".join(word for word in accepted if "=" not in word)
+        yield from (f"{time} robot +speak words", f"{time} asks ap turn=turn-1 accept={accept}")
+        if verb == "asked":
+            yield from (f"{end} robot -speak words", f"{end} turn ended")
+
+
+def _number(value: float | None) -> str:
+    return "none" if value is None else f"{round(value, 6):g}"
