@@ -1,9 +1,10 @@
-"""Adjacency pairs: every row of the table, both initiators, exact times. How stories are read: `stories.py`."""
+"""Adjacency pairs: every row of the table, both initiators, exact times. Read `event_stories.py`."""
 
 import pytest
 
+from tests.recognition.event_stories import check
 from tests.recognition.observations import HUMAN, ROBOT, Log
-from tests.recognition.stories import Story, check, each
+from tests.stories import Story, each
 
 OF_ROBOT = """
 person answers within the limit

@@ -1,6 +1,7 @@
-"""Backchannels: every row of the table, both listeners, exact times. How stories are read: `stories.py`."""
+"""Backchannels: every row of the table, both listeners, exact times. Read `event_stories.py`."""
 
-from tests.recognition.stories import Story, check, each
+from tests.recognition.event_stories import check
+from tests.stories import Story, each
 
 STORIES = """
 short speech while the robot speaks is a backchannel known at its end

@@ -1,7 +1,8 @@
-"""Directed gaze: every row of the table, the person's; gaze resolution. How stories are read: `stories.py`."""
+"""Directed gaze: every row of the table, the person's; gaze resolution. Read `event_stories.py`."""
 
+from tests.recognition.event_stories import check
 from tests.recognition.observations import HUMAN, Log
-from tests.recognition.stories import Story, check, each
+from tests.stories import Story, each
 
 STORIES = """
 pointing directs the robot who follows

@@ -1,10 +1,11 @@
-"""Directed gaze: every row of the table, the robot's, exact times. How stories are read: `stories.py`."""
+"""Directed gaze: every row of the table, the robot's, exact times. Read `event_stories.py`."""
 
 import pytest
 
 from engage_hri.schemas.requests import Refused
+from tests.recognition.event_stories import check
 from tests.recognition.observations import HUMAN, Log, world
-from tests.recognition.stories import Story, check, each
+from tests.stories import Story, each
 
 BLUE = "blue-square"
 STORIES = """

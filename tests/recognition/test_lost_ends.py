@@ -5,8 +5,9 @@ import pytest
 from engage_hri.schemas.body import BodyPose, Ray, RobotState
 from engage_hri.schemas.requests import Accepted, Refused
 from engage_hri.services.recognition.config import RecognitionConfig
+from tests.recognition.event_stories import check
 from tests.recognition.observations import HUMAN, ROBOT, Log, asked, stamp
-from tests.recognition.stories import Story, check, each
+from tests.stories import Story, each
 
 STORIES = """
 speech that began in time is the answer though the robot speaks on

@@ -1,7 +1,8 @@
-"""Mutual facial gaze: every row of the table, both initiators, exact times. How stories are read: `stories.py`."""
+"""Mutual facial gaze: every row of the table, both initiators, exact times. Read `event_stories.py`."""
 
+from tests.recognition.event_stories import check
 from tests.recognition.observations import HUMAN, ROBOT, Log
-from tests.recognition.stories import Story, check, each
+from tests.stories import Story, each
 
 OF_ROBOT = """
 person meets the robot's gaze

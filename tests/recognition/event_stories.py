@@ -1,11 +1,10 @@
-"""Stories: what is observed, and what becomes of each connection event, written as text. One claim a story.
+"""Stories (`tests/stories.py`) of what is observed, and of what becomes of each connection event.
 
     a person answers within the limit
         1 robot +speak; 1 asks ap turn=turn-1; 2 robot -speak; 2 turn ended; 2.4 human +nod; 3.4 human -nod
         robot's ap-1: started 1, succeeded 2.4 after 0.4 by nod, completed 3.4 lasting 1
 
-The first line is the claim, by which the story is called: `pytest -k a_person_answers_within_the_limit`. Lines that
-begin with a time hold the steps; all others say what becomes of every event, in the order in which they started.
+The lines at the end say what becomes of every event, in the order in which they started.
 
 | step | says |
 |---|---|
@@ -20,17 +19,14 @@ begin with a time hold the steps; all others say what becomes of every event, in
 | `1 asked nod` | the robot asks at 1 for a nod, its turn ends at 2 or `until=4`; `asking`: goes on |
 
 `told 2.3` behind a change: it became known only then. `deadline 4.5`: when time alone changes something next.
-`WORD in a b c` makes one story of each word, in the place of `WORD`; `with gaze_resolution=table` configures.
 """
 
 from collections.abc import Iterator
-from itertools import groupby
-from typing import Any, NamedTuple
-
-import pytest
+from typing import Any
 
 from engage_hri.schemas.recognition import ConnectionEvent
 from tests.recognition.observations import HUMAN, ROBOT, Log
+from tests.stories import Story, number
 
 KINDS = {"ap": "adjacency_pair", "dg": "directed_gaze", "mfg": "mutual_facial_gaze", "bc": "backchannel"}
 NAMES = {
@@ -39,26 +35,13 @@ NAMES = {
 MEASURES = {"started": "since", "completed": "lasting"}
 
 
-class Story(NamedTuple):
-    claim: str
-    config: dict[str, Any]
-    steps: list[str]
-    becomes: list[str]
-
-
-def each(text: str) -> pytest.MarkDecorator:
-    """Parametrizes a test with every story of the text."""
-    told = list(_stories(text))
-    return pytest.mark.parametrize("story", told, ids=[story.claim.replace(" ", "_") for story in told])
-
-
 def check(story: Story) -> None:
     """Play the story: all its events become what it says, and each request is answered as its event was decided."""
     log = Log(**story.config)
     known = play(log, story.steps)
     becomes = lives(log, known)
     if any(line.startswith("deadline") for line in story.becomes):
-        becomes.append(f"deadline {_number(log.session.deadline)}")
+        becomes.append(f"deadline {number(log.session.deadline)}")
 
     assert (becomes or ["nothing"]) == story.becomes
     assert all({event.initiator, event.responder} == {ROBOT, HUMAN} for event in log.events)
@@ -79,7 +62,7 @@ def play(log: Log, steps: list[str]) -> list[tuple[float, float]]:
         if time > now:
             before, now = now, time
 
-    for step in steps:
+    for step in _spelled_out(steps):
         time, *words = step.split()
         if words == ["time"]:
             while (due := log.session.deadline) is not None and due < float(time):
@@ -101,7 +84,7 @@ def lives(log: Log, known: list[tuple[float, float]]) -> list[str]:
             at = " at " + " ".join(short.get(each, each) for each in effect.objects) if effect.objects else ""
             line = lines.get(effect.id, f"{effect.initiator}'s {effect.id}{at}:")
             in_time = before < effect.at.seconds <= now or effect.at.seconds == now
-            lines[effect.id] = f"{line} {_change(effect)}{'' if in_time else f' told {_number(now)}'},"
+            lines[effect.id] = f"{line} {_change(effect)}{'' if in_time else f' told {number(now)}'},"
     return [line.rstrip(",") for line in lines.values()]
 
 
@@ -111,9 +94,9 @@ def _change(event: ConnectionEvent) -> str:
         measured = None if at == event.started.seconds else event.started.seconds
     elif event.state == "completed":
         measured = event.duration
-    text = f"{event.state} {_number(at)}"
+    text = f"{event.state} {number(at)}"
     if measured is not None:
-        text += f" {MEASURES.get(event.state, 'after')} {_number(measured)}"
+        text += f" {MEASURES.get(event.state, 'after')} {number(measured)}"
     return text + (f" by {event.response}" if event.state == "succeeded" and event.response else "")
 
 
@@ -157,32 +140,8 @@ def _take(log: Log, at: float, verb: str, *words: str) -> None:
             raise ValueError(f"no step begins with {verb!r}")
 
 
-def _stories(text: str) -> Iterator[Story]:
-    for filled, lines in groupby(text.splitlines(), key=lambda line: bool(line.strip())):
-        if filled:
-            claim, *body = (line.strip() for line in lines)
-            yield from _variants(claim, body)
-
-
-def _variants(claim: str, body: list[str]) -> Iterator[Story]:
-    for line in body:
-        word, is_in, *values = [*line.split(), ""]
-        if word.isupper() and is_in == "in":
-            rest = [other for other in body if other != line]
-            for value in filter(None, values):
-                yield from _variants(f"{claim}: {value}", [other.replace(word, value) for other in rest])
-            return
-    with_config = [line for line in body if line.startswith("with ")]
-    config = dict(word.split("=") for line in with_config for word in line.split()[1:])
-    steps = [step for line in body if line[0].isdigit() for step in _steps(line)]
-    becomes = [line for line in body if not line[0].isdigit() and line not in with_config]
-    if not steps or not becomes:
-        raise ValueError(f"{claim}: a story needs steps, and what becomes of them, or `nothing`")
-    yield Story(claim, config, steps, becomes)
-
-
-def _steps(line: str) -> Iterator[str]:
-    for step in filter(None, map(str.strip, line.split(";"))):
+def _spelled_out(steps: list[str]) -> Iterator[str]:
+    for step in steps:
         time, verb, *accepted = step.split()
         if verb not in ("asked", "asking"):
             yield step
@@ -192,7 +151,3 @@ def _steps(line: str) -> Iterator[str]:
         yield from (f"{time} robot +speak words", f"{time} asks ap turn=turn-1 accept={accept}")
         if verb == "asked":
             yield from (f"{end} robot -speak words", f"{end} turn ended")
-
-
-def _number(value: float | None) -> str:
-    return "none" if value is None else f"{round(value, 6):g}"
