@@ -79,7 +79,7 @@ def test_a_bad_setting_is_refused_with_its_key(setting: str, reason: str) -> Non
         ("realizer.late=-0.1", "late must be a finite number of at least 0"),
         ("realizer.abort=inf", "abort must be a finite number of at least 0"),
         ("realizer.stall=0.0", "stall and stall_factor must not be below late and late_factor"),
-        ("realizer.lease=0.1", "must be at least three times pulse"),
+        ("realizer.lease=2.9", "must be at least three times pulse"),
         ("realizer.pulse=0", "must be at least three times pulse"),
         ("control.variability.lost=1.5", "<= 1.0, in `control.variability.lost`"),
         ("control.covered_for=-1", "covered_for is -1.0 s: expected >= 0"),
