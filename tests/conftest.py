@@ -15,6 +15,8 @@ from hypothesis import settings
 from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.runtime.virtual_time import VirtualTimeLoop
 
+pytest.register_assert_rewrite("tests.recognition.event_stories", "tests.generation.head_stories")
+
 settings.register_profile("same", derandomize=True, database=None)
 settings.register_profile("search", parent=settings.get_profile("default"))
 settings.load_profile("same")

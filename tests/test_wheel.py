@@ -1,9 +1,11 @@
 """The wheel beside hostile neighbours: a package of the index and a folder of the application called as ours are."""
 
 import os
+import re
 import shutil
 import subprocess
 import sys
+import tomllib
 import zipfile
 from pathlib import Path
 
@@ -24,18 +26,8 @@ def installed(tmp_path_factory: pytest.TempPathFactory) -> Path:
             shutil.copytree(ROOT / name, source / name, symlinks=True, ignore=shutil.ignore_patterns("__pycache__"))
         else:
             shutil.copy2(ROOT / name, source / name)
-    command = (
-        sys.executable,
-        "-m",
-        "pip",
-        "wheel",
-        "--no-deps",
-        "--no-build-isolation",
-        "--quiet",
-        "-w",
-        place,
-        source,
-    )
+    options = ("--no-deps", "--no-build-isolation", "--quiet", "--wheel-dir", place)
+    command = (sys.executable, "-m", "pip", "wheel", *options, source)
     subprocess.run(command, check=True, capture_output=True, env={**os.environ, "PIP_NO_INDEX": "1"})
     (wheel,) = place.glob("*.whl")
     with zipfile.ZipFile(wheel) as archive:
@@ -87,3 +79,13 @@ def test_a_robot_runs_from_it(installed: Path, tmp_path: Path) -> None:
 
     assert ended.returncode == 0, ended.stderr
     assert "block b: done" in ended.stdout
+
+
+def test_every_python_that_it_promises_is_tried_before_it_is_released() -> None:
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    promised = re.findall(r":: Python :: (3\.\d+)", "\n".join(project["classifiers"]))
+    tried = re.search(r"python: \[(.*)\]", (ROOT / ".github/workflows/ci.yml").read_text())
+
+    assert tried is not None
+    assert re.findall(r"3\.\d+", tried[1]) == promised
+    assert project["requires-python"] == f">={promised[0]}"

@@ -320,3 +320,28 @@ async def test_what_cannot_be_written_down_is_refused(hub: MemoryHub, source: ob
     async with connect(hub=hub) as robot:
         with pytest.raises(InputRefused):
             await robot.perform(source)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "reason"),
+    [
+        ("missing.xml", None, "No such file"),
+        ("block.xml", '<bml id="b"><wait id="w" duration="1"/></bml>', "a BML block, not a turn fragment"),
+        (
+            "two.json",
+            '[{"id": "a", "behaviors": []}, {"id": "b", "behaviors": []}]',
+            "2 things, not one turn fragment",
+        ),
+    ],
+)
+async def test_a_file_that_holds_no_fragment_is_refused_by_its_name(
+    hub: MemoryHub, tmp_path: Path, name: str, text: str | None, reason: str
+) -> None:
+    file = tmp_path / name
+    if text is not None:
+        file.write_text(text)
+    async with connect(hub=hub) as robot:
+        with pytest.raises(InputRefused, match=reason) as refused:
+            await robot.perform(file)
+
+    assert name in refused.value.fault.where

@@ -11,7 +11,7 @@ from msgspec import structs
 from engage_hri.schemas import behaviors as of
 from engage_hri.schemas.behavior_types import dialect_sync
 from engage_hri.schemas.blocks import Block
-from engage_hri.schemas.documents.dialects import spelled
+from engage_hri.schemas.documents.dialects import core, spelled
 from engage_hri.schemas.documents.json_codec import encode_json, read
 from engage_hri.schemas.documents.xml_decode import encode_xml
 from engage_hri.schemas.faults import InputRefused
@@ -131,3 +131,33 @@ def test_any_block_is_bml_1_0_once_spelled_so(block: Block) -> None:
 
     assert violations(written) == []
     assert b"edu.wpi.ebml" not in written
+
+
+def test_two_points_that_bml_1_0_calls_by_one_name_stay_timed_both() -> None:
+    gaze = of.Gaze(id="g", target="t", timing=(of.Timing("start", "w:end"), of.Timing("stroke_start", "v:end")))
+    waits = (of.Wait(id="w", duration=1.0), of.Wait(id="v", duration=2.0))
+    block = Block(id="b", behaviors=(gaze, *waits))
+
+    named = spelled(block, "bml-1.0")
+
+    assert named.constraints != ()
+    assert violations(encode_xml(named)) == []
+    assert meaning(encode_xml(named)) == meaning(encode_xml(block))
+
+
+def test_without_an_event_what_was_tied_to_it_stays_tied_to_one_another() -> None:
+    event = of.Event(id="e", kind="directed_gaze", responder="human", objects=("t",))
+    words = [of.Wait(id=id, duration=1.0) for id in ("w", "v", "u")]
+    ties = (
+        of.Synchronize(ref="e:start", syncs=("w:start", "v:start")),
+        of.After(ref="w:end", syncs=("e:start", "u:start")),
+        of.After(ref="e:end", syncs=("v:end",)),
+    )
+    block = Block(id="b", behaviors=(event, *words), constraints=(of.Constraint(operators=ties),))
+
+    (left,) = core(block).constraints
+
+    assert left.operators == (
+        of.Synchronize(syncs=("w:start", "v:start")),
+        of.After(ref="w:end", syncs=("u:start",)),
+    )

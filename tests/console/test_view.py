@@ -8,7 +8,7 @@ import pytest
 from rich.console import Console
 
 from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorLost
-from engage_hri.schemas.attention import Claim
+from engage_hri.schemas.attention import Claim, HeadOwner
 from engage_hri.schemas.feedback import BlockProgress, PlannedPoint, PredictionFeedback, SyncPointProgress
 from engage_hri.services.console import view
 from engage_hri.services.console.render import render
@@ -236,3 +236,27 @@ def test_a_sync_point_costs_the_view_no_look_at_all_other_points_of_its_block() 
         return count
 
     assert work(1000) == work(10)
+
+
+def test_what_people_do_is_drawn(scene: view.Scene) -> None:
+    for message in (
+        ActionBegan(actor="human", action="point", at=at(13.0), targets=("trapezoid",)),
+        ActionBegan(actor="human", action="act", at=at(13.0), targets=("blue-square",)),
+        ActionBegan(actor="human", action="nod", at=at(13.0)),
+    ):
+        scene = view.feed(scene, message, 13.0)
+    text = " ".join(drawn(scene, width=240).split())
+
+    assert "points trapezoid" in text
+    assert "moves blue-square" in text
+    assert "nods" in text
+    assert "has left" in drawn(view.feed(scene, ActorLost(actor="human", at=at(14.0)), 20.0))
+
+
+def test_who_waits_for_the_head_is_drawn(scene: view.Scene) -> None:
+    owner = Claim(kind="fragment", priority=2, target="rectangle")
+    waiting = (Claim(kind="hands", priority=5), Claim(kind="face", priority=6, target="human"))
+
+    scene = view.feed(scene, HeadOwner(owner=owner, since=at(13.0), waiting=waiting), 13.0)
+
+    assert "waiting: hands, face" in drawn(scene)

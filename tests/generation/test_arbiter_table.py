@@ -10,7 +10,9 @@ import pytest
 
 from engage_hri.schemas.actions import ActorLost
 from engage_hri.schemas.world import Entity, World
+from tests.generation.head_stories import check
 from tests.generation.heads import AT, Stage, act, event, inhibition, on_the_face, statistics, world
+from tests.stories import Story, each
 
 Change = Callable[[Stage], None]
 DWELL = 0.3
@@ -173,17 +175,6 @@ def test_a_glance_that_is_cut_short_is_over(high: str) -> None:
     ]
 
 
-def test_on_a_face_there_is_no_glance_whoever_has_it_there() -> None:
-    stage = on_the_face()
-    stage.do(lambda arbiter: arbiter.fragment_gazes("human"))
-    stage.until(60.0)
-    stage.do(lambda arbiter: arbiter.inhibit(inhibition("target", "human")))
-    stage.until(120.0)
-
-    assert [kind for _, kind, _ in stage.owners] == ["fragment", "inhibition"]
-    assert stage.waiting == ["fragment", "face"]
-
-
 def test_what_waits_is_told_from_the_highest_to_the_lowest_with_its_reason() -> None:
     stage = on_the_face()
     stage.do(lambda arbiter: arbiter.inhibit(inhibition()))
@@ -238,84 +229,6 @@ def test_an_inhibition_during_a_fragments_gaze(mode: str, target: str, shifts: l
     back = [(14.3, "maintenance", "human")] if shifts else []
     assert stage.shifts == shifts + back
     assert stage.owners[1:] == [(11.0, "inhibition", target), (14.3, "face", "human")]
-
-
-def test_hold_after_target_stays_with_the_target() -> None:
-    stage = on_the_face()
-    ROWS["fragment"].begins(stage)
-    stage.do(lambda arbiter: arbiter.inhibit(inhibition("target", "other")))
-    stage.do(lambda arbiter: arbiter.inhibit(inhibition("hold")))
-    stage.until(20.0)
-
-    assert stage.shifts == [(10.0, "maintenance", "other")]
-
-
-# -- a fragment keeps the head until its block ends ---------------------------------------------------------------
-
-
-def test_between_the_gazes_of_a_block_the_head_is_the_fragments_and_on_the_base_gaze() -> None:
-    stage = on_the_face(glance_factor=100.0)
-    ROWS["fragment"].begins(stage)
-    stage.until(11.0)
-    stage.do(lambda arbiter: arbiter.fragment_rests())
-    ROWS["hands"].begins(stage)
-    stage.until(14.0)
-    stage.do(lambda arbiter: arbiter.fragment_gazes("other"))
-    stage.until(15.0)
-    stage.do(lambda arbiter: arbiter.fragment_lets_go())
-    stage.until(16.0)
-
-    assert stage.owners == [
-        (10.0, "fragment", "piece"),
-        (11.0, "fragment", "human"),
-        (14.0, "fragment", "other"),
-        (15.3, "hands", "hand"),
-    ]
-    assert stage.shifts == [(15.3, "maintenance", "hand")]
-
-
-# -- shifts that do not arrive ------------------------------------------------------------------------------------
-
-
-def test_a_target_out_of_reach_keeps_no_other_waiting() -> None:
-    stage = on_the_face()
-    ROWS["response"].begins(stage)
-    stage.do(lambda arbiter: arbiter.shift_failed("response-2", 10.0))
-    stage.until(10.4)
-    stage.do(lambda arbiter: arbiter.inhibit(inhibition("target", "other")))
-    stage.until(10.6)
-    stage.do(lambda arbiter: arbiter.inhibit(None))
-    stage.until(12.0)
-
-    assert stage.shifts == [(10.0, "response", "piece"), (10.4, "maintenance", "other"), (11.0, "response", "piece")]
-
-
-def test_an_outcome_of_a_shift_that_another_has_followed_says_nothing() -> None:
-    stage = on_the_face()
-    ROWS["response"].begins(stage)
-    stage.until(10.1)
-    stage.do(lambda arbiter: arbiter.inhibit(inhibition("target", "other")))
-    stage.do(lambda arbiter: arbiter.shift_failed("response-2", 10.1))
-    stage.until(15.0)
-
-    assert stage.shifts == [(10.0, "response", "piece"), (10.1, "maintenance", "other")]
-
-
-def test_another_body_is_told_where_to_look() -> None:
-    stage = on_the_face()
-    stage.do(lambda arbiter: arbiter.body_lost())
-
-    assert stage.shifts == [(10.0, "maintenance", "human")]
-
-
-def test_without_recognition_no_response_lasts() -> None:
-    stage = on_the_face()
-    ROWS["response"].begins(stage)
-    stage.until(11.0)
-    stage.do(lambda arbiter: arbiter.recognition_lost())
-    stage.until(12.0)
-
-    assert stage.owners == [since(10.0, "response"), since(11.3, "face")]
 
 
 # -- people and hands ---------------------------------------------------------------------------------------------
@@ -382,3 +295,49 @@ def test_five_events_are_five_without_our_own_glances() -> None:
     stage.until(20.0)
 
     assert owned(stage)[1] == (15.7, "glance", "human")
+
+
+# -- as stories: `head_stories.py` --------------------------------------------------------------------------------
+
+STORIES = """
+on a face there is no glance whoever has it there
+    10 fragment gazes human; 60 inhibit target human; 120 time
+    owners: 10 fragment human, 60 inhibition human
+    shifts: none
+
+hold after target stays with the target
+    10 fragment gazes piece; 10 inhibit target other; 10 inhibit hold; 20 time
+    owners: 10 fragment piece, 10 inhibition other, 10 inhibition
+    shifts: 10 maintenance other
+
+between the gazes of a block the head is the fragment's and on the base gaze
+    with glance_factor=100
+    10 fragment gazes piece; 11 fragment rests; 11 hand 0.3; 14 fragment gazes other; 15 fragment over; 16 time
+    owners: 10 fragment piece, 11 fragment human, 14 fragment other, 15.3 hands hand
+    shifts: 15.3 maintenance hand
+
+a target out of reach keeps no other waiting
+    10 event e started; 10 unreached response-2; 10.4 inhibit target other; 10.6 inhibit over; 12 time
+    owners: 10 response piece, 10.4 inhibition other, 10.9 response piece
+    shifts: 10 response piece, 10.4 maintenance other, 11 response piece
+
+an outcome of a shift that another has followed says nothing
+    10 event e started; 10.1 inhibit target other; 10.1 unreached response-2; 15 time
+    owners: 10 response piece, 10.1 inhibition other
+    shifts: 10 response piece, 10.1 maintenance other
+
+another body is told where to look
+    10 body lost
+    owners: 10 face human
+    shifts: 10 maintenance human
+
+without recognition no response lasts
+    10 event e started; 11 recognition lost; 12 time
+    owners: 10 response piece, 11.3 face human
+    shifts: 10 response piece, 11.3 maintenance human
+"""
+
+
+@each(STORIES)
+def test_the_head(story: Story) -> None:
+    check(story)

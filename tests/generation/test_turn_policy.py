@@ -1,5 +1,7 @@
 """Table 3.1, every row and index; turns over streamed fragments; what is illegal; what ends a turn early."""
 
+from typing import Any
+
 import pytest
 
 from engage_hri.schemas.actions import ActionBegan, ActionEnded
@@ -7,7 +9,7 @@ from engage_hri.schemas.faults import InputRefused
 from engage_hri.schemas.fragments import TurnFragment, TurnStatus
 from engage_hri.schemas.units import Stamp
 from engage_hri.services.generation.config import GenerationConfig
-from engage_hri.services.generation.turns.policy import Aborted, TurnPlan, TurnPolicy, plan_turn
+from engage_hri.services.generation.turns.policy import Aborted, TurnPlan, TurnPolicy, plan_turn, vain_delay
 
 AT = Stamp("test", 0.0)
 
@@ -307,3 +309,19 @@ def test_a_turn_may_speak_to_another_person_than_the_one_before() -> None:
     turns.accept(fragment("a", "full"), "alice")
 
     assert turns.accept(fragment("b", "full"), "bob").addressee == "bob"
+
+
+@pytest.mark.parametrize(
+    ("fields", "warning"),
+    [
+        ({"turn_status": "middle", "delay_target": "table"}, "delayTarget without delay"),
+        ({"turn_status": "end", "delay": True, "delay_target": "table"}, "after 'end' there is no turn to hold"),
+        ({"turn_status": "middle", "delay": True}, "no surface to look at"),
+        ({"turn_status": "middle", "delay": True, "delay_target": "table"}, ""),
+        ({"turn_status": "end"}, ""),
+    ],
+)
+def test_a_delay_that_holds_nothing_is_warned_of(fields: dict[str, Any], warning: str) -> None:
+    told = vain_delay(TurnFragment(id="f", **fields))
+
+    assert [warning in text for text in told] == [True] * bool(warning)

@@ -192,6 +192,9 @@ def test_a_net_of_another_tool_is_read_without_seconds() -> None:
         ('kind="phase"', 'kind="phrase"'),
         ("</pnml>", ""),
         ('target="p0"', 'target="p1"'),
+        ('source="t0" ', ""),
+        ("<page", "<net"),
+        ('target="p0"/>', 'target="p0"><inscription><text>2</text></inscription></arc>'),
     ],
 )
 def test_what_is_no_such_net_is_refused(change: tuple[str, str]) -> None:

@@ -24,28 +24,24 @@ from engage_hri.services.realizer.plan.planner import plan_block
 Parts = tuple[list[BlockBehavior], list[Synchronize | After]]
 
 
-def references(size: int) -> Parts:
-    """Points with phrases, one after another."""
+def phrased(kind: type[Gaze | Pointing], sync: str, size: int) -> Parts:
+    """Behaviors with a phrase each, which begins at `sync`; one after another."""
     behaviors: list[BlockBehavior] = []
     operators: list[Synchronize | After] = []
     for number in range(size):
-        behaviors += (Pointing(id=f"p{number}", target="a"), Speech(id=f"s{number}", text="this one"))
-        operators.append(Synchronize(ref=f"p{number}:stroke_start", syncs=(f"s{number}:start",)))
+        behaviors += (kind(id=f"p{number}", target="a"), Speech(id=f"s{number}", text="this one"))
+        operators.append(Synchronize(ref=f"p{number}:{sync}", syncs=(f"s{number}:start",)))
         if number:
             operators.append(After(ref=f"s{number - 1}:end", syncs=(f"p{number}:start",)))
     return behaviors, operators
 
 
+def references(size: int) -> Parts:
+    return phrased(Pointing, "stroke_start", size)
+
+
 def looks(size: int) -> Parts:
-    """Gazes that hand over to each other, each with a phrase."""
-    behaviors: list[BlockBehavior] = []
-    operators: list[Synchronize | After] = []
-    for number in range(size):
-        behaviors += (Gaze(id=f"g{number}", target="a"), Speech(id=f"s{number}", text="this one"))
-        operators.append(Synchronize(ref=f"g{number}:stroke", syncs=(f"s{number}:start",)))
-        if number:
-            operators.append(After(ref=f"s{number - 1}:end", syncs=(f"g{number}:start",)))
-    return behaviors, operators
+    return phrased(Gaze, "stroke", size)
 
 
 def series(size: int) -> Parts:

@@ -140,10 +140,6 @@ def asked(*accept: str, turn: str = "turn-1", end: float | None = 2.0) -> Log:
     return log
 
 
-def backchannel(start: float, end: float) -> list[tuple[str, str, float]]:
-    return [("bc-1", "started", start), ("bc-1", "succeeded", start), ("bc-1", "completed", end)]
-
-
 def request_event(
     kind: EventKind, at: float, *objects: str, request: str = "request-1", block: str = "block-1", **event: Any
 ) -> RequestEvent:

@@ -1,286 +1,157 @@
-"""Adjacency pairs: every row of the table, both initiators, exact times."""
+"""Adjacency pairs: every row of the table, both initiators, exact times. Read `event_stories.py`."""
 
 import pytest
 
-from tests.recognition.observations import HUMAN, ROBOT, Log, asked
-
-# -- the robot's pairs ------------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("action", ["speak", "nod", "shake", "point"])
-def test_person_answers_within_the_limit(action):
-    log = asked()
-    log.begins(HUMAN, action, 2.4)
-    log.ends(HUMAN, action, 3.4)
-
-    assert log.told("adjacency_pair") == [
-        ("ap-1", "started", 1.0), ("ap-1", "succeeded", 2.4), ("ap-1", "completed", 3.4),
-    ]  # fmt: skip
-    assert log.succeeded("ap-1").delay == pytest.approx(0.4)
-    assert (log.succeeded("ap-1").response, log.outcomes[0].response) == (action, action)
-    assert log.last("ap-1").duration == pytest.approx(1.0)
-    assert log.told("backchannel") == []
-
-
-def test_no_answer_fails_at_the_limit_after_the_turns_end():
-    log = asked()
-    log.until(9.0)
-
-    assert log.told() == [("ap-1", "started", 1.0), ("ap-1", "failed", 3.5)]
-    assert (log.last("ap-1").delay, log.last("ap-1").response) == (2.5, None)
-
-
-def test_manipulation_has_longer_when_it_is_accepted():
-    log = asked("act")
-    log.begins(HUMAN, "act", 9.5, "blue-square")
-    log.ends(HUMAN, "act", 11.0, "blue-square")
-
-    assert log.told() == [("ap-1", "started", 1.0), ("ap-1", "succeeded", 9.5), ("ap-1", "completed", 11.0)]
-    assert (log.succeeded("ap-1").delay, log.succeeded("ap-1").response) == (7.5, "act")
-
-
-def test_what_is_not_accepted_answers_nothing():
-    log = asked("nod")
-    log.begins(HUMAN, "speak", 2.2)
-    log.begins(HUMAN, "act", 2.3)
-    log.until(3.5)
-
-    assert log.states("ap-1") == ["started", "failed"]
-
-
-def test_an_interruption_is_decided_at_the_turns_end_with_a_negative_delay():
-    log = asked(end=None)
-    log.begins(HUMAN, "speak", 1.5)
-    log.until(2.5)
-    assert log.states("ap-1") == ["started"]
-    log.signals("ended", 3.0)
-    log.ends(HUMAN, "speak", 3.4)
-
-    assert log.told() == [("ap-1", "started", 1.0), ("ap-1", "succeeded", 3.0), ("ap-1", "completed", 3.4)]
-    assert log.succeeded("ap-1").delay == pytest.approx(-1.5)
-
-
-def test_an_interruption_that_is_over_before_the_turn_completes_with_it():
-    log = asked(end=None)
-    log.begins(HUMAN, "speak", 1.2)
-    log.ends(HUMAN, "speak", 2.2)
-    log.signals("ended", 3.0)
-
-    assert log.told()[1:] == [("ap-1", "succeeded", 3.0), ("ap-1", "completed", 3.0)]
-    assert log.last("ap-1").duration == pytest.approx(1.0)
-
-
-def test_short_speech_that_outlasts_the_turn_is_the_answer():
-    log = asked(end=None)
-    log.begins(HUMAN, "speak", 1.8)
-    log.ends(ROBOT, "speak", 2.0, behavior="block-1:speech-1")
-    log.signals("ended", 2.0)
-    log.ends(HUMAN, "speak", 2.2)
-
-    assert log.told() == [("ap-1", "started", 1.0), ("ap-1", "succeeded", 2.0), ("ap-1", "completed", 2.2)]
-    assert log.succeeded("ap-1").delay == pytest.approx(-0.2)
-
-
-def test_pauses_between_the_robots_words_belong_to_its_turn():
-    log = asked(end=None)
-    log.ends(ROBOT, "speak", 1.5, behavior="block-1:speech-1")
-    log.begins(HUMAN, "nod", 1.7)
-    log.ends(HUMAN, "nod", 1.9)
-
-    assert log.told("backchannel") == [
-        ("bc-1", "started", 1.7),
-        ("bc-1", "succeeded", 1.7),
-        ("bc-1", "completed", 1.9),
-    ]
-    assert log.states("ap-1") == ["started"]
-
-
-def test_manipulation_during_the_turn_answers_early():
-    log = asked("act", end=None)
-    log.begins(HUMAN, "act", 1.5, "blue-square")
-    log.signals("ended", 2.0)
-
-    assert log.succeeded("ap-1").delay == pytest.approx(-0.5)
-
-
-def test_the_end_of_another_turn_starts_no_clock():
-    log = asked(end=None)
-    log.signals("ended", 2.0, turn="turn-9")
-    log.until(5.0)
-
-    assert log.states("ap-1") == ["started"]
-
-
-def test_a_pair_announced_after_its_turns_end_has_its_clock():
-    log = Log()
-    log.signals("ended", 2.0)
-    log.requests_event("adjacency_pair", 1.0, turn="turn-1")
-    log.until(3.5)
-
-    assert log.told()[-1] == ("ap-1", "failed", 3.5)
-
-
-def test_without_a_turn_the_block_is_the_turn():
-    log = asked(turn="", end=None)
-    log.block_ends(2.0)
-    log.until(3.5)
-
-    assert log.told()[-1] == ("ap-1", "failed", 3.5)
-
-
-@pytest.mark.parametrize("how", ["signal", "cancel"])
-def test_an_aborted_turn_withdraws_the_question(how):
-    log = asked(end=None)
-    if how == "signal":
-        log.signals("aborted", 1.5)
-    else:
-        log.cancels("request-1", 1.5)
-
-    assert log.told() == [("ap-1", "started", 1.0), ("ap-1", "withdrawn", 1.5)]
-
-
-def test_who_interrupted_an_aborted_turn_has_answered():
-    log = asked(end=None)
-    log.begins(HUMAN, "speak", 1.5)
-    log.until(2.4)
-    log.signals("aborted", 2.5)
-
-    assert log.states("ap-1") == ["started", "succeeded"]
-    assert log.succeeded("ap-1").delay == pytest.approx(-1.0)
-
-
-def test_a_new_question_supersedes_the_pending_one():
-    log = asked()
-    log.requests_event("adjacency_pair", 3.0, turn="turn-2")
-
-    assert log.told()[1:] == [("ap-1", "superseded", 3.0), ("ap-2", "started", 3.0)]
-    assert log.outcomes[0].state == "superseded"
-
-
-def test_a_new_question_completes_the_answer_to_the_last():
-    log = asked("act")
-    log.begins(HUMAN, "act", 3.0, "blue-square")
-    log.requests_event("adjacency_pair", 4.0, turn="turn-2")
-
-    assert log.told()[1:] == [("ap-1", "succeeded", 3.0), ("ap-1", "completed", 4.0), ("ap-2", "started", 4.0)]
-
-
-def test_a_turn_that_nobody_ends_is_given_up():
-    log = asked(end=None)
-    log.until(20.0)
-    assert log.states("ap-1") == ["started"]
-    log.ends(ROBOT, "speak", 20.0, behavior="block-1:speech-1")
-    log.until(32.0)
-
-    assert log.told()[-1] == ("ap-1", "withdrawn", 32.0)
-
-
-@pytest.mark.parametrize("answered", [True, False])
-def test_the_third_turn_closes_the_pair(answered):
-    log = asked()
-    if answered:
-        log.begins(HUMAN, "speak", 2.5)
-    log.signals("repaired", 3.0)
-
-    assert log.states("ap-1") == ["started", "succeeded", "completed"]
-
-
-# -- the person's pairs -----------------------------------------------------------------------------------------
-
-
-def test_robot_answers_a_persons_turn():
-    log = Log()
-    log.begins(HUMAN, "speak", 1.0)
-    log.ends(HUMAN, "speak", 2.0)
-    log.begins(ROBOT, "speak", 2.6)
-    log.ends(ROBOT, "speak", 3.6)
-
-    assert log.told() == [("ap-1", "started", 1.0), ("ap-1", "succeeded", 2.6), ("ap-1", "completed", 3.6)]
-    assert (log.events[0].initiator, log.succeeded("ap-1").response) == (HUMAN, "speak")
-    assert log.succeeded("ap-1").delay == pytest.approx(0.6)
-
-
-@pytest.mark.parametrize("action", ["nod", "shake", "point"])
-def test_robot_answers_with_a_gesture(action):
-    log = Log()
-    log.begins(HUMAN, "speak", 1.0)
-    log.ends(HUMAN, "speak", 2.0)
-    log.begins(ROBOT, action, 2.6)
-    log.ends(ROBOT, action, 3.0)
-
-    assert log.states("ap-1") == ["started", "succeeded", "completed"]
-
-
-@pytest.mark.parametrize("signal", ["answered", "repaired"])
-def test_a_fragment_that_is_a_second_or_third_turn_answers_whoever_waits(signal):
-    log = Log()
-    log.begins(HUMAN, "speak", 1.0)
-    log.ends(HUMAN, "speak", 2.0)
-    log.signals(signal, 2.3, block="block-1")
-    log.block_ends(2.9)
-
-    assert log.told() == [("ap-1", "started", 1.0), ("ap-1", "succeeded", 2.3), ("ap-1", "completed", 2.9)]
-
-
-def test_no_answer_to_a_person_fails():
-    log = Log()
-    log.begins(HUMAN, "speak", 1.0)
-    log.ends(HUMAN, "speak", 2.0)
-    log.until(3.5)
-
-    assert log.told()[-1] == ("ap-1", "failed", 3.5)
-
-
-def test_manipulation_asks_for_an_answer_from_its_end_on():
-    log = Log()
-    log.begins(HUMAN, "act", 1.0, "blue-square")
-    log.ends(HUMAN, "act", 4.0, "blue-square")
-    log.begins(ROBOT, "speak", 5.0)
-
-    assert log.told() == [("ap-1", "started", 1.0), ("ap-1", "succeeded", 5.0)]
-    assert log.succeeded("ap-1").delay == pytest.approx(1.0)
-
-
-def test_a_person_who_goes_on_speaking_has_not_ended_the_turn():
-    log = Log()
-    log.begins(HUMAN, "speak", 1.0)
-    log.ends(HUMAN, "speak", 2.0)
-    log.begins(HUMAN, "speak", 3.0)
-    log.until(6.0)
-    assert log.states("ap-1") == ["started"]
-    log.ends(HUMAN, "speak", 6.0)
-    log.until(7.5)
-
-    assert log.told()[-1] == ("ap-1", "failed", 7.5)
-
-
-def test_the_robots_question_is_the_answer_to_a_person_who_has_finished():
-    log = Log()
-    log.begins(HUMAN, "speak", 1.0)
-    log.ends(HUMAN, "speak", 2.0)
-    log.requests_event("adjacency_pair", 2.5, turn="turn-1")
-
-    assert log.told()[1:] == [("ap-1", "succeeded", 2.5), ("ap-1", "completed", 2.5), ("ap-2", "started", 2.5)]
-
-
-def test_the_robots_question_supersedes_a_turn_that_goes_on():
-    log = Log()
-    log.begins(HUMAN, "speak", 1.0)
-    log.begins(ROBOT, "speak", 1.5)
-    log.requests_event("adjacency_pair", 1.5, turn="turn-1")
-
-    assert log.told()[1:] == [("ap-1", "superseded", 1.5), ("ap-2", "started", 1.5)]
-
-
-def test_robot_that_interrupts_has_answered_when_the_person_has_finished():
-    log = Log()
-    log.begins(HUMAN, "speak", 1.0)
-    log.begins(ROBOT, "speak", 1.5)
-    log.ends(HUMAN, "speak", 3.0)
-    log.ends(ROBOT, "speak", 3.5)
-
-    assert log.told() == [("ap-1", "started", 1.0), ("ap-1", "succeeded", 3.0), ("ap-1", "completed", 3.5)]
-    assert log.succeeded("ap-1").delay == pytest.approx(-1.5)
+from tests.recognition.event_stories import check
+from tests.recognition.observations import HUMAN, ROBOT, Log
+from tests.stories import Story, each
+
+OF_ROBOT = """
+person answers within the limit
+    ACTION in speak nod shake point
+    1 asked; 2.4 human +ACTION; 3.4 human -ACTION
+    robot's ap-1: started 1, succeeded 2.4 after 0.4 by ACTION, completed 3.4 lasting 1
+
+no answer fails at the limit after the turn's end
+    1 asked; 9 time
+    robot's ap-1: started 1, failed 3.5 after 2.5
+
+manipulation has longer when it is accepted
+    1 asked act; 9.5 human +act blue; 11 human -act blue
+    robot's ap-1: started 1, succeeded 9.5 after 7.5 by act, completed 11 lasting 1.5
+
+what is not accepted answers nothing
+    1 asked nod; 2.2 human +speak; 2.3 human +act; 3.5 time
+    robot's ap-1: started 1, failed 3.5 after 2.5
+
+an interruption is decided at the turn's end with a negative delay
+    1 asking; 1.5 human +speak; 2.5 time; 3 turn ended; 3.4 human -speak
+    robot's ap-1: started 1, succeeded 3 after -1.5 by speak, completed 3.4 lasting 1.9
+
+an interruption that is over before the turn completes with it
+    1 asking; 1.2 human +speak; 2.2 human -speak; 3 turn ended
+    robot's ap-1: started 1, succeeded 3 after -1.8 by speak, completed 3 lasting 1
+
+short speech that outlasts the turn is the answer
+    1 asking; 1.8 human +speak; 2 robot -speak words; 2 turn ended; 2.2 human -speak
+    robot's ap-1: started 1, succeeded 2 after -0.2 by speak, completed 2.2 lasting 0.4
+
+pauses between the robot's words belong to its turn
+    1 asking; 1.5 robot -speak words; 1.7 human +nod; 1.9 human -nod
+    robot's ap-1: started 1
+    robot's bc-1: started 1.7, succeeded 1.7, completed 1.9 lasting 0.2
+
+manipulation during the turn answers early
+    1 asking act; 1.5 human +act blue; 2 turn ended
+    robot's ap-1: started 1, succeeded 2 after -0.5 by act
+
+the end of another turn starts no clock
+    1 asking; 2 turn ended turn=turn-9; 5 time
+    robot's ap-1: started 1
+
+a pair announced after its turn's end has its clock
+    2 turn ended; 1 asks ap turn=turn-1; 3.5 time
+    robot's ap-1: started 1, failed 3.5 after 2.5
+
+without a turn the block is the turn
+    1 robot +speak block-1:speech-1; 1 asks ap turn=; 2 block done; 3.5 time
+    robot's ap-1: started 1, failed 3.5 after 2.5
+
+an aborted turn withdraws the question
+    1 asking; 1.5 turn aborted
+    robot's ap-1: started 1, withdrawn 1.5
+
+a cancelled request withdraws the question
+    1 asking; 1.5 cancels 1
+    robot's ap-1: started 1, withdrawn 1.5
+
+who interrupted an aborted turn has answered
+    1 asking; 1.5 human +speak; 2.4 time; 2.5 turn aborted
+    robot's ap-1: started 1, succeeded 2.5 after -1 by speak
+
+a new question supersedes the pending one
+    1 asked; 3 asks ap turn=turn-2
+    robot's ap-1: started 1, superseded 3
+    robot's ap-2: started 3
+
+a new question completes the answer to the last
+    1 asked act; 3 human +act blue; 4 asks ap turn=turn-2
+    robot's ap-1: started 1, succeeded 3 after 1 by act, completed 4 lasting 1
+    robot's ap-2: started 4
+
+a turn that nobody ends is given up
+    1 asking; 20 time; 20 robot -speak words; 32 time
+    robot's ap-1: started 1, withdrawn 32
+
+the third turn closes a pair that was answered
+    1 asked; 2.5 human +speak; 3 turn repaired
+    robot's ap-1: started 1, succeeded 2.5 after 0.5 by speak, completed 3 lasting 0.5
+
+the third turn closes a pair that nobody was seen to answer
+    1 asked; 3 turn repaired
+    robot's ap-1: started 1, succeeded 3, completed 3
+"""
+
+
+@each(OF_ROBOT)
+def test_a_pair_of_the_robot(story: Story):
+    check(story)
+
+
+OF_PERSON = """
+robot answers a person's turn
+    1 human +speak; 2 human -speak; 2.6 robot +speak; 3.6 robot -speak
+    human's ap-1: started 1, succeeded 2.6 after 0.6 by speak, completed 3.6 lasting 1
+
+robot answers with a gesture
+    ACTION in nod shake point
+    1 human +speak; 2 human -speak; 2.6 robot +ACTION; 3 robot -ACTION
+    human's ap-1: started 1, succeeded 2.6 after 0.6 by ACTION, completed 3 lasting 0.4
+
+a fragment that is a second or third turn answers whoever waits
+    SIGNAL in answered repaired
+    1 human +speak; 2 human -speak; 2.3 turn SIGNAL block=block-1; 2.9 block done
+    human's ap-1: started 1, succeeded 2.3 after 0.3 by speak, completed 2.9 lasting 0.6
+
+no answer to a person fails
+    1 human +speak; 2 human -speak; 3.5 time
+    human's ap-1: started 1, failed 3.5 after 2.5
+
+manipulation asks for an answer from its end on
+    1 human +act blue; 4 human -act blue; 5 robot +speak
+    human's ap-1: started 1, succeeded 5 after 1 by speak
+
+a person who goes on speaking has not ended the turn
+    1 human +speak; 2 human -speak; 3 human +speak; 6 time; 6 human -speak; 7.5 time
+    human's ap-1: started 1, failed 7.5 after 6.5
+
+the robot's question is the answer to a person who has finished
+    1 human +speak; 2 human -speak; 2.5 asks ap turn=turn-1
+    human's ap-1: started 1, succeeded 2.5 after 0.5 by speak, completed 2.5 lasting 0
+    robot's ap-2: started 2.5
+
+the robot's question supersedes a turn that goes on
+    1 human +speak; 1.5 robot +speak; 1.5 asks ap turn=turn-1
+    human's ap-1: started 1, superseded 1.5
+    robot's ap-2: started 1.5
+
+robot that interrupts has answered when the person has finished
+    1 human +speak; 1.5 robot +speak; 3 human -speak; 3.5 robot -speak
+    human's ap-1: started 1, succeeded 3 after -1.5 by speak, completed 3.5 lasting 2
+
+a person who leaves while speaking withdraws
+    1 human +speak; 2 lost human; 2.5 time
+    human's ap-1: started 1, withdrawn 2.5
+
+a person who leaves while answering has answered
+    1 asked; 2.5 human +speak; 3 lost human; 3.5 time
+    robot's ap-1: started 1, succeeded 2.5 after 0.5 by speak, completed 3.5 lasting 0.5
+"""
+
+
+@each(OF_PERSON)
+def test_a_pair_of_a_person(story: Story):
+    check(story)
 
 
 @pytest.mark.parametrize(("at", "pairs"), [(4.9, {"ap-1"}), (5.2, {"ap-1", "ap-2"})])
@@ -293,22 +164,3 @@ def test_the_initiator_speaking_again_at_once_is_the_third_turn(at, pairs):
     log.begins(HUMAN, "speak", at)
 
     assert {event.id for event in log.events} == pairs
-
-
-def test_a_person_who_leaves_while_speaking_withdraws():
-    log = Log()
-    log.begins(HUMAN, "speak", 1.0)
-    log.lost(HUMAN, 2.0)
-    log.until(2.5)
-
-    assert log.told()[-1] == ("ap-1", "withdrawn", 2.5)
-
-
-def test_a_person_who_leaves_while_answering_has_answered():
-    log = asked()
-    log.begins(HUMAN, "speak", 2.5)
-    log.lost(HUMAN, 3.0)
-    log.until(3.5)
-
-    assert log.told()[-1] == ("ap-1", "completed", 3.5)
-    assert log.last("ap-1").duration == pytest.approx(0.5)

@@ -25,13 +25,38 @@ class Interaction(Log):
     def block(self) -> str:
         return f"fragment-{self.step}"
 
-    def says(self, start: float, end: float, speech: str = "speech-1") -> None:
-        """A piece of the robot's speech; what happens during it is fed by `during`."""
-        self.begins(ROBOT, "speak", self.start + start, behavior=f"{self.block}:{speech}")
-        self._silent_at, self._speech = end, speech
+    def tell(self, step: int, start: float, story: str) -> None:
+        """Steps like `1.9 human rectangle`, from the start of the fragment on. What they mean: `_take`."""
+        self.step, self.start = step, start
+        self.owner("fragment", HUMAN, start)
+        for told in story.replace("\n", ";").split(";"):
+            if words := told.split():
+                self._take(float(words[0]), *words[1:])
 
-    def falls_silent(self) -> None:
-        self.ends(ROBOT, "speak", self.start + self._silent_at, behavior=f"{self.block}:{self._speech}")
+    def _take(self, at: float, what: str, *words: str) -> None:
+        match what:
+            case "human" | "robot":
+                self.looks(what, words[0].replace("face", ROBOT), self.start + at)
+            case "says" | "silent":
+                speech = f"{self.block}:speech"
+                (self.begins if what == "says" else self.ends)(ROBOT, "speak", self.start + at, behavior=speech)
+            case "acts" | "acted":
+                (self.begins if what == "acts" else self.ends)(HUMAN, "act", self.start + at, words[0])
+            case "head":
+                self.owner("fragment", words[0], self.start + at)
+            case "asks":
+                self.asks(at, *words)
+            case "directs":
+                phrase = float(words[1])
+                self.directs(at, words[0], phrase, phrase if "pointing" in words else None)
+            case "over":
+                self.turn_over(at)
+            case "done":
+                self.done(at)
+            case "time":
+                self.until(self.start + at)
+            case _:
+                raise ValueError(what)
 
     def asks(self, at: float, *accept: str) -> None:
         self.requests_event(
@@ -52,12 +77,6 @@ class Interaction(Log):
             self.passes(f"{name}-point:stroke_start", self.start + point, self.block)
         self.passes(f"{name}-phrase:start", self.start + phrase, self.block)
 
-    def robot(self, target: str, at: float) -> None:
-        self.looks(ROBOT, target, self.start + at)
-
-    def human(self, target: str, at: float) -> None:
-        self.looks(HUMAN, ROBOT if target == "face" else target, self.start + at)
-
     def turn_over(self, at: float) -> None:
         """The last word: the turn ends and the robot seeks the person's eyes."""
         self.signals("ended", self.start + at, turn=self.block, block=self.block)
@@ -66,10 +85,6 @@ class Interaction(Log):
             "mutual_facial_gaze", self.start + at, id=f"mfg-{self.step}", block=self.block, turn=self.block,
             optional=True,
         )  # fmt: skip
-
-    def fragment(self, step: int, start: float) -> None:
-        self.step, self.start = step, start
-        self.owner("fragment", HUMAN, start)
 
     def done(self, at: float) -> None:
         self.block_ends(self.start + at, block=self.block)
@@ -86,100 +101,43 @@ class Interaction(Log):
 SHORT = {"directed_gaze": "DG", "mutual_facial_gaze": "MFG", "adjacency_pair": "AP", "backchannel": "BC"}
 
 
+STEP_5_AND_6 = """
+    0 robot human; 0.2 human face; 0.4 asks act; 0.4 says; 1 silent; 1 head blue-square
+    1 directs blue-square 1.9 pointing; 1.9 says; 2.3 human blue-square; 2.5 silent
+    2.6 says; 2.9 robot human; 3.4 human rectangle; 4.6 silent; 4.6 head rectangle
+    4.6 directs rectangle 4.6; 4.6 says; 5.3 silent; 5.3 over; 5.6 robot human; 5.6 done; 8 time
+    9 acts blue-square; 10 robot human-hand; 11.5 acted blue-square; 12 human face; 12.4 robot human
+"""
+STEP_18_AND_19 = """
+    0 human face; 0.1 robot human; 0.4 asks act; 0.4 says; 1 silent; 1 head purple-triangle
+    1 directs purple-triangle 1.9 pointing; 1.9 says; 2.2 silent; 4.4 time
+    4.5 says; 4.6 robot human; 6.8 human table; 7 silent; 7 head pink-square
+    7 directs pink-square 7; 7 says; 7.8 silent; 7.9 human purple-triangle; 7.9 over; 8.2 robot human; 8.2 done
+    11 time; 12 acts purple-triangle; 14 acted purple-triangle
+"""
+STEP_21 = """
+    0 human table; 0.1 robot human; 0.4 asks act; 0.4 says; 0.6 human face; 1 silent; 1 head green-square
+    1 directs green-square 1.9 pointing; 1.9 human green-square; 1.9 says; 2.2 silent
+    2.3 says; 2.5 robot human; 2.7 human face; 4.2 human table; 4.4 silent; 4.4 head blue-square
+    4.4 directs blue-square 4.4; 4.4 says; 4.9 human face; 5.1 human table; 5.2 silent; 5.2 over; 5.5 robot human
+    5.5 done; 7.9 time; 9 acts green-square; 11 acted green-square
+"""
+
+
 def step_5_and_6(log: Interaction) -> None:
     """ "Please move the blue piece so that it is touching the top of the rectangle", and the person does."""
-    log.human(TABLE, 0.0)
-    log.fragment(5, 10.0)
-    log.robot(HUMAN, 0.0)
-    log.human("face", 0.2)
-    log.asks(0.4, "act")
-    log.says(0.4, 1.0)
-    log.falls_silent()
-    log.owner("fragment", "blue-square", 11.0)
-    log.directs(1.0, "blue-square", phrase=1.9, point=1.9)
-    log.says(1.9, 2.5, "blue-phrase")
-    log.human("blue-square", 2.3)
-    log.falls_silent()
-    log.says(2.6, 4.6, "speech-2")
-    log.robot(HUMAN, 2.9)
-    log.human("rectangle", 3.4)
-    log.falls_silent()
-    log.owner("fragment", "rectangle", 14.6)
-    log.directs(4.6, "rectangle", phrase=4.6)
-    log.says(4.6, 5.3, "rectangle-phrase")
-    log.falls_silent()
-    log.turn_over(5.3)
-    log.robot(HUMAN, 5.6)
-    log.done(5.6)
-    log.until(18.0)
-    log.begins(HUMAN, "act", 19.0, "blue-square")
-    log.robot("human-hand", 10.0)
-    log.ends(HUMAN, "act", 21.5, "blue-square")
-    log.human("face", 12.0)
-    log.robot(HUMAN, 12.4)
+    log.looks(HUMAN, TABLE, 0.0)
+    log.tell(5, 10.0, STEP_5_AND_6)
 
 
 def step_18_and_19(log: Interaction) -> None:
     """ "Please move that": the person looks at the face and comes to the piece too late."""
-    log.fragment(18, 40.0)
-    log.human("face", 0.0)
-    log.robot(HUMAN, 0.1)
-    log.asks(0.4, "act")
-    log.says(0.4, 1.0)
-    log.falls_silent()
-    log.owner("fragment", "purple-triangle", 41.0)
-    log.directs(1.0, "purple-triangle", phrase=1.9, point=1.9)
-    log.says(1.9, 2.2, "that")
-    log.falls_silent()
-    log.until(44.4)
-    log.says(4.5, 7.0, "speech-2")
-    log.robot(HUMAN, 4.6)
-    log.human(TABLE, 6.8)
-    log.falls_silent()
-    log.owner("fragment", "pink-square", 47.0)
-    log.directs(7.0, "pink-square", phrase=7.0)
-    log.says(7.0, 7.8, "pink-phrase")
-    log.falls_silent()
-    log.human("purple-triangle", 7.9)
-    log.turn_over(7.9)
-    log.robot(HUMAN, 8.2)
-    log.done(8.2)
-    log.until(51.0)
-    log.begins(HUMAN, "act", 52.0, "purple-triangle")
-    log.ends(HUMAN, "act", 54.0, "purple-triangle")
+    log.tell(18, 40.0, STEP_18_AND_19)
 
 
 def step_21(log: Interaction) -> None:
     """ "Please move this": followed; then only the table is looked at."""
-    log.fragment(21, 70.0)
-    log.human(TABLE, 0.0)
-    log.robot(HUMAN, 0.1)
-    log.asks(0.4, "act")
-    log.says(0.4, 1.0)
-    log.human("face", 0.6)
-    log.falls_silent()
-    log.owner("fragment", "green-square", 71.0)
-    log.directs(1.0, "green-square", phrase=1.9, point=1.9)
-    log.human("green-square", 1.9)
-    log.says(1.9, 2.2, "this")
-    log.falls_silent()
-    log.says(2.3, 4.4, "speech-2")
-    log.robot(HUMAN, 2.5)
-    log.human("face", 2.7)
-    log.human(TABLE, 4.2)
-    log.falls_silent()
-    log.owner("fragment", "blue-square", 74.4)
-    log.directs(4.4, "blue-square", phrase=4.4)
-    log.says(4.4, 5.2, "blue-phrase")
-    log.human("face", 4.9)
-    log.human(TABLE, 5.1)
-    log.falls_silent()
-    log.turn_over(5.2)
-    log.robot(HUMAN, 5.5)
-    log.done(5.5)
-    log.until(77.9)
-    log.begins(HUMAN, "act", 79.0, "green-square")
-    log.ends(HUMAN, "act", 81.0, "green-square")
+    log.tell(21, 70.0, STEP_21)
 
 
 @pytest.mark.parametrize("resolution", RESOLUTIONS)
@@ -239,19 +197,10 @@ def test_step_20_thinking_aloud_answers_the_manipulation_and_ends_in_mutual_gaze
     log = Interaction(resolution)
     log.begins(HUMAN, "act", 58.0, "purple-triangle")
     log.ends(HUMAN, "act", 60.0, "purple-triangle")
-    log.fragment(20, 60.5)
-    log.human(TABLE, 0.0)
-    log.robot(HUMAN, 0.1)
-    log.asks(0.4)
-    log.says(0.4, 1.0)
-    log.human("face", 0.9)
-    log.falls_silent()
-    log.robot(TABLE, 1.2)
-    log.says(2.5, 2.9, "speech-2")
-    log.falls_silent()
-    log.turn_over(2.9)
-    log.robot(HUMAN, 3.1)
-    log.human(TABLE, 4.5)
+    log.tell(20, 60.5, """
+        0 human table; 0.1 robot human; 0.4 asks; 0.4 says; 0.9 human face; 1 silent; 1.2 robot table
+        2.5 says; 2.9 silent; 2.9 over; 3.1 robot human; 4.5 human table
+    """)  # fmt: skip
 
     assert log.of(20) == [("AP", (), "F"), ("MFG", (), "S")]
     assert next((outcome.state, outcome.delay) for outcome in log.outcomes) == ("succeeded", 0.0)
@@ -262,13 +211,7 @@ def test_step_20_thinking_aloud_answers_the_manipulation_and_ends_in_mutual_gaze
 def test_step_26_the_person_leaves_and_nothing_stays_open(resolution):
     log = Interaction(resolution)
     step_5_and_6(log)
-    log.fragment(25, 30.0)
-    log.asks(0.4)
-    log.says(0.4, 3.0)
-    log.human("face", 1.0)
-    log.falls_silent()
-    log.turn_over(3.0)
-    log.done(3.3)
+    log.tell(25, 30.0, "0.4 asks; 0.4 says; 1 human face; 3 silent; 3 over; 3.3 done")
     log.lost(HUMAN, 34.0)
     log.until(60.0)
 

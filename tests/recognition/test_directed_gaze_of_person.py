@@ -1,194 +1,121 @@
-"""Directed gaze: every row of the table, the person's; gaze resolution, exact times."""
+"""Directed gaze: every row of the table, the person's; gaze resolution. Read `event_stories.py`."""
 
-import pytest
+from tests.recognition.event_stories import check
+from tests.recognition.observations import HUMAN, Log
+from tests.stories import Story, each
 
-from tests.recognition.observations import HUMAN, ROBOT, Log
+STORIES = """
+pointing directs the robot who follows
+    1 human +point blue; 1.1 human +look blue; 1.5 robot +look blue; 2.3 robot +look human
+    human's dg-1 at blue: started 1, succeeded 1.5 after 0.5, completed 2.3 lasting 0.8
 
-BLUE, PINK = "blue-square", "pink-square"
+a look directs once it has lasted
+    1 human +look blue; 1.59 time; 1.6 time; 2 robot +look blue
+    human's dg-1 at blue: started 1.6 since 1, succeeded 2 after 1
+
+robot there already shares at once
+    0.5 robot +look blue; 1 human +point blue
+    human's dg-1 at blue: started 1, succeeded 1 after 0, completed 1 lasting 0
+
+person's directed gaze fails at its limit
+    1 human +point blue; 1.5 human -point blue; 3.5 time
+    human's dg-1 at blue: started 1, failed 3.5 after 2.5
+
+the person may look away before the robot arrives
+    1 human +point blue; 1.1 human +look blue; 1.3 human +look; 1.6 robot +look blue
+    human's dg-1 at blue: started 1, succeeded 1.6 after 0.6, completed 1.6 lasting 0
+
+a look while the robot speaks directs nothing until it is silent
+    0 robot +speak; 1 human +look blue; 3 time; 3 robot -speak; 3.6 time
+    human's dg-1 at blue: started 3.6 since 3
+
+a look while the looker speaks directs
+    0.5 human +speak; 1 human +look blue; 1.6 time
+    human's ap-1: started 0.5
+    human's dg-1 at blue: started 1.6 since 1
+
+a look soon after the robot's directed gaze directs nothing
+    1 asks dg blue; 3.5 time; 5.4 human +look blue; 20 time
+    robot's dg-1 at blue: started 1, failed 3.5 after 2.5
+
+a look longer after the robot's directed gaze directs
+    1 asks dg blue; 3.5 time; 5.6 human +look blue; 20 time
+    robot's dg-1 at blue: started 1, failed 3.5 after 2.5
+    human's dg-2 at blue: started 6.2 since 5.6, failed 8.1 after 2.5
+
+a look that answered the robot never turns into a direction
+    1 asks dg blue; 1.2 robot +look blue; 1.5 human +look blue; 2 robot +look human; 60 time
+    robot's dg-1 at blue: started 1, succeeded 1.5 after 0.5, completed 2 lasting 0.5
+
+a person moving an object directs nothing with looks
+    1 human +look blue; 1.2 human +act blue; 3 human -act blue; 60 time
+    human's ap-1: started 1.2, failed 4.5 after 3.3
+
+only objects can be directed to
+    TARGET in table somewhere
+    1 human +look TARGET; 2 human +point TARGET; 9 time
+    nothing
+
+a face is met and not directed to
+    1 human +look robot; 2 human +point robot; 9 time
+    human's mfg-1: started 1, failed 2.9 after 1.9
+
+directing while a fragment looks elsewhere is preempted
+    0.5 owner fragment pink; 1 human +point blue
+    human's dg-1 at blue: started 1, preempted 1
+
+a fragment that looks there anyway preempts nothing
+    0.5 owner fragment blue; 1 human +point blue; 1.2 robot +look blue
+    human's dg-1 at blue: started 1, succeeded 1.2 after 0.2, completed 1.2 lasting 0
+
+a fragment that takes the head preempts what waits
+    1 human +point blue; 1.2 human +look robot; 1.5 owner fragment pink
+    human's dg-1 at blue: started 1, preempted 1.5
+    human's mfg-1: started 1.2, preempted 1.5
+
+the robot's own reference supersedes the person's direction
+    1 human +point blue; 1.5 asks dg blue
+    human's dg-1 at blue: started 1, superseded 1.5
+    robot's dg-2 at blue: started 1.5
+
+at resolution table anything on it will do
+    TARGET in table pink
+    with gaze_resolution=table
+    1 asks dg blue; 2 human +look TARGET; 3.5 time
+    robot's dg-1 at blue: started 1, succeeded 2 after 1
+
+at resolution object the table will not do
+    with gaze_resolution=object
+    1 asks dg blue; 2 human +look table; 3.5 time
+    robot's dg-1 at blue: started 1, failed 3.5 after 2.5
+
+at resolution object another object will not do
+    with gaze_resolution=object
+    1 asks dg blue; 2 human +look pink; 3.5 time
+    robot's dg-1 at blue: started 1, failed 3.5 after 2.5
+    human's dg-2 at pink: started 2.6 since 2
+
+at resolution table a face is not on the table
+    with gaze_resolution=table
+    1 asks dg blue; 2 human +look robot; 3.5 time
+    robot's dg-1 at blue: started 1, failed 3.5 after 2.5
+    human's mfg-1: started 2
+
+at resolution table wandering over it stays shared
+    with gaze_resolution=table
+    1 asks dg blue; 1.2 robot +look blue; 2 human +look table; 2.5 human +look pink; 3 human +look robot
+    robot's dg-1 at blue: started 1, succeeded 2 after 1, completed 3 lasting 1
+    human's mfg-1: started 3
+"""
 
 
-def test_pointing_directs_the_robot_who_follows():
+@each(STORIES)
+def test_a_directed_gaze_of_a_person(story: Story):
+    check(story)
+
+
+def test_the_start_says_how_long_the_robot_has_and_the_cause():
     log = Log()
-    log.begins(HUMAN, "point", 1.0, BLUE)
-    log.looks(HUMAN, BLUE, 1.1)
-    log.looks(ROBOT, BLUE, 1.5)
-    log.looks(ROBOT, HUMAN, 2.3)
+    log.begins(HUMAN, "point", 1.0, "blue-square")
 
-    assert log.told() == [("dg-1", "started", 1.0), ("dg-1", "succeeded", 1.5), ("dg-1", "completed", 2.3)]
-    assert (log.events[0].initiator, log.events[0].limit, log.events[0].cause) == (HUMAN, 2.5, "human")
-    assert log.succeeded("dg-1").delay == pytest.approx(0.5)
-    assert log.last("dg-1").duration == pytest.approx(0.8)
-
-
-def test_a_look_directs_once_it_has_lasted():
-    log = Log()
-    log.looks(HUMAN, BLUE, 1.0)
-    log.until(1.59)
-    assert log.events == []
-    log.until(1.6)
-    log.looks(ROBOT, BLUE, 2.0)
-
-    assert log.told() == [("dg-1", "started", 1.6), ("dg-1", "succeeded", 2.0)]
-    assert log.events[0].started.seconds == pytest.approx(1.0)
-    assert log.succeeded("dg-1").delay == pytest.approx(1.0)
-
-
-def test_robot_there_already_shares_at_once():
-    log = Log()
-    log.looks(ROBOT, BLUE, 0.5)
-    log.begins(HUMAN, "point", 1.0, BLUE)
-
-    assert log.states("dg-1")[:2] == ["started", "succeeded"]
-    assert log.succeeded("dg-1").delay == 0.0
-
-
-def test_persons_directed_gaze_fails_at_its_limit():
-    log = Log()
-    log.begins(HUMAN, "point", 1.0, BLUE)
-    log.ends(HUMAN, "point", 1.5, BLUE)
-    log.until(3.5)
-
-    assert log.told()[-1] == ("dg-1", "failed", 3.5)
-
-
-def test_the_person_may_look_away_before_the_robot_arrives():
-    log = Log()
-    log.begins(HUMAN, "point", 1.0, BLUE)
-    log.looks(HUMAN, BLUE, 1.1)
-    log.looks(HUMAN, "", 1.3)
-    log.looks(ROBOT, BLUE, 1.6)
-
-    assert log.told() == [("dg-1", "started", 1.0), ("dg-1", "succeeded", 1.6), ("dg-1", "completed", 1.6)]
-
-
-def test_a_look_while_the_robot_speaks_directs_nothing_until_it_is_silent():
-    log = Log()
-    log.begins(ROBOT, "speak", 0.0)
-    log.looks(HUMAN, BLUE, 1.0)
-    log.until(3.0)
-    assert log.events == []
-    log.ends(ROBOT, "speak", 3.0)
-    log.until(3.6)
-
-    assert log.told() == [("dg-1", "started", 3.6)]
-
-
-def test_a_look_while_the_looker_speaks_directs():
-    log = Log()
-    log.begins(HUMAN, "speak", 0.5)
-    log.looks(HUMAN, BLUE, 1.0)
-    log.until(1.6)
-
-    assert ("dg-1", "started", 1.6) in log.told("directed_gaze")
-
-
-@pytest.mark.parametrize(("after", "directs"), [(1.9, False), (2.1, True)])
-def test_a_look_soon_after_the_robots_directed_gaze_directs_nothing(after, directs):
-    log = Log()
-    log.requests_event("directed_gaze", 1.0, BLUE)
-    log.until(3.5)
-    log.looks(HUMAN, BLUE, 3.5 + after)
-    log.until(20.0)
-
-    assert ("dg-2" in {event.id for event in log.events}) == directs
-
-
-def test_a_look_that_answered_the_robot_never_turns_into_a_direction():
-    log = Log()
-    log.requests_event("directed_gaze", 1.0, BLUE)
-    log.looks(ROBOT, BLUE, 1.2)
-    log.looks(HUMAN, BLUE, 1.5)
-    log.looks(ROBOT, HUMAN, 2.0)
-    log.until(60.0)
-
-    assert {event.id for event in log.events} == {"dg-1"}
-
-
-def test_a_person_moving_an_object_directs_nothing_with_looks():
-    log = Log()
-    log.looks(HUMAN, BLUE, 1.0)
-    log.begins(HUMAN, "act", 1.2, BLUE)
-    log.ends(HUMAN, "act", 3.0, BLUE)
-    log.until(60.0)
-
-    assert log.told("directed_gaze") == []
-
-
-@pytest.mark.parametrize("target", ["table", ROBOT, "somewhere"])
-def test_only_objects_can_be_directed_to(target):
-    log = Log()
-    log.looks(HUMAN, target, 1.0)
-    log.begins(HUMAN, "point", 2.0, target)
-    log.until(9.0)
-
-    assert log.told("directed_gaze") == []
-
-
-def test_directing_while_a_fragment_looks_elsewhere_is_preempted():
-    log = Log()
-    log.owner("fragment", PINK, 0.5)
-    log.begins(HUMAN, "point", 1.0, BLUE)
-
-    assert log.told() == [("dg-1", "started", 1.0), ("dg-1", "preempted", 1.0)]
-
-
-def test_a_fragment_that_looks_there_anyway_preempts_nothing():
-    log = Log()
-    log.owner("fragment", BLUE, 0.5)
-    log.begins(HUMAN, "point", 1.0, BLUE)
-    log.looks(ROBOT, BLUE, 1.2)
-
-    assert log.states("dg-1")[1] == "succeeded"
-
-
-def test_a_fragment_that_takes_the_head_preempts_what_waits():
-    log = Log()
-    log.begins(HUMAN, "point", 1.0, BLUE)
-    log.looks(HUMAN, ROBOT, 1.2)
-    log.owner("fragment", PINK, 1.5)
-
-    assert log.states("dg-1") == ["started", "preempted"]
-    assert log.states("mfg-1") == ["started", "preempted"]
-
-
-def test_the_robots_own_reference_supersedes_the_persons_direction():
-    log = Log()
-    log.begins(HUMAN, "point", 1.0, BLUE)
-    log.requests_event("directed_gaze", 1.5, BLUE)
-
-    assert log.states("dg-1") == ["started", "superseded"]
-    assert log.states("dg-2") == ["started"]
-
-
-# -- gaze resolution --------------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize(("resolution", "state"), [("table", "succeeded"), ("object", "failed")])
-@pytest.mark.parametrize("target", ["table", PINK])
-def test_at_resolution_table_anything_on_it_will_do(resolution, state, target):
-    log = Log(gaze_resolution=resolution)
-    log.requests_event("directed_gaze", 1.0, BLUE)
-    log.looks(HUMAN, target, 2.0)
-    log.until(3.5)
-
-    assert log.states("dg-1")[1] == state
-
-
-def test_at_resolution_table_a_face_is_not_on_the_table():
-    log = Log(gaze_resolution="table")
-    log.requests_event("directed_gaze", 1.0, BLUE)
-    log.looks(HUMAN, ROBOT, 2.0)
-    log.until(3.5)
-
-    assert log.states("dg-1") == ["started", "failed"]
-
-
-def test_at_resolution_table_wandering_over_it_stays_shared():
-    log = Log(gaze_resolution="table")
-    log.requests_event("directed_gaze", 1.0, BLUE)
-    log.looks(ROBOT, BLUE, 1.2)
-    log.looks(HUMAN, "table", 2.0)
-    log.looks(HUMAN, PINK, 2.5)
-    log.looks(HUMAN, ROBOT, 3.0)
-
-    assert log.told("directed_gaze")[-1] == ("dg-1", "completed", 3.0)
+    assert [(event.limit, event.cause) for event in log.events] == [(2.5, "human")]

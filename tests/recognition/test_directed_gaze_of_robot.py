@@ -1,209 +1,134 @@
-"""Directed gaze: every row of the table, the robot's, exact times."""
+"""Directed gaze: every row of the table, the robot's, exact times. Read `event_stories.py`."""
 
 import pytest
 
 from engage_hri.schemas.requests import Refused
-from tests.recognition.observations import HUMAN, ROBOT, Log, world
+from tests.recognition.event_stories import check
+from tests.recognition.observations import HUMAN, Log, world
+from tests.stories import Story, each
 
-BLUE, PINK = "blue-square", "pink-square"
+BLUE = "blue-square"
+STORIES = """
+person follows the robot's gaze
+    1 asks dg blue cause=reference; 1.4 robot +look blue; 1.7 human +look blue; 2.5 human +look
+    robot's dg-1 at blue: started 1, succeeded 1.7 after 0.7, completed 2.5 lasting 0.8
 
+person there before the robot shares at once and the sharing waits for the robot
+    0.5 human +look blue; 1 asks dg blue; 1.4 robot +look blue; 2 human +look
+    robot's dg-1 at blue: started 1, succeeded 1 after 0, completed 2 lasting 0.6
 
-def test_person_follows_the_robots_gaze():
-    log = Log()
-    log.requests_event("directed_gaze", 1.0, BLUE, cause="reference")
-    log.looks(ROBOT, BLUE, 1.4)
-    log.looks(HUMAN, BLUE, 1.7)
-    log.looks(HUMAN, "", 2.5)
+person who leaves before the robot arrives has shared nothing
+    0.5 human +look blue; 1 asks dg blue; 1.2 human +look
+    robot's dg-1 at blue: started 1, succeeded 1 after 0, completed 1.2 lasting 0
 
-    assert log.told() == [("dg-1", "started", 1.0), ("dg-1", "succeeded", 1.7), ("dg-1", "completed", 2.5)]
-    assert log.succeeded("dg-1").delay == pytest.approx(0.7)
-    assert log.last("dg-1").duration == pytest.approx(0.8)
-    assert (log.outcomes[0].state, log.outcomes[0].id) == ("succeeded", "request-1")
+robot's directed gaze fails at its limit
+    1 asks dg blue; 3.5 time
+    robot's dg-1 at blue: started 1, failed 3.5 after 2.5
 
+a look at the very limit still counts
+    1 asks dg blue; 3.5 human +look blue
+    robot's dg-1 at blue: started 1, succeeded 3.5 after 2.5
 
-def test_person_there_before_the_robot_shares_at_once_and_the_sharing_waits_for_the_robot():
-    log = Log()
-    log.looks(HUMAN, BLUE, 0.5)
-    log.requests_event("directed_gaze", 1.0, BLUE)
-    log.looks(ROBOT, BLUE, 1.4)
-    log.looks(HUMAN, "", 2.0)
+an observation after the limit comes after the failure
+    1 asks dg blue; 3.6 human +look blue
+    robot's dg-1 at blue: started 1, failed 3.5 after 2.5
 
-    assert log.told() == [("dg-1", "started", 1.0), ("dg-1", "succeeded", 1.0), ("dg-1", "completed", 2.0)]
-    assert log.succeeded("dg-1").delay == 0.0
-    assert log.last("dg-1").duration == pytest.approx(0.6)
+the robot may look away before the person arrives
+    1 asks dg blue; 1.4 robot +look blue; 2 robot +look human; 2.2 human +look blue
+    robot's dg-1 at blue: started 1, succeeded 2.2 after 1.2, completed 2.2 lasting 0
 
+limit runs from the latest anchor
+    1 asks dg blue anchors=gaze-1:stroke,point-1:stroke_start,phrase-1:start
+    1.4 passes gaze-1:stroke; 2 passes phrase-1:start; 1.9 passes point-1:strokeStart
+    robot's dg-1 at blue: started 1
+    deadline 4.5
 
-def test_person_who_leaves_before_the_robot_arrives_has_shared_nothing():
-    log = Log()
-    log.looks(HUMAN, BLUE, 0.5)
-    log.requests_event("directed_gaze", 1.0, BLUE)
-    log.looks(HUMAN, "", 1.2)
+until all anchors have come the limit and the longest wait count
+    1 asks dg blue anchors=gaze-1:stroke,point-1:stroke_start,phrase-1:start
+    robot's dg-1 at blue: started 1
+    deadline 15.5
 
-    assert (log.last("dg-1").state, log.last("dg-1").duration) == ("completed", 0.0)
+anchors realised before the request count
+    0.8 passes phrase-1:start; 1 asks dg blue anchors=phrase-1:start
+    robot's dg-1 at blue: started 1
+    deadline 3.5
 
+anchor offsets shift the clock and bad anchors hold nothing
+    1 asks dg blue anchors=phrase-1:start+0.5,nonsense,3; 2 passes phrase-1:start
+    robot's dg-1 at blue: started 1
+    deadline 5
 
-def test_robots_directed_gaze_fails_at_its_limit():
-    log = Log()
-    log.requests_event("directed_gaze", 1.0, BLUE)
-    log.until(3.5)
+the end of the block ends the wait for anchors
+    1 asks dg blue anchors=phrase-1:start; 9 block done; 9 time
+    robot's dg-1 at blue: started 1, failed 9 after 8
 
-    assert log.told() == [("dg-1", "started", 1.0), ("dg-1", "failed", 3.5)]
-    assert (log.last("dg-1").delay, log.outcomes[0].state) == (2.5, "failed")
+what the robot never shows is withdrawn though its block never ends
+    1 asks dg blue anchors=gaze-1:stroke,phrase-1:start; 1.5 passes gaze-1:stroke; 60 time
+    robot's dg-1 at blue: started 1, withdrawn 16
+    deadline none
 
+a request after the end of its block waits for no anchor
+    0.9 block done; 1 asks dg blue anchors=phrase-1:start
+    robot's dg-1 at blue: started 1
+    deadline 3.5
 
-def test_a_look_at_the_very_limit_still_counts():
-    log = Log()
-    log.requests_event("directed_gaze", 1.0, BLUE)
-    log.looks(HUMAN, BLUE, 3.5)
+own limit of a request counts
+    1 asks dg blue limit=0.5
+    robot's dg-1 at blue: started 1
+    deadline 1.5
 
-    assert log.states("dg-1")[:2] == ["started", "succeeded"]
+cancelled directed gaze is withdrawn
+    1 asks dg blue; 1.2 cancels 1
+    robot's dg-1 at blue: started 1, withdrawn 1.2
 
+an aborted block takes its directed gaze back
+    STATUS in failed interrupted
+    1 asks dg blue; 1.5 block STATUS
+    robot's dg-1 at blue: started 1, withdrawn 1.5
 
-def test_an_observation_after_the_limit_comes_after_the_failure():
-    log = Log()
-    log.requests_event("directed_gaze", 1.0, BLUE)
-    log.looks(HUMAN, BLUE, 3.6)
+a block that is done leaves its directed gaze open
+    1 asks dg blue; 1.5 block done; 2 human +look blue
+    robot's dg-1 at blue: started 1, succeeded 2 after 1
 
-    assert log.told() == [("dg-1", "started", 1.0), ("dg-1", "failed", 3.5)]
+a shared gaze to which the robot never came ends with its block
+    0.5 human +look blue; 1 asks dg blue; 2 block done
+    robot's dg-1 at blue: started 1, succeeded 1 after 0, completed 2 lasting 0
 
+directing anew to the same object supersedes the pending one
+    1 asks dg blue; 2 asks dg blue
+    robot's dg-1 at blue: started 1, superseded 2
+    robot's dg-2 at blue: started 2
 
-def test_the_robot_may_look_away_before_the_person_arrives():
-    log = Log()
-    log.requests_event("directed_gaze", 1.0, BLUE)
-    log.looks(ROBOT, BLUE, 1.4)
-    log.looks(ROBOT, HUMAN, 2.0)
-    log.looks(HUMAN, BLUE, 2.2)
+directing anew during shared gaze completes it and succeeds at once
+    0.5 robot +look blue; 1 asks dg blue; 1.5 human +look blue; 2 asks dg blue
+    robot's dg-1 at blue: started 1, succeeded 1.5 after 0.5, completed 2 lasting 0.5
+    robot's dg-2 at blue: started 2, succeeded 2 after 0
 
-    assert log.told() == [("dg-1", "started", 1.0), ("dg-1", "succeeded", 2.2), ("dg-1", "completed", 2.2)]
-    assert log.last("dg-1").duration == 0.0
-
-
-def test_limit_runs_from_the_latest_anchor():
-    log = Log()
-    anchors = ("gaze-1:stroke", "point-1:stroke_start", "phrase-1:start")
-    log.requests_event("directed_gaze", 1.0, BLUE, anchors=anchors)
-    assert log.session.deadline == 1.0 + 2.5 + 12.0
-    log.passes("gaze-1:stroke", 1.4)
-    log.passes("phrase-1:start", 2.0)
-    log.passes("point-1:strokeStart", 1.9)
-
-    assert log.session.deadline == 4.5
-
-
-def test_anchors_realised_before_the_request_count():
-    log = Log()
-    log.passes("phrase-1:start", 0.8)
-    log.requests_event("directed_gaze", 1.0, BLUE, anchors=("phrase-1:start",))
-
-    assert log.session.deadline == 3.5
-
-
-def test_anchor_offsets_shift_the_clock_and_bad_anchors_hold_nothing():
-    log = Log()
-    log.requests_event("directed_gaze", 1.0, BLUE, anchors=("phrase-1:start+0.5", "nonsense", "3"))
-    log.passes("phrase-1:start", 2.0)
-
-    assert log.session.deadline == 5.0
-
-
-def test_the_end_of_the_block_ends_the_wait_for_anchors():
-    log = Log()
-    log.requests_event("directed_gaze", 1.0, BLUE, anchors=("phrase-1:start",))
-    log.block_ends(9.0)
-    log.until(9.0)
-
-    assert log.told() == [("dg-1", "started", 1.0), ("dg-1", "failed", 9.0)]
+directed gazes at two objects are decided each for itself
+    1 asks dg blue; 2 asks dg pink; 2.3 human +look pink; 3.5 time
+    robot's dg-1 at blue: started 1, failed 3.5 after 2.5
+    robot's dg-2 at pink: started 2, succeeded 2.3 after 0.3
+"""
 
 
-def test_what_the_robot_never_shows_is_withdrawn_though_its_block_never_ends():
-    log = Log()
-    log.requests_event("directed_gaze", 1.0, BLUE, anchors=("gaze-1:stroke", "phrase-1:start"))
-    log.passes("gaze-1:stroke", 1.5)
-    log.until(60.0)
-
-    assert log.told() == [("dg-1", "started", 1.0), ("dg-1", "withdrawn", 1.5 + 2.5 + 12.0)]
-    assert log.session.deadline is None
+@each(STORIES)
+def test_a_directed_gaze_of_the_robot(story: Story):
+    check(story)
 
 
-def test_a_request_after_the_end_of_its_block_waits_for_no_anchor():
-    log = Log()
-    log.block_ends(0.9)
-    log.requests_event("directed_gaze", 1.0, BLUE, anchors=("phrase-1:start",))
-
-    assert log.session.deadline == 3.5
-
-
-def test_own_limit_of_a_request_counts():
+def test_the_start_says_how_long_the_person_has():
     log = Log()
     log.requests_event("directed_gaze", 1.0, BLUE, limit=0.5)
 
-    assert (log.events[0].limit, log.session.deadline) == (0.5, 1.5)
+    assert [event.limit for event in log.events] == [0.5]
 
 
-def test_cancelled_directed_gaze_is_withdrawn():
+def test_an_answer_names_its_request():
     log = Log()
     request = log.requests_event("directed_gaze", 1.0, BLUE)
-    log.cancels(request, 1.2)
+    log.looks(HUMAN, BLUE, 1.7)
 
-    assert log.states("dg-1") == ["started", "withdrawn"]
-    assert log.outcomes[0].state == "withdrawn"
-
-
-@pytest.mark.parametrize("status", ["failed", "interrupted"])
-def test_an_aborted_block_takes_its_directed_gaze_back(status):
-    log = Log()
-    log.requests_event("directed_gaze", 1.0, BLUE)
-    log.block_ends(1.5, status)
-
-    assert log.told()[-1] == ("dg-1", "withdrawn", 1.5)
-
-
-def test_a_block_that_is_done_leaves_its_directed_gaze_open():
-    log = Log()
-    log.requests_event("directed_gaze", 1.0, BLUE)
-    log.block_ends(1.5)
-    log.looks(HUMAN, BLUE, 2.0)
-
-    assert log.states("dg-1")[1] == "succeeded"
-
-
-def test_a_shared_gaze_to_which_the_robot_never_came_ends_with_its_block():
-    log = Log()
-    log.looks(HUMAN, BLUE, 0.5)
-    log.requests_event("directed_gaze", 1.0, BLUE)
-    log.block_ends(2.0)
-
-    assert log.told()[-1] == ("dg-1", "completed", 2.0)
-
-
-def test_directing_anew_to_the_same_object_supersedes_the_pending_one():
-    log = Log()
-    log.requests_event("directed_gaze", 1.0, BLUE)
-    log.requests_event("directed_gaze", 2.0, BLUE)
-
-    assert log.told() == [("dg-1", "started", 1.0), ("dg-1", "superseded", 2.0), ("dg-2", "started", 2.0)]
-    assert log.outcomes[0].state == "superseded"
-
-
-def test_directing_anew_during_shared_gaze_completes_it_and_succeeds_at_once():
-    log = Log()
-    log.looks(ROBOT, BLUE, 0.5)
-    log.requests_event("directed_gaze", 1.0, BLUE)
-    log.looks(HUMAN, BLUE, 1.5)
-    log.requests_event("directed_gaze", 2.0, BLUE)
-
-    assert log.told()[2:] == [("dg-1", "completed", 2.0), ("dg-2", "started", 2.0), ("dg-2", "succeeded", 2.0)]
-    assert log.succeeded("dg-2").delay == 0.0
-
-
-def test_directed_gazes_at_two_objects_are_decided_each_for_itself():
-    log = Log()
-    log.requests_event("directed_gaze", 1.0, BLUE)
-    log.requests_event("directed_gaze", 2.0, PINK)
-    log.looks(HUMAN, PINK, 2.3)
-    log.until(3.5)
-
-    assert (log.states("dg-1"), log.states("dg-2")) == (["started", "failed"], ["started", "succeeded"])
+    assert [(outcome.id, outcome.state) for outcome in log.outcomes] == [(request, "succeeded")]
 
 
 @pytest.mark.parametrize(

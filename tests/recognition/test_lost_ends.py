@@ -5,93 +5,61 @@ import pytest
 from engage_hri.schemas.body import BodyPose, Ray, RobotState
 from engage_hri.schemas.requests import Accepted, Refused
 from engage_hri.services.recognition.config import RecognitionConfig
+from tests.recognition.event_stories import check
 from tests.recognition.observations import HUMAN, ROBOT, Log, asked, stamp
+from tests.stories import Story, each
 
-WORDS = "block-2:speech-1"
+STORIES = """
+speech that began in time is the answer though the robot speaks on
+    1 asked until=4; 5 robot +speak next-words; 5.3 human +speak; 6.8 human -speak; 7 robot -speak next-words
+    20 time
+    robot's ap-1: started 1, succeeded 5.3 after 1.3 by speak told 6.8, completed 6.8 lasting 1.5
 
+speech that began in time but was a backchannel answers nothing
+    1 asked until=4; 5 robot +speak next-words; 5.3 human +speak; 5.8 time; 5.9 human -speak; 20 time
+    robot's ap-1: started 1, failed 5.5 after 4.5 told 5.9
+    robot's bc-1: started 5.9 since 5.3, succeeded 5.9, completed 5.9 lasting 0.6
 
-# -- answers that are known late ----------------------------------------------------------------------------------
+speech that is no accepted answer is not waited for
+    1 asked nod until=4; 5 robot +speak next-words; 5.3 human +speak; 5.5 time
+    robot's ap-1: started 1, failed 5.5 after 4.5
 
+speech that began after the limit is not waited for
+    1 asked until=4; 5 robot +speak next-words; 5.6 human +speak
+    robot's ap-1: started 1, failed 5.5 after 4.5
 
-def test_speech_that_began_in_time_is_the_answer_though_the_robot_speaks_on():
-    log = asked(end=4.0)
-    log.begins(ROBOT, "speak", 5.0, behavior=WORDS)
-    log.begins(HUMAN, "speak", 5.3)
-    log.ends(HUMAN, "speak", 6.8)
-    log.ends(ROBOT, "speak", 7.0, behavior=WORDS)
-    log.until(20.0)
+speech that began before a gesture is the answer though it is known later
+    1 asking; 2 human +speak; 2.5 human +point blue; 2.7 human -point blue; 4 turn ended; 4.5 human -speak
+    robot's ap-1: started 1, succeeded 4 after -2 by speak, completed 4.5 lasting 2.5
+    human's dg-1 at blue: started 2.5
 
-    assert log.told() == [("ap-1", "started", 1.0), ("ap-1", "succeeded", 5.3), ("ap-1", "completed", 6.8)]
-    assert log.succeeded("ap-1").delay == pytest.approx(1.3)
+after a lost end of speech the next answer is heard
+    1 human +speak; 11 robot +speak next-words; 11 asks ap turn=turn-1; 14 robot -speak next-words; 14 turn ended
+    14.4 human +speak; 15 human -speak
+    human's ap-1: started 1, superseded 11
+    robot's ap-2: started 11, succeeded 14.4 after 0.4 by speak, completed 15 lasting 0.6
 
+a new beginning ends the answer whose end was lost
+    ACTION in speak act
+    1 asked speak nod point act; 2.5 human +ACTION blue; 4 human +ACTION rectangle
+    robot's ap-1: started 1, succeeded 2.5 after 0.5 by ACTION, completed 4 lasting 1.5
+    human's ap-2: started 4
 
-def test_speech_that_began_in_time_but_was_a_backchannel_answers_nothing():
-    log = asked(end=4.0)
-    log.begins(ROBOT, "speak", 5.0, behavior=WORDS)
-    log.begins(HUMAN, "speak", 5.3)
-    log.until(5.8)
-    assert log.states("ap-1") == ["started"]
-    log.ends(HUMAN, "speak", 5.9)
-    log.until(20.0)
+a new nod ends the answer whose end was lost
+    1 asked speak nod point act; 2.5 human +nod blue; 4 human +nod rectangle
+    robot's ap-1: started 1, succeeded 2.5 after 0.5 by nod, completed 4 lasting 1.5
 
-    assert ("ap-1", "failed", 5.5) in log.told()
-    assert log.states("bc-1") == ["started", "succeeded", "completed"]
-
-
-def test_speech_that_is_no_accepted_answer_is_not_waited_for():
-    log = asked("nod", end=4.0)
-    log.begins(ROBOT, "speak", 5.0, behavior=WORDS)
-    log.begins(HUMAN, "speak", 5.3)
-    log.until(5.5)
-
-    assert log.told("adjacency_pair")[-1] == ("ap-1", "failed", 5.5)
-
-
-def test_speech_that_began_after_the_limit_is_not_waited_for():
-    log = asked(end=4.0)
-    log.begins(ROBOT, "speak", 5.0, behavior=WORDS)
-    log.begins(HUMAN, "speak", 5.6)
-
-    assert log.told("adjacency_pair")[-1] == ("ap-1", "failed", 5.5)
-
-
-def test_speech_that_began_before_a_gesture_is_the_answer_though_it_is_known_later():
-    log = asked(end=None)
-    log.begins(HUMAN, "speak", 2.0)
-    log.begins(HUMAN, "point", 2.5, "blue-square")
-    log.ends(HUMAN, "point", 2.7, "blue-square")
-    log.signals("ended", 4.0)
-    log.ends(HUMAN, "speak", 4.5)
-
-    assert (log.succeeded("ap-1").response, log.succeeded("ap-1").delay) == ("speak", pytest.approx(-2.0))
-    assert log.last("ap-1").duration == pytest.approx(2.5)
+a new point ends the answer whose end was lost
+    1 asked speak nod point act; 2.5 human +point blue; 4 human +point rectangle
+    robot's ap-1: started 1, succeeded 2.5 after 0.5 by point, completed 4 lasting 1.5
+    human's dg-1 at blue: started 2.5
+    human's dg-2 at rectangle: started 4
+"""
 
 
-# -- ends that are lost -------------------------------------------------------------------------------------------
-
-
-def test_after_a_lost_end_of_speech_the_next_answer_is_heard():
-    log = Log()
-    log.begins(HUMAN, "speak", 1.0)
-    log.begins(ROBOT, "speak", 11.0, behavior=WORDS)
-    log.requests_event("adjacency_pair", 11.0, turn="turn-1")
-    log.ends(ROBOT, "speak", 14.0, behavior=WORDS)
-    log.signals("ended", 14.0)
-    log.begins(HUMAN, "speak", 14.4)
-    log.ends(HUMAN, "speak", 15.0)
-
-    assert log.states("ap-2") == ["started", "succeeded", "completed"]
-    assert log.succeeded("ap-2").delay == pytest.approx(0.4)
-
-
-@pytest.mark.parametrize("action", ["speak", "nod", "point", "act"])
-def test_a_new_beginning_ends_the_answer_whose_end_was_lost(action):
-    log = asked("speak", "nod", "point", "act")
-    log.begins(HUMAN, action, 2.5, "blue-square")
-    log.begins(HUMAN, action, 4.0, "rectangle")
-
-    assert ("ap-1", "completed", 4.0) in log.told()
-    assert log.last("ap-1").duration == pytest.approx(1.5)
+@each(STORIES)
+def test_an_adjacency_pair_in_spite_of_what_is_late_or_lost(story: Story):
+    check(story)
 
 
 def test_the_end_of_what_a_new_beginning_has_ended_does_not_end_the_new_one():

@@ -1,67 +1,44 @@
-"""People who are lost, leave and come back; several at once."""
-
-import pytest
+"""People who are lost, leave and come back; several at once. Read `event_stories.py`."""
 
 from engage_hri.schemas.requests import Refused
+from tests.recognition.event_stories import check
 from tests.recognition.observations import HUMAN, ROBOT, Log
+from tests.stories import Story, each
 
-BLUE, PINK = "blue-square", "pink-square"
+STORIES = """
+a face lost for less than the grace fails nothing
+    0.5 robot +look human; 1 human +look robot; 2 lost human; 2.4 found human; 9 time
+    human's mfg-1: started 1, succeeded 1 after 0
 
+a person who leaves closes everything
+    0.5 robot +look human; 1 human +look robot; 1.5 asks ap turn=turn-1; 2 lost human; 2.5 time
+    human's mfg-1: started 1, succeeded 1 after 0, completed 2.5 lasting 1
+    robot's ap-1: started 1.5, failed 2.5 after 1
+    deadline none
 
-def test_a_face_lost_for_less_than_the_grace_fails_nothing():
-    log = Log()
-    log.looks(ROBOT, HUMAN, 0.5)
-    log.looks(HUMAN, ROBOT, 1.0)
-    log.lost(HUMAN, 2.0)
-    log.found(HUMAN, 2.4)
-    log.until(9.0)
+a pending directed gaze for somebody who leaves fails
+    1 asks dg blue; 1.2 lost human; 2 time
+    robot's dg-1 at blue: started 1, failed 1.7 after 0.7
 
-    assert log.states("mfg-1") == ["started", "succeeded"]
+a pending facial gaze for somebody who leaves fails
+    1 asks mfg; 1.2 lost human; 2 time
+    robot's mfg-1: started 1, failed 1.7 after 0.7
 
+what a leaving person wanted is withdrawn and what was shared completed
+    0.5 asks dg rectangle; 0.6 robot +look rectangle; 0.8 human +look rectangle; 1 human +point blue; 1.2 lost human
+    1.7 time
+    robot's dg-1 at rectangle: started 0.5, succeeded 0.8 after 0.3, completed 1.7 lasting 0.4
+    human's dg-2 at blue: started 1, withdrawn 1.7
 
-def test_a_person_who_leaves_closes_everything():
-    log = Log()
-    log.looks(ROBOT, HUMAN, 0.5)
-    log.looks(HUMAN, ROBOT, 1.0)
-    log.requests_event("adjacency_pair", 1.5, turn="turn-1")
-    log.lost(HUMAN, 2.0)
-    log.until(2.5)
-
-    assert log.told()[-2:] == [("mfg-1", "completed", 2.5), ("ap-1", "failed", 2.5)]
-    assert log.last("mfg-1").duration == pytest.approx(1.0)
-    assert log.session.deadline is None
-
-
-@pytest.mark.parametrize("kind", ["directed_gaze", "mutual_facial_gaze"])
-def test_a_pending_request_to_somebody_who_leaves_fails(kind):
-    log = Log()
-    log.requests_event(kind, 1.0, *((BLUE,) if kind == "directed_gaze" else ()))
-    log.lost(HUMAN, 1.2)
-    log.until(2.0)
-
-    assert log.told()[-1][1:] == ("failed", 1.7)
+a facial gaze of somebody who vanishes is withdrawn
+    1 human +look robot; 1.2 lost human; 1.7 time
+    human's mfg-1: started 1, withdrawn 1.7
+"""
 
 
-def test_what_a_leaving_person_wanted_is_withdrawn_and_what_was_shared_completed():
-    log = Log()
-    log.requests_event("directed_gaze", 0.5, "rectangle")
-    log.looks(ROBOT, "rectangle", 0.6)
-    log.looks(HUMAN, "rectangle", 0.8)
-    log.begins(HUMAN, "point", 1.0, BLUE)
-    log.lost(HUMAN, 1.2)
-    log.until(1.7)
-
-    assert log.told()[-2:] == [("dg-1", "completed", 1.7), ("dg-2", "withdrawn", 1.7)]
-    assert log.last("dg-1").duration == pytest.approx(0.4)
-
-
-def test_a_facial_gaze_of_somebody_who_vanishes_is_withdrawn():
-    log = Log()
-    log.looks(HUMAN, ROBOT, 1.0)
-    log.lost(HUMAN, 1.2)
-    log.until(1.7)
-
-    assert log.told()[-1] == ("mfg-1", "withdrawn", 1.7)
+@each(STORIES)
+def test_what_becomes_of_the_events_of_who_leaves(story: Story):
+    check(story)
 
 
 def test_requests_to_somebody_who_has_gone_are_refused_until_the_return():

@@ -318,3 +318,18 @@ async def test_a_desk_forgets_the_oldest_ended_requests_and_no_live_one(hub: Mem
     assert is_forgotten("1")
     assert not is_forgotten("2")
     assert len(states) == ENDED_KEPT + 2
+
+
+async def test_what_cannot_be_encoded_is_refused_alone(hub: MemoryHub):
+    server = Server(hub)
+    client = hub.join("client")
+    async with Requester(client) as requests:
+        broken = requests.send(keys.BLOCK, block("half", of="\udcff"))
+        whole = requests.send(keys.BLOCK, block("whole"))
+
+        with pytest.raises(RequestRefused):
+            await broken.outcome
+        assert (await whole.outcome).id == "whole"
+
+    assert server.taken == [block("whole")]
+    await server.die(hub)

@@ -129,3 +129,8 @@ def mutated(draw: st.DrawFn) -> bytes:
 def test_no_other_exception_ever_leaves_the_decoder(data: bytes) -> None:
     with suppress(InputRefused):
         decode_xml(data)
+
+
+def test_an_encoding_that_nobody_knows_is_refused_by_its_name() -> None:
+    with pytest.raises(InputRefused, match="encoding 'iso-8859-12' is not known"):
+        decode_xml(b'<?xml version="1.0" encoding="iso-8859-12"?><bml id="b"/>')
