@@ -11,45 +11,57 @@ becomes `Unknown`; the realizer warns of both. A fragment is read strictly: it i
 stands behind a reference in it is speech: `<ebml:reference .../>, and then`.
 """
 
+import re
+from collections.abc import Callable, Mapping
+from contextlib import suppress
+from functools import cache
 from itertools import chain, count
-from typing import Any
+from typing import Any, TypeVar, get_args, get_type_hints
 
 import msgspec
 from lxml import etree
 
 from engage_hri.schemas import behaviors as of
+from engage_hri.schemas.behavior_types import TYPES
 from engage_hri.schemas.blocks import Block, Unread
 from engage_hri.schemas.check import check
-from engage_hri.schemas.documents.xml_elements import (
-    CHILDREN,
-    CORE_BEHAVIORS,
-    EXTENSIONS,
-    OPERATORS,
-    behaviors_inside,
-    misplaced,
-    take_out,
-)
 from engage_hri.schemas.documents.xml_encode import encode_xml
-from engage_hri.schemas.documents.xml_names import (
+from engage_hri.schemas.documents.xml_grammar import (
+    CHILDREN,
+    DRAFTS,
+    LISTS,
+    OPERATORS,
+    PARTS,
+    STANDARD,
     SYNC_ATTRIBUTES,
-    attributes,
-    camel,
-    converted,
-    fields,
-    hand,
-    head,
-    is_reference,
-    known_attributes,
-    ours,
+    attribute,
+    attribute_fields,
+    behavior_type,
+    behaviors_inside,
+    field_of,
+    misplaced,
     unknown_attributes,
 )
-from engage_hri.schemas.documents.xml_source import BML_1_0, CORE, EBML, Source, split
+from engage_hri.schemas.documents.xml_source import BML_1_0, CORE, EBML, Source, attributes, ours, split, take_out
 from engage_hri.schemas.documents.xml_speech import MARKS, spoken
 from engage_hri.schemas.feedback import WarningKind
 from engage_hri.schemas.fragments import TurnFragment
 from engage_hri.schemas.references import disambiguated, in_draft_spelling
+from engage_hri.schemas.syncref import SyncRef
 
 __all__ = ["decode_xml", "encode_xml"]
+
+AnyStruct = TypeVar("AnyStruct", bound=msgspec.Struct)
+_HANDS = {"LEFT": "LEFT_HAND", "RIGHT": "RIGHT_HAND", "BOTH": "BOTH_HANDS", "": None}
+_SPELLED: Mapping[str, Callable[[str], Any]] = {
+    "accept": str.split,
+    "composition": lambda text: text.strip().upper(),
+    "mode": lambda text: _HANDS.get(text.upper(), text.upper()),
+    "side": str.upper,
+}
+"""Fields whose attribute is spelled more freely than the field."""
+_OURS_TO_SAY = ("line", "timing", "marks", "unread")
+"""Fields that no attribute sets."""
 
 
 def decode_xml(data: bytes | str, source: str = "") -> Block | TurnFragment:
@@ -88,20 +100,20 @@ class _Document:
             "id": self._id(root),
             "behaviors": behaviors,
             "constraints": constraints,
-            "composition": plain.get("composition", "MERGE").strip().upper(),
+            "composition": plain.get("composition"),
             "dialect": "bml-1.0" if namespace == BML_1_0 else "draft",
-            "character_id": plain.get("characterId", ""),
+            "character_id": plain.get("characterId"),
             "unread": self._unread,
         }
-        return disambiguated(converted(self._source, root, raw, Block))
+        return disambiguated(self._converted(root, raw, Block))
 
     def _fragment(self, root: etree._Element) -> TurnFragment:
         self._is_strict = True
         raw = self._own_fields(root, TurnFragment)
         behaviors, constraints = self._content(root)
         raw |= {"id": self._id(root), "behaviors": behaviors, "constraints": constraints}
-        raw |= {"accept": str(raw.get("accept", "")).split(), "unread": self._unread, "line": self.line}
-        fragment = disambiguated(converted(self._source, root, raw, TurnFragment))
+        raw |= {"unread": self._unread, "line": self.line}
+        fragment = disambiguated(self._converted(root, raw, TurnFragment))
         return in_draft_spelling(fragment, "bml-1.0") if self._speaks_1_0 else fragment
 
     def _id(self, element: etree._Element) -> str:
@@ -158,14 +170,12 @@ class _Document:
                 constraints += further
             elif local == "constraint":
                 constraints.append(self._constraint(element, required))
-            elif local in CORE_BEHAVIORS and namespace != EBML:
-                behaviors.append(self._behavior(element, local, CORE_BEHAVIORS[local], required))
-            elif local in EXTENSIONS and (namespace == EBML or (not namespace and self._is_strict)):
-                behaviors.append(self._behavior(element, local, EXTENSIONS[local], required))
+            elif behavior_type(namespace, local, is_strict=self._is_strict):
+                behaviors.append(self._behavior(element, local, required))
                 if self._speaks_on(element) and (words := " ".join((element.tail or "").split())):
                     behaviors.append(self._after_reference(element, words, required))
             elif self._is_strict or not element.get("id"):
-                advice = f"known: {', '.join(sorted(CORE_BEHAVIORS))}, constraint"
+                advice = f"known: {', '.join(STANDARD)}, constraint"
                 kind: WarningKind = "BEHAVIOR_TYPE_NOT_SUPPORTED"
                 self._leave_out(f"unknown element <{local}>", element, kind=kind, required=required, advice=advice)
             else:
@@ -187,56 +197,33 @@ class _Document:
 
     def _unknown(self, element: etree._Element, local: str, required: bool) -> of.Unknown:
         raw = {"id": self._id(element), "element": local, "line": self._source.line(element)}
-        raw["required"] = required or fields(attributes(element)).get("required", False)
-        return converted(self._source, element, raw, of.Unknown)
+        raw["required"] = required or _fields(attributes(element)).get("required", False)
+        return self._converted(element, raw, of.Unknown)
 
-    def _behavior(self, element: etree._Element, local: str, kind: type[of.Behavior], required: bool) -> of.Behavior:
-        plain = attributes(element)
-        raw: dict[str, Any] = fields(plain)
-        if local in EXTENSIONS:
-            raw = self._own_fields(element, kind)
-        raw["id"] = self._id(element)
-        raw["line"] = self._source.line(element)
+    def _behavior(self, element: etree._Element, local: str, required: bool) -> of.Behavior:
+        row, plain = TYPES[local], attributes(element)
+        raw = _fields(plain) if row.is_standard else self._own_fields(element, row.kind)
+        raw |= {"id": self._id(element), "line": self._source.line(element)}
         if required:
             raw["required"] = True
         timing = [of.Timing(name, value) for name, value in plain.items() if name in SYNC_ATTRIBUTES]
-        if local != "speech":
+        if local == "speech":
+            timing += self._speech(element, raw)
+        else:
             self._only(element, raw["id"])
-            timing += [
-                of.Timing(child.get("sync", ""), child.get("ref", ""))
-                for child, namespace, name in ours(element)
-                if (namespace, name) == (EBML, "timing")
-            ]
-        match local:
-            case "gesture" | "pointing":
-                raw["mode"] = hand(plain.get("mode") or plain.get("hand"))
-                if plain.get("type", "").upper() == "POINT":
-                    kind = of.Pointing
-                elif kind is of.Gesture and "lexeme" not in plain and "type" in plain:
-                    raw["lexeme"] = plain["type"].upper()
-            case "head":
-                raw = head(raw)
-            case "face" | "faceShift":
-                kind = self._face(element, plain, raw, kind)
-            case "posture" | "postureShift":
-                self._posture(element, raw)
-            case "emit":
-                raw.setdefault("event", _event_of(element))
-            case "speech":
-                timing += self._speech(element, raw)
-            case "reference":
-                raw["options"] = self._options(element, raw)
-            case "event":
-                raw["accept"] = str(raw.get("accept", "")).split()
-                raw["objects"] = [child.get("id", "") for child, _, name in ours(element) if name == "object"]
-                raw["anchors"] = [child.get("ref", "") for child, _, name in ours(element) if name == "anchor"]
-        if local not in EXTENSIONS:
+            timing += _ties(element)
+        self._parts(element, local, raw)
+        for name, field in DRAFTS.get(local, {}).items():
+            if name in plain and not raw.get(field) and (local, plain[name].upper()) != ("head", "ROTATION"):
+                raw[field] = plain[name].upper()
+        if local == "emit":
+            raw.setdefault("event", _event_of(element))
+        if local == "reference":
+            raw["options"] = self._options(element, raw)
+        kind = _kind(local, plain.get("type", "").upper(), raw)
+        if row.is_standard:
             timing += self._unread_attributes(element, plain, local, kind)
-        raw["timing"] = timing
-        if "side" in raw:
-            raw["side"] = raw["side"].upper()
-        raw = {name: value for name, value in raw.items() if value is not None}
-        return converted(self._source, element, raw, kind)
+        return self._converted(element, raw | {"timing": timing}, kind)
 
     def _unread_attributes(
         self, element: etree._Element, plain: dict[str, str], local: str, kind: type[of.Behavior]
@@ -244,7 +231,7 @@ class _Document:
         """Note the attributes that nobody reads. What names a sync point was meant as timing, and is returned."""
         timing = []
         for name in unknown_attributes(plain, local, kind):
-            if is_reference(plain[name]):
+            if _is_reference(plain[name]):
                 timing.append(of.Timing(name, plain[name]))
             else:
                 self._note(f"<{local}> has no attribute {name!r}", element, plain["id"])
@@ -262,12 +249,7 @@ class _Document:
                 self._note_attributes(child, name, raw["id"])
             elif has_text and name not in ("description", "timing"):
                 self._leave_out(f"unknown element <{name}> beside <text>", child, raw["id"])
-        ties = [
-            of.Timing(child.get("sync", ""), child.get("ref", ""))
-            for child in element
-            if split(str(child.tag)) == (EBML, "timing")
-        ]
-        return [*ties, *said.timing]
+        return [*_ties(element), *said.timing]
 
     def _leave_out_strays(self, speech: etree._Element, id: str) -> None:
         """Behaviors are neither words nor markup for the voice, and marks are empty."""
@@ -280,35 +262,20 @@ class _Document:
             if split(str(each.tag))[1] in MARKS:
                 self._only(each, id)
 
-    def _face(
-        self, element: etree._Element, plain: dict[str, str], raw: dict[str, Any], kind: type[of.Behavior]
-    ) -> type[of.Behavior]:
-        parts = [child for child, _, name in ours(element) if name in ("lexeme", "facs")]
-        for part in parts[1:]:
-            reason = "more than one expression in a face"
-            self._leave_out(reason, part, raw["id"], required=_is_true(raw), advice="one element for each")
-        for part in parts[:1]:
-            self._note_attributes(part, split(str(part.tag))[1], raw["id"])
-            raw |= {name: part.get(name) for name in ("lexeme", "au", "side", "amount") if name in part.attrib}
-        if kind is of.FaceShift:
-            return kind
-        if "au" in raw or plain.get("type", "").upper() == "FACS":
-            return of.FaceFacs
-        if "lexeme" not in raw and "type" in plain:
-            raw["lexeme"] = plain["type"].upper()
-        return of.FaceLexeme if "lexeme" in raw else kind
-
-    def _posture(self, element: etree._Element, raw: dict[str, Any]) -> None:
-        seen = set()
+    def _parts(self, element: etree._Element, local: str, raw: dict[str, Any]) -> None:
+        """Read what stands inside a face, which is one expression, or a posture, which has one of each."""
+        family, seen = TYPES[local].family, set()
         for child, _, name in ours(element):
-            if name in seen:
-                reason = f"more than one <{name}> in a posture"
-                self._leave_out(reason, child, raw["id"], required=_is_true(raw), advice="one element for each")
-            elif name in ("stance", "pose"):
-                seen.add(name)
-                self._note_attributes(child, name, raw["id"])
-                read = {"stance": "type"} if name == "stance" else {"part": "part", "lexeme": "lexeme"}
-                raw |= {field: child.get(attribute, "") for field, attribute in read.items()}
+            if name not in PARTS.keys() & CHILDREN.get(local, ()):
+                continue
+            sort = "expression" if family == "face" else f"<{name}>"
+            if sort in seen:
+                reason, is_required = f"more than one {sort} in a {family}", _says_yes(raw.get("required"))
+                self._leave_out(reason, child, raw["id"], required=is_required, advice="one element for each")
+                continue
+            seen.add(sort)
+            self._note_attributes(child, name, raw["id"])
+            raw |= {field: child.get(each) for each, field in PARTS[name].items() if each in child.attrib}
 
     def _options(self, element: etree._Element, raw: dict[str, Any]) -> list[of.SpeechOption] | None:
         """None where the author leaves the phrases to generation."""
@@ -321,13 +288,11 @@ class _Document:
 
     def _option(self, element: etree._Element) -> of.SpeechOption:
         raw = self._own_fields(element, of.SpeechOption)
-        raw["line"] = self._source.line(element)
-        raw["distractors"] = [child.get("object", "") for child, _, _ in ours(element)]
-        return converted(self._source, element, raw, of.SpeechOption)
+        return self._converted(element, raw | {"line": self._source.line(element)}, of.SpeechOption)
 
     def _constraint(self, element: etree._Element, required: bool) -> of.Constraint:
         self._note_attributes(element, "constraint")
-        required = required or _is_true(fields(attributes(element)))
+        required = required or _says_yes(_fields(attributes(element)).get("required"))
         operators = []
         for child, _, local in ours(element):
             if local == "description":
@@ -339,33 +304,27 @@ class _Document:
                 continue
             self._only(child)
             self._note_attributes(child, local)
-            raw: dict[str, Any] = {"syncs": [self._ref(sync) for sync, _, name in ours(child) if name == "sync"]}
-            if (ref := child.get("ref")) is not None:
-                raw["ref"] = ref
-            raw["line"] = self._source.line(child)
-            operators.append(converted(self._source, child, raw, OPERATORS[local]))
-        raw = {"id": element.get("id", ""), "operators": operators, "line": self._source.line(element)}
-        return converted(self._source, element, raw | {"required": required}, of.Constraint)
+            for sync in (sync for sync, _, name in ours(child) if name == "sync"):
+                if "ref" not in sync.attrib:
+                    raise self._source.refusal("<sync> without ref", sync, advice='<sync ref="behavior:sync"/>')
+                self._note_attributes(sync, "sync")
+            raw: dict[str, Any] = {"ref": child.get("ref"), "line": self._source.line(child)}
+            operators.append(self._converted(child, raw, OPERATORS[local]))
+        raw = {"id": element.get("id"), "operators": operators, "line": self._source.line(element)}
+        return self._converted(element, raw | {"required": required}, of.Constraint)
 
     def _own_fields(self, element: etree._Element, kind: type[msgspec.Struct]) -> dict[str, Any]:
         """Of an EBML element, whose every attribute we know. Raises InputRefused for one that we don't."""
         plain = attributes(element)
-        raw: dict[str, Any] = fields({name: value for name, value in plain.items() if name not in SYNC_ATTRIBUTES})
-        if "min_reliability" in raw:
-            raw["minimum_reliability"] = raw.pop("min_reliability")
+        raw = _fields({name: value for name, value in plain.items() if name not in SYNC_ATTRIBUTES})
         known = {*kind.__struct_fields__, "character_id", "propose" if kind is of.Reference else "id"}
         for name in raw.keys() - known:
             local = split(str(element.tag))[1]
+            advice = ", ".join(attribute(field) for field in attribute_fields(kind) if field != "required")
             raise self._source.refusal(
-                f"<{local}> has no attribute {camel(name)!r}", element, advice=f"known: {known_attributes(kind)}"
+                f"<{local}> has no attribute {attribute(name)!r}", element, advice=f"known: {advice}"
             )
         return raw
-
-    def _ref(self, sync: etree._Element) -> str:
-        if (ref := sync.get("ref")) is None:
-            raise self._source.refusal("<sync> without ref", sync, advice='<sync ref="behavior:sync"/>')
-        self._note_attributes(sync, "sync")
-        return ref
 
     def _only(self, element: etree._Element, behavior: str = "") -> None:
         """Note what the element, or one in it, can't hold. Raises InputRefused in a fragment."""
@@ -374,9 +333,80 @@ class _Document:
             advice = f"<{holder}> holds {known}: put <{name}> beside it"
             self._leave_out(f"unknown element <{name}> in <{holder}>", child, behavior, advice=advice)
 
+    def _converted(self, element: etree._Element, raw: Mapping[str, Any], kind: type[AnyStruct]) -> AnyStruct:
+        """The struct of an element. Raises InputRefused with the attribute that is wrong. raw: None is not given."""
+        lists = {
+            field: [str(child.get(item, "")) for child, _, name in ours(element) if name == local]
+            for field, (local, item) in LISTS.items()
+            if field in kind.__struct_fields__
+        }
+        given = {name: _value(kind, name, value) for name, value in raw.items()} | lists
+        # BML has attributes called `type`; the struct's own says which element it is.
+        given = {name: value for name, value in given.items() if value is not None}
+        try:
+            return msgspec.convert({**given, "type": kind.__struct_config__.tag}, kind, strict=False)
+        except msgspec.ValidationError as error:
+            reason, _, path = str(error).partition(" - at `$")
+            field = path.strip(".`")
+            missing = re.fullmatch("Object missing required field `(.*)`", reason)
+            what = f"no {attribute(missing[1])}" if missing else f"{attribute(field)}: {reason}"
+            local = split(str(element.tag))[1]
+            name = f"<{local} id={raw['id']!r}>" if raw.get("id") else f"<{local}>"
+            raise self._source.refusal(f"{name}: {what}", element, advice=_allowed(kind, field)) from error
 
-def _is_true(raw: dict[str, Any]) -> bool:
-    return _says_yes(raw.get("required", ""))
+
+def _fields(plain: Mapping[str, str]) -> dict[str, Any]:
+    """Attributes by the names of their fields."""
+    named = {field_of(name): value for name, value in plain.items()}
+    return {name: value for name, value in named.items() if name not in _OURS_TO_SAY}
+
+
+def _kind(local: str, type: str, raw: Mapping[str, Any]) -> type[of.Behavior]:
+    """The struct of a behavior: some elements are several, by their `type` or their content."""
+    match local, type:
+        case "gesture" | "pointing", "POINT":
+            return of.Pointing
+        case "face", _ if type == "FACS" or "au" in raw:
+            return of.FaceFacs
+        case "face", _ if "lexeme" in raw:
+            return of.FaceLexeme
+    return TYPES[local].kind
+
+
+def _ties(element: etree._Element) -> list[of.Timing]:
+    children = (child for child in element if split(str(child.tag)) == (EBML, "timing"))
+    return [of.Timing(child.get("sync", ""), child.get("ref", "")) for child in children]
+
+
+@cache
+def _hints(kind: type[msgspec.Struct]) -> dict[str, Any]:
+    return get_type_hints(kind)
+
+
+def _value(kind: type[msgspec.Struct], field: str, value: Any) -> Any:
+    """An attribute as its field has it. Numbers may be written as in XML (`.5`, `+2`), which JSON does not allow."""
+    if not isinstance(value, str):
+        return value
+    if field in _SPELLED:
+        return _SPELLED[field](value)
+    hint = _hints(kind).get(field)
+    if float in (hint, *get_args(hint)):
+        with suppress(ValueError):
+            return float(value)
+    return value
+
+
+def _allowed(kind: type[msgspec.Struct], field: str) -> str:
+    """The values of a field that has only a few, as advice."""
+    choices = [str(value) for value in get_args(_hints(kind).get(field)) if isinstance(value, str | int)]
+    return f"one of {', '.join(choices)}" if choices else ""
+
+
+def _is_reference(value: str) -> bool:
+    """Does the value of an attribute name a sync point of a behavior, so that it can only be meant as timing?"""
+    with suppress(ValueError):
+        return SyncRef.parse(value).behavior != ""
+    return False
 
 
 def _says_yes(value: object) -> bool:

@@ -207,3 +207,28 @@ def split(tag: str) -> tuple[str, str]:
     """Namespace and local name of an element or attribute."""
     namespace, _, local = tag.rpartition("}")
     return namespace.removeprefix("{"), local
+
+
+def ours(parent: etree._Element) -> Iterator[tuple[etree._Element, str, str]]:
+    """The children that are BML or EBML, with namespace and local name."""
+    for child in parent:
+        namespace, local = split(str(child.tag))
+        if namespace in CORE or namespace == EBML:
+            yield child, namespace, local
+
+
+def attributes(element: etree._Element) -> dict[str, str]:
+    """The attributes that are BML's or EBML's, by local name. One with an undeclared prefix is neither's."""
+    named = ((*split(str(name)), str(value)) for name, value in element.items())
+    return {local: value for space, local, value in named if space in (*CORE, EBML) and ":" not in local}
+
+
+def take_out(element: etree._Element) -> None:
+    """Of its parent; the text behind it stays."""
+    parent, before = element.getparent(), element.getprevious()
+    assert parent is not None
+    if before is not None:
+        before.tail = f"{before.tail or ''}{element.tail or ''}"
+    else:
+        parent.text = f"{parent.text or ''}{element.tail or ''}"
+    parent.remove(element)

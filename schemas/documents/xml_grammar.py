@@ -1,0 +1,131 @@
+"""The grammar of BML and EBML that the reader and the writer share: which attributes and elements each element has.
+
+An attribute is called like the field of the struct that it becomes, in camelCase. So the structs of behaviors.py say
+most of the grammar, their rows in behavior_types.py the namespaces, and the tables here only the rest.
+"""
+
+import re
+from collections.abc import Iterator, Mapping
+
+import msgspec
+from lxml import etree
+
+from engage_hri.schemas import behaviors as of
+from engage_hri.schemas.behavior_types import TYPES, BehaviorType
+from engage_hri.schemas.documents.xml_source import CORE, EBML, ours, split
+from engage_hri.schemas.syncref import SYNC_POINTS
+
+SYNC_ATTRIBUTES = frozenset({*SYNC_POINTS, "strokeStart", "strokeEnd", "attackPeak"})
+"""Inline sync points."""
+OPERATORS: Mapping[str, type[of.Synchronize | of.Before | of.After]] = {
+    "synchronize": of.Synchronize, "before": of.Before, "after": of.After,
+}  # fmt: skip
+STANDARD = sorted(row.name for row in TYPES.values() if row.is_standard)
+
+# -- attributes ----------------------------------------------------------------------------------------------------
+
+_NAMES = {"minimum_reliability": "minReliability"}
+"""Fields whose attribute is not called like them."""
+_FIELDS = {"min_reliability": "minimum_reliability"}
+_CONTENT = frozenset({
+    "line", "timing", "marks", "options", "objects", "anchors", "distractors", "syncs", "operators", "behaviors",
+    "constraints", "dialect", "unread",
+})  # fmt: skip
+"""Fields that are no attributes: they are elements, or not the author's to say."""
+DRAFTS: Mapping[str, Mapping[str, str]] = {
+    "gesture": {"hand": "mode", "type": "lexeme"},
+    "pointing": {"hand": "mode"},
+    "head": {"rotation": "lexeme", "type": "lexeme", "action": "lexeme", "repeats": "repetition"},
+    "face": {"type": "lexeme"},
+}
+"""By element: attributes of the drafts, and the field of each. They are read where the field is not given."""
+PARTS: Mapping[str, Mapping[str, str]] = {
+    "lexeme": {"lexeme": "lexeme", "amount": "amount"},
+    "facs": {"au": "au", "side": "side", "amount": "amount"},
+    "stance": {"type": "stance"},
+    "pose": {"part": "part", "lexeme": "lexeme"},
+}
+"""Elements inside a face or posture: their attributes, and the field of the behavior that each becomes."""
+LISTS = {
+    "objects": ("object", "id"), "anchors": ("anchor", "ref"), "distractors": ("distractor", "object"),
+    "syncs": ("sync", "ref"),
+}  # fmt: skip
+"""Fields that are a list of elements, and the attribute of these that is an item."""
+_OTHER_ATTRIBUTES = {
+    "bml": ("composition", "characterId"), "face": ("overshoot",), "sync": ("ref",),
+    **dict.fromkeys(OPERATORS, ("ref",)),
+}  # fmt: skip
+
+
+def attribute_fields(kind: type[msgspec.Struct]) -> list[str]:
+    """The fields of a struct that are attributes of its element."""
+    without = _CONTENT | {"text"} if kind is of.Speech else _CONTENT
+    return [field for field in kind.__struct_fields__ if field not in without]
+
+
+def attribute(field: str) -> str:
+    """offset_angle -> offsetAngle."""
+    return _NAMES.get(field) or re.sub("_([a-z])", lambda match: match[1].upper(), field)
+
+
+def snake(name: str) -> str:
+    """offsetAngle, offset-angle -> offset_angle."""
+    return re.sub("(?<=[a-z])([A-Z])", r"_\1", name).replace("-", "_").lower()
+
+
+def field_of(name: str) -> str:
+    """The field that an attribute becomes."""
+    return _FIELDS.get(snake(name)) or snake(name)
+
+
+def unknown_attributes(plain: Mapping[str, str], local: str, kind: type[msgspec.Struct] | None) -> Iterator[str]:
+    """Of an element's own attributes those that nobody will read. kind: of a behavior."""
+    read = {"id", "type", "required", *DRAFTS.get(local, ()), *_OTHER_ATTRIBUTES.get(local, ())}
+    read |= SYNC_ATTRIBUTES if kind else PARTS.get(local, {}).keys()
+    for name in sorted(plain.keys() - read):
+        if kind is None or field_of(name) not in attribute_fields(kind):
+            yield name
+
+
+# -- elements ------------------------------------------------------------------------------------------------------
+
+_FACE, _POSTURE = ("lexeme", "facs"), ("stance", "pose")
+CHILDREN: Mapping[str, tuple[str, ...]] = {
+    "face": _FACE, "faceShift": _FACE, "posture": _POSTURE, "postureShift": _POSTURE, "emit": ("event",),
+    "reference": ("speechOption",), "event": ("object", "anchor"), "speechOption": ("distractor",),
+    **dict.fromkeys(OPERATORS, ("sync",)),
+}  # fmt: skip
+"""What else stands in them is misplaced; in those that are not listed, everything is."""
+_ANYWHERE = ("description", "timing")
+_FREE = ("description", "event")
+"""Their content is their author's affair."""
+
+
+def behavior_type(namespace: str, local: str, *, is_strict: bool) -> BehaviorType | None:
+    """The type of an element that is a behavior. is_strict: in a fragment, where our elements need no namespace."""
+    row = TYPES.get(local)
+    if row is None or (row.is_standard and namespace in CORE):
+        return row
+    is_ours = not row.is_standard and (namespace == EBML or (is_strict and not namespace))
+    return row if is_ours else None
+
+
+def misplaced(element: etree._Element) -> Iterator[tuple[etree._Element, str, str]]:
+    """Elements below this one that their parent cannot hold, with their own and the parent's name."""
+    holder = split(str(element.tag))[1]
+    for child, _, name in ours(element):
+        if name not in CHILDREN.get(holder, ()) and name not in _ANYWHERE:
+            yield child, name, holder
+        elif name not in _FREE:
+            yield from misplaced(child)
+
+
+def behaviors_inside(speech: etree._Element, *, is_strict: bool) -> Iterator[etree._Element]:
+    """Behaviors and constraints below a speech, which is no place for them. is_strict: in a fragment."""
+    for child in speech:
+        namespace, local = split(str(child.tag))
+        is_grouping = namespace in CORE and local in ("constraint", "required")
+        if is_grouping or behavior_type(namespace, local, is_strict=is_strict):
+            yield child
+        elif local != "description":
+            yield from behaviors_inside(child, is_strict=is_strict)
