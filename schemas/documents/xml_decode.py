@@ -12,11 +12,10 @@ stands behind a reference in it is speech: `<ebml:reference .../>, and then`.
 """
 
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from contextlib import suppress
-from functools import cache
 from itertools import chain, count
-from typing import Any, TypeVar, get_args, get_type_hints
+from typing import Any
 
 import msgspec
 from lxml import etree
@@ -25,23 +24,9 @@ from engage_hri.schemas import behaviors as of
 from engage_hri.schemas.behavior_types import TYPES
 from engage_hri.schemas.blocks import Block, Unread
 from engage_hri.schemas.check import check
+from engage_hri.schemas.documents import xml_grammar as grammar
 from engage_hri.schemas.documents.xml_encode import encode_xml
-from engage_hri.schemas.documents.xml_grammar import (
-    CHILDREN,
-    DRAFTS,
-    LISTS,
-    OPERATORS,
-    PARTS,
-    STANDARD,
-    SYNC_ATTRIBUTES,
-    attribute,
-    attribute_fields,
-    behavior_type,
-    behaviors_inside,
-    field_of,
-    misplaced,
-    unknown_attributes,
-)
+from engage_hri.schemas.documents.xml_grammar import AnyStruct, fields
 from engage_hri.schemas.documents.xml_source import BML_1_0, CORE, EBML, Source, attributes, ours, split, take_out
 from engage_hri.schemas.documents.xml_speech import MARKS, spoken
 from engage_hri.schemas.feedback import WarningKind
@@ -50,18 +35,6 @@ from engage_hri.schemas.references import disambiguated, in_draft_spelling
 from engage_hri.schemas.syncref import SyncRef
 
 __all__ = ["decode_xml", "encode_xml"]
-
-AnyStruct = TypeVar("AnyStruct", bound=msgspec.Struct)
-_HANDS = {"LEFT": "LEFT_HAND", "RIGHT": "RIGHT_HAND", "BOTH": "BOTH_HANDS", "": None}
-_SPELLED: Mapping[str, Callable[[str], Any]] = {
-    "accept": str.split,
-    "composition": lambda text: text.strip().upper(),
-    "mode": lambda text: _HANDS.get(text.upper(), text.upper()),
-    "side": str.upper,
-}
-"""Fields whose attribute is spelled more freely than the field."""
-_OURS_TO_SAY = ("line", "timing", "marks", "unread")
-"""Fields that no attribute sets."""
 
 
 def decode_xml(data: bytes | str, source: str = "") -> Block | TurnFragment:
@@ -77,6 +50,8 @@ class _Document:
         self._source = source
         self._speaks_1_0 = False
         self._is_strict = False
+        self._behaviors: list[of.Behavior] = []
+        self._constraints: list[of.Constraint] = []
         self._unread: list[Unread] = []
         self.line = source.line(source.root)
 
@@ -95,26 +70,23 @@ class _Document:
     def _block(self, root: etree._Element, namespace: str) -> Block:
         plain = attributes(root)
         self._note_attributes(root, "bml")
-        behaviors, constraints = self._content(root)
         raw = {
-            "id": self._id(root),
-            "behaviors": behaviors,
-            "constraints": constraints,
             "composition": plain.get("composition"),
             "dialect": "bml-1.0" if namespace == BML_1_0 else "draft",
             "character_id": plain.get("characterId"),
-            "unread": self._unread,
         }
-        return disambiguated(self._converted(root, raw, Block))
+        return disambiguated(self._converted(root, raw | self._content(root), Block))
 
     def _fragment(self, root: etree._Element) -> TurnFragment:
         self._is_strict = True
         raw = self._own_fields(root, TurnFragment)
-        behaviors, constraints = self._content(root)
-        raw |= {"id": self._id(root), "behaviors": behaviors, "constraints": constraints}
-        raw |= {"unread": self._unread, "line": self.line}
-        fragment = disambiguated(self._converted(root, raw, TurnFragment))
+        fragment = disambiguated(self._converted(root, raw | self._content(root), TurnFragment))
         return in_draft_spelling(fragment, "bml-1.0") if self._speaks_1_0 else fragment
+
+    def _content(self, root: etree._Element) -> dict[str, Any]:
+        self._walk(root, required=False)
+        content = {"behaviors": self._behaviors, "constraints": self._constraints, "unread": self._unread}
+        return {"id": self._id(root), **content}
 
     def _id(self, element: etree._Element) -> str:
         if id := element.get("id"):
@@ -145,14 +117,11 @@ class _Document:
 
     def _note_attributes(self, element: etree._Element, local: str, behavior: str = "") -> None:
         """Of an element that is no behavior."""
-        for name in unknown_attributes(attributes(element), local, None):
+        for name in grammar.unknown_attributes(attributes(element), local, None):
             self._note(f"<{local}> has no attribute {name!r}", element, behavior)
 
-    def _content(
-        self, parent: etree._Element, *, required: bool = False
-    ) -> tuple[list[of.Behavior], list[of.Constraint]]:
-        behaviors: list[of.Behavior] = []
-        constraints: list[of.Constraint] = []
+    def _walk(self, parent: etree._Element, *, required: bool) -> None:
+        """Read what a document, or a <required> in it, holds."""
         texts = [parent.text, *(child.tail for child in parent if not self._speaks_on(child))]
         if words := " ".join(text.strip() for text in texts if text and text.strip()):
             self._note(f"text {words[:40]!r} outside of speech", parent, "")
@@ -165,22 +134,19 @@ class _Document:
                 raise self._source.refusal("a block can't hold an object reference", element, advice=advice)
             if local == "required":
                 self._note_attributes(element, local)
-                more, further = self._content(element, required=True)
-                behaviors += more
-                constraints += further
+                self._walk(element, required=True)
             elif local == "constraint":
-                constraints.append(self._constraint(element, required))
-            elif behavior_type(namespace, local, is_strict=self._is_strict):
-                behaviors.append(self._behavior(element, local, required))
+                self._constraints.append(self._constraint(element, required))
+            elif grammar.behavior_type(namespace, local, is_strict=self._is_strict):
+                self._behaviors.append(self._behavior(element, local, required))
                 if self._speaks_on(element) and (words := " ".join((element.tail or "").split())):
-                    behaviors.append(self._after_reference(element, words, required))
+                    self._behaviors.append(self._after_reference(element, words, required))
             elif self._is_strict or not element.get("id"):
-                advice = f"known: {', '.join(STANDARD)}, constraint"
+                advice = f"known: {', '.join(grammar.STANDARD)}, constraint"
                 kind: WarningKind = "BEHAVIOR_TYPE_NOT_SUPPORTED"
                 self._leave_out(f"unknown element <{local}>", element, kind=kind, required=required, advice=advice)
             else:
-                behaviors.append(self._unknown(element, local, required))
-        return behaviors, constraints
+                self._behaviors.append(self._unknown(element, local, required))
 
     def _speaks_on(self, element: etree._Element) -> bool:
         """Is the text behind it said? A comma or a full stop belongs to the phrase; it is no speech by itself."""
@@ -196,31 +162,29 @@ class _Document:
         return of.Speech(id=id, text=words, timing=timing, required=required, line=line)
 
     def _unknown(self, element: etree._Element, local: str, required: bool) -> of.Unknown:
-        raw = {"id": self._id(element), "element": local, "line": self._source.line(element)}
-        raw["required"] = required or _fields(attributes(element)).get("required", False)
+        is_required = required or fields(attributes(element)).get("required")
+        raw = {"id": self._id(element), "element": local, "required": is_required}
         return self._converted(element, raw, of.Unknown)
 
     def _behavior(self, element: etree._Element, local: str, required: bool) -> of.Behavior:
         row, plain = TYPES[local], attributes(element)
-        raw = _fields(plain) if row.is_standard else self._own_fields(element, row.kind)
-        raw |= {"id": self._id(element), "line": self._source.line(element)}
-        if required:
-            raw["required"] = True
-        timing = [of.Timing(name, value) for name, value in plain.items() if name in SYNC_ATTRIBUTES]
+        raw = fields(plain) if row.is_standard else self._own_fields(element, row.kind)
+        raw |= {"id": self._id(element)} | ({"required": True} if required else {})
+        timing = [of.Timing(name, value) for name, value in plain.items() if name in grammar.SYNC_ATTRIBUTES]
         if local == "speech":
             timing += self._speech(element, raw)
         else:
             self._only(element, raw["id"])
             timing += _ties(element)
         self._parts(element, local, raw)
-        for name, field in DRAFTS.get(local, {}).items():
+        for name, field in grammar.DRAFTS.get(local, {}).items():
             if name in plain and not raw.get(field) and (local, plain[name].upper()) != ("head", "ROTATION"):
                 raw[field] = plain[name].upper()
         if local == "emit":
             raw.setdefault("event", _event_of(element))
         if local == "reference":
             raw["options"] = self._options(element, raw)
-        kind = _kind(local, plain.get("type", "").upper(), raw)
+        kind = grammar.kind_of(local, plain.get("type", "").upper(), raw)
         if row.is_standard:
             timing += self._unread_attributes(element, plain, local, kind)
         return self._converted(element, raw | {"timing": timing}, kind)
@@ -230,7 +194,7 @@ class _Document:
     ) -> list[of.Timing]:
         """Note the attributes that nobody reads. What names a sync point was meant as timing, and is returned."""
         timing = []
-        for name in unknown_attributes(plain, local, kind):
+        for name in grammar.unknown_attributes(plain, local, kind):
             if _is_reference(plain[name]):
                 timing.append(of.Timing(name, plain[name]))
             else:
@@ -253,7 +217,7 @@ class _Document:
 
     def _leave_out_strays(self, speech: etree._Element, id: str) -> None:
         """Behaviors are neither words nor markup for the voice, and marks are empty."""
-        for stray in list(behaviors_inside(speech, is_strict=self._is_strict)):
+        for stray in list(grammar.behaviors_inside(speech, is_strict=self._is_strict)):
             local = split(str(stray.tag))[1]
             advice = f'put it beside the speech; a mark says when: start="{id}:m1"'
             self._leave_out(f"unknown element <{local}> in <speech>", stray, id, advice=advice)
@@ -266,7 +230,7 @@ class _Document:
         """Read what stands inside a face, which is one expression, or a posture, which has one of each."""
         family, seen = TYPES[local].family, set()
         for child, _, name in ours(element):
-            if name not in PARTS.keys() & CHILDREN.get(local, ()):
+            if name not in grammar.PARTS.keys() & grammar.CHILDREN.get(local, ()):
                 continue
             sort = "expression" if family == "face" else f"<{name}>"
             if sort in seen:
@@ -275,30 +239,30 @@ class _Document:
                 continue
             seen.add(sort)
             self._note_attributes(child, name, raw["id"])
-            raw |= {field: child.get(each) for each, field in PARTS[name].items() if each in child.attrib}
+            raw |= {field: child.get(each) for each, field in grammar.PARTS[name].items() if each in child.attrib}
 
     def _options(self, element: etree._Element, raw: dict[str, Any]) -> list[of.SpeechOption] | None:
         """None where the author leaves the phrases to generation."""
-        options = [self._option(child) for child, _, name in ours(element) if name == "speechOption"]
+        options = [
+            self._converted(child, self._own_fields(child, of.SpeechOption), of.SpeechOption)
+            for child, _, name in ours(element)
+            if name == "speechOption"
+        ]
         if not _says_yes(raw.pop("propose", "")):
             return options
         if options:
             raise self._source.refusal("phrases are to be proposed, and offered", element, advice="leave out one")
         return None
 
-    def _option(self, element: etree._Element) -> of.SpeechOption:
-        raw = self._own_fields(element, of.SpeechOption)
-        return self._converted(element, raw | {"line": self._source.line(element)}, of.SpeechOption)
-
     def _constraint(self, element: etree._Element, required: bool) -> of.Constraint:
         self._note_attributes(element, "constraint")
-        required = required or _says_yes(_fields(attributes(element)).get("required"))
+        required = required or _says_yes(fields(attributes(element)).get("required"))
         operators = []
         for child, _, local in ours(element):
             if local == "description":
                 continue
-            if local not in OPERATORS:
-                advice = f"known: {', '.join(OPERATORS)}"
+            if local not in grammar.OPERATORS:
+                advice = f"known: {', '.join(grammar.OPERATORS)}"
                 reason = f"unknown element <{local}> in a constraint"
                 self._leave_out(reason, child, required=required, advice=advice)
                 continue
@@ -308,98 +272,50 @@ class _Document:
                 if "ref" not in sync.attrib:
                     raise self._source.refusal("<sync> without ref", sync, advice='<sync ref="behavior:sync"/>')
                 self._note_attributes(sync, "sync")
-            raw: dict[str, Any] = {"ref": child.get("ref"), "line": self._source.line(child)}
-            operators.append(self._converted(child, raw, OPERATORS[local]))
-        raw = {"id": element.get("id"), "operators": operators, "line": self._source.line(element)}
-        return self._converted(element, raw | {"required": required}, of.Constraint)
+            operators.append(self._converted(child, {"ref": child.get("ref")}, grammar.OPERATORS[local]))
+        raw = {"id": element.get("id"), "operators": operators, "required": required}
+        return self._converted(element, raw, of.Constraint)
 
     def _own_fields(self, element: etree._Element, kind: type[msgspec.Struct]) -> dict[str, Any]:
         """Of an EBML element, whose every attribute we know. Raises InputRefused for one that we don't."""
         plain = attributes(element)
-        raw = _fields({name: value for name, value in plain.items() if name not in SYNC_ATTRIBUTES})
+        raw = fields({name: value for name, value in plain.items() if name not in grammar.SYNC_ATTRIBUTES})
         known = {*kind.__struct_fields__, "character_id", "propose" if kind is of.Reference else "id"}
         for name in raw.keys() - known:
             local = split(str(element.tag))[1]
-            advice = ", ".join(attribute(field) for field in attribute_fields(kind) if field != "required")
+            advice = ", ".join(
+                grammar.attribute(field) for field in grammar.attribute_fields(kind) if field != "required"
+            )
             raise self._source.refusal(
-                f"<{local}> has no attribute {attribute(name)!r}", element, advice=f"known: {advice}"
+                f"<{local}> has no attribute {grammar.attribute(name)!r}", element, advice=f"known: {advice}"
             )
         return raw
 
     def _only(self, element: etree._Element, behavior: str = "") -> None:
         """Note what the element, or one in it, can't hold. Raises InputRefused in a fragment."""
-        for child, name, holder in misplaced(element):
-            known = ", ".join(sorted(CHILDREN.get(holder, ()))) or "nothing"
+        for child, name, holder in grammar.misplaced(element):
+            known = ", ".join(sorted(grammar.CHILDREN.get(holder, ()))) or "nothing"
             advice = f"<{holder}> holds {known}: put <{name}> beside it"
             self._leave_out(f"unknown element <{name}> in <{holder}>", child, behavior, advice=advice)
 
     def _converted(self, element: etree._Element, raw: Mapping[str, Any], kind: type[AnyStruct]) -> AnyStruct:
         """The struct of an element. Raises InputRefused with the attribute that is wrong. raw: None is not given."""
-        lists = {
-            field: [str(child.get(item, "")) for child, _, name in ours(element) if name == local]
-            for field, (local, item) in LISTS.items()
-            if field in kind.__struct_fields__
-        }
-        given = {name: _value(kind, name, value) for name, value in raw.items()} | lists
-        # BML has attributes called `type`; the struct's own says which element it is.
-        given = {name: value for name, value in given.items() if value is not None}
         try:
-            return msgspec.convert({**given, "type": kind.__struct_config__.tag}, kind, strict=False)
+            lines = {"line": self._source.line(element)}
+            return grammar.converted({**raw, **grammar.lists(element, kind), **lines}, kind)
         except msgspec.ValidationError as error:
             reason, _, path = str(error).partition(" - at `$")
             field = path.strip(".`")
             missing = re.fullmatch("Object missing required field `(.*)`", reason)
-            what = f"no {attribute(missing[1])}" if missing else f"{attribute(field)}: {reason}"
+            what = f"no {grammar.attribute(missing[1])}" if missing else f"{grammar.attribute(field)}: {reason}"
             local = split(str(element.tag))[1]
             name = f"<{local} id={raw['id']!r}>" if raw.get("id") else f"<{local}>"
-            raise self._source.refusal(f"{name}: {what}", element, advice=_allowed(kind, field)) from error
-
-
-def _fields(plain: Mapping[str, str]) -> dict[str, Any]:
-    """Attributes by the names of their fields."""
-    named = {field_of(name): value for name, value in plain.items()}
-    return {name: value for name, value in named.items() if name not in _OURS_TO_SAY}
-
-
-def _kind(local: str, type: str, raw: Mapping[str, Any]) -> type[of.Behavior]:
-    """The struct of a behavior: some elements are several, by their `type` or their content."""
-    match local, type:
-        case "gesture" | "pointing", "POINT":
-            return of.Pointing
-        case "face", _ if type == "FACS" or "au" in raw:
-            return of.FaceFacs
-        case "face", _ if "lexeme" in raw:
-            return of.FaceLexeme
-    return TYPES[local].kind
+            raise self._source.refusal(f"{name}: {what}", element, advice=grammar.choices(kind, field)) from error
 
 
 def _ties(element: etree._Element) -> list[of.Timing]:
     children = (child for child in element if split(str(child.tag)) == (EBML, "timing"))
     return [of.Timing(child.get("sync", ""), child.get("ref", "")) for child in children]
-
-
-@cache
-def _hints(kind: type[msgspec.Struct]) -> dict[str, Any]:
-    return get_type_hints(kind)
-
-
-def _value(kind: type[msgspec.Struct], field: str, value: Any) -> Any:
-    """An attribute as its field has it. Numbers may be written as in XML (`.5`, `+2`), which JSON does not allow."""
-    if not isinstance(value, str):
-        return value
-    if field in _SPELLED:
-        return _SPELLED[field](value)
-    hint = _hints(kind).get(field)
-    if float in (hint, *get_args(hint)):
-        with suppress(ValueError):
-            return float(value)
-    return value
-
-
-def _allowed(kind: type[msgspec.Struct], field: str) -> str:
-    """The values of a field that has only a few, as advice."""
-    choices = [str(value) for value in get_args(_hints(kind).get(field)) if isinstance(value, str | int)]
-    return f"one of {', '.join(choices)}" if choices else ""
 
 
 def _is_reference(value: str) -> bool:

@@ -5,7 +5,10 @@ most of the grammar, their rows in behavior_types.py the namespaces, and the tab
 """
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import suppress
+from functools import cache
+from typing import Any, TypeVar, get_args, get_type_hints
 
 import msgspec
 from lxml import etree
@@ -15,6 +18,7 @@ from engage_hri.schemas.behavior_types import TYPES, BehaviorType
 from engage_hri.schemas.documents.xml_source import CORE, EBML, ours, split
 from engage_hri.schemas.syncref import SYNC_POINTS
 
+AnyStruct = TypeVar("AnyStruct", bound=msgspec.Struct)
 SYNC_ATTRIBUTES = frozenset({*SYNC_POINTS, "strokeStart", "strokeEnd", "attackPeak"})
 """Inline sync points."""
 OPERATORS: Mapping[str, type[of.Synchronize | of.Before | of.After]] = {
@@ -129,3 +133,75 @@ def behaviors_inside(speech: etree._Element, *, is_strict: bool) -> Iterator[etr
             yield child
         elif local != "description":
             yield from behaviors_inside(child, is_strict=is_strict)
+
+
+# -- from attributes to structs ------------------------------------------------------------------------------------
+
+_HANDS = {"LEFT": "LEFT_HAND", "RIGHT": "RIGHT_HAND", "BOTH": "BOTH_HANDS", "": None}
+_SPELLED: Mapping[str, Callable[[str], Any]] = {
+    "accept": str.split,
+    "composition": lambda text: text.strip().upper(),
+    "mode": lambda text: _HANDS.get(text.upper(), text.upper()),
+    "side": str.upper,
+}
+"""Fields whose attribute is spelled more freely than the field."""
+_OURS_TO_SAY = ("line", "timing", "marks", "unread")
+"""Fields that no attribute sets."""
+
+
+def fields(plain: Mapping[str, str]) -> dict[str, Any]:
+    """Attributes by the names of their fields."""
+    named = {field_of(name): value for name, value in plain.items()}
+    return {name: value for name, value in named.items() if name not in _OURS_TO_SAY}
+
+
+def lists(element: etree._Element, kind: type[msgspec.Struct]) -> dict[str, list[str]]:
+    """The fields that are elements inside the element."""
+    return {
+        field: [str(child.get(item, "")) for child, _, name in ours(element) if name == local]
+        for field, (local, item) in LISTS.items()
+        if field in kind.__struct_fields__
+    }
+
+
+def kind_of(local: str, type: str, raw: Mapping[str, Any]) -> type[of.Behavior]:
+    """The struct of a behavior: some elements are several, by their `type` or their content."""
+    match local, type:
+        case "gesture" | "pointing", "POINT":
+            return of.Pointing
+        case "face", _ if type == "FACS" or "au" in raw:
+            return of.FaceFacs
+        case "face", _ if "lexeme" in raw:
+            return of.FaceLexeme
+    return TYPES[local].kind
+
+
+def converted(raw: Mapping[str, Any], kind: type[AnyStruct]) -> AnyStruct:
+    """The struct. Raises msgspec.ValidationError. raw: by field, texts as in XML; None is not given."""
+    given = {name: read for name, value in raw.items() if (read := _value(kind, name, value)) is not None}
+    # BML has attributes called `type`; the struct's own says which element it is.
+    return msgspec.convert({**given, "type": kind.__struct_config__.tag}, kind, strict=False)
+
+
+@cache
+def _hints(kind: type[msgspec.Struct]) -> dict[str, Any]:
+    return get_type_hints(kind)
+
+
+def _value(kind: type[msgspec.Struct], field: str, value: Any) -> Any:
+    """What an attribute says. Numbers may be written as in XML (`.5`, `+2`), which JSON does not allow."""
+    if not isinstance(value, str):
+        return value
+    if field in _SPELLED:
+        return _SPELLED[field](value)
+    hint = _hints(kind).get(field)
+    if float in (hint, *get_args(hint)):
+        with suppress(ValueError):
+            return float(value)
+    return value
+
+
+def choices(kind: type[msgspec.Struct], field: str) -> str:
+    """The values of a field that has only a few, as advice."""
+    values = [str(value) for value in get_args(_hints(kind).get(field)) if isinstance(value, str | int)]
+    return f"one of {', '.join(values)}" if values else ""

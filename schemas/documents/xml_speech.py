@@ -5,7 +5,6 @@ it. `xml:space="preserve"` keeps the text as it stands.
 """
 
 import re
-from collections.abc import Callable
 from typing import NamedTuple
 from xml.sax.saxutils import escape, quoteattr
 
@@ -37,22 +36,18 @@ def spoken(source: Source, speech: etree._Element, id: str) -> Spoken:
     content = texts[0] if texts else speech
     reading = _Reading(source, id, preserve=content.get(f"{{{XML}}}space") == "preserve")
     reading.content(content)
+    description = _ssml(speech)
     if not texts and not (said := reading.result("")).text and not said.marks:
-        if (description := _ssml(speech)) is None:
+        if description is None:
             raise source.refusal(f"speech {id!r} says nothing", speech, advice="write <text>…</text> into it")
         reading.content(description)
     if texts and any(part.strip() for part in [speech.text or "", *(child.tail or "" for child in speech)]):
         raise source.refusal("words beside <text>", speech, advice="put all words inside <text>")
-    return reading.result(_described(speech))
-
-
-def _described(speech: etree._Element) -> str:
-    """Prosodic markup from a BML 1.0 `<description type="application/ssml+xml">`, empty without one."""
-    description = _ssml(speech)
-    return "" if description is None else serialized(description)
+    return reading.result("" if description is None else serialized(description))
 
 
 def _ssml(speech: etree._Element) -> etree._Element | None:
+    """Prosodic markup from a BML 1.0 `<description type="application/ssml+xml">`."""
     for child in speech:
         if _kind(child) == "description" and child.get("type") == "application/ssml+xml":
             return child[0] if len(child) and split(str(child[0].tag))[1] == "speak" else child
@@ -160,14 +155,12 @@ def fill(element: etree._Element, speech: Speech, namespace: str) -> None:
         filter(None, speech.text.translate(dict.fromkeys(map(ord, "\t\r\n"), " ")).split(" "))
     ):
         content.set(f"{{{XML}}}space", "preserve")
-    say = _append_text(content)
-    position = 0
     tied = ties(speech, namespace)
-    for mark in speech.marks:
-        say(speech.text[position : mark.position])
-        position = mark.position
-        etree.SubElement(content, f"{{{namespace}}}sync", {"id": mark.id, **tied.get(mark.id, {})})
-    say(speech.text[position:])
+    ends = [*(mark.position for mark in speech.marks), len(speech.text)]
+    content.text = speech.text[: ends[0]] or None
+    for mark, end in zip(speech.marks, ends[1:], strict=True):
+        element = etree.SubElement(content, f"{{{namespace}}}sync", {"id": mark.id, **tied.get(mark.id, {})})
+        element.tail = speech.text[mark.position : end] or None
 
 
 def ties(speech: Speech, namespace: str) -> dict[str, dict[str, str]]:
@@ -179,16 +172,6 @@ def ties(speech: Speech, namespace: str) -> dict[str, dict[str, str]]:
     if namespace != BML_1_0 or not is_last or any(timing.sync == timing.ref for timing in speech.timing):
         return {}
     return {timing.sync: {"ref": timing.ref} for timing in speech.timing if timing.sync in order}
-
-
-def _append_text(content: etree._Element) -> Callable[[str], None]:
-    def say(words: str) -> None:
-        if len(content):
-            content[-1].tail = words or None
-        else:
-            content.text = words or None
-
-    return say
 
 
 def _description(speech: Speech) -> etree._Element | None:
