@@ -69,7 +69,7 @@ class _Document:
 
     def _block(self, root: etree._Element, namespace: str) -> Block:
         plain = attributes(root)
-        self._note_attributes(root, "bml")
+        self._note_attributes(root)
         raw = {
             "composition": plain.get("composition"),
             "dialect": "bml-1.0" if namespace == BML_1_0 else "draft",
@@ -115,10 +115,18 @@ class _Document:
         message = f"line {self._source.line(element)}: {reason}; it is ignored"
         self._unread.append(Unread(message=message, behavior=behavior, kind=kind))
 
-    def _note_attributes(self, element: etree._Element, local: str, behavior: str = "") -> None:
-        """Of an element that is no behavior."""
-        for name in grammar.unknown_attributes(attributes(element), local, None):
-            self._note(f"<{local}> has no attribute {name!r}", element, behavior)
+    def _note_attributes(
+        self, element: etree._Element, behavior: str = "", kind: type[of.Behavior] | None = None
+    ) -> list[of.Timing]:
+        """Note the attributes that nobody reads. kind: of a behavior; there what names a sync point is timing."""
+        plain, local = attributes(element), split(str(element.tag))[1]
+        timing = []
+        for name in grammar.unknown_attributes(plain, local, kind):
+            if kind and _is_reference(plain[name]):
+                timing.append(of.Timing(name, plain[name]))
+            else:
+                self._note(f"<{local}> has no attribute {name!r}", element, behavior)
+        return timing
 
     def _walk(self, parent: etree._Element, *, required: bool) -> None:
         """Read what a document, or a <required> in it, holds."""
@@ -133,7 +141,7 @@ class _Document:
                 advice = "send it to generation as a turn fragment: <ebml:ebml>"
                 raise self._source.refusal("a block can't hold an object reference", element, advice=advice)
             if local == "required":
-                self._note_attributes(element, local)
+                self._note_attributes(element)
                 self._walk(element, required=True)
             elif local == "constraint":
                 self._constraints.append(self._constraint(element, required))
@@ -186,20 +194,8 @@ class _Document:
             raw["options"] = self._options(element, raw)
         kind = grammar.kind_of(local, plain.get("type", "").upper(), raw)
         if row.is_standard:
-            timing += self._unread_attributes(element, plain, local, kind)
+            timing += self._note_attributes(element, raw["id"], kind)
         return self._converted(element, raw | {"timing": timing}, kind)
-
-    def _unread_attributes(
-        self, element: etree._Element, plain: dict[str, str], local: str, kind: type[of.Behavior]
-    ) -> list[of.Timing]:
-        """Note the attributes that nobody reads. What names a sync point was meant as timing, and is returned."""
-        timing = []
-        for name in grammar.unknown_attributes(plain, local, kind):
-            if _is_reference(plain[name]):
-                timing.append(of.Timing(name, plain[name]))
-            else:
-                self._note(f"<{local}> has no attribute {name!r}", element, plain["id"])
-        return timing
 
     def _speech(self, element: etree._Element, raw: dict[str, Any]) -> list[of.Timing]:
         self._leave_out_strays(element, raw["id"])
@@ -210,7 +206,7 @@ class _Document:
         has_text = any(name == "text" for _, _, name in children)
         for child, _, name in children:
             if name == "text":
-                self._note_attributes(child, name, raw["id"])
+                self._note_attributes(child, raw["id"])
             elif has_text and name not in ("description", "timing"):
                 self._leave_out(f"unknown element <{name}> beside <text>", child, raw["id"])
         return [*_ties(element), *said.timing]
@@ -238,7 +234,7 @@ class _Document:
                 self._leave_out(reason, child, raw["id"], required=is_required, advice="one element for each")
                 continue
             seen.add(sort)
-            self._note_attributes(child, name, raw["id"])
+            self._note_attributes(child, raw["id"])
             raw |= {field: child.get(each) for each, field in grammar.PARTS[name].items() if each in child.attrib}
 
     def _options(self, element: etree._Element, raw: dict[str, Any]) -> list[of.SpeechOption] | None:
@@ -255,7 +251,7 @@ class _Document:
         return None
 
     def _constraint(self, element: etree._Element, required: bool) -> of.Constraint:
-        self._note_attributes(element, "constraint")
+        self._note_attributes(element)
         required = required or _says_yes(fields(attributes(element)).get("required"))
         operators = []
         for child, _, local in ours(element):
@@ -267,11 +263,11 @@ class _Document:
                 self._leave_out(reason, child, required=required, advice=advice)
                 continue
             self._only(child)
-            self._note_attributes(child, local)
+            self._note_attributes(child)
             for sync in (sync for sync, _, name in ours(child) if name == "sync"):
                 if "ref" not in sync.attrib:
                     raise self._source.refusal("<sync> without ref", sync, advice='<sync ref="behavior:sync"/>')
-                self._note_attributes(sync, "sync")
+                self._note_attributes(sync)
             operators.append(self._converted(child, {"ref": child.get("ref")}, grammar.OPERATORS[local]))
         raw = {"id": element.get("id"), "operators": operators, "required": required}
         return self._converted(element, raw, of.Constraint)

@@ -133,14 +133,9 @@ def _set_fields(element: etree._Element, thing: Any, namespace: str) -> None:
 
 
 def _text(value: object) -> str:
-    match value:
-        case bool():
-            return "true" if value else "false"
-        case tuple():
-            return " ".join(str(item) for item in value)
-        case float():
-            return repr(value)
-    return str(value)
+    if isinstance(value, bool):
+        return str(value).lower()
+    return " ".join(map(str, value)) if isinstance(value, tuple) else str(value)
 
 
 def _indent(element: etree._Element, level: int) -> None:
