@@ -168,16 +168,9 @@ class Source:
 
 def _parser() -> etree.XMLParser:
     return etree.XMLParser(
-        encoding="utf-8",
-        recover=False,
-        resolve_entities=False,
-        load_dtd=False,
-        dtd_validation=False,
-        no_network=True,
-        huge_tree=False,
-        remove_comments=True,
-        remove_pis=True,
-    )
+        encoding="utf-8", recover=False, resolve_entities=False, load_dtd=False, dtd_validation=False,
+        no_network=True, huge_tree=False, remove_comments=True, remove_pis=True,
+    )  # fmt: skip
 
 
 def _declaring(text: str, prefixes: Set[str]) -> str:

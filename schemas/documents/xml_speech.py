@@ -143,17 +143,16 @@ def fill(element: etree._Element, speech: Speech, namespace: str) -> None:
 
     BML 1.0 has markup in a description beside the text, the drafts in it. What is not XML is an attribute of ours.
     """
-    content = etree.SubElement(element, f"{{{namespace}}}text")
-    if namespace == BML_1_0 and (description := _description(speech)) is not None:
-        element.append(description)
-    elif namespace != BML_1_0 and (inline := _inline(speech, namespace)) is not None:
-        element.replace(content, inline)
+    markup = _read_back(speech, namespace) if speech.markup else None
+    if markup is not None and namespace != BML_1_0:
+        element.append(markup)
         return
+    content = etree.SubElement(element, f"{{{namespace}}}text")
+    if markup is not None:
+        element.append(markup)
     elif speech.markup:
         element.set(f"{{{EBML}}}markup", speech.markup)
-    if speech.text != " ".join(
-        filter(None, speech.text.translate(dict.fromkeys(map(ord, "\t\r\n"), " ")).split(" "))
-    ):
+    if speech.text != _WHITE.sub(" ", speech.text).strip(" "):
         content.set(f"{{{XML}}}space", "preserve")
     tied = ties(speech, namespace)
     ends = [*(mark.position for mark in speech.marks), len(speech.text)]
@@ -174,30 +173,21 @@ def ties(speech: Speech, namespace: str) -> dict[str, dict[str, str]]:
     return {timing.sync: {"ref": timing.ref} for timing in speech.timing if timing.sync in order}
 
 
-def _description(speech: Speech) -> etree._Element | None:
-    """The markup as SSML, if reading it back gives exactly this markup."""
-    if not speech.markup:
-        return None
-    raw = (
-        f'<description xmlns="{BML_1_0}" priority="1" type="application/ssml+xml">'
-        f'<speak xmlns="{SSML}">{speech.markup}</speak></description>'
-    )
+def _read_back(speech: Speech, namespace: str) -> etree._Element | None:
+    """The markup as an element: in BML 1.0 a description beside the text, in the drafts the text itself.
+
+    None for what is read as something else: it is not XML, or has not the words of the text.
+    """
+    if namespace == BML_1_0:
+        ssml = f'<speak xmlns="{SSML}">{speech.markup}</speak>'
+        content = f'<text/><description priority="1" type="application/ssml+xml">{ssml}</description>'
+        expected = Spoken("", (), speech.markup, ())
+    else:
+        content = f"<text>{speech.markup}</text>"
+        expected = Spoken(speech.text, speech.marks, speech.markup, ())
     try:
-        description = Source(raw).root
+        source = Source(f'<speech xmlns="{namespace}">{content}</speech>')
+        is_same = spoken(source, source.root, speech.id) == expected
     except InputRefused:
         return None
-    return description if len(description) == 1 and serialized(description[0]) == speech.markup else None
-
-
-def _inline(speech: Speech, namespace: str) -> etree._Element | None:
-    """The markup as content of <text>, if reading it back gives exactly this speech."""
-    if not speech.markup:
-        return None
-    raw = f'<speech xmlns="{namespace}"><text>{speech.markup}</text></speech>'
-    try:
-        source = Source(raw)
-        read = spoken(source, source.root, speech.id)
-    except InputRefused:
-        return None  # not XML, or not the words of the text: it travels as an attribute
-    same = (read.text, read.marks, read.markup) == (speech.text, speech.marks, speech.markup)
-    return source.root[0] if same and not read.timing else None
+    return source.root[-1] if is_same else None
