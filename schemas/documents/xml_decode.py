@@ -27,7 +27,18 @@ from engage_hri.schemas.check import check
 from engage_hri.schemas.documents import xml_grammar as grammar
 from engage_hri.schemas.documents.xml_encode import encode_xml
 from engage_hri.schemas.documents.xml_grammar import AnyStruct, fields
-from engage_hri.schemas.documents.xml_source import BML_1_0, CORE, EBML, Source, attributes, ours, split, take_out
+from engage_hri.schemas.documents.xml_source import (
+    BML_1_0,
+    CORE,
+    EBML,
+    Source,
+    attributes,
+    local_name,
+    named,
+    ours,
+    split,
+    take_out,
+)  # fmt: skip
 from engage_hri.schemas.documents.xml_speech import MARKS, spoken
 from engage_hri.schemas.feedback import WarningKind
 from engage_hri.schemas.fragments import TurnFragment
@@ -70,11 +81,8 @@ class _Document:
     def _block(self, root: etree._Element, namespace: str) -> Block:
         plain = attributes(root)
         self._note_attributes(root)
-        raw = {
-            "composition": plain.get("composition"),
-            "dialect": "bml-1.0" if namespace == BML_1_0 else "draft",
-            "character_id": plain.get("characterId"),
-        }
+        raw = {"composition": plain.get("composition"), "character_id": plain.get("characterId")}
+        raw["dialect"] = "bml-1.0" if namespace == BML_1_0 else "draft"
         return disambiguated(self._converted(root, raw | self._content(root), Block))
 
     def _fragment(self, root: etree._Element) -> TurnFragment:
@@ -91,26 +99,18 @@ class _Document:
     def _id(self, element: etree._Element) -> str:
         if id := element.get("id"):
             return id
-        local = split(str(element.tag))[1]
-        raise self._source.refusal(f"<{local}> has no id", element, advice='add id="..."')
+        raise self._source.refusal(f"<{local_name(element)}> has no id", element, advice='add id="..."')
 
     def _leave_out(
-        self,
-        reason: str,
-        element: etree._Element,
-        behavior: str = "",
-        *,
-        kind: WarningKind = "PARSING_FAILURE",
-        required: bool = False,
-        advice: str = "",
+        self, reason: str, element: etree._Element, behavior: str = "", *, required: bool = False, advice: str = ""
     ) -> None:
         """Note what is not understood. Raises InputRefused where nothing may be left out."""
         if self._is_strict or required:
             raise self._source.refusal(reason, element, advice=advice)
-        self._note(reason, element, behavior, kind)
+        self._note(reason, element, behavior)
 
     def _note(
-        self, reason: str, element: etree._Element, behavior: str, kind: WarningKind = "PARSING_FAILURE"
+        self, reason: str, element: etree._Element, behavior: str = "", kind: WarningKind = "PARSING_FAILURE"
     ) -> None:
         message = f"line {self._source.line(element)}: {reason}; it is ignored"
         self._unread.append(Unread(message=message, behavior=behavior, kind=kind))
@@ -119,7 +119,7 @@ class _Document:
         self, element: etree._Element, behavior: str = "", kind: type[of.Behavior] | None = None
     ) -> list[of.Timing]:
         """Note the attributes that nobody reads. kind: of a behavior; there what names a sync point is timing."""
-        plain, local = attributes(element), split(str(element.tag))[1]
+        plain, local = attributes(element), local_name(element)
         timing = []
         for name in grammar.unknown_attributes(plain, local, kind):
             if kind and _is_reference(plain[name]):
@@ -132,7 +132,7 @@ class _Document:
         """Read what a document, or a <required> in it, holds."""
         texts = [parent.text, *(child.tail for child in parent if not self._speaks_on(child))]
         if words := " ".join(text.strip() for text in texts if text and text.strip()):
-            self._note(f"text {words[:40]!r} outside of speech", parent, "")
+            self._note(f"text {words[:40]!r} outside of speech", parent)
         for element, namespace, local in ours(parent):
             self._speaks_1_0 |= namespace == BML_1_0
             if local in ("description", "participant"):
@@ -150,9 +150,11 @@ class _Document:
                 if self._speaks_on(element) and (words := " ".join((element.tail or "").split())):
                     self._behaviors.append(self._after_reference(element, words, required))
             elif self._is_strict or not element.get("id"):
-                advice = f"known: {', '.join(grammar.STANDARD)}, constraint"
-                kind: WarningKind = "BEHAVIOR_TYPE_NOT_SUPPORTED"
-                self._leave_out(f"unknown element <{local}>", element, kind=kind, required=required, advice=advice)
+                reason = f"unknown element <{local}>"
+                if self._is_strict or required:
+                    advice = f"known: {', '.join(grammar.STANDARD)}, constraint"
+                    raise self._source.refusal(reason, element, advice=advice)
+                self._note(reason, element, kind="BEHAVIOR_TYPE_NOT_SUPPORTED")
             else:
                 self._behaviors.append(self._unknown(element, local, required))
 
@@ -189,7 +191,8 @@ class _Document:
             if name in plain and not raw.get(field) and (local, plain[name].upper()) != ("head", "ROTATION"):
                 raw[field] = plain[name].upper()
         if local == "emit":
-            raw.setdefault("event", _event_of(element))
+            said = ((child.text or child.get("id") or "").strip() for child in named(element, "event"))
+            raw.setdefault("event", next(said, None))
         if local == "reference":
             raw["options"] = self._options(element, raw)
         kind = grammar.kind_of(local, plain.get("type", "").upper(), raw)
@@ -214,12 +217,12 @@ class _Document:
     def _leave_out_strays(self, speech: etree._Element, id: str) -> None:
         """Behaviors are neither words nor markup for the voice, and marks are empty."""
         for stray in list(grammar.behaviors_inside(speech, is_strict=self._is_strict)):
-            local = split(str(stray.tag))[1]
+            local = local_name(stray)
             advice = f'put it beside the speech; a mark says when: start="{id}:m1"'
             self._leave_out(f"unknown element <{local}> in <speech>", stray, id, advice=advice)
             take_out(stray)
         for each in speech.iter():
-            if split(str(each.tag))[1] in MARKS:
+            if local_name(each) in MARKS:
                 self._only(each, id)
 
     def _parts(self, element: etree._Element, local: str, raw: dict[str, Any]) -> None:
@@ -235,14 +238,15 @@ class _Document:
                 continue
             seen.add(sort)
             self._note_attributes(child, raw["id"])
-            raw |= {field: child.get(each) for each, field in grammar.PARTS[name].items() if each in child.attrib}
+            for each, field in grammar.PARTS[name].items():
+                if each in child.attrib or family == "posture":
+                    raw[field] = child.get(each, "")
 
     def _options(self, element: etree._Element, raw: dict[str, Any]) -> list[of.SpeechOption] | None:
         """None where the author leaves the phrases to generation."""
         options = [
             self._converted(child, self._own_fields(child, of.SpeechOption), of.SpeechOption)
-            for child, _, name in ours(element)
-            if name == "speechOption"
+            for child in named(element, "speechOption")
         ]
         if not _says_yes(raw.pop("propose", "")):
             return options
@@ -264,7 +268,7 @@ class _Document:
                 continue
             self._only(child)
             self._note_attributes(child)
-            for sync in (sync for sync, _, name in ours(child) if name == "sync"):
+            for sync in named(child, "sync"):
                 if "ref" not in sync.attrib:
                     raise self._source.refusal("<sync> without ref", sync, advice='<sync ref="behavior:sync"/>')
                 self._note_attributes(sync)
@@ -278,13 +282,9 @@ class _Document:
         raw = fields({name: value for name, value in plain.items() if name not in grammar.SYNC_ATTRIBUTES})
         known = {*kind.__struct_fields__, "character_id", "propose" if kind is of.Reference else "id"}
         for name in raw.keys() - known:
-            local = split(str(element.tag))[1]
-            advice = ", ".join(
-                grammar.attribute(field) for field in grammar.attribute_fields(kind) if field != "required"
-            )
-            raise self._source.refusal(
-                f"<{local}> has no attribute {grammar.attribute(name)!r}", element, advice=f"known: {advice}"
-            )
+            reason = f"<{local_name(element)}> has no attribute {grammar.attribute(name)!r}"
+            known_names = (grammar.attribute(each) for each in grammar.attribute_fields(kind) if each != "required")
+            raise self._source.refusal(reason, element, advice=f"known: {', '.join(known_names)}")
         return raw
 
     def _only(self, element: etree._Element, behavior: str = "") -> None:
@@ -304,7 +304,7 @@ class _Document:
             field = path.strip(".`")
             missing = re.fullmatch("Object missing required field `(.*)`", reason)
             what = f"no {grammar.attribute(missing[1])}" if missing else f"{grammar.attribute(field)}: {reason}"
-            local = split(str(element.tag))[1]
+            local = local_name(element)
             name = f"<{local} id={raw['id']!r}>" if raw.get("id") else f"<{local}>"
             raise self._source.refusal(f"{name}: {what}", element, advice=grammar.choices(kind, field)) from error
 
@@ -323,10 +323,3 @@ def _is_reference(value: str) -> bool:
 
 def _says_yes(value: object) -> bool:
     return str(value).strip().lower() in ("true", "1")
-
-
-def _event_of(element: etree._Element) -> str | None:
-    for child, _, name in ours(element):
-        if name == "event":
-            return (child.text or child.get("id") or "").strip()
-    return None

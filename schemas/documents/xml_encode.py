@@ -12,14 +12,7 @@ from msgspec import NODEFAULT, structs
 from engage_hri.schemas import behaviors as of
 from engage_hri.schemas.behavior_types import TYPES
 from engage_hri.schemas.blocks import Block
-from engage_hri.schemas.documents.xml_grammar import (
-    CHILDREN,
-    LISTS,
-    PARTS,
-    SYNC_ATTRIBUTES,
-    attribute,
-    attribute_fields,
-)
+from engage_hri.schemas.documents import xml_grammar as grammar
 from engage_hri.schemas.documents.xml_source import BML_1_0, DRAFT, EBML
 from engage_hri.schemas.documents.xml_speech import fill, ties
 from engage_hri.schemas.faults import Fault, InputRefused
@@ -35,7 +28,7 @@ _ALWAYS = ("turn_index", "turn_status")
 def encode_xml(thing: Block | TurnFragment) -> bytes:
     """The XML document, UTF-8. Raises InputRefused for text that XML can't hold (control characters)."""
     try:
-        root = _fragment(thing) if isinstance(thing, TurnFragment) else _block(thing)
+        root = _document(thing)
     except ValueError as error:
         raise InputRefused(Fault(reason=str(error), where=thing.id, advice="send it as JSON")) from error
     etree.cleanup_namespaces(root)
@@ -43,22 +36,11 @@ def encode_xml(thing: Block | TurnFragment) -> bytes:
     return etree.tostring(root, encoding="utf-8", xml_declaration=True) + b"\n"
 
 
-def _block(block: Block) -> etree._Element:
-    namespace = BML_1_0 if block.dialect == "bml-1.0" else DRAFT
-    root = etree.Element(f"{{{namespace}}}bml", {"id": block.id}, nsmap=_prefixes(namespace))
-    return _content(root, namespace, block)
-
-
-def _fragment(fragment: TurnFragment) -> etree._Element:
-    root = etree.Element(f"{{{EBML}}}ebml", {"id": fragment.id}, nsmap=_prefixes(DRAFT))
-    return _content(root, DRAFT, fragment)
-
-
-def _prefixes(namespace: str) -> dict[str, str]:
-    return {None: namespace, "ebml": EBML}  # type: ignore[dict-item]  # None is lxml's default namespace
-
-
-def _content(root: etree._Element, namespace: str, thing: Block | TurnFragment) -> etree._Element:
+def _document(thing: Block | TurnFragment) -> etree._Element:
+    namespace = BML_1_0 if isinstance(thing, Block) and thing.dialect == "bml-1.0" else DRAFT
+    tag = f"{{{namespace}}}bml" if isinstance(thing, Block) else f"{{{EBML}}}ebml"
+    prefixes: Any = {None: namespace, "ebml": EBML}  # None is lxml's default namespace
+    root = etree.Element(tag, {"id": thing.id}, nsmap=prefixes)
     _set_fields(root, thing, namespace)
     for behavior in thing.behaviors:
         _behavior(_required(root, namespace, behavior.required), namespace, behavior)
@@ -90,7 +72,7 @@ def _behavior(root: etree._Element, namespace: str, behavior: of.Behavior) -> No
         case of.Speech():
             fill(element, behavior, namespace)
         case of.Posture() | of.PostureShift():
-            _nest(element, namespace, CHILDREN[local])
+            _nest(element, namespace, grammar.CHILDREN[local])
         case of.FaceShift() if namespace == BML_1_0 and not (behavior.lexeme and behavior.au):
             _nest(element, namespace, ["lexeme"] if behavior.lexeme else ["facs"] if behavior.au else [])
         case of.Reference():
@@ -103,7 +85,8 @@ def _behavior(root: etree._Element, namespace: str, behavior: of.Behavior) -> No
 def _nest(element: etree._Element, namespace: str, parts: Sequence[str]) -> None:
     """Move what the parts of a face or posture say from attributes into elements; an amount is that of the whole."""
     for part in parts:
-        said = {name: str(element.attrib.pop(field, "")) for name, field in PARTS[part].items() if field != "amount"}
+        fields = {name: field for name, field in grammar.PARTS[part].items() if field != "amount"}
+        said = {name: str(element.attrib.pop(field, "")) for name, field in fields.items()}
         if any(said.values()):
             said = {name: value for name, value in said.items() if value or part == "pose"}  # which has both
             etree.SubElement(element, f"{{{namespace}}}{part}", said)
@@ -111,7 +94,7 @@ def _nest(element: etree._Element, namespace: str, parts: Sequence[str]) -> None
 
 def _set_timing(element: etree._Element, timings: Sequence[of.Timing]) -> None:
     names = [timing.sync for timing in timings]
-    if SYNC_ATTRIBUTES.issuperset(names) and len(set(names)) == len(names):
+    if grammar.SYNC_ATTRIBUTES.issuperset(names) and len(set(names)) == len(names):
         for timing in timings:
             element.set(timing.sync, timing.ref)
         return
@@ -121,13 +104,13 @@ def _set_timing(element: etree._Element, timings: Sequence[of.Timing]) -> None:
 
 def _set_fields(element: etree._Element, thing: Any, namespace: str) -> None:
     """Every field that differs from its default: as an attribute, or as elements of the namespace."""
-    attributes = attribute_fields(type(thing))
+    attributes = grammar.attribute_fields(type(thing))
     for field in structs.fields(thing):
         value = getattr(thing, field.name)
         is_default = field.default is not NODEFAULT and value == field.default and field.name not in _ALWAYS
         if field.name in attributes and field.name not in _ELSEWHERE and not is_default:
-            element.set(attribute(field.name), _text(value))
-    for name, (local, item) in LISTS.items():
+            element.set(grammar.attribute(field.name), _text(value))
+    for name, (local, item) in grammar.LISTS.items():
         for value in getattr(thing, name, ()):
             etree.SubElement(element, f"{{{namespace}}}{local}", {item: value})
 

@@ -19,7 +19,7 @@ from typing import Any, NamedTuple
 import msgspec
 from lxml import etree
 
-from engage_hri.schemas.documents.xml_source import BML_1_0, EBML, Source, split
+from engage_hri.schemas.documents.xml_source import BML_1_0, EBML, Source, local_name, split
 from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.feedback import (
     BlockProgress,
@@ -148,7 +148,7 @@ def decode_feedback(data: bytes | str, source: str = "") -> tuple[Feedback, ...]
 
 
 def _read(source: Source, element: etree._Element) -> Feedback:
-    local = split(str(element.tag))[1]
+    local = local_name(element)
     if local not in (*_FORMS, "predictionFeedback"):
         known = "blockProgress, syncPointProgress, predictionFeedback, warningFeedback"
         raise source.refusal(f"<{local}> is no feedback", element, advice=f"known: {known}")
@@ -192,5 +192,5 @@ def _read_prediction(element: etree._Element) -> PredictionFeedback:
 
 def _named(point: etree._Element) -> tuple[str, str]:
     """A mark of a speech, or a point of our own."""
-    name, time = ("id", "ref") if split(str(point.tag))[1] == "sync" else ("sync", "time")
+    name, time = ("id", "ref") if local_name(point) == "sync" else ("sync", "time")
     return str(point.attrib[name]), str(point.attrib[time])

@@ -15,7 +15,7 @@ from lxml import etree
 
 from engage_hri.schemas import behaviors as of
 from engage_hri.schemas.behavior_types import TYPES, BehaviorType
-from engage_hri.schemas.documents.xml_source import CORE, EBML, ours, split
+from engage_hri.schemas.documents.xml_source import CORE, EBML, local_name, named, ours, split
 from engage_hri.schemas.syncref import SYNC_POINTS
 
 AnyStruct = TypeVar("AnyStruct", bound=msgspec.Struct)
@@ -116,7 +116,7 @@ def behavior_type(namespace: str, local: str, *, is_strict: bool) -> BehaviorTyp
 
 def misplaced(element: etree._Element) -> Iterator[tuple[etree._Element, str, str]]:
     """Elements below this one that their parent cannot hold, with their own and the parent's name."""
-    holder = split(str(element.tag))[1]
+    holder = local_name(element)
     for child, _, name in ours(element):
         if name not in CHILDREN.get(holder, ()) and name not in _ANYWHERE:
             yield child, name, holder
@@ -158,7 +158,7 @@ def fields(plain: Mapping[str, str]) -> dict[str, Any]:
 def lists(element: etree._Element, kind: type[msgspec.Struct]) -> dict[str, list[str]]:
     """The fields that are elements inside the element."""
     return {
-        field: [str(child.get(item, "")) for child, _, name in ours(element) if name == local]
+        field: [str(child.get(item, "")) for child in named(element, local)]
         for field, (local, item) in LISTS.items()
         if field in kind.__struct_fields__
     }

@@ -210,6 +210,15 @@ def ours(parent: etree._Element) -> Iterator[tuple[etree._Element, str, str]]:
             yield child, namespace, local
 
 
+def named(parent: etree._Element, local: str) -> list[etree._Element]:
+    """The children of that name that are BML or EBML."""
+    return [child for child, _, name in ours(parent) if name == local]
+
+
+def local_name(element: etree._Element) -> str:
+    return split(str(element.tag))[1]
+
+
 def attributes(element: etree._Element) -> dict[str, str]:
     """The attributes that are BML's or EBML's, by local name. One with an undeclared prefix is neither's."""
     named = ((*split(str(name)), str(value)) for name, value in element.items())

@@ -11,7 +11,7 @@ from xml.sax.saxutils import escape, quoteattr
 from lxml import etree
 
 from engage_hri.schemas.behaviors import Mark, Speech, Timing
-from engage_hri.schemas.documents.xml_source import BML_1_0, CORE, EBML, Source, split
+from engage_hri.schemas.documents.xml_source import BML_1_0, CORE, EBML, Source, local_name, split
 from engage_hri.schemas.faults import InputRefused
 
 SSML = "http://www.w3.org/2001/10/synthesis"
@@ -121,7 +121,7 @@ def serialized(element: etree._Element) -> str:
     """The inner XML without namespaces, as a voice takes it; marks as SSML's `<mark name>`."""
     parts = [escape(element.text or "")]
     for child in element:
-        local = split(str(child.tag))[1]
+        local = local_name(child)
         if local in MARKS:
             parts.append(f"<mark name={quoteattr(child.get('id') or child.get('name') or child.get('ref') or '')}/>")
         elif local != "description":
