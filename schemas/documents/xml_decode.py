@@ -37,7 +37,6 @@ from engage_hri.schemas.documents.xml_source import (
     named,
     ours,
     split,
-    take_out,
 )  # fmt: skip
 from engage_hri.schemas.documents.xml_speech import MARKS, spoken
 from engage_hri.schemas.feedback import WarningKind
@@ -46,6 +45,9 @@ from engage_hri.schemas.references import disambiguated, in_draft_spelling
 from engage_hri.schemas.syncref import SyncRef
 
 __all__ = ["decode_xml", "encode_xml"]
+
+_STRAY = "{urn:engage}stray"
+"""The tag of elements that are about to be taken out."""
 
 
 def decode_xml(data: bytes | str, source: str = "") -> Block | TurnFragment:
@@ -220,7 +222,8 @@ class _Document:
             local = local_name(stray)
             advice = f'put it beside the speech; a mark says when: start="{id}:m1"'
             self._leave_out(f"unknown element <{local}> in <speech>", stray, id, advice=advice)
-            take_out(stray)
+            stray.tag = _STRAY
+        etree.strip_elements(speech, _STRAY, with_tail=False)
         for each in speech.iter():
             if local_name(each) in MARKS:
                 self._only(each, id)

@@ -120,13 +120,11 @@ def _prediction(message: PredictionFeedback) -> etree._Element:
         for point in points:
             if type == "speech" and point.sync not in ("start", "end"):
                 text = child[0] if len(child) else etree.SubElement(child, f"{{{BML_1_0}}}text")
-                written = {"id": _clean(point.sync), "ref": _number(point.time)}
-                etree.SubElement(text, f"{{{BML_1_0}}}sync", written)
+                etree.SubElement(text, f"{{{BML_1_0}}}sync", id=_clean(point.sync), ref=_number(point.time))
             elif _ATTRIBUTE.fullmatch(point.sync) and point.sync not in child.attrib:
                 child.set(point.sync, _number(point.time))
             else:
-                written = {"sync": _clean(point.sync), "time": _number(point.time)}
-                etree.SubElement(child, f"{{{EBML}}}point", written)
+                etree.SubElement(child, f"{{{EBML}}}point", sync=_clean(point.sync), time=_number(point.time))
     return element
 
 

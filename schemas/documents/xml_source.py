@@ -80,7 +80,7 @@ class Source:
 
     def line(self, element: etree._Element) -> int:
         """Where the element begins, from 1."""
-        return self._lines.get(element, 0) or _last_line(element)
+        return self._lines.get(element, 0) or cast(int, element.sourceline or 0)
 
     def refusal(
         self, reason: str, element: etree._Element | None = None, *, line: int = 0, advice: str = ""
@@ -182,10 +182,6 @@ def _declaring(text: str, prefixes: Set[str]) -> str:
     return f"{text[:end]}{declarations}{text[end:]}"
 
 
-def _last_line(element: etree._Element) -> int:
-    return cast(int, element.sourceline or 0)
-
-
 def _start_lines(text: str) -> Iterator[int]:
     """The line of each start tag, in document order."""
     line, position = 1, 0
@@ -223,14 +219,3 @@ def attributes(element: etree._Element) -> dict[str, str]:
     """The attributes that are BML's or EBML's, by local name. One with an undeclared prefix is neither's."""
     named = ((*split(str(name)), str(value)) for name, value in element.items())
     return {local: value for space, local, value in named if space in (*CORE, EBML) and ":" not in local}
-
-
-def take_out(element: etree._Element) -> None:
-    """Of its parent; the text behind it stays."""
-    parent, before = element.getparent(), element.getprevious()
-    assert parent is not None
-    if before is not None:
-        before.tail = f"{before.tail or ''}{element.tail or ''}"
-    else:
-        parent.text = f"{parent.text or ''}{element.tail or ''}"
-    parent.remove(element)
