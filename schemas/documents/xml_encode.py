@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from lxml import etree
-from msgspec import NODEFAULT, structs
+from msgspec import NODEFAULT, Struct, structs
 
 from engage_hri.schemas import behaviors as of
 from engage_hri.schemas.behavior_types import TYPES
@@ -102,7 +102,7 @@ def _set_timing(element: etree._Element, timings: Sequence[of.Timing]) -> None:
         etree.SubElement(element, f"{{{EBML}}}timing", {"sync": timing.sync, "ref": timing.ref})
 
 
-def _set_fields(element: etree._Element, thing: Any, namespace: str) -> None:
+def _set_fields(element: etree._Element, thing: Struct, namespace: str) -> None:
     """Every field that differs from its default: as an attribute, or as elements of the namespace."""
     attributes = grammar.attribute_fields(type(thing))
     for field in structs.fields(thing):

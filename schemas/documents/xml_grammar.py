@@ -7,7 +7,7 @@ most of the grammar, their rows in behavior_types.py the namespaces, and the tab
 import re
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
-from functools import cache
+from functools import cache, lru_cache
 from typing import Any, TypeVar, get_args, get_type_hints
 
 import msgspec
@@ -30,7 +30,6 @@ STANDARD = sorted(row.name for row in TYPES.values() if row.is_standard)
 
 _NAMES = {"minimum_reliability": "minReliability"}
 """Fields whose attribute is not called like them."""
-_FIELDS = {"min_reliability": "minimum_reliability"}
 _CONTENT = frozenset({
     "line", "timing", "marks", "options", "objects", "anchors", "distractors", "syncs", "operators", "behaviors",
     "constraints", "dialect", "unread",
@@ -61,10 +60,11 @@ _OTHER_ATTRIBUTES = {
 }  # fmt: skip
 
 
-def attribute_fields(kind: type[msgspec.Struct]) -> list[str]:
+@cache
+def attribute_fields(kind: type[msgspec.Struct]) -> tuple[str, ...]:
     """The fields of a struct that are attributes of its element."""
     without = _CONTENT | {"text"} if kind is of.Speech else _CONTENT
-    return [field for field in kind.__struct_fields__ if field not in without]
+    return tuple(field for field in kind.__struct_fields__ if field not in without)
 
 
 def attribute(field: str) -> str:
@@ -77,9 +77,10 @@ def snake(name: str) -> str:
     return re.sub("(?<=[a-z])([A-Z])", r"_\1", name).replace("-", "_").lower()
 
 
+@lru_cache(1024)  # authors may write what they like
 def field_of(name: str) -> str:
     """The field that an attribute becomes."""
-    return _FIELDS.get(snake(name)) or snake(name)
+    return next((field for field, written in _NAMES.items() if snake(written) == snake(name)), snake(name))
 
 
 def unknown_attributes(plain: Mapping[str, str], local: str, kind: type[msgspec.Struct] | None) -> Iterator[str]:
@@ -188,14 +189,18 @@ def _hints(kind: type[msgspec.Struct]) -> dict[str, Any]:
     return get_type_hints(kind)
 
 
+@cache
+def _decimals(kind: type[msgspec.Struct]) -> frozenset[str]:
+    return frozenset(field for field, hint in _hints(kind).items() if float in (hint, *get_args(hint)))
+
+
 def _value(kind: type[msgspec.Struct], field: str, value: Any) -> Any:
     """What an attribute says. Numbers may be written as in XML (`.5`, `+2`), which JSON does not allow."""
     if not isinstance(value, str):
         return value
     if field in _SPELLED:
         return _SPELLED[field](value)
-    hint = _hints(kind).get(field)
-    if float in (hint, *get_args(hint)):
+    if field in _decimals(kind):
         with suppress(ValueError):
             return float(value)
     return value

@@ -20,6 +20,8 @@ BML_1_0_EXTENSIONS = "http://www.bml-initiative.org/bml/coreextensions-1.0"
 CORE = frozenset({"", DRAFT, BML_1_0, BML_1_0_EXTENSIONS})
 """Namespaces of BML proper; elements of any other but ours are somebody else's and are left alone."""
 
+OURS = CORE | {EBML}
+
 LARGEST = 4 * 1024 * 1024
 """Bytes. A block of a thousand behaviors has about 200 kB."""
 DEEPEST = 64
@@ -202,7 +204,7 @@ def ours(parent: etree._Element) -> Iterator[tuple[etree._Element, str, str]]:
     """The children that are BML or EBML, with namespace and local name."""
     for child in parent:
         namespace, local = split(str(child.tag))
-        if namespace in CORE or namespace == EBML:
+        if namespace in OURS:
             yield child, namespace, local
 
 
@@ -217,5 +219,5 @@ def local_name(element: etree._Element) -> str:
 
 def attributes(element: etree._Element) -> dict[str, str]:
     """The attributes that are BML's or EBML's, by local name. One with an undeclared prefix is neither's."""
-    named = ((*split(str(name)), str(value)) for name, value in element.items())
-    return {local: value for space, local, value in named if space in (*CORE, EBML) and ":" not in local}
+    split_names = ((*split(str(name)), str(value)) for name, value in element.items())
+    return {local: value for space, local, value in split_names if space in OURS and ":" not in local}
