@@ -292,21 +292,24 @@ and advice. Of a block, what cannot be realized is left out with a warning (docs
 ## JSON lines
 
 `--feedback FILE` and `--events FILE` (of `engage demo`, `up` and `play`) write one JSON object per line; `engage watch
---json` prints all kinds. These are public: keys may be added, but none is renamed or removed. Every key is always there
-(but for those of `head_owner` and `fault`, which are the messages of that name); what is not known is `null`. Times are
-seconds, rounded to microseconds; `time` of feedback counts from the start of the block, `global_time` and the other
-`time` are instants of the bus clock. JSON Schema: `schemas/exported/lines.json`.
+--json` prints all kinds. A line is its message (below) as JSON, with the same keys and values, but
 
-| stream | `type` | keys |
+- every key is always there, also where the message on the bus leaves it out because it is at its default;
+- an instant, on the bus `[clock, seconds]`, is a number: the seconds of the bus clock;
+- seconds are rounded to microseconds.
+
+JSON Schema: `schemas/exported/lines.json`.
+
+| stream | `type` | message |
 |---|---|---|
-| feedback | `block_progress` | `block`, `progress` (`start` or `end`), `status` (at the end: `done`, `failed`, `interrupted`), `time`, `global_time` |
-| feedback | `sync_point_progress` | `block`, `behavior`, `sync`, `time`, `global_time`, `predicted`, `source` (`body` or `clock`), `arrived`, `skew` |
-| feedback | `warning` | `block`, `behavior` (`null`: the whole block), `kind`, `message` |
-| `engage watch --json` only | `prediction` | `block`, `points` (each `behavior`, `sync`, `time`) |
-| events | `connection_event` | `id`, `kind`, `initiator`, `responder`, `objects`, `cause`, `state`, `optional`, `delay`, `time`, `started`, `duration`, `response`, `block`, `behavior`, `turn` |
-| `engage watch --json` only | `statistics` | `actor` (`null`: all together), `time`, `engagement`, `level`, `reasons`, `busy`, `session` and `recent` (each `events`, `mtbce`, `mtbce_without_maintenance`, `max_gap`, and by kind in `kinds` what `KindStatistics` has) |
-| `engage watch --json` only | `head_owner` | `owner`, `since`, `waiting` |
-| `engage watch --json` only | `fault` | `reason`, `where`, `line`, `advice`, `service` |
+| feedback | `block_progress` | [`BlockProgress`](#blockprogress--block_progress) |
+| feedback | `sync_point_progress` | [`SyncPointProgress`](#syncpointprogress--sync_point_progress) |
+| feedback | `warning` | [`WarningFeedback`](#warningfeedback--warning) |
+| `engage watch --json` only | `prediction` | [`PredictionFeedback`](#predictionfeedback--prediction) |
+| events | `connection_event` | [`ConnectionEvent`](#connectionevent--connection_event) |
+| `engage watch --json` only | `statistics` | [`Statistics`](#statistics--statistics) |
+| `engage watch --json` only | `head_owner` | [`HeadOwner`](#headowner--head_owner) |
+| `engage watch --json` only | `fault` | [`Fault`](#fault--fault) |
 
 ## Messages
 

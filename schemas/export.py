@@ -17,6 +17,7 @@ from engage_hri.schemas import lines, tool
 from engage_hri.schemas.blocks import Block
 from engage_hri.schemas.fragments import TurnFragment
 from engage_hri.schemas.messages import MAJOR, Message
+from engage_hri.schemas.units import Stamp
 
 EXPORTED = Path(__file__).parent / "exported"
 
@@ -39,10 +40,20 @@ def schema(kind: Any, name: str = "") -> dict[str, Any]:
     }
 
 
+def _schema_of_lines() -> dict[str, Any]:
+    """That of their messages, but every key is there, and an instant is a number."""
+    made = schema(lines.Told, "lines")
+    for definition in made["$defs"].values():
+        if "properties" in definition:
+            definition["required"] = list(definition["properties"])
+    made["$defs"][Stamp.__name__] = lines.INSTANT
+    return made
+
+
 def files() -> dict[str, bytes]:
     """What the folder should hold: name to content."""
     contents = {f"{kind.__name__}.json": schema(kind) for kind in exported_types()}
-    contents["lines.json"] = schema(lines.Line, "lines")
+    contents["lines.json"] = _schema_of_lines()
     contents[tool.FILE] = tool.tool_definition()
     return {
         name: msgspec.json.format(msgspec.json.encode(content), indent=2) + b"\n"

@@ -8,15 +8,7 @@ from collections.abc import Callable, Collection, Iterator, Mapping
 from msgspec.structs import replace
 
 from engage_hri.schemas.behavior_types import ROWS, dialect_sync, same_instant
-from engage_hri.schemas.behaviors import (
-    After,
-    Before,
-    Behavior,
-    Constraint,
-    Speech,
-    Synchronize,
-    Timing,
-)
+from engage_hri.schemas.behaviors import After, Before, Behavior, Constraint, Speech, Synchronize, Timing
 from engage_hri.schemas.blocks import Block, Dialect
 from engage_hri.schemas.references import in_draft_spelling, respelled, sites
 from engage_hri.schemas.syncref import BLOCK_ITSELF, SYNC_POINTS, SyncRef

@@ -14,7 +14,7 @@ from msgspec import Struct
 from engage_hri.schemas.blocks import Block
 from engage_hri.schemas.check import sound
 from engage_hri.schemas.documents.xml_decode import decode_xml
-from engage_hri.schemas.documents.xml_names import snake
+from engage_hri.schemas.documents.xml_grammar import snake
 from engage_hri.schemas.documents.xml_source import LARGEST
 from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.fragments import TurnFragment

@@ -11,6 +11,9 @@ becomes `Unknown`; the realizer warns of both. A fragment is read strictly: it i
 stands behind a reference in it is speech: `<ebml:reference .../>, and then`.
 """
 
+import re
+from collections.abc import Mapping
+from contextlib import suppress
 from itertools import chain, count
 from typing import Any
 
@@ -18,38 +21,33 @@ import msgspec
 from lxml import etree
 
 from engage_hri.schemas import behaviors as of
+from engage_hri.schemas.behavior_types import TYPES
 from engage_hri.schemas.blocks import Block, Unread
 from engage_hri.schemas.check import check
-from engage_hri.schemas.documents.xml_elements import (
-    CHILDREN,
-    CORE_BEHAVIORS,
-    EXTENSIONS,
-    OPERATORS,
-    behaviors_inside,
-    misplaced,
-    take_out,
-)
+from engage_hri.schemas.documents import xml_grammar as grammar
 from engage_hri.schemas.documents.xml_encode import encode_xml
-from engage_hri.schemas.documents.xml_names import (
-    SYNC_ATTRIBUTES,
+from engage_hri.schemas.documents.xml_grammar import AnyStruct, fields
+from engage_hri.schemas.documents.xml_source import (
+    BML_1_0,
+    CORE,
+    EBML,
+    Source,
     attributes,
-    camel,
-    converted,
-    fields,
-    hand,
-    head,
-    is_reference,
-    known_attributes,
+    local_name,
+    named,
     ours,
-    unknown_attributes,
-)
-from engage_hri.schemas.documents.xml_source import BML_1_0, CORE, EBML, Source, split
+    split,
+)  # fmt: skip
 from engage_hri.schemas.documents.xml_speech import MARKS, spoken
 from engage_hri.schemas.feedback import WarningKind
 from engage_hri.schemas.fragments import TurnFragment
 from engage_hri.schemas.references import disambiguated, in_draft_spelling
+from engage_hri.schemas.syncref import SyncRef
 
 __all__ = ["decode_xml", "encode_xml"]
+
+_STRAY = "{urn:engage}stray"
+"""The tag of elements that are about to be taken out."""
 
 
 def decode_xml(data: bytes | str, source: str = "") -> Block | TurnFragment:
@@ -65,6 +63,8 @@ class _Document:
         self._source = source
         self._speaks_1_0 = False
         self._is_strict = False
+        self._behaviors: list[of.Behavior] = []
+        self._constraints: list[of.Constraint] = []
         self._unread: list[Unread] = []
         self.line = source.line(source.root)
 
@@ -82,68 +82,59 @@ class _Document:
 
     def _block(self, root: etree._Element, namespace: str) -> Block:
         plain = attributes(root)
-        self._note_attributes(root, "bml")
-        behaviors, constraints = self._content(root)
-        raw = {
-            "id": self._id(root),
-            "behaviors": behaviors,
-            "constraints": constraints,
-            "composition": plain.get("composition", "MERGE").strip().upper(),
-            "dialect": "bml-1.0" if namespace == BML_1_0 else "draft",
-            "character_id": plain.get("characterId", ""),
-            "unread": self._unread,
-        }
-        return disambiguated(converted(self._source, root, raw, Block))
+        self._note_attributes(root)
+        raw = {"composition": plain.get("composition"), "character_id": plain.get("characterId")}
+        raw["dialect"] = "bml-1.0" if namespace == BML_1_0 else "draft"
+        return disambiguated(self._converted(root, raw | self._content(root), Block))
 
     def _fragment(self, root: etree._Element) -> TurnFragment:
         self._is_strict = True
         raw = self._own_fields(root, TurnFragment)
-        behaviors, constraints = self._content(root)
-        raw |= {"id": self._id(root), "behaviors": behaviors, "constraints": constraints}
-        raw |= {"accept": str(raw.get("accept", "")).split(), "unread": self._unread, "line": self.line}
-        fragment = disambiguated(converted(self._source, root, raw, TurnFragment))
+        fragment = disambiguated(self._converted(root, raw | self._content(root), TurnFragment))
         return in_draft_spelling(fragment, "bml-1.0") if self._speaks_1_0 else fragment
+
+    def _content(self, root: etree._Element) -> dict[str, Any]:
+        self._walk(root, required=False)
+        content = {"behaviors": self._behaviors, "constraints": self._constraints, "unread": self._unread}
+        return {"id": self._id(root), **content}
 
     def _id(self, element: etree._Element) -> str:
         if id := element.get("id"):
             return id
-        local = split(str(element.tag))[1]
-        raise self._source.refusal(f"<{local}> has no id", element, advice='add id="..."')
+        raise self._source.refusal(f"<{local_name(element)}> has no id", element, advice='add id="..."')
 
     def _leave_out(
-        self,
-        reason: str,
-        element: etree._Element,
-        behavior: str = "",
-        *,
-        kind: WarningKind = "PARSING_FAILURE",
-        required: bool = False,
-        advice: str = "",
+        self, reason: str, element: etree._Element, behavior: str = "", *, required: bool = False, advice: str = ""
     ) -> None:
         """Note what is not understood. Raises InputRefused where nothing may be left out."""
         if self._is_strict or required:
             raise self._source.refusal(reason, element, advice=advice)
-        self._note(reason, element, behavior, kind)
+        self._note(reason, element, behavior)
 
     def _note(
-        self, reason: str, element: etree._Element, behavior: str, kind: WarningKind = "PARSING_FAILURE"
+        self, reason: str, element: etree._Element, behavior: str = "", kind: WarningKind = "PARSING_FAILURE"
     ) -> None:
         message = f"line {self._source.line(element)}: {reason}; it is ignored"
         self._unread.append(Unread(message=message, behavior=behavior, kind=kind))
 
-    def _note_attributes(self, element: etree._Element, local: str, behavior: str = "") -> None:
-        """Of an element that is no behavior."""
-        for name in unknown_attributes(attributes(element), local, None):
-            self._note(f"<{local}> has no attribute {name!r}", element, behavior)
+    def _note_attributes(
+        self, element: etree._Element, behavior: str = "", kind: type[of.Behavior] | None = None
+    ) -> list[of.Timing]:
+        """Note the attributes that nobody reads. kind: of a behavior; there what names a sync point is timing."""
+        plain, local = attributes(element), local_name(element)
+        timing = []
+        for name in grammar.unknown_attributes(plain, local, kind):
+            if kind and _is_reference(plain[name]):
+                timing.append(of.Timing(name, plain[name]))
+            else:
+                self._note(f"<{local}> has no attribute {name!r}", element, behavior)
+        return timing
 
-    def _content(
-        self, parent: etree._Element, *, required: bool = False
-    ) -> tuple[list[of.Behavior], list[of.Constraint]]:
-        behaviors: list[of.Behavior] = []
-        constraints: list[of.Constraint] = []
+    def _walk(self, parent: etree._Element, *, required: bool) -> None:
+        """Read what a document, or a <required> in it, holds."""
         texts = [parent.text, *(child.tail for child in parent if not self._speaks_on(child))]
         if words := " ".join(text.strip() for text in texts if text and text.strip()):
-            self._note(f"text {words[:40]!r} outside of speech", parent, "")
+            self._note(f"text {words[:40]!r} outside of speech", parent)
         for element, namespace, local in ours(parent):
             self._speaks_1_0 |= namespace == BML_1_0
             if local in ("description", "participant"):
@@ -152,25 +143,22 @@ class _Document:
                 advice = "send it to generation as a turn fragment: <ebml:ebml>"
                 raise self._source.refusal("a block can't hold an object reference", element, advice=advice)
             if local == "required":
-                self._note_attributes(element, local)
-                more, further = self._content(element, required=True)
-                behaviors += more
-                constraints += further
+                self._note_attributes(element)
+                self._walk(element, required=True)
             elif local == "constraint":
-                constraints.append(self._constraint(element, required))
-            elif local in CORE_BEHAVIORS and namespace != EBML:
-                behaviors.append(self._behavior(element, local, CORE_BEHAVIORS[local], required))
-            elif local in EXTENSIONS and (namespace == EBML or (not namespace and self._is_strict)):
-                behaviors.append(self._behavior(element, local, EXTENSIONS[local], required))
+                self._constraints.append(self._constraint(element, required))
+            elif grammar.behavior_type(namespace, local, is_strict=self._is_strict):
+                self._behaviors.append(self._behavior(element, local, required))
                 if self._speaks_on(element) and (words := " ".join((element.tail or "").split())):
-                    behaviors.append(self._after_reference(element, words, required))
+                    self._behaviors.append(self._after_reference(element, words, required))
             elif self._is_strict or not element.get("id"):
-                advice = f"known: {', '.join(sorted(CORE_BEHAVIORS))}, constraint"
-                kind: WarningKind = "BEHAVIOR_TYPE_NOT_SUPPORTED"
-                self._leave_out(f"unknown element <{local}>", element, kind=kind, required=required, advice=advice)
+                reason = f"unknown element <{local}>"
+                if self._is_strict or required:
+                    advice = f"known: {', '.join(grammar.STANDARD)}, constraint"
+                    raise self._source.refusal(reason, element, advice=advice)
+                self._note(reason, element, kind="BEHAVIOR_TYPE_NOT_SUPPORTED")
             else:
-                behaviors.append(self._unknown(element, local, required))
-        return behaviors, constraints
+                self._behaviors.append(self._unknown(element, local, required))
 
     def _speaks_on(self, element: etree._Element) -> bool:
         """Is the text behind it said? A comma or a full stop belongs to the phrase; it is no speech by itself."""
@@ -186,69 +174,33 @@ class _Document:
         return of.Speech(id=id, text=words, timing=timing, required=required, line=line)
 
     def _unknown(self, element: etree._Element, local: str, required: bool) -> of.Unknown:
-        raw = {"id": self._id(element), "element": local, "line": self._source.line(element)}
-        raw["required"] = required or fields(attributes(element)).get("required", False)
-        return converted(self._source, element, raw, of.Unknown)
+        is_required = required or fields(attributes(element)).get("required")
+        raw = {"id": self._id(element), "element": local, "required": is_required}
+        return self._converted(element, raw, of.Unknown)
 
-    def _behavior(self, element: etree._Element, local: str, kind: type[of.Behavior], required: bool) -> of.Behavior:
-        plain = attributes(element)
-        raw: dict[str, Any] = fields(plain)
-        if local in EXTENSIONS:
-            raw = self._own_fields(element, kind)
-        raw["id"] = self._id(element)
-        raw["line"] = self._source.line(element)
-        if required:
-            raw["required"] = True
-        timing = [of.Timing(name, value) for name, value in plain.items() if name in SYNC_ATTRIBUTES]
-        if local != "speech":
+    def _behavior(self, element: etree._Element, local: str, required: bool) -> of.Behavior:
+        row, plain = TYPES[local], attributes(element)
+        raw = fields(plain) if row.is_standard else self._own_fields(element, row.kind)
+        raw |= {"id": self._id(element)} | ({"required": True} if required else {})
+        timing = [of.Timing(name, value) for name, value in plain.items() if name in grammar.SYNC_ATTRIBUTES]
+        if local == "speech":
+            timing += self._speech(element, raw)
+        else:
             self._only(element, raw["id"])
-            timing += [
-                of.Timing(child.get("sync", ""), child.get("ref", ""))
-                for child, namespace, name in ours(element)
-                if (namespace, name) == (EBML, "timing")
-            ]
-        match local:
-            case "gesture" | "pointing":
-                raw["mode"] = hand(plain.get("mode") or plain.get("hand"))
-                if plain.get("type", "").upper() == "POINT":
-                    kind = of.Pointing
-                elif kind is of.Gesture and "lexeme" not in plain and "type" in plain:
-                    raw["lexeme"] = plain["type"].upper()
-            case "head":
-                raw = head(raw)
-            case "face" | "faceShift":
-                kind = self._face(element, plain, raw, kind)
-            case "posture" | "postureShift":
-                self._posture(element, raw)
-            case "emit":
-                raw.setdefault("event", _event_of(element))
-            case "speech":
-                timing += self._speech(element, raw)
-            case "reference":
-                raw["options"] = self._options(element, raw)
-            case "event":
-                raw["accept"] = str(raw.get("accept", "")).split()
-                raw["objects"] = [child.get("id", "") for child, _, name in ours(element) if name == "object"]
-                raw["anchors"] = [child.get("ref", "") for child, _, name in ours(element) if name == "anchor"]
-        if local not in EXTENSIONS:
-            timing += self._unread_attributes(element, plain, local, kind)
-        raw["timing"] = timing
-        if "side" in raw:
-            raw["side"] = raw["side"].upper()
-        raw = {name: value for name, value in raw.items() if value is not None}
-        return converted(self._source, element, raw, kind)
-
-    def _unread_attributes(
-        self, element: etree._Element, plain: dict[str, str], local: str, kind: type[of.Behavior]
-    ) -> list[of.Timing]:
-        """Note the attributes that nobody reads. What names a sync point was meant as timing, and is returned."""
-        timing = []
-        for name in unknown_attributes(plain, local, kind):
-            if is_reference(plain[name]):
-                timing.append(of.Timing(name, plain[name]))
-            else:
-                self._note(f"<{local}> has no attribute {name!r}", element, plain["id"])
-        return timing
+            timing += _ties(element)
+        self._parts(element, local, raw)
+        for name, field in grammar.DRAFTS.get(local, {}).items():
+            if name in plain and not raw.get(field) and (local, plain[name].upper()) != ("head", "ROTATION"):
+                raw[field] = plain[name].upper()
+        if local == "emit":
+            said = ((child.text or child.get("id") or "").strip() for child in named(element, "event"))
+            raw.setdefault("event", next(said, None))
+        if local == "reference":
+            raw["options"] = self._options(element, raw)
+        kind = grammar.kind_of(local, plain.get("type", "").upper(), raw)
+        if row.is_standard:
+            timing += self._note_attributes(element, raw["id"], kind)
+        return self._converted(element, raw | {"timing": timing}, kind)
 
     def _speech(self, element: etree._Element, raw: dict[str, Any]) -> list[of.Timing]:
         self._leave_out_strays(element, raw["id"])
@@ -259,132 +211,118 @@ class _Document:
         has_text = any(name == "text" for _, _, name in children)
         for child, _, name in children:
             if name == "text":
-                self._note_attributes(child, name, raw["id"])
+                self._note_attributes(child, raw["id"])
             elif has_text and name not in ("description", "timing"):
                 self._leave_out(f"unknown element <{name}> beside <text>", child, raw["id"])
-        ties = [
-            of.Timing(child.get("sync", ""), child.get("ref", ""))
-            for child in element
-            if split(str(child.tag)) == (EBML, "timing")
-        ]
-        return [*ties, *said.timing]
+        return [*_ties(element), *said.timing]
 
     def _leave_out_strays(self, speech: etree._Element, id: str) -> None:
         """Behaviors are neither words nor markup for the voice, and marks are empty."""
-        for stray in list(behaviors_inside(speech, is_strict=self._is_strict)):
-            local = split(str(stray.tag))[1]
+        for stray in list(grammar.behaviors_inside(speech, is_strict=self._is_strict)):
+            local = local_name(stray)
             advice = f'put it beside the speech; a mark says when: start="{id}:m1"'
             self._leave_out(f"unknown element <{local}> in <speech>", stray, id, advice=advice)
-            take_out(stray)
+            stray.tag = _STRAY
+        etree.strip_elements(speech, _STRAY, with_tail=False)
         for each in speech.iter():
-            if split(str(each.tag))[1] in MARKS:
+            if local_name(each) in MARKS:
                 self._only(each, id)
 
-    def _face(
-        self, element: etree._Element, plain: dict[str, str], raw: dict[str, Any], kind: type[of.Behavior]
-    ) -> type[of.Behavior]:
-        parts = [child for child, _, name in ours(element) if name in ("lexeme", "facs")]
-        for part in parts[1:]:
-            reason = "more than one expression in a face"
-            self._leave_out(reason, part, raw["id"], required=_is_true(raw), advice="one element for each")
-        for part in parts[:1]:
-            self._note_attributes(part, split(str(part.tag))[1], raw["id"])
-            raw |= {name: part.get(name) for name in ("lexeme", "au", "side", "amount") if name in part.attrib}
-        if kind is of.FaceShift:
-            return kind
-        if "au" in raw or plain.get("type", "").upper() == "FACS":
-            return of.FaceFacs
-        if "lexeme" not in raw and "type" in plain:
-            raw["lexeme"] = plain["type"].upper()
-        return of.FaceLexeme if "lexeme" in raw else kind
-
-    def _posture(self, element: etree._Element, raw: dict[str, Any]) -> None:
-        seen = set()
+    def _parts(self, element: etree._Element, local: str, raw: dict[str, Any]) -> None:
+        """Read what stands inside a face, which is one expression, or a posture, which has one of each."""
+        family, seen = TYPES[local].family, set()
         for child, _, name in ours(element):
-            if name in seen:
-                reason = f"more than one <{name}> in a posture"
-                self._leave_out(reason, child, raw["id"], required=_is_true(raw), advice="one element for each")
-            elif name in ("stance", "pose"):
-                seen.add(name)
-                self._note_attributes(child, name, raw["id"])
-                read = {"stance": "type"} if name == "stance" else {"part": "part", "lexeme": "lexeme"}
-                raw |= {field: child.get(attribute, "") for field, attribute in read.items()}
+            if name not in grammar.PARTS.keys() & grammar.CHILDREN.get(local, ()):
+                continue
+            sort = "expression" if family == "face" else f"<{name}>"
+            if sort in seen:
+                reason, is_required = f"more than one {sort} in a {family}", _says_yes(raw.get("required"))
+                self._leave_out(reason, child, raw["id"], required=is_required, advice="one element for each")
+                continue
+            seen.add(sort)
+            self._note_attributes(child, raw["id"])
+            for each, field in grammar.PARTS[name].items():
+                if each in child.attrib or family == "posture":
+                    raw[field] = child.get(each, "")
 
     def _options(self, element: etree._Element, raw: dict[str, Any]) -> list[of.SpeechOption] | None:
         """None where the author leaves the phrases to generation."""
-        options = [self._option(child) for child, _, name in ours(element) if name == "speechOption"]
+        options = [
+            self._converted(child, self._own_fields(child, of.SpeechOption), of.SpeechOption)
+            for child in named(element, "speechOption")
+        ]
         if not _says_yes(raw.pop("propose", "")):
             return options
         if options:
             raise self._source.refusal("phrases are to be proposed, and offered", element, advice="leave out one")
         return None
 
-    def _option(self, element: etree._Element) -> of.SpeechOption:
-        raw = self._own_fields(element, of.SpeechOption)
-        raw["line"] = self._source.line(element)
-        raw["distractors"] = [child.get("object", "") for child, _, _ in ours(element)]
-        return converted(self._source, element, raw, of.SpeechOption)
-
     def _constraint(self, element: etree._Element, required: bool) -> of.Constraint:
-        self._note_attributes(element, "constraint")
-        required = required or _is_true(fields(attributes(element)))
+        self._note_attributes(element)
+        required = required or _says_yes(fields(attributes(element)).get("required"))
         operators = []
         for child, _, local in ours(element):
             if local == "description":
                 continue
-            if local not in OPERATORS:
-                advice = f"known: {', '.join(OPERATORS)}"
+            if local not in grammar.OPERATORS:
+                advice = f"known: {', '.join(grammar.OPERATORS)}"
                 reason = f"unknown element <{local}> in a constraint"
                 self._leave_out(reason, child, required=required, advice=advice)
                 continue
             self._only(child)
-            self._note_attributes(child, local)
-            raw: dict[str, Any] = {"syncs": [self._ref(sync) for sync, _, name in ours(child) if name == "sync"]}
-            if (ref := child.get("ref")) is not None:
-                raw["ref"] = ref
-            raw["line"] = self._source.line(child)
-            operators.append(converted(self._source, child, raw, OPERATORS[local]))
-        raw = {"id": element.get("id", ""), "operators": operators, "line": self._source.line(element)}
-        return converted(self._source, element, raw | {"required": required}, of.Constraint)
+            self._note_attributes(child)
+            for sync in named(child, "sync"):
+                if "ref" not in sync.attrib:
+                    raise self._source.refusal("<sync> without ref", sync, advice='<sync ref="behavior:sync"/>')
+                self._note_attributes(sync)
+            operators.append(self._converted(child, {"ref": child.get("ref")}, grammar.OPERATORS[local]))
+        raw = {"id": element.get("id"), "operators": operators, "required": required}
+        return self._converted(element, raw, of.Constraint)
 
     def _own_fields(self, element: etree._Element, kind: type[msgspec.Struct]) -> dict[str, Any]:
         """Of an EBML element, whose every attribute we know. Raises InputRefused for one that we don't."""
         plain = attributes(element)
-        raw: dict[str, Any] = fields({name: value for name, value in plain.items() if name not in SYNC_ATTRIBUTES})
-        if "min_reliability" in raw:
-            raw["minimum_reliability"] = raw.pop("min_reliability")
+        raw = fields({name: value for name, value in plain.items() if name not in grammar.SYNC_ATTRIBUTES})
         known = {*kind.__struct_fields__, "character_id", "propose" if kind is of.Reference else "id"}
         for name in raw.keys() - known:
-            local = split(str(element.tag))[1]
-            raise self._source.refusal(
-                f"<{local}> has no attribute {camel(name)!r}", element, advice=f"known: {known_attributes(kind)}"
-            )
+            reason = f"<{local_name(element)}> has no attribute {grammar.attribute(name)!r}"
+            known_names = (grammar.attribute(each) for each in grammar.attribute_fields(kind) if each != "required")
+            raise self._source.refusal(reason, element, advice=f"known: {', '.join(known_names)}")
         return raw
-
-    def _ref(self, sync: etree._Element) -> str:
-        if (ref := sync.get("ref")) is None:
-            raise self._source.refusal("<sync> without ref", sync, advice='<sync ref="behavior:sync"/>')
-        self._note_attributes(sync, "sync")
-        return ref
 
     def _only(self, element: etree._Element, behavior: str = "") -> None:
         """Note what the element, or one in it, can't hold. Raises InputRefused in a fragment."""
-        for child, name, holder in misplaced(element):
-            known = ", ".join(sorted(CHILDREN.get(holder, ()))) or "nothing"
+        for child, name, holder in grammar.misplaced(element):
+            known = ", ".join(sorted(grammar.CHILDREN.get(holder, ()))) or "nothing"
             advice = f"<{holder}> holds {known}: put <{name}> beside it"
             self._leave_out(f"unknown element <{name}> in <{holder}>", child, behavior, advice=advice)
 
+    def _converted(self, element: etree._Element, raw: Mapping[str, Any], kind: type[AnyStruct]) -> AnyStruct:
+        """The struct of an element. Raises InputRefused with the attribute that is wrong. raw: None is not given."""
+        try:
+            lines = {"line": self._source.line(element)}
+            return grammar.converted({**raw, **grammar.lists(element, kind), **lines}, kind)
+        except msgspec.ValidationError as error:
+            reason, _, path = str(error).partition(" - at `$")
+            field = path.strip(".`")
+            missing = re.fullmatch("Object missing required field `(.*)`", reason)
+            what = f"no {grammar.attribute(missing[1])}" if missing else f"{grammar.attribute(field)}: {reason}"
+            local = local_name(element)
+            name = f"<{local} id={raw['id']!r}>" if raw.get("id") else f"<{local}>"
+            raise self._source.refusal(f"{name}: {what}", element, advice=grammar.choices(kind, field)) from error
 
-def _is_true(raw: dict[str, Any]) -> bool:
-    return _says_yes(raw.get("required", ""))
+
+def _ties(element: etree._Element) -> list[of.Timing]:
+    children = (child for child in element if split(str(child.tag)) == (EBML, "timing"))
+    return [of.Timing(child.get("sync", ""), child.get("ref", "")) for child in children]
+
+
+def _is_reference(value: str) -> bool:
+    """Does the value of an attribute name a sync point of a behavior, so that it can only be meant as timing?"""
+    with suppress(ValueError):
+        return SyncRef.parse(value).behavior != ""
+    return False
 
 
 def _says_yes(value: object) -> bool:
     return str(value).strip().lower() in ("true", "1")
-
-
-def _event_of(element: etree._Element) -> str | None:
-    for child, _, name in ours(element):
-        if name == "event":
-            return (child.text or child.get("id") or "").strip()
-    return None

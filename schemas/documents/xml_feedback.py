@@ -12,14 +12,14 @@ can't be that of an attribute is an `ebml:point`. A stream of feedback is one `<
 """
 
 import re
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable, Mapping
 from itertools import groupby
-from typing import Any
+from typing import Any, NamedTuple
 
 import msgspec
 from lxml import etree
 
-from engage_hri.schemas.documents.xml_source import BML_1_0, EBML, Source, split
+from engage_hri.schemas.documents.xml_source import BML_1_0, EBML, Source, local_name, split
 from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.feedback import (
     BlockProgress,
@@ -36,22 +36,43 @@ TAIL = "</ebml:feedback>\n"
 """What stands before and behind the elements of a stream."""
 _ATTRIBUTE = re.compile(r"(?!xml|id$|type$)[A-Za-z_][A-Za-z0-9_.-]*", re.IGNORECASE)
 _OURS = ("event", "turn", "unknown")
-_GLOBAL_TIME = f"{{{EBML}}}globalTime"
-"""Of a warning: there BML knows no time."""
+_PREFIXES: Any = {None: BML_1_0, "ebml": EBML}
 _UNWRITABLE = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
+
+
+def _ours(*names: str) -> dict[str, str]:
+    """Fields whose attributes are of our namespace."""
+    return {name: f"{{{EBML}}}{name}" for name in names}
+
+
+class _Form(NamedTuple):
+    """How a message is one element. id: the fields that make up its id. attributes: of its other fields."""
+
+    kind: type[BlockProgress | SyncPointProgress | WarningFeedback]
+    id: tuple[str, ...]
+    attributes: Mapping[str, str]
+
+
+_GLOBAL_TIME = _ours("globalTime")["globalTime"]
+"""Of a warning: there BML knows no time."""
+_CLOCK = _ours("clock")["clock"]
+_FORMS = {
+    "blockProgress": _Form(
+        BlockProgress, ("block", "progress"), {"at": "globalTime", **_ours("time", "status")},
+    ),
+    "syncPointProgress": _Form(
+        SyncPointProgress, ("block", "behavior", "sync"),
+        {"time": "time", "at": "globalTime", **_ours("predicted", "arrived", "skew", "source")},
+    ),
+    "warningFeedback": _Form(WarningFeedback, ("block", "behavior"), {"kind": "type", "at": _GLOBAL_TIME}),
+}  # fmt: skip
+"""All but predictions."""
+_NAMES = {form.kind: name for name, form in _FORMS.items()}
 
 
 def encode_feedback(message: Feedback, *, in_stream: bool = False) -> str:
     """One element, without the line end. in_stream: between HEAD and TAIL, which declare the namespaces."""
-    match message:
-        case BlockProgress():
-            element = _block_progress(message)
-        case SyncPointProgress():
-            element = _sync_point_progress(message)
-        case PredictionFeedback():
-            element = _prediction(message)
-        case WarningFeedback():
-            element = _warning(message)
+    element = _prediction(message) if isinstance(message, PredictionFeedback) else _element(message)
     if message.character_id:
         element.set("characterId", _clean(message.character_id))
     etree.cleanup_namespaces(element)
@@ -62,19 +83,26 @@ def encode_feedback(message: Feedback, *, in_stream: bool = False) -> str:
     return text
 
 
-def _block_progress(message: BlockProgress) -> etree._Element:
-    element = _element("blockProgress", f"{message.block or ''}:{message.progress}")
-    _set_global_time(element, message.at)
-    _set(element, time=message.time, status=message.status)
+def _element(message: BlockProgress | SyncPointProgress | WarningFeedback) -> etree._Element:
+    local = _NAMES[type(message)]
+    form = _FORMS[local]
+    element = etree.Element(f"{{{BML_1_0}}}{local}", nsmap=_PREFIXES)
+    if id := ":".join(getattr(message, field) or "" for field in form.id).rstrip(":"):
+        element.set("id", _clean(id))
+    for field, name in form.attributes.items():
+        _set(element, name, getattr(message, field))
+    if isinstance(message, WarningFeedback):
+        element.text = _clean(message.message)
     return element
 
 
-def _sync_point_progress(message: SyncPointProgress) -> etree._Element:
-    element = _element("syncPointProgress", f"{message.block}:{message.behavior}:{message.sync}")
-    element.set("time", _number(message.time))
-    _set_global_time(element, message.at)
-    _set(element, predicted=message.predicted, arrived=message.arrived, skew=message.skew, source=message.source)
-    return element
+def _set(element: etree._Element, name: str, value: Seconds | Stamp | str | None) -> None:
+    """An attribute, unless it is empty; of an instant also its clock."""
+    if isinstance(value, Stamp):
+        _set(element, name, float(value.seconds))
+        _set(element, _CLOCK, value.clock)
+    elif value not in (None, ""):
+        element.set(name, _number(value) if isinstance(value, float) else _clean(str(value)))
 
 
 def _prediction(message: PredictionFeedback) -> etree._Element:
@@ -84,7 +112,7 @@ def _prediction(message: PredictionFeedback) -> etree._Element:
         last = max((point.time for point in message.points), default=0.0)
         block.set("globalStart", _number(message.at.seconds))
         block.set("globalEnd", _number(message.at.seconds + last))
-        _set(block, clock=message.at.clock)
+        _set(block, _CLOCK, message.at.clock)
     for (behavior, type), points in groupby(message.points, lambda point: (point.behavior, point.type)):
         is_known = _ATTRIBUTE.fullmatch(type) is not None
         tag = f"{{{EBML if type in _OURS else BML_1_0}}}{type}" if is_known else f"{{{EBML}}}behavior"
@@ -92,45 +120,12 @@ def _prediction(message: PredictionFeedback) -> etree._Element:
         for point in points:
             if type == "speech" and point.sync not in ("start", "end"):
                 text = child[0] if len(child) else etree.SubElement(child, f"{{{BML_1_0}}}text")
-                written = {"id": _clean(point.sync), "ref": _number(point.time)}
-                etree.SubElement(text, f"{{{BML_1_0}}}sync", written)
+                etree.SubElement(text, f"{{{BML_1_0}}}sync", id=_clean(point.sync), ref=_number(point.time))
             elif _ATTRIBUTE.fullmatch(point.sync) and point.sync not in child.attrib:
                 child.set(point.sync, _number(point.time))
             else:
-                written = {"sync": _clean(point.sync), "time": _number(point.time)}
-                etree.SubElement(child, f"{{{EBML}}}point", written)
+                etree.SubElement(child, f"{{{EBML}}}point", sync=_clean(point.sync), time=_number(point.time))
     return element
-
-
-def _warning(message: WarningFeedback) -> etree._Element:
-    id = ":".join(filter(None, (message.block, message.behavior)))
-    element = etree.Element(f"{{{BML_1_0}}}warningFeedback", nsmap=_PREFIXES)
-    if id:
-        element.set("id", _clean(id))
-    element.set("type", message.kind)
-    if message.at is not None:
-        _set(element, globalTime=message.at.seconds, clock=message.at.clock)
-    element.text = _clean(message.message)
-    return element
-
-
-_PREFIXES: Any = {None: BML_1_0, "ebml": EBML}
-
-
-def _element(local: str, id: str) -> etree._Element:
-    return etree.Element(f"{{{BML_1_0}}}{local}", {"id": _clean(id)}, nsmap=_PREFIXES)
-
-
-def _set_global_time(element: etree._Element, at: Stamp) -> None:
-    element.set("globalTime", _number(at.seconds))
-    _set(element, clock=at.clock)
-
-
-def _set(element: etree._Element, **fields: Seconds | str | None) -> None:
-    """Attributes of ours, unless empty."""
-    for name, value in fields.items():
-        if value not in (None, ""):
-            element.set(f"{{{EBML}}}{name}", _number(value) if isinstance(value, float) else _clean(str(value)))
 
 
 def _number(seconds: Seconds) -> str:
@@ -151,33 +146,29 @@ def decode_feedback(data: bytes | str, source: str = "") -> tuple[Feedback, ...]
 
 
 def _read(source: Source, element: etree._Element) -> Feedback:
-    local = split(str(element.tag))[1]
-    readers: dict[str, Callable[[etree._Element], Feedback]] = {
-        "blockProgress": _read_block_progress,
-        "syncPointProgress": _read_sync_point_progress,
-        "predictionFeedback": _read_prediction,
-        "warningFeedback": _read_warning,
-    }
-    if local not in readers:
-        raise source.refusal(f"<{local}> is no feedback", element, advice=f"known: {', '.join(readers)}")
+    local = local_name(element)
+    if local not in (*_FORMS, "predictionFeedback"):
+        known = "blockProgress, syncPointProgress, predictionFeedback, warningFeedback"
+        raise source.refusal(f"<{local}> is no feedback", element, advice=f"known: {known}")
     try:
-        return readers[local](element)
+        return _read_prediction(element) if local == "predictionFeedback" else _read_form(element, _FORMS[local])
     except (ValueError, LookupError, msgspec.ValidationError) as error:
         fault = Fault(reason=f"<{local}>: {error}", where=source.name, line=source.line(element))
         raise InputRefused(fault) from error
 
 
-def _read_block_progress(element: etree._Element) -> BlockProgress:
-    block, _, progress = str(element.attrib["id"]).rpartition(":")
-    fields = {"type": "block_progress", "block": block or None, "progress": progress, "at": _at(element)}
-    return msgspec.convert(fields | _extra(element, "time", "status"), BlockProgress, strict=False)
-
-
-def _read_sync_point_progress(element: etree._Element) -> SyncPointProgress:
-    block, behavior, sync = str(element.attrib["id"]).split(":", 2)
-    fields = {"type": "sync_point_progress", "block": block, "behavior": behavior, "sync": sync, "at": _at(element)}
-    fields |= {"time": element.attrib["time"]} | _extra(element, "predicted", "arrived", "skew", "source")
-    return msgspec.convert(fields, SyncPointProgress, strict=False)
+def _read_form(element: etree._Element, form: _Form) -> Feedback:
+    fields: dict[str, Any] = {"character_id": element.get("characterId", ""), "type": form.kind.__struct_config__.tag}
+    split_id = str.rsplit if form.kind is BlockProgress else str.split
+    fields |= dict(zip(form.id, split_id(str(element.get("id", "")), ":", len(form.id) - 1), strict=False))
+    if form.kind is not SyncPointProgress:
+        fields["block"] = fields["block"] or None
+    fields |= {field: element.get(name) for field, name in form.attributes.items() if name in element.attrib}
+    if seconds := fields.pop("at", None) or element.get("globalTime"):
+        fields["at"] = Stamp(str(element.get(_CLOCK, "")), float(seconds))
+    if form.kind is WarningFeedback:
+        fields["message"] = element.text or ""
+    return msgspec.convert(fields, form.kind, strict=False)
 
 
 def _read_prediction(element: etree._Element) -> PredictionFeedback:
@@ -191,40 +182,13 @@ def _read_prediction(element: etree._Element) -> PredictionFeedback:
         timed.sort(key=lambda point: type == "speech" and point[0] == "end")
         type = "" if namespace == EBML and type == "behavior" else type
         points += [PlannedPoint(behavior=behavior, sync=sync, time=float(time), type=type) for sync, time in timed]
-    at = Stamp(_clock(about), float(about.attrib["globalStart"])) if "globalStart" in about.attrib else None
-    block = str(about.attrib["id"])
-    return PredictionFeedback(block=block, points=tuple(points), at=at, character_id=element.get("characterId", ""))
+    clock, start = str(about.get(_CLOCK, "")), about.get("globalStart")
+    at = None if start is None else Stamp(clock, float(start))
+    block, character = str(about.attrib["id"]), str(element.get("characterId", ""))
+    return PredictionFeedback(block=block, points=tuple(points), at=at, character_id=character)
 
 
 def _named(point: etree._Element) -> tuple[str, str]:
     """A mark of a speech, or a point of our own."""
-    name, time = ("id", "ref") if split(str(point.tag))[1] == "sync" else ("sync", "time")
+    name, time = ("id", "ref") if local_name(point) == "sync" else ("sync", "time")
     return str(point.attrib[name]), str(point.attrib[time])
-
-
-def _read_warning(element: etree._Element) -> WarningFeedback:
-    block, _, behavior = element.get("id", "").partition(":")
-    fields = {
-        "type": "warning",
-        "block": block or None,
-        "behavior": behavior,
-        "kind": element.attrib["type"],
-        "message": element.text or "",
-        "at": _at(element) if {"globalTime", _GLOBAL_TIME} & set(element.attrib) else None,
-    }
-    return msgspec.convert(fields | _extra(element), WarningFeedback, strict=False)
-
-
-def _at(element: etree._Element) -> Stamp:
-    seconds = element.attrib.get(_GLOBAL_TIME) or element.attrib["globalTime"]
-    return Stamp(_clock(element), float(seconds))
-
-
-def _clock(element: etree._Element) -> str:
-    return str(element.get(f"{{{EBML}}}clock", ""))
-
-
-def _extra(element: etree._Element, *names: str) -> dict[str, Any]:
-    """Those of our own attributes that are there."""
-    found = {name: str(value) for name in names if (value := element.get(f"{{{EBML}}}{name}")) is not None}
-    return found | {"character_id": str(element.get("characterId", ""))}

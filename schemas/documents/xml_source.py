@@ -20,6 +20,8 @@ BML_1_0_EXTENSIONS = "http://www.bml-initiative.org/bml/coreextensions-1.0"
 CORE = frozenset({"", DRAFT, BML_1_0, BML_1_0_EXTENSIONS})
 """Namespaces of BML proper; elements of any other but ours are somebody else's and are left alone."""
 
+OURS = CORE | {EBML}
+
 LARGEST = 4 * 1024 * 1024
 """Bytes. A block of a thousand behaviors has about 200 kB."""
 DEEPEST = 64
@@ -80,7 +82,7 @@ class Source:
 
     def line(self, element: etree._Element) -> int:
         """Where the element begins, from 1."""
-        return self._lines.get(element, 0) or _last_line(element)
+        return self._lines.get(element, 0) or cast(int, element.sourceline or 0)
 
     def refusal(
         self, reason: str, element: etree._Element | None = None, *, line: int = 0, advice: str = ""
@@ -168,16 +170,9 @@ class Source:
 
 def _parser() -> etree.XMLParser:
     return etree.XMLParser(
-        encoding="utf-8",
-        recover=False,
-        resolve_entities=False,
-        load_dtd=False,
-        dtd_validation=False,
-        no_network=True,
-        huge_tree=False,
-        remove_comments=True,
-        remove_pis=True,
-    )
+        encoding="utf-8", recover=False, resolve_entities=False, load_dtd=False, dtd_validation=False,
+        no_network=True, huge_tree=False, remove_comments=True, remove_pis=True,
+    )  # fmt: skip
 
 
 def _declaring(text: str, prefixes: Set[str]) -> str:
@@ -187,10 +182,6 @@ def _declaring(text: str, prefixes: Set[str]) -> str:
     end = next(tag.end(1) for tag in _TAGS.finditer(text) if tag[1])
     declarations = "".join(f' xmlns:{prefix}="{_NOBODYS}{prefix}"' for prefix in sorted(prefixes))
     return f"{text[:end]}{declarations}{text[end:]}"
-
-
-def _last_line(element: etree._Element) -> int:
-    return cast(int, element.sourceline or 0)
 
 
 def _start_lines(text: str) -> Iterator[int]:
@@ -207,3 +198,26 @@ def split(tag: str) -> tuple[str, str]:
     """Namespace and local name of an element or attribute."""
     namespace, _, local = tag.rpartition("}")
     return namespace.removeprefix("{"), local
+
+
+def ours(parent: etree._Element) -> Iterator[tuple[etree._Element, str, str]]:
+    """The children that are BML or EBML, with namespace and local name."""
+    for child in parent:
+        namespace, local = split(str(child.tag))
+        if namespace in OURS:
+            yield child, namespace, local
+
+
+def named(parent: etree._Element, local: str) -> list[etree._Element]:
+    """The children of that name that are BML or EBML."""
+    return [child for child, _, name in ours(parent) if name == local]
+
+
+def local_name(element: etree._Element) -> str:
+    return split(str(element.tag))[1]
+
+
+def attributes(element: etree._Element) -> dict[str, str]:
+    """The attributes that are BML's or EBML's, by local name. One with an undeclared prefix is neither's."""
+    split_names = ((*split(str(name)), str(value)) for name, value in element.items())
+    return {local: value for space, local, value in split_names if space in OURS and ":" not in local}

@@ -5,14 +5,13 @@ it. `xml:space="preserve"` keeps the text as it stands.
 """
 
 import re
-from collections.abc import Callable
 from typing import NamedTuple
 from xml.sax.saxutils import escape, quoteattr
 
 from lxml import etree
 
 from engage_hri.schemas.behaviors import Mark, Speech, Timing
-from engage_hri.schemas.documents.xml_source import BML_1_0, CORE, EBML, Source, split
+from engage_hri.schemas.documents.xml_source import BML_1_0, CORE, EBML, Source, local_name, split
 from engage_hri.schemas.faults import InputRefused
 
 SSML = "http://www.w3.org/2001/10/synthesis"
@@ -37,22 +36,18 @@ def spoken(source: Source, speech: etree._Element, id: str) -> Spoken:
     content = texts[0] if texts else speech
     reading = _Reading(source, id, preserve=content.get(f"{{{XML}}}space") == "preserve")
     reading.content(content)
+    description = _ssml(speech)
     if not texts and not (said := reading.result("")).text and not said.marks:
-        if (description := _ssml(speech)) is None:
+        if description is None:
             raise source.refusal(f"speech {id!r} says nothing", speech, advice="write <text>…</text> into it")
         reading.content(description)
     if texts and any(part.strip() for part in [speech.text or "", *(child.tail or "" for child in speech)]):
         raise source.refusal("words beside <text>", speech, advice="put all words inside <text>")
-    return reading.result(_described(speech))
-
-
-def _described(speech: etree._Element) -> str:
-    """Prosodic markup from a BML 1.0 `<description type="application/ssml+xml">`, empty without one."""
-    description = _ssml(speech)
-    return "" if description is None else serialized(description)
+    return reading.result("" if description is None else serialized(description))
 
 
 def _ssml(speech: etree._Element) -> etree._Element | None:
+    """Prosodic markup from a BML 1.0 `<description type="application/ssml+xml">`."""
     for child in speech:
         if _kind(child) == "description" and child.get("type") == "application/ssml+xml":
             return child[0] if len(child) and split(str(child[0].tag))[1] == "speak" else child
@@ -126,7 +121,7 @@ def serialized(element: etree._Element) -> str:
     """The inner XML without namespaces, as a voice takes it; marks as SSML's `<mark name>`."""
     parts = [escape(element.text or "")]
     for child in element:
-        local = split(str(child.tag))[1]
+        local = local_name(child)
         if local in MARKS:
             parts.append(f"<mark name={quoteattr(child.get('id') or child.get('name') or child.get('ref') or '')}/>")
         elif local != "description":
@@ -148,26 +143,23 @@ def fill(element: etree._Element, speech: Speech, namespace: str) -> None:
 
     BML 1.0 has markup in a description beside the text, the drafts in it. What is not XML is an attribute of ours.
     """
-    content = etree.SubElement(element, f"{{{namespace}}}text")
-    if namespace == BML_1_0 and (description := _description(speech)) is not None:
-        element.append(description)
-    elif namespace != BML_1_0 and (inline := _inline(speech, namespace)) is not None:
-        element.replace(content, inline)
+    markup = _read_back(speech, namespace) if speech.markup else None
+    if markup is not None and namespace != BML_1_0:
+        element.append(markup)
         return
+    content = etree.SubElement(element, f"{{{namespace}}}text")
+    if markup is not None:
+        element.append(markup)
     elif speech.markup:
         element.set(f"{{{EBML}}}markup", speech.markup)
-    if speech.text != " ".join(
-        filter(None, speech.text.translate(dict.fromkeys(map(ord, "\t\r\n"), " ")).split(" "))
-    ):
+    if speech.text != _WHITE.sub(" ", speech.text).strip(" "):
         content.set(f"{{{XML}}}space", "preserve")
-    say = _append_text(content)
-    position = 0
     tied = ties(speech, namespace)
-    for mark in speech.marks:
-        say(speech.text[position : mark.position])
-        position = mark.position
-        etree.SubElement(content, f"{{{namespace}}}sync", {"id": mark.id, **tied.get(mark.id, {})})
-    say(speech.text[position:])
+    ends = [*(mark.position for mark in speech.marks), len(speech.text)]
+    content.text = speech.text[: ends[0]] or None
+    for mark, end in zip(speech.marks, ends[1:], strict=True):
+        element = etree.SubElement(content, f"{{{namespace}}}sync", {"id": mark.id, **tied.get(mark.id, {})})
+        element.tail = speech.text[mark.position : end] or None
 
 
 def ties(speech: Speech, namespace: str) -> dict[str, dict[str, str]]:
@@ -181,40 +173,21 @@ def ties(speech: Speech, namespace: str) -> dict[str, dict[str, str]]:
     return {timing.sync: {"ref": timing.ref} for timing in speech.timing if timing.sync in order}
 
 
-def _append_text(content: etree._Element) -> Callable[[str], None]:
-    def say(words: str) -> None:
-        if len(content):
-            content[-1].tail = words or None
-        else:
-            content.text = words or None
+def _read_back(speech: Speech, namespace: str) -> etree._Element | None:
+    """The markup as an element: in BML 1.0 a description beside the text, in the drafts the text itself.
 
-    return say
-
-
-def _description(speech: Speech) -> etree._Element | None:
-    """The markup as SSML, if reading it back gives exactly this markup."""
-    if not speech.markup:
-        return None
-    raw = (
-        f'<description xmlns="{BML_1_0}" priority="1" type="application/ssml+xml">'
-        f'<speak xmlns="{SSML}">{speech.markup}</speak></description>'
-    )
+    None for what is read as something else: it is not XML, or has not the words of the text.
+    """
+    if namespace == BML_1_0:
+        ssml = f'<speak xmlns="{SSML}">{speech.markup}</speak>'
+        content = f'<text/><description priority="1" type="application/ssml+xml">{ssml}</description>'
+        expected = Spoken("", (), speech.markup, ())
+    else:
+        content = f"<text>{speech.markup}</text>"
+        expected = Spoken(speech.text, speech.marks, speech.markup, ())
     try:
-        description = Source(raw).root
+        source = Source(f'<speech xmlns="{namespace}">{content}</speech>')
+        is_same = spoken(source, source.root, speech.id) == expected
     except InputRefused:
         return None
-    return description if len(description) == 1 and serialized(description[0]) == speech.markup else None
-
-
-def _inline(speech: Speech, namespace: str) -> etree._Element | None:
-    """The markup as content of <text>, if reading it back gives exactly this speech."""
-    if not speech.markup:
-        return None
-    raw = f'<speech xmlns="{namespace}"><text>{speech.markup}</text></speech>'
-    try:
-        source = Source(raw)
-        read = spoken(source, source.root, speech.id)
-    except InputRefused:
-        return None  # not XML, or not the words of the text: it travels as an attribute
-    same = (read.text, read.marks, read.markup) == (speech.text, speech.marks, speech.markup)
-    return source.root[0] if same and not read.timing else None
+    return source.root[-1] if is_same else None

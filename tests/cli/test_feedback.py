@@ -40,7 +40,7 @@ def test_a_refused_block_is_told_once_with_its_line(engage: Engage, block: Path,
     result = engage(*PLAY, "--feedback", "-", block)
 
     (warning,) = lines(result.out)
-    assert (warning["type"], warning["block"], warning["behavior"]) == ("warning", id, None)
+    assert (warning["type"], warning["block"], warning["behavior"]) == ("warning", id, "")
     assert result.code == 2
     assert result.err.startswith(f"{block}:{line}: ")
     assert result.err.count("\n") == 1

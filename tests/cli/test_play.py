@@ -106,7 +106,7 @@ def test_the_events_of_a_block_are_followed_to_their_ends(engage: Engage, tmp_pa
     assert result.code == 0, result.err
     (started,) = lines(result.out, type="connection_event", state="started")
     (failed,) = lines(result.out, type="connection_event", state="failed", id=started["id"])
-    assert failed["time"] - started["time"] == pytest.approx(2.5)
+    assert failed["at"] - started["at"] == pytest.approx(2.5)
 
 
 def test_a_turn_that_goes_on_is_not_held_up_by_its_pair(engage: Engage, tmp_path: Path) -> None:
@@ -136,7 +136,7 @@ def test_files_come_one_after_the_other(engage: Engage, files: dict[str, Path]) 
     (end,) = lines(result.out, block="long", progress="end")
     (start,) = lines(result.out, block="hello", progress="start")
     assert result.code == 0, result.err
-    assert start["global_time"] >= end["global_time"]
+    assert start["at"] >= end["at"]
 
 
 def test_at_gives_each_file_its_time(engage: Engage, files: dict[str, Path]) -> None:
@@ -145,7 +145,7 @@ def test_at_gives_each_file_its_time(engage: Engage, files: dict[str, Path]) -> 
     (first,) = lines(result.out, block="long", progress="start")
     (second,) = lines(result.out, block="hello", progress="start")
     assert result.code == 0, result.err
-    assert second["global_time"] - first["global_time"] == pytest.approx(0.5)
+    assert second["at"] - first["at"] == pytest.approx(0.5)
 
 
 def test_a_block_that_another_file_replaces_counts_as_done(engage: Engage, files: dict[str, Path]) -> None:
@@ -241,7 +241,7 @@ def test_a_block_may_wait_for_a_point_of_another_file(engage: Engage, files: dic
     (said,) = lines(result.out, block="long", behavior="s", sync="end")
     (looked,) = lines(result.out, block="after", behavior="g", sync="start")
     assert result.code == 0, result.err
-    assert looked["global_time"] == pytest.approx(said["global_time"])
+    assert looked["at"] == pytest.approx(said["at"])
 
 
 def test_a_point_of_a_block_that_is_not_there_is_refused(engage: Engage, tmp_path: Path) -> None:

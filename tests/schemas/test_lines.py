@@ -2,6 +2,10 @@
 
 import json
 
+import pytest
+
+from engage_hri.schemas.attention import Claim, HeadOwner
+from engage_hri.schemas.export import files
 from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.feedback import (
     BlockProgress,
@@ -11,7 +15,7 @@ from engage_hri.schemas.feedback import (
     WarningFeedback,
 )
 from engage_hri.schemas.lines import line
-from engage_hri.schemas.messages import published
+from engage_hri.schemas.messages import Message, published
 from engage_hri.schemas.presence import PeerGone
 from engage_hri.schemas.recognition import ConnectionEvent, KindStatistics, OpenEvents, Statistics, WindowStatistics
 from engage_hri.schemas.units import Stamp
@@ -23,7 +27,8 @@ def at(seconds: float) -> Stamp:
 
 def test_the_start_of_a_block() -> None:
     assert line(BlockProgress(block="b", progress="start", at=at(1.23456789))) == (
-        '{"type":"block_progress","block":"b","progress":"start","status":null,"time":0.0,"global_time":1.234568}'
+        '{"type":"block_progress","block":"b","progress":"start","at":1.234568,"time":0.0,"status":"",'
+        '"character_id":""}'
     )
 
 
@@ -31,7 +36,8 @@ def test_the_end_of_a_block_that_had_no_id() -> None:
     message = BlockProgress(block=None, progress="end", status="failed", time=0.1 + 0.2, at=at(2))
 
     assert line(message) == (
-        '{"type":"block_progress","block":null,"progress":"end","status":"failed","time":0.3,"global_time":2.0}'
+        '{"type":"block_progress","block":null,"progress":"end","at":2.0,"time":0.3,"status":"failed",'
+        '"character_id":""}'
     )
 
 
@@ -39,23 +45,26 @@ def test_a_sync_point() -> None:
     message = SyncPointProgress(block="b", behavior="g", sync="stroke", at=at(5.5), time=0.5, predicted=0.4)
 
     assert line(message) == (
-        '{"type":"sync_point_progress","block":"b","behavior":"g","sync":"stroke","time":0.5,"global_time":5.5,'
-        '"predicted":0.4,"source":"body","arrived":null,"skew":0.0}'
+        '{"type":"sync_point_progress","block":"b","behavior":"g","sync":"stroke","at":5.5,"time":0.5,'
+        '"predicted":0.4,"arrived":null,"skew":0.0,"source":"body","character_id":""}'
     )
 
 
 def test_a_warning_about_a_behavior_and_about_the_whole_block() -> None:
-    message = WarningFeedback(block="b", behavior="g", kind="NO_SUCH_TARGET", message="no 'cup'")
+    message = WarningFeedback(block="b", behavior="g", kind="NO_SUCH_TARGET", message="no 'cup'", at=at(1))
 
     assert line(message) == (
-        '{"type":"warning","block":"b","behavior":"g","kind":"NO_SUCH_TARGET","message":"no \'cup\'"}'
+        '{"type":"warning","block":"b","kind":"NO_SUCH_TARGET","message":"no \'cup\'","behavior":"g","at":1.0,'
+        '"character_id":""}'
     )
     assert json.loads(line(WarningFeedback(block=None, kind="PARSING_FAILURE", message="")) or "") == {
         "type": "warning",
         "block": None,
-        "behavior": None,
         "kind": "PARSING_FAILURE",
         "message": "",
+        "behavior": "",
+        "at": None,
+        "character_id": "",
     }
 
 
@@ -63,8 +72,9 @@ def test_a_prediction() -> None:
     message = PredictionFeedback(block="b", points=(PlannedPoint(behavior="g", sync="end", time=-0.0),))
 
     assert line(message) == (
-        '{"type":"prediction","block":"b","points":[{"behavior":"g","sync":"end","time":0.0}]}'
-    )  # fmt: skip
+        '{"type":"prediction","block":"b","points":[{"behavior":"g","sync":"end","time":0.0,"type":""}],"at":null,'
+        '"character_id":""}'
+    )
 
 
 def test_a_connection_event_that_has_only_begun() -> None:
@@ -75,8 +85,8 @@ def test_a_connection_event_that_has_only_begun() -> None:
 
     assert line(message) == (
         '{"type":"connection_event","id":"e-1","kind":"directed_gaze","initiator":"robot","responder":"human",'
-        '"objects":["cup"],"cause":"reference","state":"started","optional":false,"delay":null,"time":3.0,'
-        '"started":3.0,"duration":null,"response":null,"block":null,"behavior":null,"turn":null}'
+        '"state":"started","at":3.0,"started":3.0,"objects":["cup"],"cause":"reference","optional":false,'
+        '"delay":null,"duration":null,"limit":null,"response":null,"confidence":1.0,"block":"","behavior":"","turn":""}'
     )
 
 
@@ -86,16 +96,17 @@ def test_other_messages_have_no_line() -> None:
 
 def test_statistics_of_all() -> None:
     kind = KindStatistics(kind="directed_gaze", count=2, succeeded=2, delay_mean=0.1 + 0.2, failure_rate=0.0)
-    window = WindowStatistics(kinds=(kind,), events=2, mtbce=5.7)
+    window = WindowStatistics(kinds=(kind,), events=2, mtbce=5.7, last_start=at(2.5))
     message = Statistics(
         actor="", at=at(3), session=window, recent=WindowStatistics(), engagement=0.5, level="engaged"
     )
 
     assert json.loads(line(message) or "") == {
-        "type": "statistics", "actor": None, "time": 3.0, "engagement": 0.5, "level": "engaged", "reasons": [],
+        "type": "statistics", "actor": "", "at": 3.0, "engagement": 0.5, "level": "engaged", "reasons": [],
         "busy": False,
         "session": {
-            "events": 2, "mtbce": 5.7, "mtbce_without_maintenance": None, "max_gap": None,
+            "events": 2, "mtbce": 5.7, "mtbce_without_maintenance": None, "max_gap": None, "last_start": 2.5,
+            "last_start_without_maintenance": None,
             "kinds": [
                 {
                     "kind": "directed_gaze", "count": 2, "succeeded": 2, "failed": 0, "failure_rate": 0.0,
@@ -106,12 +117,33 @@ def test_statistics_of_all() -> None:
         },
         "recent": {
             "events": 0, "mtbce": None, "mtbce_without_maintenance": None, "max_gap": None, "kinds": [],
+            "last_start": None, "last_start_without_maintenance": None,
         },
     }  # fmt: skip
 
 
-def test_faults_and_head_owners_are_lines_as_they_travel() -> None:
-    assert line(Fault(reason="bad", where="here")) == '{"type":"fault","reason":"bad","where":"here"}'
+def test_a_fault() -> None:
+    assert line(Fault(reason="bad", where="here")) == (
+        '{"type":"fault","reason":"bad","where":"here","line":0,"advice":"","service":""}'
+    )
+
+
+@pytest.mark.parametrize(
+    "message",
+    [
+        HeadOwner(owner=Claim(kind="none", priority=0), since=at(1), waiting=(Claim(kind="glance", priority=3),)),
+        Statistics(actor="", at=at(3), session=WindowStatistics(), recent=WindowStatistics()),
+        WarningFeedback(block=None, kind="LATE", message="late"),
+    ],
+    ids=lambda message: type(message).__name__,
+)
+def test_the_exported_schema_has_the_keys_of_a_line(message: Message) -> None:
+    definitions = json.loads(files()["lines.json"])["$defs"]
+
+    schema = definitions[type(message).__name__]
+
+    assert list(json.loads(line(message) or "")) == list(schema["properties"]) == schema["required"]
+    assert definitions["Stamp"]["type"] == "number"
 
 
 def test_what_is_for_programs_of_others_travels_as_json() -> None:

@@ -60,12 +60,14 @@ def test_every_key_is_in_the_table(protocol: ModuleType) -> None:
     assert table == (constants | made) - {keys.PREFIX, keys.EVERYTHING}
 
 
-@pytest.mark.parametrize("kind", get_args(lines.Line))
-def test_every_key_of_the_json_lines_is_described(kind: type[msgspec.Struct]) -> None:
-    (row,) = re.findall(rf"^\| [^|]+ \| `{kind.__struct_config__.tag}` \| (.*) \|$", PAGE, re.MULTILINE)
+@pytest.mark.parametrize("kind", get_args(lines.Told))
+def test_the_table_of_json_lines_leads_to_the_message_of_each(kind: type[msgspec.Struct]) -> None:
+    name, tag = kind.__name__, kind.__struct_config__.tag
 
-    assert kind.__struct_fields__
-    assert set(kind.__struct_fields__) <= set(re.findall(r"`(\w+)`", row))
+    (link,) = re.findall(rf"^\| [^|]+ \| `{tag}` \| \[`{name}`\]\(#(.*)\) \|$", PAGE, re.MULTILINE)
+
+    assert link == f"{name}--{tag}".lower()
+    assert f"#### {name} · `{tag}`\n" in PAGE
 
 
 @pytest.mark.real_time
