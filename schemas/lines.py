@@ -1,6 +1,6 @@
 """The public JSON lines of `--feedback`, `--events` and `engage watch`: one line per message, every key always there.
 
-Described in docs/protocol.md, as JSON Schema in exported/lines.json; anyone may build on them, so keys are added but
+Described in docs/protocol.md, as `Line` in exported/engage.json; anyone may build on them, so keys are added but
 never renamed or removed. Times are seconds, rounded to microseconds; what is not known is null.
 """
 
