@@ -45,11 +45,28 @@ def page() -> str:
     return HEAD + "\n".join(_module(module) for module in MODULES)
 
 
+def _linked(kind: str, page: str) -> str:
+    """A type, with a link where it names one struct."""
+    names = [name for name in re.findall(r"\w+", kind) if _struct_of(name)]
+    return f"[`{kind}`]({page}#{anchor(names[0])})" if len(names) == 1 else f"`{kind}`"
+
+
+def _struct_of(name: str) -> type[msgspec.Struct] | None:
+    found = [vars(module).get(name) for module in MODULES]
+    return next((kind for kind in found if isinstance(kind, type) and issubclass(kind, msgspec.Struct)), None)
+
+
 def anchor(name: str) -> str:
     """Of a struct's heading on the page."""
-    kind = next(vars(module)[name] for module in MODULES if name in vars(module))
-    tag = kind.__struct_config__.tag
-    return name.lower() + (f"--{tag}" if tag else "")
+    kind = _struct_of(name)
+    assert kind is not None, name
+    return name.lower() + (f"--{tag}" if (tag := _tag(kind).lower()) else "")
+
+
+def _tag(kind: type[msgspec.Struct]) -> str:
+    """What `type` says of it; empty for one that is only the base of others."""
+    tag = str(kind.__struct_config__.tag or "")
+    return "" if tag == kind.__name__ else tag
 
 
 def _module(module: ModuleType) -> str:
@@ -68,7 +85,7 @@ def _struct(module: ModuleType, node: ast.ClassDef) -> list[str]:
     kind = getattr(module, node.name)
     if not (isinstance(kind, type) and issubclass(kind, msgspec.Struct)):
         return []
-    tag = kind.__struct_config__.tag
+    tag = _tag(kind)
     parts = [f"### {node.name}" + (f" · `{tag}`" if tag else ""), ""]
     prose, meanings = meanings_of(ast.get_docstring(node) or "", kind.__struct_fields__)
     if prose:
@@ -77,7 +94,7 @@ def _struct(module: ModuleType, node: ast.ClassDef) -> list[str]:
         parts += ["| field | type | default | |", "|---|---|---|---|", *rows, ""]
     bases = [base.__name__ for base in kind.__bases__ if base is not msgspec.Struct and base.__struct_fields__]
     if bases:
-        parts += [f"And the fields of `{bases[0]}`.", ""]
+        parts += [f"And the fields of [`{bases[0]}`](#{anchor(bases[0])}).", ""]
     return parts
 
 
@@ -97,7 +114,8 @@ def meanings_of(text: str, fields: tuple[str, ...]) -> tuple[str, dict[str, str]
     return prose.strip(), found
 
 
-def field_rows(owner: type, meanings: dict[str, str]) -> list[str]:
+def field_rows(owner: type, meanings: dict[str, str], page: str = "") -> list[str]:
+    """page: where the types are described, if elsewhere."""
     (node,) = ast.parse(dedent(inspect.getsource(owner))).body
     assert isinstance(node, ast.ClassDef)
     rows = []
@@ -109,7 +127,7 @@ def field_rows(owner: type, meanings: dict[str, str]) -> list[str]:
         default = "" if field.value is None else f"`{ast.unparse(field.value)}`"
         name = field.target.id
         meaning = " ".join(filter(None, [meanings.get(name), _said(following)])).replace("|", "\\|")
-        rows.append(f"| `{name}` | `{kind}` | {default} | {meaning} |")
+        rows.append(f"| `{name}` | {_linked(kind, page)} | {default} | {meaning} |")
     return rows
 
 

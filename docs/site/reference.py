@@ -3,7 +3,7 @@
 import ast
 import inspect
 import re
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from importlib import import_module
 
 import messages
@@ -59,29 +59,45 @@ def page() -> str:
         for place in BESIDE.get(title, ()):
             module, _, name = place.rpartition(".")
             kind = getattr(import_module(f"engage_hri.{module}"), name)
-            parts += [_entry(kind, f"Import it from `{kind.__module__}`.")]
+            parts += [_entry(kind, f"Import it from `{kind.__module__}`.\n")]
     return "\n".join(parts)
 
 
 def _entry(thing: type, where: str = "") -> str:
     (node,) = ast.parse(inspect.getsource(thing)).body
     if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
-        return _directive("function", node, _function(node), 4)
+        return _directive("function", _signature(node), _options(node), _function(node), 4)
     assert isinstance(node, ast.ClassDef)
-    is_struct = issubclass(thing, msgspec.Struct)
-    fields = thing.__struct_fields__ if is_struct else ()
-    doc = inspect.cleandoc(thing.__dict__.get("__doc__") or "")
-    prose, meanings = messages.meanings_of(doc, fields)
-    body = [where, prose] if where else [prose]
-    if is_struct:
-        rows = [row for base in _structs(thing) for row in messages.field_rows(base, meanings)]
-        body += ["", "| field | type | default | |", "|---|---|---|---|", *rows]
-    body += ["", *(_member(member) for member in node.body if _is_public(member))]
+    members = {each.name: each for each in node.body if isinstance(each, ast.FunctionDef | ast.AsyncFunctionDef)}
+    making = members.get("__init__")
+    is_made_by_users = making is not None and ast.get_docstring(making) is not None
+    signature = _signature(making).replace("__init__", node.name) if is_made_by_users else node.name
+    body = [*_bases(thing), where, *(_struct(thing) if issubclass(thing, msgspec.Struct) else _plain(thing))]
+    if is_made_by_users:
+        body += ["", _function(making)]
+    body += ["", *(_member(each) for name, each in members.items() if not name.startswith("_"))]
     kind = "exception" if issubclass(thing, BaseException) else "class"
-    bases = [base.__name__ for base in thing.__bases__ if base.__module__.startswith("engage_hri") and not is_struct]
-    if bases:
-        body.insert(0, f"Is a {', '.join(f'`{base}`' for base in bases)}.\n")
-    return _directive(kind, node, "\n".join(body), 5)
+    return _directive(kind, signature.replace(" -> None", ""), (), "\n".join(body), 5)
+
+
+def _bases(thing: type) -> list[str]:
+    ours = [f"`{base.__name__}`" for base in thing.__bases__ if base.__module__.startswith("engage_hri")]
+    return [f"Is a {', '.join(ours)}.\n"] if ours and not issubclass(thing, msgspec.Struct) else []
+
+
+def _plain(thing: type) -> list[str]:
+    """Of a class that is no struct: what it says, and its attributes."""
+    attributes = (*vars(thing).get("__annotations__", ()), "points", "pace", "revoked", "outcome", "block")
+    prose, meanings = messages.meanings_of(inspect.cleandoc(thing.__doc__ or ""), attributes)
+    return [prose, "", *(f"- `{name}`: {said}" for name, said in meanings.items())]
+
+
+def _struct(thing: type) -> list[str]:
+    rows, prose = [], ""
+    for base in _structs(thing):
+        prose, meanings = messages.meanings_of(inspect.cleandoc(base.__doc__ or ""), base.__struct_fields__)
+        rows += messages.field_rows(base, meanings, "messages.md")
+    return [prose, "", "| field | type | default | |", "|---|---|---|---|", *rows]
 
 
 def _structs(thing: type) -> list[type]:
@@ -91,15 +107,9 @@ def _structs(thing: type) -> list[type]:
     ]
 
 
-def _is_public(node: ast.stmt) -> bool:
-    if isinstance(node, ast.AnnAssign):  # of a class that is no struct
-        return False
-    return isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef) and not node.name.startswith("_")
-
-
-def _member(node: ast.stmt) -> str:
-    assert isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef)
-    return _directive("property" if "property" in _marks(node) else "method", node, _function(node), 4)
+def _member(node: ast.FunctionDef | ast.AsyncFunctionDef) -> str:
+    kind = "property" if "property" in _marks(node) else "method"
+    return _directive(kind, _signature(node), _options(node), _function(node), 4)
 
 
 def _marks(node: ast.FunctionDef | ast.AsyncFunctionDef) -> list[str]:
@@ -120,26 +130,20 @@ def _function(node: ast.FunctionDef | ast.AsyncFunctionDef) -> str:
     return "\n".join(told)
 
 
-def _signature(node: ast.stmt) -> str:
-    if isinstance(node, ast.ClassDef):
-        return node.name
-    assert isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef)
+def _signature(node: ast.FunctionDef | ast.AsyncFunctionDef) -> str:
     own = node.args
     own.args = [each for each in own.args if each.arg not in ("self", "cls")]
-    returned = ast.unparse(node.returns).strip("'") if node.returns else ""
     if "property" in _marks(node):
         return node.name
+    returned = ast.unparse(node.returns).replace("'Robot'", "Robot") if node.returns else ""
     return f"{node.name}({ast.unparse(own)})" + (f" -> {returned}" if returned else "")
 
 
-def _directive(kind: str, node: ast.stmt, body: str, colons: int) -> str:
-    options = _options(node)
-    return "\n".join([f"{':' * colons}{{py:{kind}}} {_signature(node)}", *options, "", body, ":" * colons, ""])
+def _directive(kind: str, signature: str, options: Iterable[str], body: str, colons: int) -> str:
+    return "\n".join([f"{':' * colons}{{py:{kind}}} {signature}", *options, "", body, ":" * colons, ""])
 
 
-def _options(node: ast.stmt) -> Iterator[str]:
-    if not isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
-        return
+def _options(node: ast.FunctionDef | ast.AsyncFunctionDef) -> Iterator[str]:
     marks = _marks(node)
     if isinstance(node, ast.AsyncFunctionDef) and "asynccontextmanager" not in marks:
         yield ":async:"
