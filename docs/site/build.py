@@ -65,11 +65,16 @@ def stage(folder: Path) -> None:
     shutil.copy2(here / "conf.py", folder)
 
 
+def sphinx(source: str, out: str) -> int:
+    """Build what is laid out. Returns 1 if there was a warning."""
+    options = ("-W", "--keep-going", "-q", "-E", "-b", "html", "-d", f"{source}/.trees")
+    return build_main([*options, source, out])
+
+
 def main(out: Path = OUT) -> int:
     source = SOURCE if out == OUT else out.with_name(f"{out.name}-source")
     stage(source)
-    options = ["-W", "--keep-going", "-q", "-E", "-b", "html", "-d", str(source / ".trees")]
-    return build_main([*options, str(source), str(out)])
+    return sphinx(str(source), str(out))
 
 
 if __name__ == "__main__":

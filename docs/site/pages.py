@@ -41,6 +41,8 @@ def _state(name: str) -> str:
 
 
 def _told(label: str) -> str:
+    if not label:
+        return ""
     happens, _, told = label.partition(" / ")
     return ", ".join(f"`{word}`" for word in happens.split(", ")) + (told and f" / {told}")
 
