@@ -1,10 +1,10 @@
-# Two commands do everything: `make demo` and `make test`. They need Python >= 3.11, make and a package index;
-# the first run makes .venv, later ones reuse it until pyproject.toml or constraints.txt change.
+# `make demo` shows it and `make test` checks it; `make docs` builds the site. They need Python >= 3.11, make and a
+# package index; the first run makes .venv, later ones reuse it until pyproject.toml or constraints.txt change.
 
 BIN := .venv/bin
 READY := .venv/.ready
 
-.PHONY: demo test lint coverage bench clean
+.PHONY: demo test lint docs generate coverage bench clean
 
 demo: $(READY)
 	@$(BIN)/engage demo $(ARGS)
@@ -24,6 +24,15 @@ coverage: $(READY)
 	@$(BIN)/coverage run -m pytest -n auto --dist loadfile $(ARGS)
 	@$(BIN)/coverage combine -q
 	@$(BIN)/coverage report
+
+docs: $(READY)
+	@$(BIN)/python docs/site/build.py
+	@echo "build/docs/index.html"
+
+# What is made from the code and tracked; a test says when it is stale.
+generate: $(READY)
+	@$(BIN)/python -m engage_hri.schemas.export
+	@$(BIN)/python docs/site/configuration.py
 
 bench: $(READY)
 	@for file in $$(grep -l __main__ benchmarks/*.py); do echo "== $$file"; $(BIN)/python "$$file" $(ARGS) || exit 1; done

@@ -25,7 +25,13 @@ class Timing(Struct, frozen=True, omit_defaults=True):
 
 
 class Behavior(Struct, frozen=True, kw_only=True, tag_field="type", omit_defaults=True):
-    """What every behavior has. `line` is the line of its XML source, 0 when there is none."""
+    """What every behavior has.
+
+    id: unique in its block or fragment; sync references name it.
+    required: without it, the block fails instead of going on.
+    timing: sync references written at the behavior itself.
+    line: of its XML source, from 1; 0 when there is none.
+    """
 
     id: str
     required: bool = False
@@ -34,7 +40,12 @@ class Behavior(Struct, frozen=True, kw_only=True, tag_field="type", omit_default
 
 
 class Gaze(Behavior, frozen=True, kw_only=True, tag="gaze", omit_defaults=True):
-    """Look at `target`, overlaid on the base gaze; at its end the eyes go back to the base."""
+    """Look at a target, overlaid on the base gaze; at its end the eyes go back to the base.
+
+    target: id of an entity; an actor's id stands for its face.
+    influence: which parts may move, as BML names them; empty: the body chooses.
+    offset_angle: degrees away from the target. offset_direction: which way, `LEFT`, `UPRIGHT` and so on.
+    """
 
     target: str
     influence: str = ""
@@ -52,7 +63,10 @@ class GazeShift(Behavior, frozen=True, kw_only=True, tag="gazeShift", omit_defau
 
 
 class Pointing(Behavior, frozen=True, kw_only=True, tag="pointing", omit_defaults=True):
-    """Point at `target`; without `mode` the body chooses the arm."""
+    """Point at a target with an arm.
+
+    target: id of an entity. mode: which hand; None: the body chooses.
+    """
 
     target: str
     mode: Hand | None = None
@@ -128,7 +142,12 @@ class Mark(Struct, frozen=True, omit_defaults=True):
 
 
 class Speech(Behavior, frozen=True, kw_only=True, tag="speech", omit_defaults=True):
-    """Say `text`. `markup` is prosodic markup for the voice (the same words), passed through untouched."""
+    """Say a text.
+
+    text: the words, as they are to be heard.
+    marks: sync points inside the text.
+    markup: prosodic markup for the voice (the same words), passed through untouched.
+    """
 
     text: str
     marks: tuple[Mark, ...] = ()
@@ -186,7 +205,13 @@ class Unknown(Behavior, frozen=True, kw_only=True, tag="unknown", omit_defaults=
 
 
 class SpeechOption(Struct, frozen=True, kw_only=True, omit_defaults=True):
-    """One phrase for a reference. cost: words, or what the manager thinks it costs; >= 0."""
+    """One phrase for a reference.
+
+    text: the words. cost: how many words they are, or what the manager thinks they cost; >= 0.
+    distractors: ids of objects besides the target that the phrase could mean, too.
+    deictic: does it need a gesture to be understood, as `this` does?
+    line: of its XML source, from 1; 0 when there is none.
+    """
 
     text: str
     cost: float
@@ -198,6 +223,7 @@ class SpeechOption(Struct, frozen=True, kw_only=True, omit_defaults=True):
 class Reference(Behavior, frozen=True, kw_only=True, tag="reference", omit_defaults=True):
     """An object reference: generation replaces it by a phrase and perhaps a gaze, a directed gaze, a point.
 
+    target: id of the object.
     minimum_reliability: in (0, 1), of the target being understood; None: generation's default.
     options: the phrases to choose from; None: generation proposes some, from what the world knows of the target.
     """

@@ -24,6 +24,10 @@ class Unread(Struct, frozen=True, kw_only=True, omit_defaults=True):
 class Block(Struct, frozen=True, kw_only=True, tag="block", omit_defaults=True):
     """A BML behavior block: behaviors and the constraints between their sync points.
 
+    id: the manager's name for it; no other live block has it.
+    behaviors: in any order; constraints and their own timing say when.
+    constraints: between sync points of these behaviors, or of live blocks.
+    composition: beside what runs (`MERGE`), after it (`APPEND`), or in its place (`REPLACE`).
     dialect: how its author spells sync points; feedback about the block is spelled the same way.
     """
 

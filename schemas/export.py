@@ -1,15 +1,17 @@
-"""JSON Schemas of everything that travels, for other languages: `python -m engage_hri.schemas.export [--check]`.
+"""JSON Schemas of everything that travels, for other languages: `python -m engage_hri.schemas.export`.
 
-One file per message of the bus, one each for a block and a turn fragment, and `lines.json` for the lines of
-`engage watch`. Draft 2020-12; quantities carry their unit as `description`. And the tool by which language models
-speak, as an API takes it (`schemas/tool.py`).
+`exported/engage.json` is one bundle, draft 2020-12, with a definition for each struct under `$defs`: all messages of
+the bus, blocks and turn fragments, and the lines of `engage watch` (`Line`). As a whole it describes any message.
+A definition is named by `engage.json#/$defs/PerformFragment`, or in a validator that has loaded the bundle by
+`urn:engage:1#PerformFragment`. Each has an `$anchor` and none an `$id`, for under an `$id` of its own `#/$defs/...`
+would mean another place. Quantities carry their unit as `description`.
+
+Beside it stands the tool by which language models speak, as an API takes it (`schemas/tool.py`).
 """
 
-import argparse
 import inspect
-import sys
 from pathlib import Path
-from typing import Any, get_args
+from typing import Any
 
 import msgspec
 
@@ -20,45 +22,55 @@ from engage_hri.schemas.messages import MAJOR, Message
 from engage_hri.schemas.units import Stamp
 
 EXPORTED = Path(__file__).parent / "exported"
+BUNDLE = "engage.json"
+"""In the folder of exported schemas."""
+ID = f"urn:engage:{MAJOR}"
 
 
-def exported_types() -> tuple[type[msgspec.Struct], ...]:
-    return (Block, TurnFragment, *get_args(Message))
-
-
-def schema(kind: Any, name: str = "") -> dict[str, Any]:
-    """The JSON Schema of a struct, or of a named union of some, complete in itself."""
-    reference, components = msgspec.json.schema_components((kind,), ref_template="#/$defs/{name}")
-    for component in components.values():
+def bundle() -> dict[str, Any]:
+    """The JSON Schema of any message, with a definition for every struct that people or programs write or read."""
+    roots = (Message, Block, TurnFragment)
+    (message, *_), components = msgspec.json.schema_components(roots, ref_template="#/$defs/{name}")
+    components |= _lines()
+    for name, component in components.items():
+        component["$anchor"] = name
         if "description" in component:
             component["description"] = inspect.cleandoc(component["description"])
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
-        "$id": f"urn:engage:{MAJOR}:{name or kind.__name__}",
-        **reference[0],
+        "$id": ID,
+        "title": f"Engage, protocol {MAJOR}: any message of the bus",
+        **message,
         "$defs": {name: components[name] for name in sorted(components)},
     }
 
 
-def _schema_of_lines() -> dict[str, Any]:
-    """That of their messages, but every key is there, and an instant is a number."""
-    made = schema(lines.Told, "lines")
-    for definition in made["$defs"].values():
-        if "properties" in definition:
-            definition["required"] = list(definition["properties"])
-    made["$defs"][Stamp.__name__] = lines.INSTANT
-    return made
+def _lines() -> dict[str, Any]:
+    """`Line`, and what it holds: as the messages, but every key is there, and an instant is a number."""
+    (line,), components = msgspec.json.schema_components((lines.Told,), ref_template="#/$defs/{name}Line")
+    for component in components.values():
+        if "properties" in component:
+            component["required"] = list(component["properties"])
+    components[Stamp.__name__] = dict(lines.INSTANT)
+    made = {f"{name}Line": component for name, component in components.items()}
+    return made | {"Line": {"description": "One line of `engage watch --json`.", **line}}
 
 
 def files() -> dict[str, bytes]:
     """What the folder should hold: name to content."""
-    contents = {f"{kind.__name__}.json": schema(kind) for kind in exported_types()}
-    contents["lines.json"] = _schema_of_lines()
-    contents[tool.FILE] = tool.tool_definition()
     return {
-        name: msgspec.json.format(msgspec.json.encode(content), indent=2) + b"\n"
-        for name, content in contents.items()
+        BUNDLE: _written(bundle(), 4).encode() + b"\n",
+        tool.FILE: _written(tool.tool_definition(), 9).encode() + b"\n",
     }
+
+
+def _written(node: Any, depth: int, indent: str = "\n") -> str:
+    """As JSON, with a line for each member down to `depth`: in the bundle each field is one line."""
+    if depth == 0 or not isinstance(node, dict):
+        return msgspec.json.encode(node).decode()
+    inner = f"{indent}  "
+    members = (f'{inner}"{name}": {_written(each, depth - 1, inner)}' for name, each in node.items())
+    return f"{{{','.join(members)}{indent}}}"
 
 
 def stale(folder: Path = EXPORTED) -> list[str]:
@@ -70,9 +82,7 @@ def stale(folder: Path = EXPORTED) -> list[str]:
 
 def write(folder: Path = EXPORTED) -> list[str]:
     """Make the folder hold exactly `files()`. Returns the names that changed."""
-    changed = stale(folder)
-    expected = files()
-    folder.mkdir(exist_ok=True)
+    changed, expected = stale(folder), files()
     for name in changed:
         if name in expected:
             (folder / name).write_bytes(expected[name])
@@ -81,20 +91,6 @@ def write(folder: Path = EXPORTED) -> list[str]:
     return changed
 
 
-def main(arguments: list[str] | None = None) -> int:
-    parser = argparse.ArgumentParser(
-        prog="python -m engage_hri.schemas.export", description=inspect.getdoc(sys.modules[__name__])
-    )
-    parser.add_argument("--check", action="store_true", help="write nothing; fail if a file is stale")
-    if parser.parse_args(arguments).check:
-        names = stale()
-        if names:
-            print(f"stale: {', '.join(names)}; run python -m engage_hri.schemas.export", file=sys.stderr)
-        return 1 if names else 0
+if __name__ == "__main__":
     for name in write():
         print(name)
-    return 0
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -5,7 +5,10 @@ from msgspec.structs import force_setattr
 
 
 class Fault(Struct, frozen=True, kw_only=True, tag="fault", omit_defaults=True):
-    """A refusal or failure, as it crosses the bus and as people read it."""
+    """A refusal or failure, as it crosses the bus and as people read it.
+
+    reason: what is wrong. advice: what to do about it. service: who says so.
+    """
 
     reason: str
     where: str = ""

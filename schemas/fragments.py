@@ -18,10 +18,17 @@ GestureChoice = Literal["none", "gaze", "directed_gaze", "directed_gaze_with_poi
 class TurnFragment(Struct, frozen=True, kw_only=True, tag="fragment", omit_defaults=True):
     """Part or whole of a turn. Thesis 3.2.
 
+    id: the manager's name for it; no other live fragment has it.
     turn_index: first, second or third turn of an adjacency pair.
+    turn_status: a whole turn (`full`), a piece of one (`beginning`, `middle`, `end`), or a `backchannel`
+    while another speaks.
+    behaviors: speech and references one after the other as written, others as their timing says.
+    constraints: between sync points of these behaviors.
     addressee: id of the person spoken to; empty: the only person the world knows.
     delay: hold the turn after this fragment while the manager thinks, eyes on `delay_target`.
+    delay_target: id of an entity; empty: a surface, away from the face.
     accept: which actions answer the adjacency pair this turn starts; empty: recognition's default.
+    line: of its XML source, from 1; 0 when there is none.
     """
 
     id: str
@@ -77,9 +84,13 @@ class ReferenceChoice(Struct, frozen=True, kw_only=True, omit_defaults=True):
 
 
 class FragmentOutcome(Outcome, frozen=True, kw_only=True, tag="fragment_outcome", omit_defaults=True):
-    """evt: generation -> requester. Sent when the block has ended and its DG and MFG are decided.
+    """evt: generation -> requester. What became of a fragment, when its block has ended and its gazes are decided.
 
-    interrupted with `replaced_by` set: the REPLACE of this block ended it.
+    fragment: its id. status: done, failed while it ran, or ended by somebody.
+    spoken: the words that were really said.
+    replaced_by: the block whose `REPLACE` ended it, if interrupted so.
+    choices: how each reference was made. warnings: what was done otherwise than asked.
+    fault: why it failed.
     """
 
     fragment: str

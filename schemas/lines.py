@@ -1,8 +1,8 @@
 """The public JSON lines of `--feedback`, `--events` and `engage watch`: one message per line.
 
-A line is the JSON form of its message (docs/protocol.md, exported/lines.json), but easier to read for a program that
-knows nothing else of the bus: every key is always there, also those at their default, and an instant is a number,
-the seconds of the bus clock. Seconds are rounded to microseconds.
+A line is the JSON form of its message (docs/protocol.md; `Line` in exported/engage.json), but easier to read for a
+program that knows nothing else of the bus: every key is always there, also those at their default, and an instant is
+a number, the seconds of the bus clock. Seconds are rounded to microseconds.
 """
 
 from typing import Any, get_args

@@ -26,9 +26,15 @@ def session_of(run: str) -> str:
 class ConnectionEvent(Struct, frozen=True, kw_only=True, tag="connection_event", omit_defaults=True):
     """evt: one change in the life of a connection event; the same id from `started` to the end.
 
-    delay: responder's start - initiator's start (adjacency pair: from the end of the turn, may be negative);
+    id: made up by recognition. kind: which of the four. state: what has just become of it.
+    initiator, responder: who began it, and who is to answer: actor ids, one of them the robot's.
+    started: when it began. objects: ids of what it is about.
+    cause: what it was begun for; `human`: a person began it. optional: does its failure count?
+    delay: responder's start - initiator's start (adjacency pair: from the end of the turn, may be negative), seconds;
     of a failed event the time from its start to its failure; None while undecided and for backchannels.
-    duration: of the shared phase, when `completed`.
+    duration: of the shared phase, seconds, when `completed`.
+    block: of an event that the robot began, the block that asked for it.
+    turn: of an adjacency pair, the robot's turn that opened it.
     """
 
     id: str
@@ -52,15 +58,19 @@ class ConnectionEvent(Struct, frozen=True, kw_only=True, tag="connection_event",
     """The least of the observations of the person that began and answered it; so far, when `started`."""
     block: str = ""
     behavior: str = ""
-    """Robot-initiated: the block and the event behavior that asked for it."""
+    """The event behavior of that block."""
     turn: str = ""
 
     def person(self, robot: str) -> str:
-        """Who takes part in it with the robot; an actor's id."""
+        """Who takes part in it with the robot: an actor's id.
+
+        robot: the robot's own actor id.
+        """
         return self.responder if self.initiator == robot else self.initiator
 
     @property
     def session(self) -> str:
+        """Which life of recognition the event is from: what its id begins with."""
         return self.id.partition("-")[0]
 
 
@@ -147,9 +157,12 @@ class WindowStatistics(Struct, frozen=True, kw_only=True, omit_defaults=True):
 
 
 class Statistics(Struct, frozen=True, kw_only=True, tag="statistics", omit_defaults=True):
-    """state: recognition. `actor` empty: overall.
+    """state: recognition. How the connection events with one person, or all, come and go.
 
-    engagement: estimate in 0..1 with its reasons and level.
+    actor: id of the person; empty: all together. at: when this was true.
+    session: since the beginning. recent: of the last seconds, `window` of the configuration.
+    engagement: estimate in 0..1; None: too little is known. level: the same in a word. reasons: why, in words.
+    busy: are they busy with a task? Then nothing is concluded from silence.
     """
 
     actor: str

@@ -86,9 +86,9 @@ class KeepAlive(Struct, frozen=True, kw_only=True, tag="keep_alive", omit_defaul
 
 
 class Answer(Struct, frozen=True, kw_only=True, omit_defaults=True):
-    """What every answer has: whose request it is about. requester, life, kind: copied from the request.
+    """What every answer has: whose request it is about.
 
-    kind: its `type`.
+    id: of the request. requester, life: copied from it. kind: its `type`.
     """
 
     id: str

@@ -36,11 +36,14 @@ class Referred(Struct, frozen=True, kw_only=True, omit_defaults=True):
 
 
 class Summary(Struct, frozen=True, kw_only=True, omit_defaults=True):
-    """status: the worst of all fragments. said: the words that were really spoken.
+    """What became of a fragment or a turn, short enough for a language model.
 
+    status: the worst of all fragments. said: the words that were really spoken.
+    references: each object that was referred to, in order.
     eye_contact: did the person return the look at the end of the turn? Absent: the turn goes on.
     answer: the action that answered the turn, `none` if none came in time, `pending` while there is time;
     absent: it expects none.
+    problems: what went wrong, in words.
     """
 
     status: Literal["done", "interrupted", "failed", "refused"]
@@ -56,6 +59,7 @@ class Summary(Struct, frozen=True, kw_only=True, omit_defaults=True):
 
     @property
     def json(self) -> str:
+        """The summary as a JSON object, without what is at its default."""
         return msgspec.json.encode(self).decode()
 
     @property
@@ -65,7 +69,10 @@ class Summary(Struct, frozen=True, kw_only=True, omit_defaults=True):
 
 
 def summary(*outcomes: FragmentOutcome) -> Summary:
-    """Of one fragment, or of the fragments of one turn in order."""
+    """Sum up one fragment, or the fragments of one turn.
+
+    outcomes: in the order of the turn.
+    """
     spoken = [each for outcome in outcomes for each in outcome.spoken]
     statuses = {outcome.status for outcome in outcomes}
     events = {event.id: event for outcome in outcomes for event in outcome.events}

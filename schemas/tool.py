@@ -121,10 +121,13 @@ Schema = dict[str, Any]
 
 
 def tool_definition(format: Format = "anthropic", world: World | None = None) -> Schema:
-    """The tool as an entry of the API's `tools`. world: its objects and people are the only ids allowed.
+    """Make the tool as an entry of the API's `tools`.
 
     OpenAI's are strict (every field required, null where it may be left out); to have Anthropic's so, add
     `"strict": true`.
+
+    format: of Anthropic's Messages API, OpenAI's Responses API, or the Chat Completions API, which others speak, too.
+    world: its objects and people are the only ids allowed; None: any.
     """
     if format == "anthropic":
         return {"name": NAME, "description": DESCRIPTION, "input_schema": input_schema(world)}

@@ -13,7 +13,10 @@ M = TypeVar("M")
 
 
 class Feed(Reading[M]):
-    """Messages of one kind, from when it was made: `async for`, or `next` with a timeout. Ends with the client."""
+    """Messages of one kind, from when it was made: `async for`, or `next` with a timeout. Ends with the client.
+
+    Use it in a `with`, or close it: what nobody reads is kept until then.
+    """
 
     def __init__(self, subscription: Subscription, kinds: tuple[type, ...], now: Callable[[], Seconds]) -> None:
         self._subscription = subscription
@@ -21,7 +24,10 @@ class Feed(Reading[M]):
         self._now = now
 
     async def next(self, timeout: Seconds | None = None) -> M | None:
-        """The next message; None after `timeout` seconds without one, or at the end."""
+        """Return the next message; None after `timeout` seconds without one, or at the end.
+
+        timeout: seconds; None: for ever.
+        """
         deadline = None if timeout is None else self._now() + timeout
         while (received := await self._subscription.next(deadline)) is not None:
             if isinstance(received.message, self._kinds):
@@ -29,6 +35,7 @@ class Feed(Reading[M]):
         return None
 
     def close(self) -> None:
+        """Hear nothing any more. What is waiting for `next` gets None."""
         self._subscription.close()
 
 
@@ -43,10 +50,14 @@ class EventFeed(Feed[ConnectionEvent]):
 
     @property
     def open(self) -> tuple[ConnectionEvent, ...]:
-        """Of what `next` has returned or will return at once, the events that have not ended."""
+        """The events that have not ended, of what `next` has returned or will return at once."""
         return tuple(self._stream.open.values())
 
     async def next(self, timeout: Seconds | None = None) -> ConnectionEvent | None:
+        """Return the next change; None after `timeout` seconds without one, or at the end.
+
+        timeout: seconds; None: for ever.
+        """
         deadline = None if timeout is None else self._now() + timeout
         while not self._told:
             due = self._stream.deadline

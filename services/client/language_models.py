@@ -23,7 +23,8 @@ from engage_hri.schemas.tool import Part, ToolInput
 from engage_hri.schemas.tool_call import fragment_of
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.client.chunking import Chunk, Chunker
-from engage_hri.services.client.robot import PerformFailed, Robot
+from engage_hri.services.client.ended import PerformFailed
+from engage_hri.services.client.robot import Robot
 
 Piece = str | Part
 """A bit of text, however short, in which `[id]` refers to an object; or a part by itself."""
@@ -35,7 +36,10 @@ async def perform_call(
 ) -> Summary:
     """Perform a model's tool call; returns the tool's result, whatever becomes of it: nothing is raised.
 
-    call: as its API gives it, decoded or as JSON. await_answer, timeout: see `Robot.perform`.
+    robot: as `connect` gives it.
+    call: the input of the tool, as its API gives it, decoded or as JSON.
+    await_answer: if it ends a turn, return only when that has been answered, or it is too late.
+    timeout: seconds to wait for it to be accepted; None: for ever.
     """
     try:
         return summary(await robot.perform(call, await_answer=await_answer, timeout=timeout))
@@ -61,10 +65,19 @@ async def stream(
 ) -> tuple[FragmentOutcome, ...]:
     """Speak the pieces as they come, as one turn; returns what became of its fragments `<id>-1`, `<id>-2`...
 
+    Where a fragment is refused, fails or is interrupted no more pieces are read, and the outcomes say so. Cancelling
+    this interrupts the robot, and so does what `pieces` raises.
+
+    robot: as `connect` gives it.
+    pieces: bits of text, however short, in which `[id]` refers to an object; or parts by themselves.
+    id: of the turn; its fragments are named by it.
     turn: what concerns the whole turn (parts and status are found here); with `thinking` the robot looks away while
-    pieces fail to come. await_answer: return only when the turn has been answered, or it is too late.
-    Where a fragment is refused, fails or is interrupted no more pieces are read, and the outcomes say so; nothing is
-    raised. Cancelling this interrupts the robot, and so does what `pieces` raises; it comes as an ExceptionGroup.
+    pieces fail to come.
+    chunker: what makes clauses of the pieces; None: as is usual.
+    await_answer: return only when the turn has been answered, or it is too late.
+
+    Raises:
+        ExceptionGroup: holds what `pieces` raised.
     """
     speaking = _Speaking(robot, id, turn, await_answer)
     try:

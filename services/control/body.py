@@ -24,14 +24,21 @@ How = Literal["relax", "freeze"]
 
 
 class Arrived(Struct, frozen=True):
-    """The body waits at hold point `sync`, which it may not pass yet."""
+    """The body has come to a hold point that it may not pass yet, and waits there.
+
+    sync: its name. at: loop time, seconds.
+    """
 
     sync: str
     at: Seconds
 
 
 class Reached(Struct, frozen=True):
-    """The body passed `sync` at `at`; it had come there at `arrived`, earlier if it had to wait. Loop time."""
+    """The body has passed a sync point.
+
+    sync: its name. at: loop time, seconds. arrived: when it had come there; earlier than `at` if it had
+    to wait.
+    """
 
     sync: str
     at: Seconds
@@ -39,7 +46,10 @@ class Reached(Struct, frozen=True):
 
 
 class Spoke(Struct, frozen=True):
-    """The voice has finished `word`; `position` characters of the text have been said."""
+    """The voice has finished a word.
+
+    word: as it stands in the text. position: characters of the text said so far. at: loop time, seconds.
+    """
 
     word: str
     position: int
@@ -50,7 +60,7 @@ Progress = Arrived | Reached | Spoke
 
 
 class BehaviorRefused(EngageError):
-    """The body cannot do this; nothing has moved."""
+    """The body cannot do this behavior. Nothing has moved."""
 
 
 class BodyFailed(EngageError):
@@ -67,12 +77,22 @@ class MovementAuthority:
     A simple body awaits `granted(sync)` before it leaves a hold point. One that plans ahead asks `covers` and
     is told of changes through `watch`.
 
-    pace: loop times at which it is asked to come to its points, where its own pace would miss them. A body that can
-    be no faster or slower ignores it; its estimates say how far it can.
+    points: the sync points of the behavior, in order.
+    pace: loop times in seconds at which it is asked to come to its points, where its own pace would miss them. A body
+    that can be no faster or slower ignores it; its estimates say how far it can.
+    revoked: how it is to end, once `revoke` was called; None before.
     """
 
     def __init__(self, behavior: BlockBehavior, through: str, pace: Mapping[str, Seconds] | None = None) -> None:
-        """Raises ValueError if the behavior has no sync point `through`."""
+        """Grant a behavior the way up to and including `through`.
+
+        behavior: whose sync points they are.
+        through: the last sync point that may be passed.
+        pace: loop times in seconds, by sync point.
+
+        Raises:
+            ValueError: the behavior has no sync point `through`.
+        """
         self.points = sync_points(behavior)
         self.pace: Mapping[str, Seconds] = dict(pace or {})
         self.revoked: How | None = None
@@ -85,33 +105,62 @@ class MovementAuthority:
         return self.points[self._through]
 
     def covers(self, sync: str) -> bool:
+        """Whether `sync` may be passed now.
+
+        sync: a sync point of the behavior.
+
+        Raises:
+            ValueError: the behavior has no such point.
+        """
         return self.points.index(sync) <= self._through
 
     def extend(self, through: str) -> None:
-        """Raises ValueError for a sync point the behavior does not have. An earlier one changes nothing."""
+        """Let the behavior go on up to and including `through`. An earlier point than before changes nothing.
+
+        through: a sync point of the behavior.
+
+        Raises:
+            ValueError: the behavior has no such point.
+        """
         if (index := self._index(through)) > self._through:
             self._through = index
             self._tell()
 
     def set_pace(self, pace: Mapping[str, Seconds]) -> None:
-        """Ask for these instants from now on, and no others."""
+        """Ask for these instants from now on, and no others.
+
+        pace: loop times in seconds, by sync point.
+        """
         if dict(pace) != self.pace:
             self.pace = dict(pace)
             self._tell()
 
     def revoke(self, how: How = "relax") -> None:
-        """End the behavior now: go to the safe pose at once, or freeze, then go."""
+        """End the behavior now. A second call changes nothing.
+
+        how: go to the safe pose at once (`relax`), or stop moving and then go (`freeze`).
+        """
         if self.revoked is None:
             self.revoked = how
             self._tell()
 
     def watch(self, on_change: Callable[[], None]) -> Callable[[], None]:
-        """Call `on_change` after each of these changes, until the returned function is called."""
+        """Call `on_change` after each change, until the returned function is called.
+
+        on_change: called on the event loop, without arguments.
+        """
         self._watchers.append(on_change)
         return lambda: self._watchers.remove(on_change)
 
     async def granted(self, sync: str) -> None:
-        """Wait until `sync` may be passed. Raises Revoked."""
+        """Wait until a sync point may be passed.
+
+        sync: a sync point of the behavior.
+
+        Raises:
+            Revoked: the behavior is to end.
+            ValueError: the behavior has no such point.
+        """
         changed = asyncio.Event()
         unwatch = self.watch(changed.set)
         try:
@@ -134,7 +183,12 @@ class MovementAuthority:
 
 
 class BodyState(Struct, frozen=True, kw_only=True):
-    """What a body measures of itself. moving: is anything in motion? looking_at: entity on the gaze axis."""
+    """What a body measures of itself.
+
+    pose: joint angles, radians. gaze: from the eyes. left_arm, right_arm: from the elbow, through the hand.
+    moving: is anything in motion? looking_at: id of the entity on the gaze axis; empty: none.
+    speaking: the text that is being said; empty: none.
+    """
 
     pose: BodyPose
     gaze: Ray
@@ -146,31 +200,51 @@ class BodyState(Struct, frozen=True, kw_only=True):
 
 
 class Body(ABC):
-    """A robot, or what passes for one. All of it is called on the event loop and none of it may block."""
+    """A robot, or what passes for one. All of it is called on the event loop and none of it may block.
+
+    capabilities: what it can do, for those who plan: types of behaviors, joints and their limits.
+    """
 
     capabilities: Capabilities
 
     @abstractmethod
     def estimate(self, behavior: BlockBehavior, pose: BodyPose | None, world: World) -> Estimate:
-        """What `behavior` would take from `pose` (None: from where the body is). Quick, and changes nothing."""
+        """Estimate what a behavior would take. Quick, and changes nothing: called often while a block is planned.
+
+        behavior: what is to be done.
+        pose: joint angles from which it would begin, radians; None: from where the body is.
+        world: the entities that targets name, in metres.
+        """
 
     @abstractmethod
     def perform(self, behavior: BlockBehavior, authority: MovementAuthority) -> AsyncGenerator[Progress, None]:
-        """Do it: every sync point once, in order, at the measured time, and never past the authority.
+        """Do a behavior: yield every sync point once, in order, at the measured time, and never past the authority.
 
-        Ending after `end` means done; ending earlier means that the authority was revoked. Raises BehaviorRefused
-        before the first progress if it can't be done, BodyFailed if it fails. However it ends, the parts
-        it used go on to their safe pose by themselves.
+        Ending after `end` means done; ending earlier means that the authority was revoked. However it ends, the parts
+        that it used go on to their safe pose by themselves.
+
+        behavior: what is to be done.
+        authority: how far it may go now; more is granted while it runs.
+
+        Raises:
+            BehaviorRefused: it can't be done; before the first progress.
+            BodyFailed: it could not be finished.
         """
 
     @abstractmethod
     async def home(self, parts: tuple[str, ...] = ()) -> None:
-        """Move `parts` (empty: all) to the safe pose; return when they are there. Ends what moves them as aborted."""
+        """Move to the safe pose; returns when the body is there. Ends what moves these parts as aborted.
+
+        parts: names of parts, as in `capabilities`; empty: all.
+        """
 
     @abstractmethod
     def state(self) -> BodyState:
-        """Now, as measured."""
+        """Measure the body now."""
 
     @abstractmethod
     def see(self, world: World) -> None:
-        """The world has changed: gaze follows its entities."""
+        """Take note of a changed world: gaze follows its entities.
+
+        world: all that is perceived, in metres.
+        """

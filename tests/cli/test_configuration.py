@@ -1,6 +1,4 @@
 import re
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
@@ -11,14 +9,6 @@ from engage_hri.services.commandline.roster import NAMES, service
 from engage_hri.services.commandline.settings import ELSEWHERE, RobotConfig, read
 
 ROOT = Path(__file__).parents[2]
-
-
-def test_the_page_is_what_the_code_says() -> None:
-    check = subprocess.run(
-        [sys.executable, ROOT / "docs" / "configuration.py", "--check"], capture_output=True, text=True, check=False
-    )
-
-    assert check.returncode == 0, check.stderr
 
 
 def test_every_key_says_what_it_means() -> None:

@@ -37,6 +37,8 @@ pytestmark = pytest.mark.real_time
 EXCUSED = {
     "make demo": "takes two and a half minutes; it runs with ARGS=--virtual-time",
     "make test": "is what runs this",
+    "make docs": "tests/docs/test_site.py builds it and looks at the result",
+    "make generate": "writes into the tree; tests/docs/test_generated.py compares",
     ".venv/bin/engage up": "is what all pages are run against",
     ".venv/bin/engage simulate --sessions 20 --seed 1 --out study": "takes minutes; tests/cli/test_simulate.py",
     ".venv/bin/python -m pip install -e '.[study]'": "changes the tests' environment; the extra is checked",

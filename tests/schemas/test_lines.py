@@ -5,7 +5,7 @@ import json
 import pytest
 
 from engage_hri.schemas.attention import Claim, HeadOwner
-from engage_hri.schemas.export import files
+from engage_hri.schemas.export import bundle
 from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.feedback import (
     BlockProgress,
@@ -138,12 +138,12 @@ def test_a_fault() -> None:
     ids=lambda message: type(message).__name__,
 )
 def test_the_exported_schema_has_the_keys_of_a_line(message: Message) -> None:
-    definitions = json.loads(files()["lines.json"])["$defs"]
+    definitions = bundle()["$defs"]
 
-    schema = definitions[type(message).__name__]
+    schema = definitions[f"{type(message).__name__}Line"]
 
     assert list(json.loads(line(message) or "")) == list(schema["properties"]) == schema["required"]
-    assert definitions["Stamp"]["type"] == "number"
+    assert definitions["StampLine"]["type"] == "number"
 
 
 def test_what_is_for_programs_of_others_travels_as_json() -> None:

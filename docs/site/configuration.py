@@ -1,0 +1,132 @@
+"""Writes docs/configuration.md from the services' config.py files: `make generate`. A test says when it is stale.
+
+The files are parsed, not imported, because what a field means stands in the strings and comments beside it.
+"""
+
+import ast
+import fnmatch
+import re
+from collections.abc import Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+ROOT = Path(__file__).resolve().parents[2]
+PAGE = ROOT / "docs" / "configuration.md"
+SECTIONS = ("generation", "realizer", "recognition", "control", "simulation", "collaboration")
+HEAD = """\
+# Configuration
+
+One TOML file configures all services: `engage run SERVICE --config engage.toml`, and the same option of `demo`,
+`up`, `play`, `plan` and `watch`. Each table below is a table of that file. Everything has a default; an unknown key,
+a wrong type or a value out of range is refused at start, with the file and the key. One setting can also be given
+on the command line, stronger than the file: `--set recognition.gaze_resolution=table`. What drives a robot loads
+nothing of the simulation: `engage run` of its services passes over `[simulation]` and `[collaboration]`.
+
+```toml
+robot = "melvin"                 # the namespace on the bus, and the robot's actor id
+covered_for = 10.0               # s: so long an object that the world leaves out is taken to be covered, where it was
+
+[recognition]
+gaze_resolution = "table"
+
+[control.variability]
+seed = 3
+noise = 0.05
+```
+
+This page is made from the code: `make generate`.
+"""
+
+
+class Key(NamedTuple):
+    name: str
+    kind: str
+    default: str
+    meaning: str
+
+
+def page() -> str:
+    parts = [HEAD]
+    for section in SECTIONS:
+        module = ast.parse((ROOT / "services" / section / "config.py").read_text(encoding="utf-8"))
+        classes = [node for node in module.body if isinstance(node, ast.ClassDef)]
+        own = [node for node in classes if node.name.endswith("Config")]
+        for node in [*own, *(node for node in classes if node not in own)]:
+            parts.append(_table(section, node, module))
+    return "\n".join(parts)
+
+
+def _table(section: str, node: ast.ClassDef, module: ast.Module) -> str:
+    title = f"## `[{section}]`" if node.name.endswith("Config") else f"### `{node.name}` (in `[{section}]`)"
+    intro, keys = _keys(node, module)
+    rows = [
+        f"| `{key.name}` | `{key.kind}` | {f'`{key.default}`' if key.default else 'required'} | {key.meaning} |"
+        for key in keys
+    ]
+    return "\n".join([title, "", intro, "", "| key | type | default | meaning |", "|---|---|---|---|", *rows, ""])
+
+
+def _docstring(text: str, fields: Sequence[str]) -> tuple[str, dict[str, str]]:
+    """What a class docstring says in general, and its `name: meaning` entries; `*_limit` names all that end so."""
+    general: list[str] = []
+    entries: dict[str, str] = {}
+    for paragraph in text.split("\n\n"):
+        paragraph = " ".join(paragraph.split())
+        starts = [
+            (found, names)
+            for found in re.finditer(r"(?:^|(?<=\. ))([a-z_*]+(?:, [a-z_*]+)*): ", paragraph)
+            if (names := _named(found[1], fields))
+        ]
+        general.append(paragraph[: starts[0][0].start()] if starts else paragraph)
+        ends = [*(found.start() for found, _ in starts[1:]), len(paragraph)] if starts else []
+        for (found, names), end in zip(starts, ends, strict=True):
+            entries.update(dict.fromkeys(names, paragraph[found.end() : end].strip()))
+    return " ".join(part.strip() for part in general if part.strip()), entries
+
+
+def _named(names: str, fields: Sequence[str]) -> list[str]:
+    """The fields that the start of an entry names; none if it is not an entry."""
+    groups = [fnmatch.filter(fields, name) for name in names.split(", ")]
+    return [name for group in groups for name in group] if all(groups) else []
+
+
+def _keys(node: ast.ClassDef, module: ast.Module) -> tuple[str, list[Key]]:
+    """What the class says in general, and its fields: documented below them or in the class's docstring."""
+    fields = [s for s in node.body if isinstance(s, ast.AnnAssign) and isinstance(s.target, ast.Name)]
+    names = [ast.unparse(field.target) for field in fields]
+    general, documented = _docstring(ast.get_docstring(node) or "", names)
+    keys = []
+    for field, name in zip(fields, names, strict=True):
+        below = node.body[node.body.index(field) + 1 :][:1]
+        if below and isinstance(below[0], ast.Expr) and isinstance(below[0].value, ast.Constant):
+            documented[name] = str(below[0].value.value)
+        default = ast.unparse(field.value) if field.value else ""
+        meaning = _cell(documented.get(name, ""))
+        keys.append(Key(name, _cell(_kind(field.annotation, module)), _cell(default), _capitalized(meaning)))
+    return general, keys
+
+
+def _kind(annotation: ast.expr, module: ast.Module) -> str:
+    """The type as written, with the module's own names for literals spelled out."""
+    for statement in module.body:
+        if (
+            isinstance(annotation, ast.Name)
+            and isinstance(statement, ast.Assign)
+            and isinstance(statement.targets[0], ast.Name)
+            and statement.targets[0].id == annotation.id
+        ):
+            return ast.unparse(statement.value)
+    return ast.unparse(annotation)
+
+
+def _capitalized(text: str) -> str:
+    """A sentence begins with a capital; a symbol, unit or name stays what it is (`kg, s/degree:`)."""
+    return text if re.match(r"[\w/]+[:,] ", text) else text[:1].upper() + text[1:]
+
+
+def _cell(text: str) -> str:
+    return " ".join(text.split()).replace("|", "\\|")
+
+
+if __name__ == "__main__":
+    PAGE.write_text(page(), encoding="utf-8")

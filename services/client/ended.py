@@ -1,0 +1,36 @@
+"""What becomes of what a client asks for: the outcome or answer, or the error that a caller gets."""
+
+from typing import TypeVar
+
+from msgspec import Struct
+
+from engage_hri.schemas.blocks import BlockOutcome
+from engage_hri.schemas.faults import Fault, NoReply, RunFailed
+from engage_hri.schemas.fragments import FragmentOutcome
+from engage_hri.schemas.units import Seconds
+
+
+class PerformFailed(RunFailed):
+    """A fragment or block failed while it ran. `outcome` tells what was done of it, `fault` why it failed."""
+
+    def __init__(self, fault: Fault, outcome: FragmentOutcome | BlockOutcome) -> None:
+        super().__init__(fault)
+        self.outcome = outcome
+
+
+O = TypeVar("O", FragmentOutcome, BlockOutcome)  # noqa: E741
+
+
+def unless_failed(outcome: O, subject: str) -> O:
+    if outcome.status == "failed":
+        raise PerformFailed(outcome.fault or Fault(reason="it failed", where=subject), outcome)
+    return outcome
+
+
+S = TypeVar("S", bound=Struct)
+
+
+def answered(message: S | None, what: str, timeout: Seconds | None) -> S:
+    if message is None:
+        raise NoReply(Fault(reason=f"no {what} within {timeout} s", advice="is its service running?"))
+    return message

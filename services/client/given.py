@@ -1,0 +1,62 @@
+"""What a client is given, checked before it is sent: a fragment in any form, a request as its server will read it."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, TypeVar
+
+import msgspec
+
+from engage_hri.schemas.blocks import Block
+from engage_hri.schemas.documents.json_codec import read
+from engage_hri.schemas.faults import Fault, InputRefused
+from engage_hri.schemas.fragments import TurnFragment
+from engage_hri.schemas.messages import decode, published
+from engage_hri.schemas.requests import Request
+
+FragmentSource = TurnFragment | str | bytes | Path | dict[str, Any]
+"""A fragment, or EBML or JSON that describes one (a language model's tool input, too), or the file it stands in."""
+
+
+def fragment_in(source: FragmentSource, unnamed: str) -> TurnFragment:
+    """unnamed: the id of one that has none. Raises InputRefused with file, line or JSON path."""
+    match source:
+        case TurnFragment():
+            return source
+        case Path():
+            try:
+                data, place = source.read_bytes(), str(source)
+            except OSError as error:
+                raise InputRefused(Fault(reason=error.strerror or str(error), where=str(source))) from error
+        case str():
+            data, place = _encoded(source.encode), ""
+        case bytes():
+            data, place = source, ""
+        case dict():
+            data, place = _encoded(lambda: msgspec.json.encode(source)), ""
+    things = read(data, place, unnamed)
+    match things:
+        case (TurnFragment() as fragment,):
+            return fragment
+        case (Block(),):
+            raise InputRefused(Fault(reason="a BML block, not a turn fragment", where=place, advice="use `realize`"))
+    raise InputRefused(Fault(reason=f"{len(things)} things, not one turn fragment", where=place))
+
+
+R = TypeVar("R", bound=Request)
+
+
+def checked(request: R) -> R:
+    """As its server will get it: structs take any values where they are made. Raises InputRefused."""
+    try:
+        decode(*published(request))  # type: ignore[arg-type]
+    except (UnicodeEncodeError, OverflowError, TypeError, ValueError, RecursionError, msgspec.MsgspecError) as error:
+        raise InputRefused(Fault(reason=str(error), where=str(request.id))) from error
+    return request
+
+
+def _encoded(encode: Callable[[], bytes]) -> bytes:
+    """Raises InputRefused for half a character, and for values that JSON does not have."""
+    try:
+        return encode()
+    except (UnicodeEncodeError, TypeError, ValueError, RecursionError, msgspec.MsgspecError) as error:
+        raise InputRefused(Fault(reason=str(error), advice="text in Unicode, or what JSON can hold")) from error

@@ -1,0 +1,24 @@
+"""What is made from the code and tracked is what the code says now."""
+
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+
+
+def test_the_page_on_configuration_is_not_stale(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.syspath_prepend(str(ROOT / "docs" / "site"))
+    import configuration
+
+    assert configuration.page() == (ROOT / "docs" / "configuration.md").read_text(encoding="utf-8"), "make generate"
+    del sys.modules["configuration"]
+
+
+def test_make_generate_writes_all_of_it() -> None:
+    """The schemas are compared in tests/schemas/test_export.py."""
+    recipe = (ROOT / "Makefile").read_text(encoding="utf-8").partition("\ngenerate:")[2].partition("\n\n")[0]
+
+    assert "engage_hri.schemas.export" in recipe
+    assert "docs/site/configuration.py" in recipe
