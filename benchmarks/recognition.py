@@ -34,7 +34,7 @@ from engage_hri.schemas.units import Seconds
 from engage_hri.services.recognition.config import RecognitionConfig
 from engage_hri.services.recognition.events.machine import Effect
 from engage_hri.services.recognition.events.session import Observation, Session
-from engage_hri.services.recognition.statistics.standings import Standings
+from engage_hri.services.recognition.statistics.published import PublishedStatistics
 from tests.recognition import recomputed
 from tests.recognition.kept import reachable
 from tests.recognition.meeting import meeting
@@ -52,7 +52,7 @@ class Recognition:
 
     def __init__(self) -> None:
         self.session = Session(ROBOT, RecognitionConfig())
-        self.standings = Standings(ROBOT, RecognitionConfig())
+        self.published = PublishedStatistics(ROBOT, RecognitionConfig())
         self.log: list[ConnectionEvent] | None = None
         """Fill it to keep the events."""
 
@@ -64,13 +64,13 @@ class Recognition:
 
     @property
     def _deadline(self) -> Seconds | None:
-        times = (self.session.deadline, self.standings.deadline)
+        times = (self.session.deadline, self.published.deadline)
         return min((at for at in times if at is not None), default=None)
 
     def _tell(self, effects: list[Effect], now: Seconds) -> None:
         events = [effect for effect in effects if isinstance(effect, ConnectionEvent)]
         busy = self.session.busy
-        self.standings.feed(events, busy, now)
+        self.published.feed(events, busy, now)
         if self.log is not None:
             self.log += events
 
@@ -104,9 +104,9 @@ def statistics(observations: int) -> Rows:
     recognition.run(islice(meeting(1), observations))
     log, config = recognition.log, RecognitionConfig()
     since = process_time()
-    standings = Standings(ROBOT, config)
+    published = PublishedStatistics(ROBOT, config)
     for change in log:
-        standings.feed([change], set(), change.at.seconds)
+        published.feed([change], set(), change.at.seconds)
     kept_up = (process_time() - since) / len(log)
     sample = range(len(log) // 20, len(log), max(1, len(log) // 20))
     since = process_time()
@@ -145,7 +145,7 @@ def day(hours: int, people: int) -> Rows:
         recognition.run(stream)
         seconds = process_time() - since
         gc.collect()
-        kept = list(reachable(recognition.session, recognition.standings))
+        kept = list(reachable(recognition.session, recognition.published))
         rows.append({"hour": number, "objects": len(kept), "kB": round(sum(map(sys.getsizeof, kept)) / 1000, 1),
                      "process_MB": round(resident() / 1e6, 1), "cpu_seconds": round(seconds, 1)})  # fmt: skip
         del kept

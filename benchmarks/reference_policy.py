@@ -38,7 +38,7 @@ from engage_hri.services.commandline.process import run
 from engage_hri.services.control.torso.body import SimulatedBody
 from engage_hri.services.generation.config import GenerationConfig
 from engage_hri.services.generation.references.motions import Motions, collect, distinct, from_each_other, from_here
-from engage_hri.services.generation.references.policy import Posture, Scene, choose, considered, cost
+from engage_hri.services.generation.references.policy import HeadAndArms, ReferenceScene, choose, considered, cost
 from engage_hri.services.generation.service import generate
 from engage_hri.services.requests.ends import RequestDesk, Requester
 from engage_hri.services.runtime.service import running
@@ -117,9 +117,9 @@ class Choosing:
         self.world = world
         self.body = body
 
-    def scene(self) -> Scene:
+    def scene(self) -> ReferenceScene:
         says = self.body.capabilities
-        return Scene(world=self.world, half_angle=says.gaze_half_angle, pointing_radius=says.pointing_radius)
+        return ReferenceScene(world=self.world, half_angle=says.gaze_half_angle, pointing_radius=says.pointing_radius)
 
     def cost(self) -> Seconds:
         choices = choose(self.references, self.scene(), self.motions, CONFIG).choices
@@ -151,7 +151,7 @@ class BruteForce(Choosing):
         ]  # fmt: skip
         least = math.inf
         for sequence in itertools.product(*tables):
-            total, posture = 0.0, Posture()
+            total, posture = 0.0, HeadAndArms()
             for reference, pair in zip(self.references, sequence, strict=True):
                 total += cost(pair, reference.target, posture, self.motions, CONFIG)
                 posture = posture.after(pair.gesture, reference.target, self.motions)

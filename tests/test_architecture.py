@@ -37,7 +37,7 @@ SHELLS = {
     "services/realizer/perform/surroundings.py",  # what performances share: the bus, too
     "services/realizer/perform/live.py",  # resolved when a block has ended
     "services/generation/body_link.py",  # asks the body
-    "services/generation/conductor.py",  # awaits the blocks of fragments
+    "services/generation/fragment_runner.py",  # awaits the blocks of fragments
     "services/control/body.py",  # the interface of bodies: coroutines
     "services/control/torso/body.py",  # a body that moves on the loop's clock
     "services/control/waiting.py",  # waits for a moment or a change of authority
@@ -60,7 +60,7 @@ LAYERS = {
     " > client > requests > runtime > bus > tangram",
     "services/bus": "memory zenoh > interface payloads > journal",
     "services/control": "service > torso > voice > actions waiting > body > variability > config",
-    "services/generation": "service > conductor > performance > body_link fragment_check pipeline > block head"
+    "services/generation": "service > fragment_runner > performance > body_link fragment_check pipeline > block head"
     " > references turns > permits > config",
     "services/realizer": "export service > perform > decide > plan > net > config points",
     "services/recognition": "service > recognizer > perceive statistics > events > config",

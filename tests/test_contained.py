@@ -39,9 +39,9 @@ def breaking(attribute: str) -> Callable[..., Any]:
 @pytest.mark.parametrize(
     ("place", "what"),
     [
-        ("engage_hri.services.generation.conductor.Conductor.admit", "perform"),
+        ("engage_hri.services.generation.fragment_runner.Conductor.admit", "perform"),
         ("engage_hri.services.generation.pipeline.plan", "perform"),
-        ("engage_hri.services.generation.conductor.plan", "perform"),
+        ("engage_hri.services.generation.fragment_runner.plan", "perform"),
         ("engage_hri.services.realizer.service.plan_steps", "realize"),
         ("engage_hri.services.realizer.perform.performance.Decisions", "realize"),
         ("engage_hri.services.realizer.decide.decisions.Decisions.advance", "realize"),
@@ -193,7 +193,7 @@ async def test_an_error_of_a_driver_that_cannot_even_be_written_down_ends_one_be
     def broken(*arguments: object) -> Any:
         raise Odd
 
-    monkeypatch.setattr(logging.getLogger("engage"), "disabled", True)  # pytest can't write it down, either
+    monkeypatch.setattr(logging.root.manager, "disable", logging.CRITICAL)  # pytest can't write it down, either
     async with whole_robot(hub) as robot:
         with monkeypatch.context() as patch:
             patch.setattr("engage_hri.services.control.torso.body.SimulatedBody.perform", broken)

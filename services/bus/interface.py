@@ -336,7 +336,7 @@ class Hub(ABC):
         """A participant's own view. Names are unique on a robot's bus; a client makes its own unique."""
 
     @abstractmethod
-    async def vacant(self, *names: str) -> None:
+    async def wait_until_free(self, *names: str) -> None:
         """Wait until nobody else is there under these names, for one who has died may still seem to be.
 
         Raises InputRefused for those who stay.

@@ -53,7 +53,7 @@ class MemoryHub(Hub):
         self._buses[name] = bus = MemoryBus(self, name, role, run=str(self._lives))
         return bus
 
-    async def vacant(self, *names: str) -> None:
+    async def wait_until_free(self, *names: str) -> None:
         """Whoever has died is gone at once; `join` refuses a name that is taken."""
 
     async def close(self) -> None:

@@ -318,7 +318,7 @@ class Robot:
                 if world.people:
                     return world.people[0]
 
-    def standings(self, actor: str = "") -> Feed[Statistics]:
+    def statistics_updates(self, actor: str = "") -> Feed[Statistics]:
         """Follow the statistics of a person, or of each and `all`: now, and at each change. Only the newest are kept.
 
         actor: id of the person, or `all` for all together; empty: each of these.
@@ -338,7 +338,7 @@ class Robot:
             NoReply: none within `timeout`.
             ValueError: a name that can be no person.
         """
-        with self.standings(actor) as feed:
+        with self.statistics_updates(actor) as feed:
             return answered(await feed.next(timeout), f"statistics of {actor}", timeout)
 
     def _feed(self, kinds: tuple[type, ...], *patterns: str, keep: Keep = Keep.EVERY) -> Feed[Any]:

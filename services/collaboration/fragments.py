@@ -30,7 +30,7 @@ SIDE_WORDS: dict[Side, str] = {"left": "left side", "right": "right side"}
 """The others are called what they are: "the top right of"."""
 
 
-class Mention(Struct, frozen=True, kw_only=True):
+class PieceMention(Struct, frozen=True, kw_only=True):
     """A reference to a piece within a sentence. deictic: a word ("that") offered besides the phrase."""
 
     piece: str
@@ -39,7 +39,7 @@ class Mention(Struct, frozen=True, kw_only=True):
     deictic: str = ""
 
 
-Sentence = Sequence[str | Mention]
+Sentence = Sequence[str | PieceMention]
 
 
 def fragment(
@@ -84,7 +84,7 @@ def fragment(
     )
 
 
-def _spoken(number: int, part: str | Mention, universe: tuple[str, ...]) -> Speech | Reference:
+def _spoken(number: int, part: str | PieceMention, universe: tuple[str, ...]) -> Speech | Reference:
     if isinstance(part, str):
         return Speech(id=f"speech-{number}", text=part)
     named = SpeechOption(text=part.phrase, cost=float(len(part.phrase.split())))
@@ -114,14 +114,14 @@ def request(
     verb: Literal["move", "fix"] = "move",
     piece_reliability: float,
     landmark_reliability: float,
-) -> tuple[str | Mention, ...]:
+) -> tuple[str | PieceMention, ...]:
     """ "Please move the blue piece so that it is touching the top of the rectangle." """
     side = SIDE_WORDS.get(wanted.side, wanted.side)
     landmark = name_of(wanted.landmark, table)
     piece = name_of(wanted.piece, table)
     return (
         f"Please {verb}",
-        Mention(piece=wanted.piece, phrase=piece, reliability=piece_reliability, deictic=deictic),
+        PieceMention(piece=wanted.piece, phrase=piece, reliability=piece_reliability, deictic=deictic),
         f"so that it is touching the {side} of",
-        Mention(piece=wanted.landmark, phrase=landmark, reliability=landmark_reliability),
+        PieceMention(piece=wanted.landmark, phrase=landmark, reliability=landmark_reliability),
     )

@@ -12,7 +12,7 @@ from engage_hri.schemas.fragments import FragmentOutcome, TurnFragment
 from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.world import Entity
 from engage_hri.services.collaboration.config import CollaborationConfig
-from engage_hri.services.collaboration.fragments import MANIPULATION, Mention, Sentence, fragment, request
+from engage_hri.services.collaboration.fragments import MANIPULATION, PieceMention, Sentence, fragment, request
 from engage_hri.services.collaboration.task import Goal, Instruction, check
 from engage_hri.services.tangram.table import TangramTable
 
@@ -142,14 +142,14 @@ class Manager:
         )
         return fragment(id, sentence, addressee=self._person, universe=self._universe, accept=MANIPULATION)
 
-    def introduction(self) -> tuple[str | Mention, ...]:
+    def introduction(self) -> tuple[str | PieceMention, ...]:
         """Step 3: what lies on the table."""
         return (
             "We are going to use the pieces on the table to make a picture together. "
             "As you can see, on the table we have: squares, triangles,",
-            Mention(piece="rectangle", phrase="a rectangle", reliability=self.config.landmark_reliability),
+            PieceMention(piece="rectangle", phrase="a rectangle", reliability=self.config.landmark_reliability),
             "and",
-            Mention(piece="trapezoid", phrase="a trapezoid", reliability=self.config.piece_reliability),
+            PieceMention(piece="trapezoid", phrase="a trapezoid", reliability=self.config.piece_reliability),
             "of different colors.",
         )
 
@@ -161,7 +161,7 @@ class Turn(Struct, frozen=True, kw_only=True):
     """A row of a script. Exactly one of the three: something said, a placement asked for, or "Ummmm, good."."""
 
     step: str
-    say: tuple[str | Mention, ...] = ()
+    say: tuple[str | PieceMention, ...] = ()
     instruction: Instruction | None = None
     look: bool = True
 

@@ -15,8 +15,8 @@ from engage_hri.services.client.robot import Robot
 from engage_hri.services.collaboration import plans
 from engage_hri.services.collaboration.appendix_b import turns
 from engage_hri.services.collaboration.config import CollaborationConfig
+from engage_hri.services.collaboration.pieces_in_view import PiecesInView
 from engage_hri.services.collaboration.placement import has_been_placed
-from engage_hri.services.collaboration.sight import Sight
 from engage_hri.services.runtime.service import Ready
 from engage_hri.services.tangram.table import tangram_table
 
@@ -26,7 +26,7 @@ async def collaborate(bus: Bus, ready: Ready, config: CollaborationConfig) -> No
     manager = plans.Manager(config, tangram_table())
     plan = plans.script(manager, turns(manager)) if config.mode == "scripted" else plans.task(manager)
     async with Robot.on(bus) as robot, asyncio.TaskGroup() as tasks:
-        engine = _Engine(robot, bus, Sight(config.steady))
+        engine = _Engine(robot, bus, PiecesInView(config.steady))
         with robot.worlds() as worlds:
             watching = tasks.create_task(engine.watch(worlds), name="watch the table")
             ready()
@@ -47,7 +47,7 @@ async def _follow(plan: plans.Plan[None], engine: "_Engine") -> None:
 class _Engine:
     """Does what a plan wishes, and watches the table all the while."""
 
-    def __init__(self, robot: Robot, bus: Bus, sight: Sight) -> None:
+    def __init__(self, robot: Robot, bus: Bus, sight: PiecesInView) -> None:
         self._robot = robot
         self._bus = bus
         self._sight = sight

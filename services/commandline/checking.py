@@ -11,10 +11,10 @@ from engage_hri.schemas.syncref import SyncRef
 from engage_hri.schemas.world import World
 from engage_hri.services.commandline.ends import readable
 from engage_hri.services.commandline.outputs import Outputs
-from engage_hri.services.commandline.sources import Source, read_source
+from engage_hri.services.commandline.sources import InputFile, read_source
 
 
-def read_all(files: Sequence[Path], outputs: Outputs) -> tuple[Source, ...]:
+def read_all(files: Sequence[Path], outputs: Outputs) -> tuple[InputFile, ...]:
     """All files. Raises InputRefused for the first bad one, its warning among the feedback."""
     sources = []
     for path in files:
@@ -26,7 +26,7 @@ def read_all(files: Sequence[Path], outputs: Outputs) -> tuple[Source, ...]:
     return tuple(sources)
 
 
-def check(sources: Sequence[Source], world: World | None, robot: str, outputs: Outputs) -> None:
+def check(sources: Sequence[InputFile], world: World | None, robot: str, outputs: Outputs) -> None:
     """Contradictions in blocks; in fragments what the world does not know, if it is known. Raises InputRefused."""
     from engage_hri.services.generation.fragment_check import checked
     from engage_hri.services.realizer.plan.planner import plan_block

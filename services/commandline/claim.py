@@ -23,7 +23,7 @@ PATIENCE: Seconds = 4.0
 _TOKEN = re.compile(r"(?P<starting>starting-)?up-(?P<id>[0-9a-f]{8})")
 
 
-class Claim:
+class StartClaim:
     """Of one that is starting, on a robot's services."""
 
     def __init__(self, robot: str, id: str) -> None:
@@ -55,7 +55,7 @@ class Claim:
 class Claiming:
     """A claim, the tokens that show it, and what is heard of others."""
 
-    def __init__(self, claim: Claim, presence: Subscription, up: Bus) -> None:
+    def __init__(self, claim: StartClaim, presence: Subscription, up: Bus) -> None:
         self._claim = claim
         self._presence = presence
         self.bus = up
@@ -101,8 +101,8 @@ async def claiming(hub: Hub, id: str = "") -> AsyncIterator[Claiming]:
     try:
         with starting.subscribe(keys.ANY_ALIVE) as presence:
             starting.declare_alive()
-            await hub.vacant()  # until all are known who are there
-            yield Claiming(Claim(hub.robot, id), presence, up)
+            await hub.wait_until_free()  # until all are known who are there
+            yield Claiming(StartClaim(hub.robot, id), presence, up)
     finally:
         await starting.leave()
         await up.leave()

@@ -20,7 +20,7 @@ from engage_hri.services.commandline.options import Configured, WorldFile
 from engage_hri.services.commandline.outputs import Terminal
 from engage_hri.services.commandline.process import DONE
 from engage_hri.services.commandline.sources import read_source, read_world
-from engage_hri.services.generation.pipeline import Plan
+from engage_hri.services.generation.pipeline import FragmentPlan
 
 GESTURES: dict[GestureChoice, str] = {
     "none": "none",
@@ -77,7 +77,7 @@ def as_json(choices: Sequence[ReferenceChoice]) -> str:
     return msgspec.json.format(msgspec.json.encode(rows), indent=2).decode()
 
 
-def show(plans: Sequence[Plan], console: Console) -> None:
+def show(plans: Sequence[FragmentPlan], console: Console) -> None:
     for plan in plans:
         show_tables(plan.choices, console)
         total = sum(choice.cost for choice in plan.choices)

@@ -11,20 +11,20 @@ from engage_hri.schemas.fragments import ReferenceChoice, TurnFragment
 from engage_hri.schemas.world import World
 from engage_hri.services.commandline.config import Config
 from engage_hri.services.commandline.sources import Thing
-from engage_hri.services.generation.pipeline import Plan
+from engage_hri.services.generation.pipeline import FragmentPlan
 from engage_hri.services.runtime.virtual_time import run_virtual
 
 
 class Unplanned(RunFailed):
     """A fragment that cannot be performed. plans: of those before it. choices: the tables of its references."""
 
-    def __init__(self, fault: Fault, plans: list[Plan], choices: tuple[ReferenceChoice, ...]) -> None:
+    def __init__(self, fault: Fault, plans: list[FragmentPlan], choices: tuple[ReferenceChoice, ...]) -> None:
         super().__init__(fault)
         self.plans = plans
         self.choices = choices
 
 
-def generated(things: Sequence[Thing], world: World, config: Config, source: str) -> list[Plan]:
+def generated(things: Sequence[Thing], world: World, config: Config, source: str) -> list[FragmentPlan]:
     """As generation would plan them one after the other, the simulated body at home before each.
 
     A block is its own plan. Raises InputRefused or Unplanned, as performing them would.
@@ -32,12 +32,12 @@ def generated(things: Sequence[Thing], world: World, config: Config, source: str
     return run_virtual(_generated(things, world, config, source))
 
 
-async def _generated(things: Sequence[Thing], world: World, config: Config, source: str) -> list[Plan]:
+async def _generated(things: Sequence[Thing], world: World, config: Config, source: str) -> list[FragmentPlan]:
     from engage_hri.services.control.torso.body import SimulatedBody
     from engage_hri.services.generation.fragment_check import checked
     from engage_hri.services.generation.head.inhibitions import Leases
     from engage_hri.services.generation.pipeline import glance, plan, targets
-    from engage_hri.services.generation.references.discourse import SILENCE
+    from engage_hri.services.generation.references.discourse import NO_DISCOURSE
     from engage_hri.services.generation.references.motions import collect, distinct, from_each_other, from_here
     from engage_hri.services.generation.references.policy import Unreferable
     from engage_hri.services.generation.turns.policy import TurnPolicy
@@ -50,10 +50,10 @@ async def _generated(things: Sequence[Thing], world: World, config: Config, sour
         return [body.estimate(item.behavior, item.pose, world) for item in items]
 
     plans = []
-    discourse = SILENCE
+    discourse = NO_DISCOURSE
     for each in things:
         if isinstance(each, Block):
-            plans.append(Plan(block=each))
+            plans.append(FragmentPlan(block=each))
             continue
         fragment = checked(each, world, config.robot)
         turn = turns.accept(fragment, fragment.addressee)

@@ -31,7 +31,7 @@ from engage_hri.services.commandline.outputs import FeedbackFormat, Outputs, Ter
 from engage_hri.services.commandline.played import Played
 from engage_hri.services.commandline.process import DONE, FAILED, REFUSED, run, unique
 from engage_hri.services.commandline.prose import Prose, Warnings, not_strict
-from engage_hri.services.commandline.sources import Source, Thing, read_world, still
+from engage_hri.services.commandline.sources import InputFile, Thing, read_world, still
 from engage_hri.services.console.follow import Sink, following
 from engage_hri.services.console.live import Log
 from engage_hri.services.console.log import Telling
@@ -77,7 +77,7 @@ class Job(NamedTuple):
     """times: when to submit each source, seconds from the start; None: one after the other."""
 
     options: Options
-    sources: tuple[Source, ...]
+    sources: tuple[InputFile, ...]
     times: tuple[Seconds, ...] | None
     played: Played
     outputs: Outputs
@@ -209,7 +209,7 @@ async def _perform_each(job: Job, robot: Robot, patience: Seconds | None) -> int
     loop = asyncio.get_running_loop()
     began = loop.time()
 
-    async def later(source: Source, time: Seconds) -> int:
+    async def later(source: InputFile, time: Seconds) -> int:
         await asyncio.sleep(began + time - loop.time())
         return await _perform(job, source, robot, patience)
 
@@ -219,7 +219,7 @@ async def _perform_each(job: Job, robot: Robot, patience: Seconds | None) -> int
     return max(task.result() for task in tasks)
 
 
-async def _perform(job: Job, source: Source, robot: Robot, patience: Seconds | None) -> int:
+async def _perform(job: Job, source: InputFile, robot: Robot, patience: Seconds | None) -> int:
     """Perform what a file holds, in order; its worst exit code. A failure is told and ends nothing else."""
     worst = DONE
     for thing in source.things:

@@ -19,7 +19,7 @@ from engage_hri.services.runtime.service import Service
 Thing = Block | TurnFragment
 
 
-class Source(Struct, frozen=True, kw_only=True):
+class InputFile(Struct, frozen=True, kw_only=True):
     """A file and what it holds, in order."""
 
     path: Path
@@ -38,13 +38,13 @@ class Source(Struct, frozen=True, kw_only=True):
             raise InputRefused(fault) from error
 
 
-def read_source(path: Path) -> Source:
+def read_source(path: Path) -> InputFile:
     """Raises InputRefused with the file, the line or JSON path, and the reason."""
     unnamed = path.stem if is_id(path.stem) else json_codec.UNNAMED
     things = json_codec.read(_bytes(path), str(path), unnamed)
     if not things:
         raise InputRefused(Fault(reason="holds nothing to perform", where=str(path)))
-    return Source(path=path, things=things)
+    return InputFile(path=path, things=things)
 
 
 def read_world(path: Path | None) -> World:

@@ -45,7 +45,7 @@ async def _up(options: Options, config: Config, outputs: Outputs, console: Conso
     # Our own session comes first and stays: children may crash, the place where all find one another does not.
     async with await options.open(config.robot, options.listen or ()) as hub, claiming(hub) as claim:
         await claim.granted()
-        await hub.vacant(*_names(options))
+        await hub.wait_until_free(*_names(options))
         bus = claim.bus
         tallying = Tallying(bus.now())
         live = options.task and console.is_terminal and not options.quiet

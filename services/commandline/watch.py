@@ -104,7 +104,7 @@ async def _watch(options: Options, config: Config, wanted: Wanted) -> None:
         bus = hub.join(unique("watch"))
         # As text everything includes what people do and say, but statistics would drown it.
         everything = wanted.is_everything and not options.json
-        telling = Telling(standings=not everything)
+        telling = Telling(statistics=not everything)
         show: Sink = as_json if options.json else Log(Terminal(), config.robot, bus.now(), telling)
 
         def tell(message: Message, at: Seconds) -> None:

@@ -15,13 +15,13 @@ from engage_hri.services.console.view import OWN_BLOCKS, Scene
 
 class Telling(Struct, frozen=True, kw_only=True):
     """What the log tells. actions: what people and the robot do; points: sync points; head: who owns the head;
-    standings: statistics; warnings: of the realizer and of the policies.
+    statistics: statistics; warnings: of the realizer and of the policies.
     """
 
     actions: bool = True
     points: bool = True
     head: bool = True
-    standings: bool = False
+    statistics: bool = False
     warnings: bool = True
 
 
@@ -43,8 +43,8 @@ def _text(message: Message, before: Scene, after: Scene, telling: Telling) -> st
             who = f"{message.initiator} → {message.responder}"
             kind = wording.KINDS[message.kind]
             return f"* {kind}, {who}{about} ({message.cause}): {wording.decision(message)}"
-        case Statistics() if telling.standings:
-            return wording.standing(message)
+        case Statistics() if telling.statistics:
+            return wording.statistics(message)
         case HeadOwner() if telling.head:
             waiting = wording.names([claim.kind for claim in message.waiting])
             return f"head: {wording.claim(message.owner)}" + (f"; waiting: {waiting}" if waiting else "")

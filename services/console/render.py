@@ -11,7 +11,7 @@ from rich.text import Text
 
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.console import wording
-from engage_hri.services.console.view import Actor, EventInView, Point, Scene
+from engage_hri.services.console.view import Actor, EventInView, PointInView, Scene
 
 HEIGHT = 30
 """In lines, where nothing says how high the terminal is."""
@@ -168,9 +168,9 @@ def _plan(scene: Scene, height: int) -> Panel:
     return _panel(_LastLines(table, height), title)
 
 
-def _together(points: tuple[Point, ...]) -> list[list[Point]]:
+def _together(points: tuple[PointInView, ...]) -> list[list[PointInView]]:
     """Points of one behavior that are one instant share a row."""
-    rows: list[list[Point]] = []
+    rows: list[list[PointInView]] = []
     for point in points:
         last = rows[-1][0] if rows else None
         if last and (last.behavior, _ms(last.planned), _ms(last.realised)) == (
@@ -186,7 +186,7 @@ def _ms(value: float | None) -> int | None:
     return None if value is None else round(1000 * value)
 
 
-def _window(rows: list[list[Point]], shown: int) -> list[list[Point]]:
+def _window(rows: list[list[PointInView]], shown: int) -> list[list[PointInView]]:
     """The newest realised rows and the next planned ones, by time."""
     came = sorted((row for row in rows if row[0].realised is not None), key=lambda row: row[0].realised or 0.0)
     to_come = [row for row in rows if row[0].realised is None]

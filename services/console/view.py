@@ -47,7 +47,7 @@ class Actor(Struct, frozen=True, kw_only=True):
         return next((doing for doing in self.doing if doing.action == "look"), None)
 
 
-class Utterance(Struct, frozen=True, kw_only=True):
+class UtteranceInView(Struct, frozen=True, kw_only=True):
     """text: the words said so far; of people the words are not known."""
 
     actor: str
@@ -57,7 +57,7 @@ class Utterance(Struct, frozen=True, kw_only=True):
     open: bool = True
 
 
-class Point(Struct, frozen=True, kw_only=True):
+class PointInView(Struct, frozen=True, kw_only=True):
     """A sync point of a block; both times count from the block's start."""
 
     behavior: str
@@ -76,7 +76,7 @@ class BlockInView(Struct, frozen=True, kw_only=True):
 
     id: str
     began: Seconds
-    points: tuple[Point, ...] = ()
+    points: tuple[PointInView, ...] = ()
     places: Mapping[tuple[str, str], int] = {}
     status: str = ""
     """Empty while it runs."""
@@ -96,7 +96,7 @@ class Scene(Struct, frozen=True, kw_only=True):
     began: Seconds
     now: Seconds
     actors: tuple[Actor, ...] = ()
-    said: tuple[Utterance, ...] = ()
+    said: tuple[UtteranceInView, ...] = ()
     blocks: tuple[BlockInView, ...] = ()
     events: tuple[EventInView, ...] = ()
     owner: Claim | None = None
@@ -131,12 +131,12 @@ def feed(scene: Scene, message: Message, at: Seconds) -> Scene:
         case BlockProgress(block=str() as block) if not block.startswith(OWN_BLOCKS):
             return _block(scene, message, at)
         case SyncPointProgress(block=block) if not block.startswith(OWN_BLOCKS):
-            point = Point(
+            point = PointInView(
                 behavior=message.behavior, sync=message.sync, planned=message.predicted, realised=message.time
             )
             return _points(scene, block, (point,))
         case PredictionFeedback(block=block) if not block.startswith(OWN_BLOCKS):
-            points = tuple(Point(behavior=p.behavior, sync=p.sync, planned=p.time) for p in message.points)
+            points = tuple(PointInView(behavior=p.behavior, sync=p.sync, planned=p.time) for p in message.points)
             return _points(scene, block, points)
         case ConnectionEvent():
             return _event(scene, message, at)
@@ -188,7 +188,7 @@ def _voice(scene: Scene, message: ActionBegan | ActionEnded, at: Seconds) -> Sce
             msgspec.structs.replace(u, open=False) if u.open and u.actor == message.actor else u for u in scene.said
         )
         return msgspec.structs.replace(scene, said=said)
-    utterance = Utterance(actor=message.actor, behavior=message.behavior, began=at)
+    utterance = UtteranceInView(actor=message.actor, behavior=message.behavior, began=at)
     if any(u.open and (u.actor, u.behavior) == (message.actor, message.behavior) for u in scene.said):
         return scene
     return msgspec.structs.replace(scene, said=(*scene.said, utterance)[-UTTERANCES_KEPT:])
@@ -203,7 +203,7 @@ def _speak(scene: Scene, word: WordSpoken, at: Seconds) -> Scene:
             said[index] = msgspec.structs.replace(said[index], text=text)
             break
     else:
-        said.append(Utterance(actor=scene.robot, behavior=behavior, began=at, text=word.word))
+        said.append(UtteranceInView(actor=scene.robot, behavior=behavior, began=at, text=word.word))
     return msgspec.structs.replace(scene, said=tuple(said)[-UTTERANCES_KEPT:])
 
 
@@ -221,12 +221,12 @@ def _block(scene: Scene, message: BlockProgress, at: Seconds) -> Scene:
     return msgspec.structs.replace(scene, blocks=tuple(block for block in blocks if block.id not in forgotten))
 
 
-def _points(scene: Scene, id: str, news: tuple[Point, ...]) -> Scene:
+def _points(scene: Scene, id: str, news: tuple[PointInView, ...]) -> Scene:
     blocks = tuple(_merged(block, news) if block.id == id else block for block in scene.blocks)
     return msgspec.structs.replace(scene, blocks=blocks)
 
 
-def _merged(block: BlockInView, news: tuple[Point, ...]) -> BlockInView:
+def _merged(block: BlockInView, news: tuple[PointInView, ...]) -> BlockInView:
     """A plan never unsays what was realised, and a realised point keeps the newest plan made before it."""
     points, places = list(block.points), block.places
     if any((new.behavior, new.sync) not in places for new in news):

@@ -76,7 +76,7 @@ def warning(message: WarningFeedback) -> str:
     return f"! {message.kind} {place}: {message.message}"
 
 
-def standing(statistics: Statistics) -> str:
+def statistics(statistics: Statistics) -> str:
     """`anna: engaged 0.92; 12 events, MTBCE 5.31 s`; the reasons, too, if it is less than engaged."""
     engagement = f"{statistics.level} {number(statistics.engagement)}" if statistics.engagement is not None else "-"
     reasons = f" ({'; '.join(statistics.reasons)})" if statistics.reasons and statistics.level != "engaged" else ""

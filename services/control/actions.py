@@ -8,7 +8,7 @@ from engage_hri.services.control.body import Reached
 ActionMessage = ActionBegan | ActionEnded
 
 
-class Deeds:
+class ActionReporter:
     """Turns progress into actions of `actor`. Every action that began ends once."""
 
     def __init__(self, actor: str, clock: str) -> None:

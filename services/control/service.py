@@ -33,7 +33,7 @@ from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.world import World
 from engage_hri.services.bus.interface import Bus, Received, is_asked_to_stop
 from engage_hri.services.control import variability
-from engage_hri.services.control.actions import ActionMessage, Deeds
+from engage_hri.services.control.actions import ActionMessage, ActionReporter
 from engage_hri.services.control.body import (
     Arrived,
     BehaviorRefused,
@@ -115,7 +115,7 @@ class _Control:
         self._config = config
         self._body = body
         self._tasks = tasks
-        self._deeds = Deeds(bus.robot, bus.clock)
+        self._deeds = ActionReporter(bus.robot, bus.clock)
         self._world = World(entities=())
         self._objects = objects
         self._live: dict[str, _UnderWay] = {}

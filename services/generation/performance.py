@@ -23,11 +23,11 @@ from engage_hri.schemas.fragments import FragmentOutcome, PerformFragment, Refer
 from engage_hri.schemas.speakable import has_words
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.generation.permits import Permits
-from engage_hri.services.generation.pipeline import Plan
+from engage_hri.services.generation.pipeline import FragmentPlan
 from engage_hri.services.generation.references.policy import Unreferable
+from engage_hri.services.generation.turns.continuation import NO_CONTINUATION, Continuation
 from engage_hri.services.generation.turns.events import TurnEvents
 from engage_hri.services.generation.turns.policy import TurnPlan
-from engage_hri.services.generation.turns.trail import NOTHING, Trail
 
 AWAITED = ("directed_gaze", "mutual_facial_gaze")
 """Events that must be decided before the outcome. An adjacency pair may take as long as its answer."""
@@ -51,7 +51,7 @@ class FragmentPerformance:
         self.fragment = fragment
         self.turn = turn
         self.block_id = ""
-        self.plan: Plan | None = None
+        self.plan: FragmentPlan | None = None
         self.accepted = False
         self.refusal: Fault | None = None
         """The realizer found the block impossible before the fragment was accepted: nothing has moved."""
@@ -73,7 +73,7 @@ class FragmentPerformance:
         self._reached: set[tuple[str, str]] = set()
         self._ended: Ended | None = None
 
-    def begin(self, plan: Plan) -> None:
+    def begin(self, plan: FragmentPlan) -> None:
         """Its block is to be sent; again, if what it referred to had ended when it came."""
         self._tries += 1
         self.block_id = f"{self.request.id}.block" + (f"-{self._tries}" if self._tries > 1 else "")
@@ -112,9 +112,13 @@ class FragmentPerformance:
         return self is not other and self.turn.turn == other.turn.turn and self.plan is not None and not self.is_over
 
     @property
-    def trail(self) -> Trail:
+    def continuation(self) -> Continuation:
         """What the turn's next fragment has to follow."""
-        return self.plan.trail.pending(self.fragment.id, self._reached) if self.plan is not None else NOTHING
+        return (
+            self.plan.continuation.pending(self.fragment.id, self._reached)
+            if self.plan is not None
+            else NO_CONTINUATION
+        )
 
     @property
     def unsaid(self) -> frozenset[str]:

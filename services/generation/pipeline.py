@@ -14,19 +14,19 @@ from engage_hri.services.generation.block.ordering import ordered
 from engage_hri.services.generation.block.parts import Mention
 from engage_hri.services.generation.config import GenerationConfig
 from engage_hri.services.generation.permits import Permits
-from engage_hri.services.generation.references.discourse import SILENCE, Discourse
+from engage_hri.services.generation.references.discourse import NO_DISCOURSE, Discourse
 from engage_hri.services.generation.references.motions import Motions
 from engage_hri.services.generation.references.phrases import proposed
-from engage_hri.services.generation.references.policy import Choices, Scene, choose
+from engage_hri.services.generation.references.policy import Choices, ReferenceScene, choose
+from engage_hri.services.generation.turns.continuation import NO_CONTINUATION, Continuation
 from engage_hri.services.generation.turns.policy import TurnPlan, vain_delay
-from engage_hri.services.generation.turns.trail import NOTHING, Trail
 
 
-class Plan(Struct, frozen=True, kw_only=True):
-    """trail: what the block leaves for the turn's next fragment. mentions: when each object has been referred to."""
+class FragmentPlan(Struct, frozen=True, kw_only=True):
+    """continuation: for the turn's next fragment. mentions: when each object has been referred to."""
 
     block: Block
-    trail: Trail = NOTHING
+    continuation: Continuation = NO_CONTINUATION
     mentions: tuple[Mention, ...] = ()
     choices: tuple[ReferenceChoice, ...] = ()
     warnings: tuple[str, ...] = ()
@@ -56,9 +56,9 @@ def plan(
     motions: Motions,
     permits: Permits,
     config: GenerationConfig,
-    before: Trail = NOTHING,
-    discourse: Discourse = SILENCE,
-) -> Plan:
+    before: Continuation = NO_CONTINUATION,
+    discourse: Discourse = NO_DISCOURSE,
+) -> FragmentPlan:
     """The block of a checked fragment. body, motions: needed for references only. before: the turn's other blocks'.
 
     discourse: what was referred to before it.
@@ -70,18 +70,18 @@ def plan(
         chosen = choose(made.references, _scene(world, body, permits, config), motions, config)
     emission = emit(fragment, turn, chosen.choices, config, permits, chosen.hands, before)
     warnings = (*vain_delay(fragment), *made.warnings, *chosen.warnings, *emission.warnings)
-    return Plan(
+    return FragmentPlan(
         block=emission.block,
-        trail=emission.trail,
+        continuation=emission.continuation,
         mentions=emission.mentions,
         choices=chosen.choices,
         warnings=warnings,
     )
 
 
-def _scene(world: World, body: Capabilities | None, permits: Permits, config: GenerationConfig) -> Scene:
+def _scene(world: World, body: Capabilities | None, permits: Permits, config: GenerationConfig) -> ReferenceScene:
     said = body or Capabilities(body="unknown", types=(), parts=())
-    return Scene(
+    return ReferenceScene(
         world=world,
         half_angle=config.gaze_half_angle or said.gaze_half_angle,
         pointing_radius=config.pointing_radius or said.pointing_radius,

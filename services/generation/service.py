@@ -17,9 +17,9 @@ from engage_hri.schemas.requests import Cancel, Request, Unreadable
 from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.world import World
 from engage_hri.services.bus.interface import Bus, Received
-from engage_hri.services.generation.conductor import Conductor
 from engage_hri.services.generation.config import GenerationConfig
 from engage_hri.services.generation.fragment_check import lacks_people
+from engage_hri.services.generation.fragment_runner import FragmentRunner
 from engage_hri.services.generation.head.arbiter import Arbiter, Shift
 from engage_hri.services.generation.head.inhibitions import Leases
 from engage_hri.services.requests.ends import RequestDesk, Requester
@@ -62,7 +62,9 @@ class _Generation:
         self._requests = Requester(bus)
         self._arbiter = Arbiter(bus.robot, config)
         self._leases = Leases(config)
-        self._conductor = Conductor(bus, config, self._desk, self._requests, self._arbiter, self._leases, self._after)
+        self._runner = FragmentRunner(
+            bus, config, self._desk, self._requests, self._arbiter, self._leases, self._after
+        )
         self._objects = objects
         self._early: dict[str, tuple[PerformFragment, Seconds]] = {}
         """Fragments that came before the first report of the world, and when they give up."""
@@ -86,35 +88,35 @@ class _Generation:
         match message:
             case World():
                 world = self._objects.see(message, now)
-                self._conductor.feed(world, now)
+                self._runner.feed(world, now)
                 self._arbiter.feed(world, now)
                 early, self._early = self._early, {}
                 for request, until in early.values():
                     with self._desk.serving(request):
                         self._admit(request, now, until)
             case ConnectionEvent():
-                self._conductor.feed(message, now)
+                self._runner.feed(message, now)
                 self._arbiter.feed(message, now)
             case ActionBegan() | ActionEnded():
-                self._conductor.feed(message, now)
+                self._runner.feed(message, now)
                 if message.actor != self._bus.robot:
                     self._arbiter.feed(message, now)
             case RobotState() | Statistics() | ActorFound() | ActorLost():
                 self._arbiter.feed(message, now)
             case SyncPointProgress():
-                self._conductor.feed(message, now)
+                self._runner.feed(message, now)
             case Unreadable(id=id, fault=fault):
                 self._warn(id, "PARSING_FAILURE", str(fault))
             case PeerGone(participant="control"):
-                self._conductor.body_lost()
+                self._runner.body_lost()
                 self._arbiter.body_lost()
             case PeerGone(participant="realizer"):
                 self._arbiter.body_lost()
             case PeerGone(participant="recognition"):
-                self._conductor.recognition_gone(now)
+                self._runner.recognition_gone(now)
                 self._arbiter.recognition_lost()
             case PeerAlive(participant="recognition", run=run):
-                self._conductor.recognition_there(session_of(run))
+                self._runner.recognition_there(session_of(run))
         self._after(now)
 
     def _serve(self, request: Request, now: Seconds) -> None:
@@ -133,7 +135,7 @@ class _Generation:
             self._early[request.id] = (request, until)
             return
         try:
-            self._conductor.admit(request, world)
+            self._runner.admit(request, world)
         except EngageError as error:
             self._refuse(request.id, error.fault)
             self._warn(request.fragment.id, "PARSING_FAILURE", str(error.fault))
@@ -167,12 +169,12 @@ class _Generation:
         elif self._early.pop(cancel.id, None):
             self._desk.refuse(cancel.id, Fault(reason="cancelled", where=cancel.id))
         else:
-            self._conductor.cancel(cancel.id, cancel.reason or "cancelled", now)
+            self._runner.cancel(cancel.id, cancel.reason or "cancelled", now)
         self._after(now)
 
     async def perform(self) -> None:
         """Fragments, as they come."""
-        await self._conductor.perform_in_order()
+        await self._runner.perform_in_order()
 
     # -- time -----------------------------------------------------------------------------------------------------
 
@@ -188,7 +190,7 @@ class _Generation:
                     self._after(self._bus.now())
 
     def _deadline(self) -> Seconds | None:
-        due = [self._conductor.deadline, self._arbiter.deadline]
+        due = [self._runner.deadline, self._arbiter.deadline]
         due += [until for _, until in self._early.values()]
         return min((each for each in due if each is not None), default=None)
 
@@ -202,7 +204,7 @@ class _Generation:
                     continue
                 fault = Fault(reason="the world is unknown", where=id, advice="is perception running?")
                 self._refuse(id, fault)
-        for id, fault in self._conductor.settle(now):
+        for id, fault in self._runner.settle(now):
             self._refuse(id, fault)
         self._rule(now)
         self._changed.set()

@@ -28,10 +28,10 @@ from engage_hri.schemas.requests import Cancel, Outcome, Request, Unreadable
 from engage_hri.services.bus.interface import Bus, Received
 from engage_hri.services.realizer.config import RealizerConfig
 from engage_hri.services.realizer.perform.control_link import LONGEST_WAY
-from engage_hri.services.realizer.perform.ledger import Ledger
 from engage_hri.services.realizer.perform.live import Ending, Live
+from engage_hri.services.realizer.perform.live_blocks import LiveBlocks
 from engage_hri.services.realizer.perform.performance import BlockPerformance
-from engage_hri.services.realizer.perform.surroundings import Moving, Presence, Surroundings
+from engage_hri.services.realizer.perform.surroundings import Moving, PeersThere, Surroundings
 from engage_hri.services.realizer.plan.planner import Plan, plan_steps
 from engage_hri.services.realizer.plan.poses import poses_before, poses_left
 from engage_hri.services.realizer.plan.relations import BlockRefused, extent, relation_steps
@@ -55,11 +55,13 @@ class _Realizer:
         self.performances: dict[str, BlockPerformance] = {}
         """By the id of the request: of those of `live` that are being performed."""
         self.routes: dict[str, Moving] = {}
-        self.peers = Presence()
-        self.ledger = Ledger()
+        self.peers = PeersThere()
+        self.live_blocks = LiveBlocks()
         self.homing: set[asyncio.Future[Outcome]] = set()
         """Outcomes of what was sent home for a block that replaces others, as long as it is on its way."""
-        self.around = Surroundings(bus, self.requests, config, self.peers, self.routes, self.performing, self.ledger)
+        self.around = Surroundings(
+            bus, self.requests, config, self.peers, self.routes, self.performing, self.live_blocks
+        )
 
     # -- what arrives ---------------------------------------------------------------------------------------------
 
@@ -159,7 +161,7 @@ class _Realizer:
     async def perform(self, live: Live) -> None:
         """A block from request to outcome."""
         block = live.request.block
-        elsewhere = self.ledger.blocks
+        elsewhere = self.live_blocks.blocks
         if block.id in elsewhere:
             advice = "give it another id, or wait until that has ended: a cancelled one ends with its word"
             fault = Fault(reason="a block of this id is still being performed", where=block.id, advice=advice)
@@ -169,15 +171,15 @@ class _Realizer:
             fault = Fault(reason=f"it follows {', '.join(sorted(absent))}: no such live block", where=block.id)
             self._refuse(live, BlockRefused(fault))
             return
-        with self.ledger.opened(block):
+        with self.live_blocks.opened(block):
             try:
-                plan = await _unless(live.ending, self._plan(block, elsewhere))
+                plan = await _result_or_stopped(live.ending, self._plan(block, elsewhere))
             except EngageError as error:
                 self._refuse(live, error)
                 return
             if plan is not None:
                 self.desk.accept(live.request.id)
-                plan = await _unless(live.ending, self._await_turn(live, plan, elsewhere))
+                plan = await _result_or_stopped(live.ending, self._await_turn(live, plan, elsewhere))
             if plan is None:
                 await self._end(live, live.outcome)
                 return
@@ -315,7 +317,7 @@ class _Realizer:
         live.ended.set_result(None)
 
 
-async def _unless(stopped: asyncio.Future[Ending], work: Coroutine[Any, Any, Result]) -> Result | None:
+async def _result_or_stopped(stopped: asyncio.Future[Ending], work: Coroutine[Any, Any, Result]) -> Result | None:
     """What comes of `work`; None, and it is given up, once `stopped`."""
     task = asyncio.ensure_future(work)
     try:

@@ -25,7 +25,7 @@ from engage_hri.services.recognition.events.machine import Forgotten, Mishap
 from engage_hri.services.recognition.events.open_events import OpenBook
 from engage_hri.services.recognition.perceive.reporters import Witnesses
 from engage_hri.services.recognition.recognizer import Perceived, Recognizer, Result
-from engage_hri.services.recognition.statistics.standings import Standings
+from engage_hri.services.recognition.statistics.published import PublishedStatistics
 from engage_hri.services.requests.ends import RequestDesk
 from engage_hri.services.runtime.service import Ready
 
@@ -67,16 +67,16 @@ class _Recognition:
         session = session_of(bus.run)
         self._recognizer = Recognizer(bus.robot, config, clock=bus.clock, name=f"{session}-", strict=False)
         self._open = OpenBook(bus.robot, session)
-        self._standings = Standings(bus.robot, config, bus.clock)
+        self._published = PublishedStatistics(bus.robot, config, bus.clock)
 
     @property
     def deadline(self) -> Seconds | None:
-        times = (self._recognizer.deadline, self._standings.deadline)
+        times = (self._recognizer.deadline, self._published.deadline)
         return min((at for at in times if at is not None), default=None)
 
     def begin(self) -> None:
         """Who asks before anything has happened is told so."""
-        self._bus.publish(keys.statistics("all"), self._standings.overall(self._bus.now()))
+        self._bus.publish(keys.statistics("all"), self._published.overall(self._bus.now()))
 
     def advance(self) -> None:
         self._tell(self._recognizer.advance(self._bus.now()))
@@ -166,7 +166,7 @@ class _Recognition:
         events = [change for change in changes if isinstance(change, ConnectionEvent)]
         for book in self._open.feed(events, self._bus.stamp()):
             self._bus.publish(keys.open_events(book.actor), book)
-        for statistics in self._standings.feed(changes, self._recognizer.session.busy, self._bus.now()):
+        for statistics in self._published.feed(changes, self._recognizer.session.busy, self._bus.now()):
             if statistics.actor != "all":  # a person of that name would pass for everybody
                 self._bus.publish(keys.statistics(statistics.actor or "all"), statistics)
         return fault

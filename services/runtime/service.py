@@ -24,7 +24,7 @@ Service = Callable[[Bus, Ready], Awaitable[None]]
 
 async def serve(hub: Hub, name: str, service: Service, ready: Ready = lambda: None) -> None:
     """Run one service on the hub until it is cancelled or fails. Raises InputRefused if another one is there."""
-    await hub.vacant(name)
+    await hub.wait_until_free(name)
     bus = hub.join(name, role=name if name in keys.ROLES else "manager")
     joined = bus.stamp()
     since: Stamp | None = None

@@ -12,7 +12,7 @@ from engage_hri.services.simulation.human import (
     Begun,
     Ended,
     Entrance,
-    Event,
+    EventChanged,
     Grab,
     Lay,
     Leave,
@@ -82,7 +82,7 @@ def moves(step: str, piece: str, side: Side, landmark: str) -> tuple[Rule, ...]:
     return (
         Rule(step, RobotDoes("point", piece), (LookAt(piece),), FOLLOW),
         Rule(step, Word("so"), (Grab(piece),), GLANCE),
-        Rule(step, Event("directed_gaze", "started", landmark), (LookAt(landmark),), 0.6),
+        Rule(step, EventChanged("directed_gaze", "started", landmark), (LookAt(landmark),), 0.6),
         Rule(step, Ended(), (Lay(piece, side, landmark), Withdraw(), Pause(0.2), LookAt(FACE)), MOVE),
     )
 
@@ -121,7 +121,7 @@ LAST_PIECES = (
     Rule("step-18", Begun(), (LookAt(AWAY),), 0.05),
     Rule("step-18", Word("that"), (LookAt(FACE),), GLANCE),
     # On the table in time for the landmark, but not while the first event still waits.
-    Rule("step-18", Event("directed_gaze", "failed", "purple-triangle"), (LookAt(TABLE),), 0.05),
+    Rule("step-18", EventChanged("directed_gaze", "failed", "purple-triangle"), (LookAt(TABLE),), 0.05),
     # Within 2 s after the event at the triangle failed: as its answer, not to direct the robot there.
     Rule("step-18", Word("pink"), (LookAt("purple-triangle"),), 0.05),
     Rule(

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from engage_hri.schemas.actions import ActionBegan
 from engage_hri.schemas.messages import Message
 from engage_hri.schemas.units import Seconds
-from engage_hri.services.simulation.hearing import THINKING, Utterance
+from engage_hri.services.simulation.hearing import THINKING, HeardSpeech
 from engage_hri.services.simulation.human import FACE, Act, LookAt, Pause, Start, Stop
 from engage_hri.services.simulation.listening import ListeningHuman
 from engage_hri.services.tangram.table import TangramTable
@@ -42,5 +42,5 @@ class AttentiveHuman(ListeningHuman):
                     self._react((LookAt(target),), self.FOLLOWS, now)
         self._listen(message, now)
 
-    def _answer(self, utterance: Utterance) -> tuple[Act, ...]:
+    def _answer(self, utterance: HeardSpeech) -> tuple[Act, ...]:
         return () if utterance.words == THINKING else super()._answer(utterance)

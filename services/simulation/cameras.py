@@ -14,7 +14,7 @@ from engage_hri.schemas.world import Entity, World
 from engage_hri.services.simulation.config import SimulationConfig
 from engage_hri.services.simulation.faults import Chances, FaceLoss, TableVision
 from engage_hri.services.simulation.head import Sightlines
-from engage_hri.services.simulation.perception import Scene, Stamper
+from engage_hri.services.simulation.perception import PersonAtTable, Stamper
 from engage_hri.services.simulation.reports import Actions, Reports, Signals
 
 
@@ -22,7 +22,7 @@ class Cameras:
     """See `scene` as `config` says; to be used in its stead."""
 
     def __init__(
-        self, scene: Scene, sightlines: Sightlines, config: SimulationConfig, stamp: Stamper, chances: Chances
+        self, scene: PersonAtTable, sightlines: Sightlines, config: SimulationConfig, stamp: Stamper, chances: Chances
     ) -> None:
         faults = config.faults
         self._scene = scene

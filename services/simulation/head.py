@@ -42,7 +42,7 @@ class Sightlines:
         return {self._robot: self.robot_eyes, surface.id: surface.free, **pieces}
 
 
-class Head:
+class SimulatedHead:
     """turning: how long it takes to face something else, however far it is."""
 
     def __init__(self, turning: Seconds) -> None:

@@ -23,7 +23,7 @@ THINKING = "ummmm"
 """Said by a robot that will go on: nothing to answer."""
 
 
-class Utterance(Struct, frozen=True):
+class HeardSpeech(Struct, frozen=True):
     """The words of a block of the robot, in lower case without punctuation, and what it pointed at meanwhile."""
 
     words: str
@@ -43,7 +43,7 @@ class Hearing:
         self._pointed: dict[str, str] = {}
         self._pointing_at = ""
 
-    def feed(self, message: Message) -> Utterance | None:
+    def feed(self, message: Message) -> HeardSpeech | None:
         """Perceive the robot. The utterance that is over now, if one is."""
         match message:
             case WordSpoken(block=block, word=word):
@@ -56,11 +56,11 @@ class Hearing:
                 self._pointing_at = ""
             case BlockProgress(block=str(block), progress="end") if block in self._words:
                 words = re.sub(r"[^a-z' ]", "", " ".join(self._words.pop(block)).lower()).split()
-                return Utterance(" ".join(words), self._pointed.pop(block, ""))
+                return HeardSpeech(" ".join(words), self._pointed.pop(block, ""))
         return None
 
 
-def wanted(utterance: Utterance, table: TangramTable) -> Lay | None:
+def wanted(utterance: HeardSpeech, table: TangramTable) -> Lay | None:
     """The placement that is asked for; None if none is, or the words and the pointing don't tell which."""
     request = REQUEST.search(utterance.words)
     if request is None:

@@ -112,7 +112,7 @@ class RobotDoes(Struct, frozen=True):
     target: str
 
 
-class Event(Struct, frozen=True):
+class EventChanged(Struct, frozen=True):
     """A connection event about `target` that the robot initiated in this step came to `state`."""
 
     kind: EventKind
@@ -120,7 +120,7 @@ class Event(Struct, frozen=True):
     target: str = ""
 
 
-Trigger = Entrance | Begun | Ended | Word | RobotDoes | Event
+Trigger = Entrance | Begun | Ended | Word | RobotDoes | EventChanged
 
 
 class Rule(Struct, frozen=True):
@@ -177,7 +177,7 @@ class Human:
             case ActionBegan(actor=self._robot, action=action, targets=(target,)):
                 self._observe(self._step, RobotDoes(action, target), now)
             case ConnectionEvent(initiator=self._robot, block=block, kind=kind, state=state, objects=objects):
-                self._observe(block, Event(kind, state, objects[0] if objects else ""), now)
+                self._observe(block, EventChanged(kind, state, objects[0] if objects else ""), now)
 
     def _observe(self, step: str, seen: Trigger, now: Seconds) -> None:
         for index, rule in enumerate(self._rules):

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from engage_hri.schemas.actions import ActionBegan
 from engage_hri.schemas.messages import Message
 from engage_hri.schemas.units import Seconds
-from engage_hri.services.simulation.hearing import Hearing, Utterance, wanted
+from engage_hri.services.simulation.hearing import HeardSpeech, Hearing, wanted
 from engage_hri.services.simulation.human import (
     FACE,
     TABLE,
@@ -69,7 +69,7 @@ class ListeningHuman(Human):
     def _react(self, acts: tuple[Act, ...], delay: Seconds, now: Seconds) -> None:
         self.go_on(acts, max(now, now + delay + self._vary()))
 
-    def _answer(self, utterance: Utterance) -> tuple[Act, ...]:
+    def _answer(self, utterance: HeardSpeech) -> tuple[Act, ...]:
         """What the words of a whole block make the person do."""
         if "goodbye" in utterance.words:
             return GOES

@@ -26,12 +26,12 @@ from engage_hri.services.simulation.human import (
     Withdraw,
 )
 from engage_hri.services.simulation.table import Table
-from engage_hri.services.tangram.table import Pose, overlap, poses_touching
+from engage_hri.services.tangram.table import PiecePose, overlap, poses_touching
 
 Stamper = Callable[[Seconds], Stamp]
 
 
-class Scene:
+class PersonAtTable:
     """A person at the table. `feed` it with what the robot does; `advance` gives what has happened by `now`.
 
     frame: seconds between two reports of the world while something moves.
@@ -124,7 +124,7 @@ class Scene:
     def _does(self, kind: type[ActionBegan] | type[ActionEnded], action: Action, target: str, at: Seconds) -> Message:
         return kind(actor=self._actor, action=action, targets=(target,) if target else (), at=self._stamp(at))
 
-    def _place_for(self, lay: Lay, now: Seconds) -> Pose | None:
+    def _place_for(self, lay: Lay, now: Seconds) -> PiecePose | None:
         """The first place with room, or the first if there is none; None if no edges fit."""
         piece = self._table.piece(lay.piece, now)
         others = [other for other in self._table.pieces(now) if other.id != lay.piece]
@@ -135,6 +135,6 @@ class Scene:
             (pose for pose in places if self._has_room(lay.piece, pose, others)), places[0] if places else None
         )
 
-    def _has_room(self, piece: str, pose: Pose, others: list[Entity]) -> bool:
+    def _has_room(self, piece: str, pose: PiecePose, others: list[Entity]) -> bool:
         lying = self._table.layout.lying(self._table.layout.piece(piece), pose)
         return not any(overlap(lying, other) for other in others)

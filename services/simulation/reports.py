@@ -15,7 +15,7 @@ from engage_hri.schemas.perception import HeadPose, VoiceActivity
 from engage_hri.schemas.units import Seconds, Stamp
 from engage_hri.services.simulation.config import PerceptionFaults
 from engage_hri.services.simulation.faults import Chances, off_by
-from engage_hri.services.simulation.head import Head, Sightlines
+from engage_hri.services.simulation.head import Sightlines, SimulatedHead
 
 
 class Reports(Protocol):
@@ -121,7 +121,7 @@ class Signals:
         self._deviation = math.radians(faults.gaze)
         self._chance = chances("gaze")
         self._ear = Ear(faults, chances)
-        self._head = Head(head_turn)
+        self._head = SimulatedHead(head_turn)
         self._target = ""
 
     def happened(self, message: Message, now: Seconds) -> Iterator[Message]:

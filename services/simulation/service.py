@@ -18,7 +18,7 @@ from engage_hri.services.simulation.config import SimulationConfig
 from engage_hri.services.simulation.head import Sightlines
 from engage_hri.services.simulation.human import Human
 from engage_hri.services.simulation.listening import ListeningHuman
-from engage_hri.services.simulation.perception import Scene
+from engage_hri.services.simulation.perception import PersonAtTable
 from engage_hri.services.simulation.stochastic import StochasticHuman
 from engage_hri.services.simulation.table import Table
 from engage_hri.services.tangram.table import tangram_table
@@ -28,7 +28,7 @@ async def simulate(bus: Bus, ready: Ready, config: SimulationConfig) -> None:
     """Serve until cancelled. The person comes when everybody the configuration names is on the bus."""
     table = Table(tangram_table(), hand_speed=config.hand_speed, shortest_movement=config.shortest_movement)
     human = _human(config, bus.robot, random.Random(config.seed))
-    scene = Scene(human, table, robot=bus.robot, frame=config.frame, stamp=bus.stamp)
+    scene = PersonAtTable(human, table, robot=bus.robot, frame=config.frame, stamp=bus.stamp)
     cameras = Cameras(scene, Sightlines(table, bus.robot), config, bus.stamp, partial(_chance, config.seed))
     with bus.subscribe(
         keys.ANY_ALIVE, keys.FEEDBACK, keys.SYNC_POINT, keys.ROBOT_ACTION, keys.ANY_CONNECTION_EVENT,

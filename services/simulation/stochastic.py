@@ -16,7 +16,7 @@ from engage_hri.schemas.messages import Message
 from engage_hri.schemas.units import Probability, Seconds
 from engage_hri.services.simulation.chance import Chance, Delays
 from engage_hri.services.simulation.config import Habits
-from engage_hri.services.simulation.hearing import THINKING, Hearing, Utterance, wanted
+from engage_hri.services.simulation.hearing import THINKING, HeardSpeech, Hearing, wanted
 from engage_hri.services.simulation.human import (
     FACE,
     TABLE,
@@ -233,7 +233,7 @@ class StochasticHuman(Human):
 
     # -- turns --------------------------------------------------------------------------------------------------
 
-    def _respond(self, utterance: Utterance, now: Seconds) -> None:
+    def _respond(self, utterance: HeardSpeech, now: Seconds) -> None:
         """The robot has said something."""
         habits = self._habits
         if utterance.words == THINKING or not self._happens(habits.hears):
@@ -246,12 +246,12 @@ class StochasticHuman(Human):
         elif self._answers(habits.answers_turn):
             self._utter(at)
 
-    def _understood(self, utterance: Utterance) -> Lay | None:
+    def _understood(self, utterance: HeardSpeech) -> Lay | None:
         """What they are to do as they understand it, which may be wrong; None if they cannot tell."""
         habits = self._habits
         if utterance.pointed not in self._shown:
             guess = self._chance.choice(sorted(self._pieces)) if self._happens(habits.guesses) else ""
-            utterance = Utterance(utterance.words, guess)
+            utterance = HeardSpeech(utterance.words, guess)
         asked = wanted(utterance, self._table)
         if asked is None:
             return None

@@ -12,7 +12,7 @@ from msgspec import Struct
 
 from engage_hri.schemas.units import Meters, Seconds, Vector
 from engage_hri.schemas.world import Entity
-from engage_hri.services.tangram.table import Pose, TangramTable
+from engage_hri.services.tangram.table import PiecePose, TangramTable
 
 HandSide = Literal["left", "right"]
 LIFT: Meters = 0.03
@@ -64,7 +64,7 @@ class Table:
         self.seated = False
         self._hand_speed = hand_speed
         self._shortest = shortest_movement
-        self._poses: dict[str, Pose] = {piece.id: piece.start for piece in layout.pieces}
+        self._poses: dict[str, PiecePose] = {piece.id: piece.start for piece in layout.pieces}
         self._rest: dict[HandSide, Vector] = {"left": layout.person.left_hand, "right": layout.person.right_hand}
         self._hands: dict[HandSide, Vector] = dict(self._rest)
         self._moving: dict[HandSide, Movement] = {}
@@ -76,7 +76,7 @@ class Table:
         x, y, _ = self.piece(piece, now).position
         return self._move(self._hand_for(piece, now), (x, y, self._holding_height), now).until
 
-    def carry(self, piece: str, pose: Pose, now: Seconds) -> Seconds:
+    def carry(self, piece: str, pose: PiecePose, now: Seconds) -> Seconds:
         """The hand at the piece (or the nearer one) takes it to `pose`. Returns when it lies there."""
         entity = self.piece(piece, now)
         x, y, _ = entity.position
@@ -137,7 +137,7 @@ class Table:
                 if movement.piece:
                     x, y, _ = movement.end
                     yaw = math.degrees(math.remainder(movement.yaw_end, math.tau))
-                    self._poses[movement.piece] = Pose(x, y, yaw)
+                    self._poses[movement.piece] = PiecePose(x, y, yaw)
                     rested.append(PieceMoved(movement.piece, False, movement.until))
         return rested
 
@@ -154,7 +154,7 @@ class Table:
             if movement.piece == id:
                 x, y, _ = movement.position(now)
                 yaw = movement.yaw_start + movement.progress(now) * (movement.yaw_end - movement.yaw_start)
-                lying = self.layout.lying(piece, Pose(x, y, math.degrees(yaw)))
+                lying = self.layout.lying(piece, PiecePose(x, y, math.degrees(yaw)))
                 return msgspec.structs.replace(lying, velocity=movement.velocity(now))
         return self.layout.lying(piece, self._poses[id])
 

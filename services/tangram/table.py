@@ -28,7 +28,7 @@ GAP_TOLERANCE: Meters = 0.012
 ANGLE_TOLERANCE: Radians = math.radians(12.0)
 
 
-class Pose(Struct, frozen=True, array_like=True):
+class PiecePose(Struct, frozen=True, array_like=True):
     """Where a piece lies. Degrees because people write this in a file."""
 
     x: Meters
@@ -43,11 +43,11 @@ class Piece(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     color: str
     shape: str
     footprint: tuple[Point, ...]
-    start: Pose
-    goal: Pose
+    start: PiecePose
+    goal: PiecePose
 
 
-class Person(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+class TablePerson(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     id: str
     face: Vector
     left_hand: Vector
@@ -68,7 +68,7 @@ class TangramTable(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
 
     base: str
     surface: Surface
-    person: Person
+    person: TablePerson
     pieces: tuple[Piece, ...]
 
     def piece(self, id: str) -> Piece:
@@ -78,7 +78,7 @@ class TangramTable(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
                 return piece
         raise KeyError(id)
 
-    def lying(self, piece: Piece, pose: Pose) -> Entity:
+    def lying(self, piece: Piece, pose: PiecePose) -> Entity:
         """The piece as perception reports it when it lies at `pose`."""
         return Entity(
             id=piece.id,
@@ -152,7 +152,7 @@ def touches(edge: Edge, other: Edge) -> bool:
     )
 
 
-def poses_touching(piece: Entity, landmark: Entity, side: Side) -> Iterable[Pose]:
+def poses_touching(piece: Entity, landmark: Entity, side: Side) -> Iterable[PiecePose]:
     """Every pose in which an edge of `piece` lies on an equal edge of `landmark` that faces `side`."""
     for place in edges(landmark):
         if place.side != side:
@@ -164,7 +164,7 @@ def poses_touching(piece: Entity, landmark: Entity, side: Side) -> Iterable[Pose
             cos, sin = math.cos(turn), math.sin(turn)
             dx, dy = edge.middle[0] - piece.position[0], edge.middle[1] - piece.position[1]
             yaw = math.degrees(math.remainder(piece.yaw + turn, math.tau))
-            yield Pose(place.middle[0] - (cos * dx - sin * dy), place.middle[1] - (sin * dx + cos * dy), yaw)
+            yield PiecePose(place.middle[0] - (cos * dx - sin * dy), place.middle[1] - (sin * dx + cos * dy), yaw)
 
 
 def overlap(piece: Entity, other: Entity, margin: Meters = 0.004) -> bool:

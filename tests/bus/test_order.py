@@ -4,14 +4,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from engage_hri.schemas import keys
-from engage_hri.services.bus.zenoh.order import Follower, Ledger, Missing, Pulse, Written
+from engage_hri.services.bus.zenoh.order import Follower, Missing, Pulse, SentLog, Written
 
 KEYS = (keys.BLOCK, keys.FEEDBACK, keys.SYNC_POINT, keys.INHIBIT)
 HEARD = (keys.BLOCK, "engage/v1/evt/**")
 
 
-def write(ledger: Ledger, key: str, now: float = 0.0) -> Written:
-    return ledger.write(key, "application/msgpack", b"", "there", "clock", now)
+def write(sent: SentLog, key: str, now: float = 0.0) -> Written:
+    return sent.write(key, "application/msgpack", b"", "there", "clock", now)
 
 
 def numbers(written: list[Written]) -> list[int]:
@@ -19,16 +19,16 @@ def numbers(written: list[Written]) -> list[int]:
 
 
 class Wire:
-    """From a ledger to a follower, with the follower's questions answered when told to."""
+    """From a sent to a follower, with the follower's questions answered when told to."""
 
     def __init__(self) -> None:
-        self.ledger = Ledger("run")
+        self.sent = SentLog("run")
         self.follower = Follower(HEARD)
         self.delivered: list[Written] = []
         self.expected: list[Written] = []
 
     def send(self, key: str, copies: int = 1) -> None:
-        written = write(self.ledger, key)
+        written = write(self.sent, key)
         if key == keys.INHIBIT:
             return
         self.expected.append(written)
@@ -36,11 +36,11 @@ class Wire:
             self.delivered += self.follower.take(written)
 
     def pulse(self) -> None:
-        self.follower.pulse(Pulse(self.ledger.recent(0.0)))
+        self.follower.pulse(Pulse(self.sent.recent(0.0)))
 
     def ask(self) -> None:
         if self.follower.behind:
-            past = self.ledger.past(self.follower.missing(), 0.0)
+            past = self.sent.past(self.follower.missing(), 0.0)
             self.delivered += [one for one, _ in self.follower.catch_up(past)]
 
 
@@ -90,57 +90,57 @@ def test_what_a_cut_link_lost_comes_in_order_across_keys(steps: list[tuple[str, 
 
 
 def test_the_first_question_gets_two_seconds_of_events_and_the_last_state():
-    ledger = Ledger("run")
-    write(ledger, keys.WORLD, now=0.0)
-    write(ledger, keys.FEEDBACK, now=0.9)
-    write(ledger, keys.WORLD, now=0.95)
-    write(ledger, keys.FEEDBACK, now=1.0)
-    write(ledger, keys.BLOCK, now=2.0)
+    sent = SentLog("run")
+    write(sent, keys.WORLD, now=0.0)
+    write(sent, keys.FEEDBACK, now=0.9)
+    write(sent, keys.WORLD, now=0.95)
+    write(sent, keys.FEEDBACK, now=1.0)
+    write(sent, keys.BLOCK, now=2.0)
 
-    past = ledger.past(Missing((keys.FEEDBACK, keys.WORLD), {}), now=3.0)
+    past = sent.past(Missing((keys.FEEDBACK, keys.WORLD), {}), now=3.0)
 
     assert numbers(list(past.written)) == [3, 4]
     assert past.counts == {keys.WORLD: 2, keys.FEEDBACK: 2}
 
 
 def test_after_a_cut_everything_kept_is_handed_out_however_old():
-    ledger, follower = Ledger("run"), Follower([keys.FEEDBACK, keys.BLOCK])
-    follower.catch_up(ledger.past(follower.missing(), now=0.0))
-    cut = [write(ledger, key, now=0.0) for key in (keys.FEEDBACK, keys.BLOCK, keys.FEEDBACK)]
+    sent, follower = SentLog("run"), Follower([keys.FEEDBACK, keys.BLOCK])
+    follower.catch_up(sent.past(follower.missing(), now=0.0))
+    cut = [write(sent, key, now=0.0) for key in (keys.FEEDBACK, keys.BLOCK, keys.FEEDBACK)]
 
     follower.behind = True
-    caught_up = follower.catch_up(ledger.past(follower.missing(), now=100.0))
+    caught_up = follower.catch_up(sent.past(follower.missing(), now=100.0))
 
     assert caught_up == [(one, False) for one in cut]
 
 
 def test_what_is_no_longer_kept_counts_as_lost():
-    ledger, follower = Ledger("run", kept=2), Follower([keys.FEEDBACK])
-    follower.catch_up(ledger.past(follower.missing(), now=0.0))
+    sent, follower = SentLog("run", kept=2), Follower([keys.FEEDBACK])
+    follower.catch_up(sent.past(follower.missing(), now=0.0))
     for _ in range(5):
-        write(ledger, keys.FEEDBACK)
-    last = write(ledger, keys.FEEDBACK)
+        write(sent, keys.FEEDBACK)
+    last = write(sent, keys.FEEDBACK)
 
     assert follower.take(last) == []
-    assert numbers([one for one, _ in follower.catch_up(ledger.past(follower.missing(), 0.0))]) == [5, 6]
+    assert numbers([one for one, _ in follower.catch_up(sent.past(follower.missing(), 0.0))]) == [5, 6]
     assert follower.lost == 4
 
 
 def test_a_state_that_was_skipped_is_not_missed():
-    ledger, follower = Ledger("run"), Follower([keys.WORLD])
-    follower.catch_up(ledger.past(follower.missing(), now=0.0))
-    write(ledger, keys.WORLD)
-    second = write(ledger, keys.WORLD)
+    sent, follower = SentLog("run"), Follower([keys.WORLD])
+    follower.catch_up(sent.past(follower.missing(), now=0.0))
+    write(sent, keys.WORLD)
+    second = write(sent, keys.WORLD)
 
     assert follower.take(second) == [second]
     assert not follower.behind
 
 
 def test_a_process_that_does_not_answer_holds_nothing_up():
-    ledger, follower = Ledger("run"), Follower([keys.FEEDBACK])
+    sent, follower = SentLog("run"), Follower([keys.FEEDBACK])
     for _ in range(5):
-        write(ledger, keys.FEEDBACK)
-    held = [write(ledger, keys.FEEDBACK), write(ledger, keys.FEEDBACK)]
+        write(sent, keys.FEEDBACK)
+    held = [write(sent, keys.FEEDBACK), write(sent, keys.FEEDBACK)]
     for one in reversed(held):
         assert follower.take(one) == []
 
@@ -149,10 +149,10 @@ def test_a_process_that_does_not_answer_holds_nothing_up():
 
 
 def test_the_pulse_tells_of_the_keys_written_lately():
-    ledger = Ledger("run")
-    write(ledger, keys.FEEDBACK, now=0.0)
-    write(ledger, keys.BLOCK, now=2.0)
+    sent = SentLog("run")
+    write(sent, keys.FEEDBACK, now=0.0)
+    write(sent, keys.BLOCK, now=2.0)
 
-    assert ledger.recent(2.5) == {keys.FEEDBACK: 1, keys.BLOCK: 1}
-    assert ledger.recent(4.0) == {keys.BLOCK: 1}
-    assert ledger.recent(6.0) == {}
+    assert sent.recent(2.5) == {keys.FEEDBACK: 1, keys.BLOCK: 1}
+    assert sent.recent(4.0) == {keys.BLOCK: 1}
+    assert sent.recent(6.0) == {}

@@ -9,7 +9,7 @@ import pytest
 from engage_hri.schemas.faults import InputRefused
 from engage_hri.schemas.presence import PeerAlive, PeerGone
 from engage_hri.services.bus.memory import MemoryHub
-from engage_hri.services.commandline.claim import PATIENCE, Claim, claiming
+from engage_hri.services.commandline.claim import PATIENCE, StartClaim, claiming
 
 EARLY, LATE = "00000000", "ffffffff"
 
@@ -86,7 +86,7 @@ async def test_those_that_meet_only_while_their_services_start_part_at_once(hub:
 def test_two_claims_never_give_way_to_each_other_nor_both_go_on() -> None:
     for ours in (False, True):
         for theirs in (False, True):
-            one, other = Claim("r", EARLY), Claim("r", LATE)
+            one, other = StartClaim("r", EARLY), StartClaim("r", LATE)
             one.is_up, other.is_up = ours, theirs
             one.feed(PeerAlive(participant=f"{'' if theirs else 'starting-'}up-{LATE}"))
             other.feed(PeerAlive(participant=f"{'' if ours else 'starting-'}up-{EARLY}"))
@@ -96,7 +96,7 @@ def test_two_claims_never_give_way_to_each_other_nor_both_go_on() -> None:
 
 
 def test_nobody_else_is_in_the_way() -> None:
-    claim = Claim("r", LATE)
+    claim = StartClaim("r", LATE)
     for name in ("upright", "up-x", "control", f"up-{LATE}", f"starting-up-{LATE}", "up-123456789"):
         claim.feed(PeerAlive(participant=name))
     assert claim.is_good

@@ -11,7 +11,7 @@ from engage_hri.schemas.world import Entity
 from engage_hri.services.collaboration.placement import has_been_placed
 from engage_hri.services.collaboration.relations import Relation, relation, relations
 from engage_hri.services.collaboration.task import Goal, Instruction, check
-from engage_hri.services.tangram.table import Pose, poses_touching, tangram_table
+from engage_hri.services.tangram.table import PiecePose, poses_touching, tangram_table
 
 TABLE = tangram_table()
 GOAL = {entity.id: entity for entity in TABLE.figure()}
@@ -52,7 +52,7 @@ def test_relations_do_not_depend_on_who_computed_the_pose(piece: str, landmark: 
     """Wherever `poses_touching` lays a piece, the relation found there has the side that was asked for."""
     if piece == landmark:
         return
-    base = TABLE.lying(TABLE.piece(landmark), Pose(0.5, 0.0, yaw))
+    base = TABLE.lying(TABLE.piece(landmark), PiecePose(0.5, 0.0, yaw))
     for side in ("top", "top right", "left", "bottom"):
         for pose in poses_touching(GOAL[piece], base, side):
             touching = relation(TABLE.lying(TABLE.piece(piece), pose), base)

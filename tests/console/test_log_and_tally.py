@@ -118,7 +118,7 @@ def test_statistics_are_told_if_asked_for_with_reasons_for_what_is_not_well() ->
     )  # fmt: skip
     ill = msgspec.structs.replace(well, actor="", engagement=0.1, level="disengaged")
 
-    assert lines(((well, 12.0), (ill, 12.0)), Telling(standings=True)) == [
+    assert lines(((well, 12.0), (ill, 12.0)), Telling(statistics=True)) == [
         "0:02.0  ann: engaged 0.92; 12 events, MTBCE 5.31 s",
         "0:02.0  all: disengaged 0.10 (pace 0.92); 12 events, MTBCE 5.31 s",
     ]

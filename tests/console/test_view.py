@@ -186,7 +186,7 @@ def test_the_newest_event_and_words_are_there_on_a_small_terminal() -> None:
     scene = view.empty("robot", 0.0)
     for number in range(30):
         scene = view.feed(scene, *event(f"e{number}", "started", float(number), objects=(f"piece-{number}",)))
-    said = tuple(view.Utterance(actor="robot", began=0.0, text="so many words " * 6 + str(n)) for n in range(5))
+    said = tuple(view.UtteranceInView(actor="robot", began=0.0, text="so many words " * 6 + str(n)) for n in range(5))
     scene = msgspec.structs.replace(scene, said=said, notes=("beware",))
 
     text = drawn(scene, width=80, height=24)

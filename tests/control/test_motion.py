@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from engage_hri.services.control.torso import tracks
-from engage_hri.services.control.torso.motion import Leg, Motion, Path, State, resting
+from engage_hri.services.control.torso.motion import JointMotion, Leg, Motion, Path, resting
 
 LIMITS = tracks.LIMITS["right_arm"]
 HOME = tracks.HOME["right_arm"]
@@ -182,7 +182,7 @@ def test_a_new_path_takes_over_without_a_jump(
 
 def test_a_state_knows_whether_it_rests():
     assert resting(HOME).at_rest
-    assert not State(np.zeros(3), np.array([0.0, 0.1, 0.0]), np.zeros(3)).at_rest
+    assert not JointMotion(np.zeros(3), np.array([0.0, 0.1, 0.0]), np.zeros(3)).at_rest
 
 
 @pytest.mark.parametrize("at", [0.0, 0.4, 1.0])

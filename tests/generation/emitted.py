@@ -17,8 +17,8 @@ from engage_hri.schemas.fragments import GestureChoice, ReferenceChoice, TurnFra
 from engage_hri.services.generation.block.emission import Emission, emit
 from engage_hri.services.generation.config import GenerationConfig
 from engage_hri.services.generation.permits import Permits
+from engage_hri.services.generation.turns.continuation import NO_CONTINUATION, Continuation
 from engage_hri.services.generation.turns.policy import plan_turn
-from engage_hri.services.generation.turns.trail import NOTHING, Trail
 
 POINT: GestureChoice = "directed_gaze_with_pointing"
 LOOK: GestureChoice = "directed_gaze"
@@ -40,7 +40,7 @@ def emission(
     profile: str = "check-back",
     permits: Permits | None = None,
     hands: dict[str, str] | None = None,
-    before: Trail = NOTHING,
+    before: Continuation = NO_CONTINUATION,
 ) -> Emission:
     """`made`: gesture and phrase of each reference in document order."""
     references = [behavior for behavior in fragment.behaviors if isinstance(behavior, Reference)]

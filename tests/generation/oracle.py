@@ -13,8 +13,8 @@ from typing import NamedTuple
 
 from engage_hri.schemas.behaviors import Reference
 from engage_hri.services.generation.config import Channel
-from engage_hri.services.generation.references.motions import HERE, Motions
-from engage_hri.services.generation.references.policy import Scene
+from engage_hri.services.generation.references.motions import CURRENT_POSE, Motions
+from engage_hri.services.generation.references.policy import ReferenceScene
 from tests.generation.tables import body, flat_world, scene
 
 HEAD, ARM, WORD, WAIT = 6, 10, 210, 180
@@ -39,7 +39,7 @@ class Problem(NamedTuple):
     no_point: str = ""
     channel: Channel = "sum"
 
-    def scene(self) -> Scene:
+    def scene(self) -> ReferenceScene:
         return scene(flat_world(self.places), no_gaze=self.no_gaze, no_point=self.no_point)
 
     def motions(self) -> Motions:
@@ -129,7 +129,7 @@ def _least(problem: Problem, sequences: Iterable[Sequence[Choice]]) -> Best | No
     @cache
     def motion(gestures: tuple[int, ...]) -> int | None:
         """In 1/600 s; None where the arm cannot."""
-        head, at, total = HERE, {"left_arm": HERE, "right_arm": HERE}, 0
+        head, at, total = CURRENT_POSE, {"left_arm": CURRENT_POSE, "right_arm": CURRENT_POSE}, 0
         for gesture, target, arm in zip(gestures, targets, arms, strict=True):
             if gesture in LOOKS:
                 total += HEAD * problem.head[head, target]

@@ -7,8 +7,8 @@ from engage_hri.schemas.body import Estimate, Ray
 from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.units import Vector
 from engage_hri.schemas.world import Entity, World
-from engage_hri.services.generation.references.motions import HERE, Motions
-from engage_hri.services.generation.references.policy import Scene
+from engage_hri.services.generation.references.motions import CURRENT_POSE, Motions
+from engage_hri.services.generation.references.policy import ReferenceScene
 
 TANGRAMS = (
     "pink-triangle", "purple-triangle", "yellow-triangle", "red-square", "blue-square", "pink-square",
@@ -28,9 +28,9 @@ def apart(ids: Sequence[str] = TANGRAMS) -> World:
     return flat_world({id: (float(index), 0.0) for index, id in enumerate(ids)})
 
 
-def scene(world: World, **fields: object) -> Scene:
+def scene(world: World, **fields: object) -> ReferenceScene:
     """Gaze means what is within 0.2 m of where it goes, pointing what is within 0.1 m."""
-    return Scene(world=world, half_angle=0.2 / HEIGHT, pointing_radius=0.1, **fields)  # type: ignore[arg-type]
+    return ReferenceScene(world=world, half_angle=0.2 / HEIGHT, pointing_radius=0.1, **fields)  # type: ignore[arg-type]
 
 
 def body(
@@ -50,7 +50,7 @@ def body(
         assert entity is not None
         x, y, _ = entity.position
         above: Vector = (x, y, HEIGHT)
-        for since in (HERE, *sequence):
+        for since in (CURRENT_POSE, *sequence):
             ray = Ray(origin=above, axis=(0.0, 0.0, -1.0), tip=above)
             gazes[since, target] = Estimate(behavior="g", feasible=True, head_degrees=head(since, target), ray=ray)
             reached = target not in out_of_reach and (since, target) not in refused

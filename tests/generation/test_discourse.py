@@ -13,7 +13,7 @@ from engage_hri.schemas.units import Stamp
 from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.commandline.config import Config
 from engage_hri.services.commandline.generating import generated
-from engage_hri.services.generation.references.discourse import SILENCE, Discourse
+from engage_hri.services.generation.references.discourse import NO_DISCOURSE, Discourse
 from engage_hri.services.simulation.still import tangram_world
 from tests.generation.partners import Partners, stage
 from tests.generation.test_service_streams import says
@@ -75,14 +75,14 @@ def test_a_backchannel_is_no_turn() -> None:
 
 
 def test_somebody_else_has_heard_of_nothing() -> None:
-    named = SILENCE.in_turn("t", "ann").naming("t", [A])
+    named = NO_DISCOURSE.in_turn("t", "ann").naming("t", [A])
 
     assert named.in_turn("u", "ann").topic == A
     assert named.in_turn("u", "ben").topic == ""
 
 
 def test_what_was_not_said_is_not_named() -> None:
-    named = SILENCE.in_turn("t", "ann").naming("t", [A]).naming("u", [B])
+    named = NO_DISCOURSE.in_turn("t", "ann").naming("t", [A]).naming("u", [B])
 
     assert named.topic == ""
     assert named.without("u", {B}).topic == A
@@ -91,7 +91,7 @@ def test_what_was_not_said_is_not_named() -> None:
 
 
 def test_a_person_who_directs_to_something_else_changes_the_topic() -> None:
-    named = SILENCE.in_turn("t", "ann").naming("t", [A])
+    named = NO_DISCOURSE.in_turn("t", "ann").naming("t", [A])
 
     assert named.hearing(directs(B), "robot") == Discourse("t", "ann")
     assert named.hearing(directs(A), "robot") == named

@@ -8,7 +8,7 @@ from engage_hri.schemas.fragments import TurnFragment
 from engage_hri.services.generation.config import GenerationConfig
 from engage_hri.services.generation.fragment_check import checked
 from engage_hri.services.generation.permits import Permits
-from engage_hri.services.generation.pipeline import Plan, plan, targets
+from engage_hri.services.generation.pipeline import FragmentPlan, plan, targets
 from engage_hri.services.generation.turns.policy import plan_turn
 from tests.generation.emitted import POINT, by_id, lines
 from tests.generation.tables import TANGRAMS, body, flat_world, scene
@@ -57,7 +57,7 @@ def planned(
     purple: tuple[float, float] = FAR,
     beside: dict[str, tuple[float, float]] = BESIDE,
     **config: object,
-) -> Plan:
+) -> FragmentPlan:
     """yellow, purple: degrees of head and arm to each. rs .85, so that words alone may do."""
     settings = {
         "phrase_reliability": 0.85, "gaze_reliability": 0.05, "directed_gaze_reliability": 0.08,
@@ -79,7 +79,7 @@ def planned(
     return plan(fragment, plan_turn(fragment, "turn", "human"), world, None, motions, Permits(), made)
 
 
-def choices(plan: Plan) -> list[tuple[str, str]]:
+def choices(plan: FragmentPlan) -> list[tuple[str, str]]:
     return [(choice.gesture, choice.phrase) for choice in plan.choices]
 
 

@@ -9,8 +9,14 @@ from engage_hri.schemas.body import Estimate, NoPointZone
 from engage_hri.schemas.faults import RunFailed
 from engage_hri.schemas.fragments import ReferenceChoice
 from engage_hri.services.generation.config import GenerationConfig
-from engage_hri.services.generation.references.motions import HERE, Motions, collect, from_each_other, from_here
-from engage_hri.services.generation.references.policy import Pair, Posture, choose
+from engage_hri.services.generation.references.motions import (
+    CURRENT_POSE,
+    Motions,
+    collect,
+    from_each_other,
+    from_here,
+)
+from engage_hri.services.generation.references.policy import HeadAndArms, Pair, choose
 from tests.generation.tables import apart, body, flat_world, option, refer, scene
 
 CONFIG = GenerationConfig()
@@ -269,7 +275,7 @@ def test_an_arm_that_is_near_already_changes_the_next_choice() -> None:
     references = [refer(str(i), id, 0.65, option(long, 3), THIS) for i, id in enumerate(["rectangle", "trapezoid"])]
 
     def arm(since: str, target: str) -> float:
-        return 40.0 if since == HERE else 0.0
+        return 40.0 if since == CURRENT_POSE else 0.0
 
     motions = body(world, ["rectangle", "trapezoid"], head=lambda since, target: 5.0, arm=arm)
 
@@ -287,7 +293,11 @@ def test_a_hand_that_has_pointed_elsewhere_starts_from_there_and_the_other_from_
     targets = ["rectangle", "trapezoid", "pink-square"]
     references = [refer(id, id, 0.95, option("it")) for id in targets]
     sides = {"rectangle": "left_arm", "trapezoid": "right_arm", "pink-square": "left_arm"}
-    degrees = {(HERE, "rectangle"): 60.0, (HERE, "trapezoid"): 120.0, ("rectangle", "pink-square"): 6.0}
+    degrees = {
+        (CURRENT_POSE, "rectangle"): 60.0,
+        (CURRENT_POSE, "trapezoid"): 120.0,
+        ("rectangle", "pink-square"): 6.0,
+    }
     motions = body(world, targets, arm=lambda since, target: degrees.get((since, target), 999.0), arm_for=sides.get)  # type: ignore[arg-type]
 
     chosen = choose(references, scene(world), motions, CONFIG)
@@ -301,7 +311,7 @@ def test_from_there_the_body_is_asked_about_the_hand_that_will_be_named_and_abou
     world = apart()
     sides = {"trapezoid": "right_arm", "rectangle": "left_arm", "pink-square": "left_arm"}
     motions = body(world, list(sides), arm_for=sides.get)  # type: ignore[arg-type]
-    here = [motion for id in sides for motion in (motions.gaze(HERE, id), motions.point(HERE, id))]
+    here = [motion for id in sides for motion in (motions.gaze(CURRENT_POSE, id), motions.point(CURRENT_POSE, id))]
     sequence = ["trapezoid", "rectangle", "trapezoid", "pink-square"]
 
     asked = [item.behavior for item in from_each_other(sequence, here)]
@@ -321,7 +331,7 @@ def test_the_head_is_on_who_is_glanced_at_after_a_point() -> None:
     away = Estimate(behavior="", feasible=True, head_degrees=40.0)
     motions = body(apart(), ["rectangle", "rectangle"])
     motions = Motions({**motions.gazes, ("ann", "rectangle"): away}, motions.points, "ann")
-    posture = Posture().after("directed_gaze_with_pointing", "rectangle", motions)
+    posture = HeadAndArms().after("directed_gaze_with_pointing", "rectangle", motions)
 
     assert posture.head == "ann"
     assert posture.after("directed_gaze", "rectangle", motions).head == "rectangle"

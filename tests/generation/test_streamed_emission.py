@@ -5,10 +5,10 @@ import pytest
 from engage_hri.schemas.behaviors import After, Before, Constraint, Gesture, Hand, Head, Pointing, Synchronize, Timing
 from engage_hri.schemas.fragments import TurnFragment
 from engage_hri.services.generation.permits import Permits
-from engage_hri.services.generation.turns.trail import NOTHING, Stroke, Trail
+from engage_hri.services.generation.turns.continuation import NO_CONTINUATION, Continuation, Stroke
 from tests.generation.emitted import LOOK, POINT, by_id, emission, lines, reference, speech, start_of
 
-BUSY = Trail(speech="a:s", glance="a:r-glance", strokes=(Stroke("a:r-point", "LEFT_HAND"),))
+BUSY = Continuation(speech="a:s", glance="a:r-glance", strokes=(Stroke("a:r-point", "LEFT_HAND"),))
 
 
 def middle(*behaviors: object, **fields: object) -> TurnFragment:
@@ -43,7 +43,7 @@ def test_a_reference_follows_the_words_the_glance_and_the_arm_of_earlier_fragmen
     ],
 )
 def test_a_point_waits_for_the_arm_that_may_be_the_same(hand: Hand, other: Hand | None, waits: bool) -> None:
-    before = Trail(strokes=(Stroke("a:p", hand),))
+    before = Continuation(strokes=(Stroke("a:p", hand),))
     point = Pointing(id="q", target="piece", mode=other)
 
     assert ("q:start after a:p:stroke_end" in lines(emission(middle(point), before=before).block)) is waits
@@ -51,7 +51,7 @@ def test_a_point_waits_for_the_arm_that_may_be_the_same(hand: Hand, other: Hand 
 
 def test_a_nod_waits_for_the_nod_before_it_and_for_no_arm() -> None:
     first = emission(TurnFragment(id="a", turn_status="beginning", behaviors=(Head(id="n", lexeme="NOD"),)))
-    before = first.trail.pending("a", ())
+    before = first.continuation.pending("a", ())
 
     assert lines(emission(middle(Head(id="m", lexeme="NOD")), before=before).block) == ["m:start after a:n:end"]
     assert lines(emission(middle(Gesture(id="g", lexeme="BEAT")), before=before).block) == []
@@ -137,7 +137,11 @@ def test_profile_figure_looks_when_the_words_before_it_begin() -> None:
 def test_with_nothing_before_it_a_block_names_no_other() -> None:
     fragment = middle(speech("s"), reference("r"), Gesture(id="g", lexeme="BEAT"), speech("t"))
 
-    named = {ref for line in lines(emission(fragment, [(POINT, "it")], before=NOTHING).block) for ref in line.split()}
+    named = {
+        ref
+        for line in lines(emission(fragment, [(POINT, "it")], before=NO_CONTINUATION).block)
+        for ref in line.split()
+    }
     assert {ref for ref in named if ref.count(":") > 1} == set()
 
 
@@ -147,19 +151,19 @@ def test_with_nothing_before_it_a_block_names_no_other() -> None:
 def test_a_block_leaves_its_last_words_its_last_glance_and_its_strokes() -> None:
     fragment = middle(speech("s"), Gesture(id="g", lexeme="BEAT", mode="RIGHT_HAND"), reference("r"))
 
-    assert emission(fragment, [(POINT, "it")], hands={"r": "LEFT_HAND"}).trail == Trail(
+    assert emission(fragment, [(POINT, "it")], hands={"r": "LEFT_HAND"}).continuation == Continuation(
         speech="r-phrase", glance="r-glance", strokes=(Stroke("g", "RIGHT_HAND"), Stroke("r-point", "LEFT_HAND"))
     )
 
 
 def test_what_was_reached_is_left_no_more() -> None:
-    trail = Trail("s", "g", (Stroke("p", None), Stroke("n", "head", "end")))
+    continuation = Continuation("s", "g", (Stroke("p", None), Stroke("n", "head", "end")))
     reached = {("s", "end"), ("g", "start"), ("p", "stroke_end"), ("n", "stroke_end")}
 
-    assert trail.pending("a", reached) == Trail("", "a:g", (Stroke("a:n", "head", "end"),))
+    assert continuation.pending("a", reached) == Continuation("", "a:g", (Stroke("a:n", "head", "end"),))
 
 
 def test_a_fragment_without_words_leaves_those_before_it() -> None:
-    later = Trail(glance="b:g", strokes=(Stroke("b:p", None),))
+    later = Continuation(glance="b:g", strokes=(Stroke("b:p", None),))
 
-    assert BUSY.then(later) == Trail("a:s", "b:g", (*BUSY.strokes, Stroke("b:p", None)))
+    assert BUSY.then(later) == Continuation("a:s", "b:g", (*BUSY.strokes, Stroke("b:p", None)))

@@ -7,7 +7,7 @@ import pytest
 
 from engage_hri.schemas.behaviors import Gaze, Gesture, Mark, Pointing, Speech, Wait
 from engage_hri.schemas.blocks import Block
-from engage_hri.services.realizer.perform.ledger import Ledger
+from engage_hri.services.realizer.perform.live_blocks import LiveBlocks
 from engage_hri.services.realizer.points import Point
 from tests.realizer.fake_body import FakeBody, Script
 from tests.realizer.stage import Stage, after, block, stage, together
@@ -139,7 +139,7 @@ def test_foresight_goes_through_a_chain_of_any_length() -> None:
 
         def foresee(self, point: Point, at: float) -> None:
             self.told.append(at)
-            ledger.foresee(self.block, {Point("s", "end"): at + 1.0})
+            live_blocks.foresee(self.block, {Point("s", "end"): at + 1.0})
 
         def hear(self, point: Point, at: float) -> None:
             raise AssertionError
@@ -147,14 +147,14 @@ def test_foresight_goes_through_a_chain_of_any_length() -> None:
         def miss(self, behaviors: object) -> None:
             """The end of the test."""
 
-    ledger = Ledger()
+    live_blocks = LiveBlocks()
     links = [Link(f"b{number}") for number in range(2000)]
     with ExitStack() as live:
         for number, link in enumerate(links):
-            live.enter_context(ledger.opened(block((WORDS,), id=link.block)))
+            live.enter_context(live_blocks.opened(block((WORDS,), id=link.block)))
             if number:
                 ties = [Point(f"b{number - 1}:s", "end")]
-                live.enter_context(ledger.followed(link, ties, ledger.blocks))
-        ledger.foresee("b0", {Point("s", "end"): 1.0})
+                live.enter_context(live_blocks.followed(link, ties, live_blocks.blocks))
+        live_blocks.foresee("b0", {Point("s", "end"): 1.0})
 
     assert [link.told for link in links[1:]] == [[float(number)] for number in range(1, 2000)]

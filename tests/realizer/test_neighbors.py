@@ -5,7 +5,7 @@ import asyncio
 import pytest
 
 from engage_hri.schemas.behaviors import Event, Pointing, Speech, Wait
-from engage_hri.services.realizer.perform.ledger import Ledger
+from engage_hri.services.realizer.perform.live_blocks import LiveBlocks
 from engage_hri.services.realizer.points import Point
 from tests.realizer.fake_body import FakeBody, Script
 from tests.realizer.puppet import BML_1_0, bml, puppet
@@ -176,17 +176,17 @@ def test_a_ledger_forgets_a_block_when_it_is_over() -> None:
         def miss(self, behaviors: object) -> None:
             self.heard.append(sorted(behaviors))  # type: ignore[call-overload]
 
-    ledger, early, late = Ledger(), Ears(), Ears()
+    live_blocks, early, late = LiveBlocks(), Ears(), Ears()
     end, start = Point("one:s", "end"), Point("one:s", "start")
     one = block((Speech(id="s", text="so"),), id="one")
-    with ledger.followed(late, [end], {}):
+    with live_blocks.followed(late, [end], {}):
         pass
-    with ledger.opened(one):
-        ledger.reach("one", Point("s", "start"), 1.0)
-        follows = ledger.followed(early, [start, end], {"one": one})
+    with live_blocks.opened(one):
+        live_blocks.reach("one", Point("s", "start"), 1.0)
+        follows = live_blocks.followed(early, [start, end], {"one": one})
         follows.__enter__()
     follows.__exit__(None, None, None)
 
     assert late.heard == [["one:s"]]
     assert early.heard == [(start, 1.0), ["one:bml", "one:s"]]
-    assert ledger.blocks == {}
+    assert live_blocks.blocks == {}

@@ -4,7 +4,7 @@ from engage_hri.schemas.behaviors import Gesture
 from engage_hri.services.realizer.config import RealizerConfig
 from engage_hri.services.realizer.decide.decisions import Decisions
 from engage_hri.services.realizer.decide.effects import Extend
-from engage_hri.services.realizer.decide.patience import Late, Patience, Stalled
+from engage_hri.services.realizer.decide.patience import Late, LatenessWatch, Stalled
 from engage_hri.services.realizer.plan.planner import plan_block
 from engage_hri.services.realizer.points import Point
 from tests.realizer.fake_body import FakeBody
@@ -14,7 +14,7 @@ CONFIG = RealizerConfig(late=0.5, late_factor=1.0, stall=3.0, stall_factor=5.0)
 
 
 def test_what_does_not_come_is_late_once_and_given_up_once() -> None:
-    patience = Patience(CONFIG)
+    patience = LatenessWatch(CONFIG)
     patience.expect("b", "stroke", 1.0, 1.0)
 
     assert patience.deadline == 2.5
@@ -27,7 +27,7 @@ def test_what_does_not_come_is_late_once_and_given_up_once() -> None:
 
 
 def test_who_comes_to_look_long_after_gives_up_at_once() -> None:
-    patience = Patience(CONFIG)
+    patience = LatenessWatch(CONFIG)
     patience.expect("b", "stroke", 1.0, 1.0)
 
     assert patience.overdue(20.0) == [Stalled("b", "stroke", 19.0)]

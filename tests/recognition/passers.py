@@ -14,7 +14,7 @@ from engage_hri.services.recognition.events.machine import Forgotten
 from engage_hri.services.recognition.events.open_events import OpenBook
 from engage_hri.services.recognition.perceive.reporters import Witnesses
 from engage_hri.services.recognition.recognizer import Perceived, Recognizer, Result
-from engage_hri.services.recognition.statistics.standings import Standings
+from engage_hri.services.recognition.statistics.published import PublishedStatistics
 from tests.recognition.observations import PIECES, ROBOT, stamp, world
 from tests.recognition.raw import EYES
 
@@ -29,13 +29,13 @@ class Lobby(Struct):
     events: list[ConnectionEvent] = field(default_factory=list)
     keeps_events: bool = False
     recognizer: Recognizer = field(default=None)  # type: ignore[arg-type]
-    standings: Standings = field(default=None)  # type: ignore[arg-type]
+    published: PublishedStatistics = field(default=None)  # type: ignore[arg-type]
     book: OpenBook = field(default=None)  # type: ignore[arg-type]
     witnesses: Witnesses = field(default_factory=Witnesses)
 
     def __post_init__(self) -> None:
         self.recognizer = Recognizer(ROBOT, self.config)
-        self.standings = Standings(ROBOT, self.config)
+        self.published = PublishedStatistics(ROBOT, self.config)
         self.book = OpenBook(ROBOT, "session")
         self.feed(world("host"), 0.0)
 
@@ -47,7 +47,7 @@ class Lobby(Struct):
 
     @property
     def _deadline(self) -> Seconds | None:
-        times = (self.recognizer.deadline, self.standings.deadline)
+        times = (self.recognizer.deadline, self.published.deadline)
         return min((at for at in times if at is not None), default=None)
 
     def _tell(self, results: list[Result], now: Seconds) -> None:
@@ -57,12 +57,12 @@ class Lobby(Struct):
             if isinstance(change, Forgotten):
                 self.witnesses.forget(change.actor)
         self.book.feed(events, stamp(now))
-        self.standings.feed(changes, self.recognizer.session.busy, now)
+        self.published.feed(changes, self.recognizer.session.busy, now)
         if self.keeps_events:
             self.events += events
 
     def kept(self) -> tuple[object, ...]:
-        return self.recognizer, self.standings, self.book, self.witnesses
+        return self.recognizer, self.published, self.book, self.witnesses
 
 
 def visit(number: int, *, raw: bool) -> Iterator[tuple[Seconds, Perceived]]:

@@ -16,7 +16,7 @@ from engage_hri.services.recognition.events.machine import Forgotten
 from engage_hri.services.recognition.events.open_events import OpenBook
 from engage_hri.services.recognition.events.person import Person
 from engage_hri.services.recognition.events.session import Session
-from engage_hri.services.recognition.statistics.standings import Standings
+from engage_hri.services.recognition.statistics.published import PublishedStatistics
 from tests.recognition.kept import kinds
 from tests.recognition.observations import HUMAN, ROBOT, Log, stamp, world
 from tests.recognition.passers import Lobby, visit
@@ -112,12 +112,12 @@ def test_who_has_been_found_is_there_however_quiet():
 
 
 def test_who_comes_back_later_is_somebody_new_and_the_totals_stay():
-    log, standings = met_and_lost(forgotten_after=60.0), Standings(ROBOT, RecognitionConfig())
+    log, published = met_and_lost(forgotten_after=60.0), PublishedStatistics(ROBOT, RecognitionConfig())
     log.until(100.0)
     log.found("ann", 100.0)
     log.looks("ann", ROBOT, 100.0)
     changes = [effect for effect in log.effects if isinstance(effect, ConnectionEvent | Forgotten)]
-    (first, everybody) = sorted(standings.feed(changes, set(), 100.0), key=lambda one: one.session.events)
+    (first, everybody) = sorted(published.feed(changes, set(), 100.0), key=lambda one: one.session.events)
 
     assert (first.actor, first.session.events) == ("ann", 1)
     assert (everybody.actor, everybody.session.events) == ("", 2)
@@ -235,12 +235,12 @@ def _of(name: str, observation: object) -> object:
 def told(stream: Stream, forgotten_after: float) -> tuple[Counter[object], Statistics, int]:
     """The effects, but for their numbers: at one instant it is whoever was met first; the totals; who is known."""
     config = RecognitionConfig(forgotten_after=forgotten_after)
-    session, standings = Session(ROBOT, config), Standings(ROBOT, config)
+    session, published = Session(ROBOT, config), PublishedStatistics(ROBOT, config)
     session.feed(world("ann", "bob"), 0.0)
     effects = []
     for at, observation in stream:
         new = session.feed(observation, at)
-        standings.feed((one for one in new if isinstance(one, ConnectionEvent | Forgotten)), session.busy, at)
+        published.feed((one for one in new if isinstance(one, ConnectionEvent | Forgotten)), session.busy, at)
         effects += new
     end = stream[-1][0]
     known = len(session.persons)
@@ -254,7 +254,7 @@ def told(stream: Stream, forgotten_after: float) -> tuple[Counter[object], Stati
                 kept[replace(effect, event="")] += 1
             case Accepted(id=id) | Refused(id=id):
                 kept[type(effect), id] += 1
-    return kept, standings.overall(end), known
+    return kept, published.overall(end), known
 
 
 @settings(max_examples=60, deadline=None)

@@ -7,7 +7,7 @@ import pytest
 from engage_hri.schemas.recognition import ConnectionEvent, Statistics
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.recognition.config import RecognitionConfig
-from engage_hri.services.recognition.statistics.standings import Standings
+from engage_hri.services.recognition.statistics.published import PublishedStatistics
 from tests.recognition.test_statistics import event, table_2_1
 
 PAUSE: Seconds = 70.0
@@ -15,12 +15,12 @@ TASK_AFTER: Seconds = 2.0
 
 
 class Told:
-    """What standings publish of one actor (empty: all), each message at its time."""
+    """What published publish of one actor (empty: all), each message at its time."""
 
     def __init__(self, actor: str = "human", **config: object) -> None:
         self.messages: list[Statistics] = []
         self._actor = actor
-        self._standings = Standings("robot", RecognitionConfig(**config))  # type: ignore[arg-type]
+        self._published = PublishedStatistics("robot", RecognitionConfig(**config))  # type: ignore[arg-type]
         self._busy: set[str] = set()
 
     def happens(self, *events: ConnectionEvent, at: Seconds | None = None) -> None:
@@ -33,11 +33,11 @@ class Told:
         self._feed([], at)
 
     def until(self, now: Seconds) -> None:
-        while self._standings.deadline is not None and self._standings.deadline <= now:
-            self._feed([], self._standings.deadline)
+        while self._published.deadline is not None and self._published.deadline <= now:
+            self._feed([], self._published.deadline)
 
     def _feed(self, events: list[ConnectionEvent], now: Seconds) -> None:
-        told = self._standings.feed(events, self._busy, now)
+        told = self._published.feed(events, self._busy, now)
         self.messages += [statistics for statistics in told if statistics.actor == self._actor]
 
     @property

@@ -102,7 +102,7 @@ async def test_statistics_of_one_person_or_of_each(hub: MemoryHub):
             looks(perception, actor, ROBOT)
         await robot.statistics("bob")
 
-        with robot.standings() as everybodys, robot.standings("ann") as anns:
+        with robot.statistics_updates() as everybodys, robot.statistics_updates("ann") as anns:
             actors = {one.actor for one in [await everybodys.next(1) for _ in range(3)] if one}
             own = await anns.next(1)
 

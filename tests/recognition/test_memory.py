@@ -12,7 +12,7 @@ from engage_hri.schemas.units import Seconds
 from engage_hri.services.recognition.config import RecognitionConfig
 from engage_hri.services.recognition.events.news import Latest
 from engage_hri.services.recognition.events.session import Observation, Session
-from engage_hri.services.recognition.statistics.standings import Standings
+from engage_hri.services.recognition.statistics.published import PublishedStatistics
 from tests.recognition.kept import kinds
 from tests.recognition.meeting import meeting
 from tests.recognition.observations import ROBOT, Log, stamp
@@ -42,15 +42,15 @@ class Untidy:
 
 
 def test_a_long_session_keeps_no_more_than_a_short_one():
-    session, standings = Session(ROBOT, RecognitionConfig()), Standings(ROBOT, RecognitionConfig())
+    session, published = Session(ROBOT, RecognitionConfig()), PublishedStatistics(ROBOT, RecognitionConfig())
     sizes, now = [], 0.0
     for number, (at, observation) in enumerate(islice(Untidy(2), LATE + 1)):
         now = max(now, at)
         effects = session.feed(observation, at)
         busy = session.busy
-        standings.feed([effect for effect in effects if isinstance(effect, ConnectionEvent)], busy, now)
+        published.feed([effect for effect in effects if isinstance(effect, ConnectionEvent)], busy, now)
         if number in (EARLY, LATE):
-            sizes.append(kinds(session, standings))
+            sizes.append(kinds(session, published))
     early, late = sizes
 
     assert now > 3600.0

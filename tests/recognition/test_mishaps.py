@@ -43,7 +43,7 @@ def meeting(*, strict: bool = False) -> Session:
 
 def break_gaze(session: Session, name: str, breaks_at: float) -> None:
     person = session.persons[name]
-    person.facial = Broken(session._ledger)
+    person.facial = Broken(session._writer)
     person.facial.breaks_at = breaks_at
 
 

@@ -11,7 +11,7 @@ from engage_hri.services.recognition.config import RecognitionConfig
 from engage_hri.services.recognition.events.machine import Effect
 from engage_hri.services.recognition.events.session import Session
 from engage_hri.services.recognition.statistics.engagement import JUST_AFTER, next_level
-from engage_hri.services.recognition.statistics.standings import Standings
+from engage_hri.services.recognition.statistics.published import PublishedStatistics
 from tests.recognition import recomputed
 from tests.recognition.observations import ROBOT, world
 from tests.recognition.test_random_streams import ACTORS, Stream, streams
@@ -21,14 +21,14 @@ CONFIG = RecognitionConfig(window=5.0, reference_mtbce=0.8)
 
 
 class Replay:
-    """A stream through session and standings as the service runs them, with all that was published."""
+    """A stream through session and published as the service runs them, with all that was published."""
 
     def __init__(self) -> None:
         self.log: list[ConnectionEvent] = []
         self.told: dict[str, Statistics] = {}
         self.busy: set[str] = set()
         self._session = Session(ROBOT, CONFIG)
-        self._standings = Standings(ROBOT, CONFIG)
+        self._published = PublishedStatistics(ROBOT, CONFIG)
         self._now: Seconds = 0.0
         self._session.feed(world(*ACTORS), 0.0)
 
@@ -47,14 +47,14 @@ class Replay:
 
     @property
     def deadline(self) -> Seconds | None:
-        times = (self._session.deadline, self._standings.deadline)
+        times = (self._session.deadline, self._published.deadline)
         return min((at for at in times if at is not None), default=None)
 
     def _tell(self, effects: list[Effect]) -> list[Statistics]:
         events = [effect for effect in effects if isinstance(effect, ConnectionEvent)]
         self.log += events
         self.busy = set(self._session.busy)
-        told = self._standings.feed(events, self.busy, self._now)
+        told = self._published.feed(events, self.busy, self._now)
         self.told.update((statistics.actor, statistics) for statistics in told)
         return told
 
@@ -126,7 +126,7 @@ def test_statistics_do_not_depend_on_how_changes_are_grouped(stream, size):
     replay = Replay()
     for _ in replay.run(stream):
         pass
-    together = Standings(ROBOT, CONFIG)
+    together = PublishedStatistics(ROBOT, CONFIG)
     told: dict[str, Statistics] = {}
     end = max((change.at.seconds for change in replay.log), default=0.0)
     for first in range(0, len(replay.log), size):

@@ -6,7 +6,7 @@ from engage_hri.schemas.recognition import ConnectionEvent
 from engage_hri.schemas.units import Stamp
 from engage_hri.services.recognition.config import RecognitionConfig
 from engage_hri.services.recognition.statistics.engagement import Engagement, next_level, pace
-from engage_hri.services.recognition.statistics.standings import Standings
+from engage_hri.services.recognition.statistics.published import PublishedStatistics
 from engage_hri.services.recognition.statistics.tally import Tally
 
 KIND = {
@@ -204,28 +204,28 @@ def test_who_is_busy_is_not_judged_and_starts_afresh():
     assert (after.level, after.value) == ("engaged", 1.0)
 
 
-def test_standings_tell_each_person_and_everybody():
-    standings = Standings("robot", RecognitionConfig())
-    told = standings.feed([event("dg-1", "started", 1.0)], set(), 1.0)
+def test_statistics_are_published_for_each_person_and_everybody():
+    published = PublishedStatistics("robot", RecognitionConfig())
+    told = published.feed([event("dg-1", "started", 1.0)], set(), 1.0)
 
     assert [statistics.actor for statistics in told] == ["", "human"]
-    assert standings.deadline is not None
-    assert standings.feed([], set(), 1.5) == []
+    assert published.deadline is not None
+    assert published.feed([], set(), 1.5) == []
 
 
-def test_standings_tell_again_when_time_changes_them_and_then_fall_silent():
-    standings = Standings("robot", RecognitionConfig())
-    standings.feed([event("dg-1", "started", 1.0)], set(), 1.0)
+def test_statistics_are_published_again_when_time_changes_them_and_then_fall_silent():
+    published = PublishedStatistics("robot", RecognitionConfig())
+    published.feed([event("dg-1", "started", 1.0)], set(), 1.0)
     seen = []
-    while standings.deadline is not None:
-        now = standings.deadline
-        seen += [(round(now, 2), one.level, one.recent.events) for one in standings.feed([], set(), now) if one.actor]
+    while published.deadline is not None:
+        now = published.deadline
+        seen += [(round(now, 2), one.level, one.recent.events) for one in published.feed([], set(), now) if one.actor]
 
     assert seen == [(13.67, "weakening", 1), (29.5, "disengaged", 1), (31.0, "disengaged", 0)]
 
 
-def test_standings_tell_when_somebody_gets_busy():
-    standings = Standings("robot", RecognitionConfig())
-    told = standings.feed([], {"human"}, 1.0)
+def test_statistics_are_published_when_somebody_gets_busy():
+    published = PublishedStatistics("robot", RecognitionConfig())
+    told = published.feed([], {"human"}, 1.0)
 
     assert [(statistics.actor, statistics.busy) for statistics in told] == [("", True), ("human", True)]

@@ -11,7 +11,7 @@ from engage_hri.services.recognition.events import adjacency_pair, backchannel, 
 from engage_hri.services.recognition.events.machine import (
     DECISIONS,
     IDLE,
-    Ledger,
+    EventWriter,
     Row,
     UndefinedTransition,
     UnderWay,
@@ -99,7 +99,7 @@ def test_every_name_that_a_shared_gaze_gives_stands_in_its_table(gaze: type[Shar
 
 
 def gaze() -> mutual_facial_gaze.MutualFacialGaze:
-    machine = mutual_facial_gaze.MutualFacialGaze(Ledger("loop"))
+    machine = mutual_facial_gaze.MutualFacialGaze(EventWriter("loop"))
     machine.event = UnderWay(kind="mutual_facial_gaze", initiator="robot", responder="human", started=1.0)
     machine.step("robot_looks", 1.0)
     return machine
@@ -110,16 +110,16 @@ def test_an_undefined_transition_raises_and_changes_nothing():
 
     with pytest.raises(UndefinedTransition, match="MutualFacialGaze: no 'robot_answers' in state 'robot_waiting'"):
         machine.step("robot_answers", 2.0)
-    assert (machine.state, len(machine._ledger.effects)) == ("robot_waiting", 1)
+    assert (machine.state, len(machine._writer.effects)) == ("robot_waiting", 1)
 
 
 def test_ids_count_by_kind_and_carry_the_session():
-    ledger = Ledger("loop", "3f2-")
+    writer = EventWriter("loop", "3f2-")
     kinds: tuple[EventKind, ...] = ("directed_gaze", "backchannel", "directed_gaze")
     for kind in kinds:
-        ledger.publish(UnderWay(kind=kind, initiator="robot", responder="human", started=0.0), "started", 0.0)
+        writer.publish(UnderWay(kind=kind, initiator="robot", responder="human", started=0.0), "started", 0.0)
 
-    assert [event.id for event in ledger.take()] == ["3f2-dg-1", "3f2-bc-1", "3f2-dg-2"]  # type: ignore[union-attr]
+    assert [event.id for event in writer.take()] == ["3f2-dg-1", "3f2-bc-1", "3f2-dg-2"]  # type: ignore[union-attr]
 
 
 @pytest.mark.parametrize(

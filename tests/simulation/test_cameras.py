@@ -19,7 +19,7 @@ from engage_hri.schemas.units import Seconds, Stamp, Vector
 from engage_hri.schemas.world import World
 from engage_hri.services.simulation.cameras import Cameras
 from engage_hri.services.simulation.config import PerceptionFaults, SimulationConfig
-from engage_hri.services.simulation.head import Head, Sightlines, angle, unit
+from engage_hri.services.simulation.head import Sightlines, SimulatedHead, angle, unit
 from engage_hri.services.simulation.human import (
     AWAY,
     FACE,
@@ -38,7 +38,7 @@ from engage_hri.services.simulation.human import (
     Stop,
     Withdraw,
 )
-from engage_hri.services.simulation.perception import Scene
+from engage_hri.services.simulation.perception import PersonAtTable
 from engage_hri.services.simulation.table import Table
 from engage_hri.services.tangram.table import tangram_table
 
@@ -60,7 +60,7 @@ class Filmed:
         whole = SimulationConfig(**config)
         table = Table(tangram_table(), hand_speed=whole.hand_speed, shortest_movement=whole.shortest_movement)
         human = Human((Rule("step-1", Entrance(), (Sit(), *acts)),))
-        scene = Scene(human, table, robot="robot", frame=whole.frame, stamp=stamp)
+        scene = PersonAtTable(human, table, robot="robot", frame=whole.frame, stamp=stamp)
         cameras = Cameras(
             scene, Sightlines(table, "robot"), whole, stamp, lambda name: random.Random(f"{seed} {name}")
         )
@@ -188,7 +188,7 @@ def test_a_world_at_rest_is_not_told_again() -> None:
 @settings(max_examples=60)
 @given(*(st.tuples(*[st.floats(-1, 1)] * 3).filter(lambda it: math.hypot(*it) > 0.1) for _ in range(2)))
 def test_a_turning_head_always_points_somewhere_and_never_goes_back(start: Vector, goal: Vector) -> None:
-    head, start, goal = Head(0.2), unit(start), unit(goal)
+    head, start, goal = SimulatedHead(0.2), unit(start), unit(goal)
     head.turn(start, 1.0)
 
     way = [head.facing(goal, 1.0 + 0.02 * step) for step in range(11)]
@@ -315,7 +315,7 @@ def test_a_missed_look_is_told_neither_when_it_begins_nor_when_it_ends() -> None
 def test_without_faults_actions_pass_as_they_are() -> None:
     acts = (LookAt(FACE), *MOVES_BLUE, LookAt(TABLE), Pause(0.5), Leave())
     table = Table(tangram_table(), hand_speed=0.45, shortest_movement=0.6)
-    scene = Scene(
+    scene = PersonAtTable(
         Human((Rule("step-1", Entrance(), (Sit(), *acts)),)), table, robot="robot", frame=FRAME, stamp=stamp
     )
     happened: list[tuple[Seconds, Message]] = [(0.0, scene.world(0.0))]

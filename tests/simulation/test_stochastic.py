@@ -15,7 +15,7 @@ from engage_hri.schemas.messages import Message
 from engage_hri.schemas.units import Stamp
 from engage_hri.schemas.world import World
 from engage_hri.services.simulation.config import Habits
-from engage_hri.services.simulation.perception import Scene
+from engage_hri.services.simulation.perception import PersonAtTable
 from engage_hri.services.simulation.stochastic import StochasticHuman
 from engage_hri.services.simulation.table import Table
 from engage_hri.services.tangram.table import tangram_table
@@ -35,7 +35,7 @@ class Watch:
     def __init__(self, seed: int = 0, **habits: Any) -> None:
         self.table = Table(tangram_table(), hand_speed=0.45, shortest_movement=0.6)
         self.human = StochasticHuman(tangram_table(), Habits(**habits), random.Random(seed), ROBOT)
-        self.scene = Scene(self.human, self.table, robot=ROBOT, frame=1 / 15, stamp=stamp)
+        self.scene = PersonAtTable(self.human, self.table, robot=ROBOT, frame=1 / 15, stamp=stamp)
         self.seen: list[Message] = []
         self.now = 0.0
         self.blocks = 0

@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from engage_hri.services.simulation.table import PieceMoved, Table
-from engage_hri.services.tangram.table import Pose, tangram_table
+from engage_hri.services.tangram.table import PiecePose, tangram_table
 
 
 def table() -> Table:
@@ -17,7 +17,7 @@ def table() -> Table:
 def test_a_piece_lies_where_it_was_laid() -> None:
     scene = table()
 
-    end = scene.carry("blue-square", Pose(0.48, 0.0, 90.0), 1.0)
+    end = scene.carry("blue-square", PiecePose(0.48, 0.0, 90.0), 1.0)
     rested = scene.settle(end)
 
     lies = scene.piece("blue-square", end + 1.0)
@@ -39,8 +39,8 @@ def test_reaching_moves_the_hand_but_not_the_piece() -> None:
 
 
 def test_a_far_movement_takes_longer_than_a_near_one() -> None:
-    near = table().carry("blue-square", Pose(0.55, -0.2), 0.0)
-    far = table().carry("blue-square", Pose(0.40, 0.39), 0.0)
+    near = table().carry("blue-square", PiecePose(0.55, -0.2), 0.0)
+    far = table().carry("blue-square", PiecePose(0.40, 0.39), 0.0)
 
     assert near == 0.6
     assert far == pytest.approx(math.hypot(0.16, 0.60) / 0.5)
@@ -67,7 +67,7 @@ def test_an_unknown_piece_is_an_error() -> None:
 @given(st.floats(0.35, 0.75), st.floats(-0.4, 0.4), st.floats(-180, 180), st.integers(1, 60))
 def test_velocity_is_the_derivative_of_position(x: float, y: float, yaw: float, part: int) -> None:
     scene = table()
-    end = scene.carry("red-square", Pose(x, y, yaw), 0.0)
+    end = scene.carry("red-square", PiecePose(x, y, yaw), 0.0)
     now, step = end * part / 61, 1e-6
 
     before, piece, after = (scene.piece("red-square", at) for at in (now - step, now, now + step))

@@ -5,7 +5,7 @@ from itertools import combinations
 import pytest
 
 from engage_hri.schemas.world import Entity
-from engage_hri.services.tangram.table import Pose, edges, overlap, poses_touching, tangram_table, touches
+from engage_hri.services.tangram.table import PiecePose, edges, overlap, poses_touching, tangram_table, touches
 
 TABLE = tangram_table()
 START = {piece.id: TABLE.lying(piece, piece.start) for piece in TABLE.pieces}
@@ -70,4 +70,4 @@ def test_a_piece_laid_where_poses_touching_says_touches_there() -> None:
 def test_a_longer_edge_does_not_touch_a_shorter_one() -> None:
     green = TABLE.piece("green-square")
 
-    assert side_of(TABLE.lying(green, Pose(0.55, 0.07)), GOAL["rectangle"]) is None
+    assert side_of(TABLE.lying(green, PiecePose(0.55, 0.07)), GOAL["rectangle"]) is None

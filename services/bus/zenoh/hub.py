@@ -22,11 +22,11 @@ from engage_hri.schemas.units import Seconds, Stamp
 from engage_hri.services.bus import journal
 from engage_hri.services.bus.interface import LOG, Answer, Bus, Hub, Keep, Received, Subscription
 from engage_hri.services.bus.zenoh.clocks import Clocks
-from engage_hri.services.bus.zenoh.order import Envelope, Ledger, Pulse
+from engage_hri.services.bus.zenoh.foreign_clients import ForeignClients, form_asked, in_form, refuse
+from engage_hri.services.bus.zenoh.order import Envelope, Pulse, SentLog
 from engage_hri.services.bus.zenoh.peers import Peers, finish, pack
 from engage_hri.services.bus.zenoh.readers import Readers
-from engage_hri.services.bus.zenoh.session import QOS, RENDEZVOUS, STREAM_QOS, Doorway, open_session
-from engage_hri.services.bus.zenoh.visitors import Visitors, form_asked, in_form, refuse
+from engage_hri.services.bus.zenoh.session import QOS, RENDEZVOUS, STREAM_QOS, LoopBridge, open_session
 
 FIRST_PULSE: Seconds = 0.25
 NEXT_PULSE: Seconds = 1.0
@@ -58,7 +58,7 @@ async def open_hub(
     session, calls = open_session(robot, connect, listen, None if connect or listen else rendezvous)
     hub = ZenohHub(robot, session)
     if calls:
-        await hub.peers.settle(asyncio.get_running_loop().time() + OPENING)
+        await hub.peers.wait_for_discovery(asyncio.get_running_loop().time() + OPENING)
     return hub
 
 
@@ -67,28 +67,28 @@ class ZenohHub(Hub):
         self.robot = robot
         self.run = str(session.zid())
         self.session = session
-        self.doorway = Doorway(self.failed)
+        self.bridge = LoopBridge(self.failed)
         self.life_numbers = count(1)
         self._loop = asyncio.get_running_loop()
         self.clocks = Clocks(_clock_name(self._loop, self.run), self._loop.time)
-        self._ledger = Ledger(self.run)
+        self._sent = SentLog(self.run)
         self._publishers: dict[str, zenoh.Publisher] = {}
         self._buses: dict[str, ZenohBus] = {}
         self._pulse: asyncio.TimerHandle | None = None
         self._closed = False
-        self.peers = Peers(session, self.doorway, self._ledger, self.clocks)
-        self.readers = Readers(session, self.doorway, self._ledger, self.peers)
-        self._visitors = Visitors(session, self.doorway)
+        self.peers = Peers(session, self.bridge, self._sent, self.clocks)
+        self.readers = Readers(session, self.bridge, self._sent, self.peers)
+        self._foreign = ForeignClients(session, self.bridge)
         self.peers.stand(self.readers.process_came, self.readers.participant_changed)
 
     @property
     def health(self) -> BusHealth:
         """Of the process, without what is each participant's own."""
-        traffic = self.doorway.traffic
+        traffic = self.bridge.traffic
         return BusHealth(
             peers=tuple(sorted(self.peers.names)), refused=self.readers.refused,
             passed=traffic.passed, dropped=traffic.dropped, depth=traffic.depth, lag=traffic.lag,
-            waiting=self.doorway.waiting,
+            waiting=self.bridge.waiting,
         )  # fmt: skip
 
     def join(self, name: str, role: str = "manager") -> "ZenohBus":
@@ -98,8 +98,8 @@ class ZenohHub(Hub):
         self.readers.log = next(iter(self._buses.values())).log
         return bus
 
-    async def vacant(self, *names: str) -> None:
-        await self.peers.rest(QUIET)
+    async def wait_until_free(self, *names: str) -> None:
+        await self.peers.wait_for_quiet(QUIET)
         deadline = self._loop.time() + VACANCY
         while taken := sorted(set(names) & set(self.peers.names)):
             if not await self.peers.change(deadline):
@@ -124,11 +124,11 @@ class ZenohHub(Hub):
             await bus.leave()
         await self.peers.flush()
         self._closed = True
-        self.doorway.close()
+        self.bridge.close()
         if self._pulse is not None:
             self._pulse.cancel()
         self.readers.close()
-        self._visitors.close()
+        self._foreign.close()
         self.peers.close()
         for publisher in self._publishers.values():
             publisher.undeclare()  # type: ignore[no-untyped-call]
@@ -142,9 +142,9 @@ class ZenohHub(Hub):
         payload, encoding = published(message)
         stamp = self.session.new_timestamp()
         if ordered:
-            written = self._ledger.write(key, encoding, payload, bus.name, self.clocks.own, now)
+            written = self._sent.write(key, encoding, payload, bus.name, self.clocks.own, now)
             envelope = written.envelope
-            self._visitors.note(written, stamp)
+            self._foreign.note(written, stamp)
             if self._pulse is None:
                 self._pulse = self._loop.call_later(FIRST_PULSE, self._send_pulse)
         else:
@@ -162,7 +162,7 @@ class ZenohHub(Hub):
 
     def _send_pulse(self) -> None:
         """Tell the recent counts, a few times: a receiver that lost the last message of a burst sees it by them."""
-        counts = self._ledger.recent(self._loop.time())
+        counts = self._sent.recent(self._loop.time())
         self._pulse = self._loop.call_later(NEXT_PULSE, self._send_pulse) if counts else None
         if counts:
             self._publisher(keys.own(self.run, "pulse"), True).put(
@@ -279,7 +279,7 @@ class ZenohBus(Bus):
                 finish(query)
 
         session = self._hub.session
-        self._answers.append(session.declare_queryable(key, self._hub.doorway.entrance(reply)))
+        self._answers.append(session.declare_queryable(key, self._hub.bridge.on_loop(reply)))
         # Whoever asked too early hears by this token that it is worth asking again.
         self._answers.append(session.liveliness().declare_token(keys.own(self._hub.run, f"answers/{key}")))
 

@@ -1,6 +1,6 @@
 """Order, history and loss on top of a wire that keeps order only per link. Pure: no zenoh, no clock, no loop.
 
-Every process numbers what it publishes on ordered keys (`Envelope`), keeps the last of it (`Ledger`) and hands it
+Every process numbers what it publishes on ordered keys (`Envelope`), keeps the last of it (`SentLog`) and hands it
 out on request. Every subscription follows each publishing process (`Follower`): it starts by asking for the past,
 holds what arrives meanwhile, and merges both by number; a gap in a key's count makes it ask again. So messages of
 one process arrive in its order across keys, each once, whether they came live, from history, or after a cut.
@@ -72,7 +72,7 @@ class Pulse(Struct, frozen=True):
     counts: dict[str, int]
 
 
-class Ledger:
+class SentLog:
     """What one process has published: numbers it, keeps it, gives it out again."""
 
     def __init__(self, run: str, kept: int = KEPT) -> None:

@@ -11,8 +11,8 @@ import zenoh
 from engage_hri.schemas import keys
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.zenoh.clocks import Clocks
-from engage_hri.services.bus.zenoh.order import Ledger, Missing, Past, Pulse
-from engage_hri.services.bus.zenoh.session import QOS, Doorway
+from engage_hri.services.bus.zenoh.order import Missing, Past, Pulse, SentLog
+from engage_hri.services.bus.zenoh.session import QOS, LoopBridge
 
 CATCH_UP: Seconds = 1.0
 """How long a process may take to hand out its past."""
@@ -38,8 +38,8 @@ class Peers:
     def __init__(
         self,
         session: zenoh.Session,
-        doorway: Doorway,
-        ledger: Ledger,
+        bridge: LoopBridge,
+        sent: SentLog,
         clocks: Clocks,
     ) -> None:
         self.processes: set[str] = set()
@@ -48,13 +48,13 @@ class Peers:
         self.clocks = clocks
         self._loop = asyncio.get_running_loop()
         self._session = session
-        self._doorway = doorway
-        self._ledger = ledger
+        self._bridge = bridge
+        self._sent = sent
         self._watchers: list[asyncio.Future[None]] = []
-        run = ledger.run
+        run = sent.run
         self._declared: tuple[Any, ...] = (
-            session.declare_queryable(keys.own(run, "past"), doorway.entrance(self._tell_past)),
-            session.declare_queryable(keys.own(run, "clock"), doorway.entrance(self._tell_time)),
+            session.declare_queryable(keys.own(run, "past"), bridge.on_loop(self._tell_past)),
+            session.declare_queryable(keys.own(run, "clock"), bridge.on_loop(self._tell_time)),
         )
 
     def stand(self, on_process: Callable[[str], None], on_participant: Callable[[str, str, bool], None]) -> None:
@@ -62,20 +62,20 @@ class Peers:
         self._on_process = on_process
         self._on_participant = on_participant
         liveliness = self._session.liveliness()
-        handler = self._doorway.entrance(self._token_changed)
+        handler = self._bridge.on_loop(self._token_changed)
         self._declared += (
             liveliness.declare_subscriber(keys.ANY_TOKEN, handler, history=True),
-            liveliness.declare_token(keys.own(self._ledger.run, "process")),
+            liveliness.declare_token(keys.own(self._sent.run, "process")),
         )
 
     # on_process: it has come, or come back. on_participant: come or, with False, gone.
 
-    async def settle(self, deadline: Seconds) -> None:
+    async def wait_for_discovery(self, deadline: Seconds) -> None:
         """Wait until the first other process is known."""
         while not self.processes and await self.change(deadline):
             pass
 
-    async def rest(self, pause: Seconds) -> None:
+    async def wait_for_quiet(self, pause: Seconds) -> None:
         """Wait until nobody has come or gone for this long; with no other process there is nobody to wait for."""
         while self.processes and await self.change(self._loop.time() + pause):
             pass
@@ -89,7 +89,7 @@ class Peers:
     def _token_changed(self, sample: zenoh.Sample) -> None:
         run, *subject = str(sample.key_expr).split("/")[3:]
         there = sample.kind == zenoh.SampleKind.PUT
-        if run == self._ledger.run:
+        if run == self._sent.run:
             return
         if subject == ["process"]:
             if there:
@@ -149,7 +149,7 @@ class Peers:
         """A Zenoh query, all matching servers; `reply` for each answer and then `end`, on the loop."""
         self._session.get(
             key,
-            self._doorway.entrance(reply, end),
+            self._bridge.on_loop(reply, end),
             target=zenoh.QueryTarget.ALL,
             consolidation=zenoh.ConsolidationMode.NONE,
             payload=payload,
@@ -175,7 +175,7 @@ class Peers:
         except BAD as error:
             query.reply_err(str(error))
         else:
-            query.reply(query.key_expr, pack(self._ledger.past(missing, self._loop.time())))
+            query.reply(query.key_expr, pack(self._sent.past(missing, self._loop.time())))
         finish(query)
 
     def measure_clock(self, run: str, clock: str, trips: int = CLOCK_TRIPS) -> None:
@@ -198,10 +198,10 @@ class Peers:
 
     async def flush(self) -> None:
         """Wait until every process we know has what was written last: a put and then an exit loses most of it."""
-        counts = self._ledger.recent(self._loop.time())
+        counts = self._sent.recent(self._loop.time())
         if counts and self.processes:
             done: asyncio.Future[None] = self._loop.create_future()
-            question = pack((self._ledger.run, Pulse(counts)))
+            question = pack((self._sent.run, Pulse(counts)))
             self.ask(keys.ANY_FLUSH, question, lambda reply: None, lambda _: _resolve(done), FLUSH)
             await done
 

@@ -15,9 +15,9 @@ from engage_hri.schemas.requests import Unreadable
 from engage_hri.services.bus import journal
 from engage_hri.services.bus.interface import Bus, Received, Subscription
 from engage_hri.services.bus.payloads import read_payload, unreadable
-from engage_hri.services.bus.zenoh.order import Envelope, Follower, Ledger, Missing, Past, Pulse, Written
+from engage_hri.services.bus.zenoh.order import Envelope, Follower, Missing, Past, Pulse, SentLog, Written
 from engage_hri.services.bus.zenoh.peers import BAD, Peers, finish
-from engage_hri.services.bus.zenoh.session import Doorway
+from engage_hri.services.bus.zenoh.session import LoopBridge
 
 _envelopes = msgspec.msgpack.Decoder(Envelope)
 _pulses = msgspec.msgpack.Decoder(Pulse)
@@ -40,21 +40,21 @@ class _Reader:
 class Readers:
     """All subscriptions of the process. refused: how many payloads were bad. log: tells who comes and goes."""
 
-    def __init__(self, session: zenoh.Session, doorway: Doorway, ledger: Ledger, peers: Peers) -> None:
+    def __init__(self, session: zenoh.Session, bridge: LoopBridge, sent: SentLog, peers: Peers) -> None:
         self.refused = 0
         self.log = journal.BUS
         self._loop = asyncio.get_running_loop()
         self._session = session
-        self._doorway = doorway
-        self._ledger = ledger
+        self._bridge = bridge
+        self._sent = sent
         self._peers = peers
         self._readers: list[_Reader] = []
         self._carriers: dict[str, tuple[Any, list[_Reader]]] = {}
         self._flushing: list[tuple[str, zenoh.Query]] = []
         self._decoded: tuple[Written, Message | None] | None = None
         self._declared: tuple[Any, ...] = (
-            session.declare_queryable(keys.own(ledger.run, "flush"), doorway.entrance(self._flush_asked)),
-            session.declare_subscriber(keys.ANY_PULSE, doorway.samples(self._pulse_heard)),
+            session.declare_queryable(keys.own(sent.run, "flush"), bridge.on_loop(self._flush_asked)),
+            session.declare_subscriber(keys.ANY_PULSE, bridge.samples(self._pulse_heard)),
         )
 
     def missed(self, bus: Bus) -> tuple[int, int]:
@@ -78,11 +78,11 @@ class Readers:
         for name, runs in self._peers.names.items():
             for run in sorted(runs):
                 self._offer_presence(reader, PeerAlive(participant=name, run=run))
-        for written in self._ledger.past(Missing(subscription.patterns, {}), self._loop.time()).written:
+        for written in self._sent.past(Missing(subscription.patterns, {}), self._loop.time()).written:
             self._deliver(reader, written, past=True)
         for pattern in subscription.patterns:
             if pattern not in self._carriers:
-                handler = self._doorway.samples(partial(self._sample_came, pattern))
+                handler = self._bridge.samples(partial(self._sample_came, pattern))
                 carrier = self._session.declare_subscriber(pattern, handler, allowed_origin=zenoh.Locality.REMOTE)
                 self._carriers[pattern] = (carrier, [])
             self._carriers[pattern][1].append(reader)
@@ -137,7 +137,7 @@ class Readers:
         if sample.timestamp is None:
             return ""
         stamped_by = str(sample.timestamp.get_id())
-        passed_on_by = {self._ledger.run, *self._peers.processes, *map(str, self._session.info.routers_zid())}
+        passed_on_by = {self._sent.run, *self._peers.processes, *map(str, self._session.info.routers_zid())}
         return "" if stamped_by in passed_on_by else stamped_by
 
     def _deliver(self, reader: _Reader, written: Written, *, past: bool) -> None:
@@ -210,7 +210,7 @@ class Readers:
         except BAD:
             self.refused += 1
         else:
-            if run != self._ledger.run:
+            if run != self._sent.run:
                 self._compare(run, pulse)
 
     def _compare(self, run: str, pulse: Pulse) -> None:
@@ -226,7 +226,7 @@ class Readers:
             query.reply_err(str(error))
             finish(query)
             return
-        if run != self._ledger.run:
+        if run != self._sent.run:
             self._compare(run, pulse)
         self._flushing.append((run, query))
         self._answer_flushes()
@@ -237,7 +237,7 @@ class Readers:
             if any(run in reader.followers and reader.followers[run].behind for reader in self._readers):
                 waiting.append((run, query))
             else:
-                query.reply(keys.own(self._ledger.run, "flush"), b"")
+                query.reply(keys.own(self._sent.run, "flush"), b"")
                 finish(query)
         self._flushing = waiting
 

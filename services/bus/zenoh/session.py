@@ -101,7 +101,7 @@ def _config(robot: str | None, connect: Sequence[str], listen: Sequence[str], mo
 
 
 class Traffic(Struct):
-    """What the doorway has seen. depth: most that ever waited. lag: longest wait of a batch for the loop."""
+    """What the bridge has seen. depth: most that ever waited. lag: longest wait of a batch for the loop."""
 
     passed: int = 0
     dropped: int = 0
@@ -109,7 +109,7 @@ class Traffic(Struct):
     lag: Seconds = 0.0
 
 
-class Doorway:
+class LoopBridge:
     """From Zenoh's threads to the loop: one queue for all keys, in order; streams apart, the oldest dropped first.
 
     A callback appends and wakes the loop if nobody has, nothing else: whatever blocks there stalls the link.
@@ -126,7 +126,7 @@ class Doorway:
         self._woken_at = 0.0
         self._open = True
 
-    def entrance(self, enter: Callable[[Any], None], end: Callable[[Any], None] | None = None) -> Any:
+    def on_loop(self, enter: Callable[[Any], None], end: Callable[[Any], None] | None = None) -> Any:
         """A handler for Zenoh: `enter` runs on the loop with each item, `end` when there will be no more."""
 
         def ended() -> None:
@@ -137,7 +137,7 @@ class Doorway:
         return zenoh.handlers.Callback(lambda item: self._let_in(enter, item), ended, indirect=False)
 
     def samples(self, enter: Callable[[zenoh.Sample], None]) -> Any:
-        """As `entrance`, for subscribers: samples that may be dropped take the streams' queue."""
+        """As `on_loop`, for subscribers: samples that may be dropped take the streams' queue."""
 
         def sort(sample: zenoh.Sample) -> None:
             if sample.congestion_control == zenoh.CongestionControl.DROP:

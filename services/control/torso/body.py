@@ -28,9 +28,9 @@ from engage_hri.services.control.body import (
 )
 from engage_hri.services.control.config import Variability
 from engage_hri.services.control.torso import choreography, head, kinematics, tracks
-from engage_hri.services.control.torso.course import Course, Impossible, Point, Scene
+from engage_hri.services.control.torso.course import Course, CoursePoint, Impossible, Situation
 from engage_hri.services.control.torso.estimates import infeasible, moved, spoken, waited
-from engage_hri.services.control.torso.head import Attention
+from engage_hri.services.control.torso.head import EyeTarget
 from engage_hri.services.control.torso.motion import Motion, Path, resting
 from engage_hri.services.control.torso.runs import OVERHEAT, STALL, Run
 from engage_hri.services.control.torso.tracks import Track
@@ -57,7 +57,7 @@ class SimulatedBody(Body):
         self._tracks = {part: Track(part, tracks.home_of(part, displaced)) for part in tracks.LIMITS}
         self._runs: dict[str, Run] = {}
         self._world = World(entities=())
-        self._attention = Attention()
+        self._attention = EyeTarget()
         self._utterance: MovementAuthority | None = None
         self._saying = ""
         self._hushed = asyncio.Event()
@@ -113,7 +113,7 @@ class SimulatedBody(Body):
 
     # -- planning -----------------------------------------------------------------------------------------------
 
-    def _scene(self, world: World, pose: BodyPose | None = None, *, true: bool = False) -> Scene:
+    def _scene(self, world: World, pose: BodyPose | None = None, *, true: bool = False) -> Situation:
         """true: with joints where they are, not where the body believes them to be."""
         now = self._loop.time()
         here: dict[str, float] = {}
@@ -126,9 +126,9 @@ class SimulatedBody(Body):
             here.update(self._misbelieved)
         rest = {**kinematics.HOME, **dict(zip(tracks.NECK, self._attention.angles, strict=True))}
         zones = self.capabilities.no_point_zones
-        return Scene(tracks.updated(here, pose), rest, world, zones, tuple(self._runs))
+        return Situation(tracks.updated(here, pose), rest, world, zones, tuple(self._runs))
 
-    def _path(self, course: Course, scene: Scene | None = None) -> Path:
+    def _path(self, course: Course, scene: Situation | None = None) -> Path:
         """scene: start from rest there, instead of from where the parts are and move. Raises Impossible."""
         if scene is not None and course.parts != ("nod",):
             start = resting([scene.pose[joint] for joint in course.joints])
@@ -140,7 +140,7 @@ class SimulatedBody(Body):
             raise Impossible("CANNOT_CREATE_BEHAVIOR", "the table is in the way of the arm")
         return path
 
-    def _estimate(self, behavior: BlockBehavior, scene: Scene, *, moving: bool) -> Estimate:
+    def _estimate(self, behavior: BlockBehavior, scene: Situation, *, moving: bool) -> Estimate:
         match behavior:
             case Speech(text=text):
                 if self._deviations.mute == "refuse":
@@ -258,7 +258,7 @@ class SimulatedBody(Body):
         if run.keep_pace(now) or is_extended:
             self._attention.follow_run(run, now)
 
-    async def _fail_or_stall(self, run: Run, point: Point) -> None:
+    async def _fail_or_stall(self, run: Run, point: CoursePoint) -> None:
         if point.sync == OVERHEAT:
             raise BodyFailed(_fault(run.behavior, f"the motor of the {run.course.parts[0]} is overheated"))
         assert run.stall is not None

@@ -34,7 +34,7 @@ from engage_hri.schemas.syncref import SYNC_POINTS
 from engage_hri.schemas.units import Degrees, Seconds
 from engage_hri.schemas.world import Entity, World
 from engage_hri.services.control.torso import kinematics
-from engage_hri.services.control.torso.course import Course, Impossible, Point, Scene
+from engage_hri.services.control.torso.course import Course, CoursePoint, Impossible, Situation
 from engage_hri.services.control.torso.kinematics import Side, Unreachable
 from engage_hri.services.control.torso.motion import Leg
 from engage_hri.services.control.torso.vocabulary import ACTION_UNITS, FACES, GESTURES, POSTURES
@@ -56,7 +56,7 @@ TYPES: tuple[type[BlockBehavior], ...] = (
 """What this body performs."""
 
 
-def plan(behavior: BlockBehavior, scene: Scene) -> Course:
+def plan(behavior: BlockBehavior, scene: Situation) -> Course:
     """The course of `behavior` in `scene`. Not for speech and wait, which move nothing. Raises Impossible."""
     match behavior:
         case Gaze(target=target, offset_angle=offset, offset_direction=direction):
@@ -87,7 +87,7 @@ def plan(behavior: BlockBehavior, scene: Scene) -> Course:
             raise Impossible("BEHAVIOR_TYPE_NOT_SUPPORTED", f"this body has no {type(behavior).__name__.lower()}")
 
 
-def look(target: str, scene: Scene) -> tuple[float, float]:
+def look(target: str, scene: Situation) -> tuple[float, float]:
     """Neck angles that look at an entity, as near as the joints come. Raises Impossible if there is none."""
     return _neck(target, 0.0, "", scene)
 
@@ -110,7 +110,7 @@ def _entity(target: str, world: World) -> Entity:
     return entity
 
 
-def _neck(target: str, offset: Degrees, direction: str, scene: Scene) -> tuple[float, float]:
+def _neck(target: str, offset: Degrees, direction: str, scene: Situation) -> tuple[float, float]:
     entity = _entity(target, scene.world)
     try:
         yaw, pitch = kinematics.look_at(entity.position, scene.pose, NOD_RESERVE)
@@ -126,7 +126,7 @@ def _neck(target: str, offset: Degrees, direction: str, scene: Scene) -> tuple[f
     )
 
 
-def _glance(goal: tuple[float, float], scene: Scene) -> Course:
+def _glance(goal: tuple[float, float], scene: Situation) -> Course:
     joints = ("neck_yaw", "neck_pitch")
     here, base = _angles(joints, scene.pose), _angles(joints, scene.rest)
     out, back = turning_time(here, goal), turning_time(goal, base)
@@ -149,18 +149,18 @@ def _glance(goal: tuple[float, float], scene: Scene) -> Course:
     return _course(("head",), joints, legs, _held_on_target("stroke"), goal, scene, ray)
 
 
-def _shift(joints: tuple[str, ...], goal: tuple[float, ...], scene: Scene) -> Course:
+def _shift(joints: tuple[str, ...], goal: tuple[float, ...], scene: Situation) -> Course:
     here = _angles(joints, scene.pose)
     part = kinematics.LIMIT[joints[0]].part
     seconds = turning_time(here, goal) if part == "head" else _moving_time(part, here, goal)
     goal = goal if seconds else here
     legs = (Leg(goal=goal, seconds=seconds, marks=(("start", 0.0), ("end", 1.0))),)
     on_target = {**scene.pose, **dict(zip(joints, goal, strict=True))}
-    points = (Point("start"), Point("end"))
+    points = (CoursePoint("start"), CoursePoint("end"))
     return _course((part,), joints, legs, points, goal, scene, kinematics.gaze(on_target) if part == "head" else None)
 
 
-def _point(entity: Entity, mode: str | None, scene: Scene) -> Course:
+def _point(entity: Entity, mode: str | None, scene: Situation) -> Course:
     for zone in scene.zones:
         if math.dist(zone.center, entity.position) <= zone.radius:
             raise Impossible("CANNOT_CREATE_BEHAVIOR", f"{entity.id!r} is in a no-point zone")
@@ -178,7 +178,7 @@ def _point(entity: Entity, mode: str | None, scene: Scene) -> Course:
     raise Impossible("CANNOT_CREATE_BEHAVIOR", f"cannot point at {entity.id!r}: {'; '.join(reasons)}")
 
 
-def _point_with(side: Side, aim: kinematics.Aim, scene: Scene) -> Course:
+def _point_with(side: Side, aim: kinematics.ArmAim, scene: Situation) -> Course:
     joints = kinematics.joints_of(f"{side}_arm")
     here, home = _angles(joints, scene.pose), _angles(joints, scene.rest)
     yaw, pitch, elbow = aim.stroke
@@ -204,7 +204,7 @@ def _point_with(side: Side, aim: kinematics.Aim, scene: Scene) -> Course:
     return _course((f"{side}_arm",), joints, legs, _held_around_stroke(), aim.held, scene, ray)
 
 
-def _gesture(lexeme: str, mode: str | None, scene: Scene) -> Course:
+def _gesture(lexeme: str, mode: str | None, scene: Situation) -> Course:
     poses = GESTURES.get(lexeme.upper())
     if poses is None:
         raise Impossible("CANNOT_CREATE_BEHAVIOR", f"no gesture {lexeme!r}: there are {', '.join(GESTURES)}")
@@ -268,7 +268,7 @@ def _nod(lexeme: str, repetition: int, amount: float) -> Course:
     )  # fmt: skip
 
 
-def _excursion(part: str, goal: tuple[float, ...], scene: Scene) -> Course:
+def _excursion(part: str, goal: tuple[float, ...], scene: Situation) -> Course:
     """Out to `goal`, held there, back: a face or a posture."""
     joints = kinematics.joints_of(part)
     joint, size = _sideways(part, dict(zip(joints, goal, strict=True)))
@@ -292,8 +292,8 @@ def _excursion(part: str, goal: tuple[float, ...], scene: Scene) -> Course:
 
 
 def _course(
-    parts: tuple[str, ...], joints: tuple[str, ...], legs: tuple[Leg, ...], points: tuple[Point, ...],
-    goal: tuple[float, ...], scene: Scene, ray: Ray | None,
+    parts: tuple[str, ...], joints: tuple[str, ...], legs: tuple[Leg, ...], points: tuple[CoursePoint, ...],
+    goal: tuple[float, ...], scene: Situation, ray: Ray | None,
 ) -> Course:  # fmt: skip
     return Course(
         parts=parts, joints=joints, legs=legs, points=points, on_target=dict(zip(joints, goal, strict=True)),
@@ -328,7 +328,7 @@ def _torso(lexeme: str) -> tuple[float, float]:
     return (radians(angles[0]), radians(angles[1]))
 
 
-def _sides(mode: str | None, rank: Callable[[Side], float], scene: Scene) -> list[Side]:
+def _sides(mode: str | None, rank: Callable[[Side], float], scene: Situation) -> list[Side]:
     """Arms to try, best first: the one named, or free ones before busy ones."""
     match mode:
         case "LEFT_HAND":
@@ -339,20 +339,23 @@ def _sides(mode: str | None, rank: Callable[[Side], float], scene: Scene) -> lis
             return sorted(("left", "right"), key=lambda side: (f"{side}_arm" in scene.busy, rank(side)))
 
 
-def _held_on_target(*arrival: str) -> tuple[Point, ...]:
+def _held_on_target(*arrival: str) -> tuple[CoursePoint, ...]:
     """arrival: points at which it is first on target."""
     before = SYNC_POINTS[: SYNC_POINTS.index("stroke_end")]
     return (
-        *(Point(sync, "stroke", stands_at="relax") if sync in arrival else Point(sync) for sync in before),
-        *(Point("stroke_end", "relax"), Point("relax", "relax"), Point("end")),
+        *(
+            CoursePoint(sync, "stroke", stands_at="relax") if sync in arrival else CoursePoint(sync)
+            for sync in before
+        ),
+        *(CoursePoint("stroke_end", "relax"), CoursePoint("relax", "relax"), CoursePoint("end")),
     )
 
 
-def _held_around_stroke(strokes: Sequence[str] = ()) -> tuple[Point, ...]:
+def _held_around_stroke(strokes: Sequence[str] = ()) -> tuple[CoursePoint, ...]:
     """strokes: the repetitions of the first."""
     number = SYNC_POINTS.index("stroke_end")
     syncs = (*SYNC_POINTS[:number], *strokes, *SYNC_POINTS[number:])
-    return tuple(Point(sync, sync if sync in ("stroke_start", "stroke_end") else "") for sync in syncs)
+    return tuple(CoursePoint(sync, sync if sync in ("stroke_start", "stroke_end") else "") for sync in syncs)
 
 
 def _at(fraction: float, *syncs: str) -> tuple[tuple[str, float], ...]:

@@ -20,7 +20,7 @@ class Impossible(Exception):
         self.reason = reason
 
 
-class Point(Struct, frozen=True):
+class CoursePoint(Struct, frozen=True):
     """A sync point. held_with: the hold point at which this one waits; its own name for a hold point itself.
 
     stands_at: the later point that it may go on to while it waits here, since on target it is in both places.
@@ -37,7 +37,7 @@ class Course(Struct, frozen=True, kw_only=True):
     parts: tuple[str, ...]
     joints: tuple[str, ...]
     legs: tuple[Leg, ...]
-    points: tuple[Point, ...]
+    points: tuple[CoursePoint, ...]
     on_target: Mapping[str, float] = {}
     """Joint angles at the stroke, or at the end of a shift."""
     degrees: Degrees = 0.0
@@ -47,7 +47,7 @@ class Course(Struct, frozen=True, kw_only=True):
     """May it be smaller, for want of time? Not where it has a target."""
 
 
-class Scene(Struct, frozen=True):
+class Situation(Struct, frozen=True):
     """What a course depends on besides the behavior. pose: where the joints are. rest: where each goes home to."""
 
     pose: Mapping[str, float]

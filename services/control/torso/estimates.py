@@ -8,7 +8,7 @@ from engage_hri.schemas.behaviors import BlockBehavior, Speech, Wait
 from engage_hri.schemas.body import BodyPose, Estimate, Phase
 from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.units import Seconds
-from engage_hri.services.control.torso.course import Course, Point
+from engage_hri.services.control.torso.course import Course, CoursePoint
 from engage_hri.services.control.torso.motion import SLOWEST, Path
 from engage_hri.services.control.torso.sizing import quickest
 from engage_hri.services.control.voice.timeline import Utterance
@@ -23,12 +23,12 @@ def spoken(behavior: Speech, utterance: Utterance, pose: BodyPose) -> Estimate:
     times = {"start": 0.0, **{mark.id: utterance.said_by(mark.position) for mark in behavior.marks}}
     times["end"] = utterance.seconds
     gaps = {mark.id for mark in behavior.marks if utterance.is_gap(mark.position)}
-    phases = _phases([Point(sync, sync if sync in gaps else "") for sync in sync_points(behavior)], times)
+    phases = _phases([CoursePoint(sync, sync if sync in gaps else "") for sync in sync_points(behavior)], times)
     return Estimate(behavior=behavior.id, feasible=True, parts=("voice",), phases=phases, pose_after=pose)
 
 
 def waited(behavior: Wait, duration: Seconds, pose: BodyPose) -> Estimate:
-    phases = _phases((Point("start"), Point("end", "end")), {"start": 0.0, "end": duration})
+    phases = _phases((CoursePoint("start"), CoursePoint("end", "end")), {"start": 0.0, "end": duration})
     return Estimate(behavior=behavior.id, feasible=True, phases=phases, pose_after=pose)
 
 
@@ -48,7 +48,7 @@ def moved(behavior: BlockBehavior, course: Course, path: Path, pose: BodyPose) -
 
 
 def _phases(
-    points: Sequence[Point],
+    points: Sequence[CoursePoint],
     times: Mapping[str, Seconds],
     quickest: Mapping[str, Seconds] | None = None,
     slowest: float = 1.0,

@@ -6,7 +6,7 @@ from math import inf, radians
 from engage_hri.schemas.behaviors import BlockBehavior, Gaze, GazeShift, HeadDirectionShift
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.control.torso import choreography, tracks
-from engage_hri.services.control.torso.course import Course, Impossible, Scene
+from engage_hri.services.control.torso.course import Course, Impossible, Situation
 from engage_hri.services.control.torso.motion import Leg, Motion, Path
 from engage_hri.services.control.torso.runs import Run
 from engage_hri.services.control.torso.tracks import Track
@@ -28,7 +28,7 @@ def eyes_on(behavior: BlockBehavior | None) -> str:
     return behavior.target if isinstance(behavior, Gaze | GazeShift | HeadDirectionShift) else ""
 
 
-class Attention:
+class EyeTarget:
     """The base gaze and the fixation: what the eyes rest on, and since (or from) when.
 
     The instant of a fixation is known in advance, as the motion that leads to it is.
@@ -52,7 +52,7 @@ class Attention:
         """The base is a direction, not an entity."""
         self.base, self.angles = None, angles
 
-    def update(self, scene: Scene) -> None:
+    def update(self, scene: Situation) -> None:
         """Turn the base after its entity; the last direction stays when it is gone or out of view."""
         if self.base is not None:
             try:

@@ -85,7 +85,7 @@ class Unreachable(ValueError):
     """No joint angles do it; the message says why."""
 
 
-class Aim(Struct, frozen=True):
+class ArmAim(Struct, frozen=True):
     """Arm angles (shoulder yaw, shoulder pitch, elbow) whose forearm axis runs through a target."""
 
     stroke: tuple[float, float, float]
@@ -136,7 +136,7 @@ def look_at(target: Vector, pose: Pose, reserve: Radians = 0.0) -> tuple[float, 
     return angles
 
 
-def point_at(side: Side, target: Vector, radius: Meters, pose: Pose) -> Aim:
+def point_at(side: Side, target: Vector, radius: Meters, pose: Pose) -> ArmAim:
     """Angles of the `side` arm that point at `target` without touching it, as extended as the table allows.
 
     radius: of what is pointed at. Raises Unreachable.
@@ -151,7 +151,7 @@ def point_at(side: Side, target: Vector, radius: Meters, pose: Pose) -> Aim:
         stroke, held = (_pointing(x, y, z, angle) for angle in (pitch, pitch - SLIDE))
         reason = _objection(side, stroke, target, radius, pose) or _objection(side, held, target, radius, pose)
         if not reason:
-            return Aim(stroke, held)
+            return ArmAim(stroke, held)
     raise Unreachable(f"the {side} arm finds no way to point at it: {reason}")
 
 

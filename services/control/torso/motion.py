@@ -34,7 +34,7 @@ SAMPLES = np.linspace(0.0, 1.0, 33)
 _STRETCHES = tuple(1.1**step for step in range(40)) + tuple(0.9**step for step in range(1, 12))
 
 
-class State(Struct, frozen=True):
+class JointMotion(Struct, frozen=True):
     """Position, velocity and acceleration of some joints, in the order of their limits."""
 
     q: Array
@@ -46,9 +46,9 @@ class State(Struct, frozen=True):
         return bool(np.all(np.abs(self.v) < AT_REST) and np.all(np.abs(self.a) < AT_REST))
 
 
-def resting(q: Sequence[float] | Array) -> State:
+def resting(q: Sequence[float] | Array) -> JointMotion:
     position = np.asarray(q, dtype=np.float64)
-    return State(position, np.zeros_like(position), np.zeros_like(position))
+    return JointMotion(position, np.zeros_like(position), np.zeros_like(position))
 
 
 class Leg(Struct, frozen=True, kw_only=True):
@@ -77,7 +77,7 @@ class Path:
     marks: sync point -> s. length: seconds at natural speed.
     """
 
-    def __init__(self, start: State, legs: Sequence[Leg], limits: Sequence[JointLimit]) -> None:
+    def __init__(self, start: JointMotion, legs: Sequence[Leg], limits: Sequence[JointLimit]) -> None:
         self.legs = tuple(legs)
         self.start = start
         self.marks: dict[str, Seconds] = {}
@@ -90,10 +90,10 @@ class Path:
         for leg in self.legs:
             state = self._append(leg, state)
 
-    def _append(self, leg: Leg, state: State) -> State:
+    def _append(self, leg: Leg, state: JointMotion) -> JointMotion:
         goal = np.asarray(leg.goal, dtype=np.float64)
         velocity = np.asarray(leg.velocity or np.zeros_like(goal), dtype=np.float64)
-        end = State(goal, velocity, np.zeros_like(goal))
+        end = JointMotion(goal, velocity, np.zeros_like(goal))
         self._leg_starts.append(self.length)
         still = state.at_rest and not velocity.any() and bool(np.all(np.abs(state.q - goal) < 1e-7))
         seconds = 0.0
@@ -107,7 +107,7 @@ class Path:
         self.length += seconds
         return end
 
-    def at(self, s: Seconds) -> State:
+    def at(self, s: Seconds) -> JointMotion:
         """q, q' and q'' at s."""
         if not self._segments:
             return resting(self.legs[-1].goal if self.legs else self.start.q)
@@ -173,12 +173,12 @@ class _Limits:
         self.acceleration = np.array([limit.acceleration for limit in limits])
         self.brake_anywhere = float(np.min((1 - SHARE) * self.acceleration / self.speed)) if len(limits) else 1.0
 
-    def soften(self, state: State) -> State:
+    def soften(self, state: JointMotion) -> JointMotion:
         """The state with an acceleration that a path may have."""
         bound = MARGIN * SHARE * self.acceleration
-        return State(state.q, state.v, np.clip(state.a, -bound, bound))
+        return JointMotion(state.q, state.v, np.clip(state.a, -bound, bound))
 
-    def connect(self, start: State, end: State, seconds: Seconds) -> "_Connection":
+    def connect(self, start: JointMotion, end: JointMotion, seconds: Seconds) -> "_Connection":
         """The quintic between two states that takes `seconds`, or as near to it as keeps the limits."""
         best: _Connection | None = None
         for stretch in _STRETCHES:
@@ -190,7 +190,7 @@ class _Limits:
         assert best is not None
         return best
 
-    def permits_brake(self, state: State, brake: float) -> bool:
+    def permits_brake(self, state: JointMotion, brake: float) -> bool:
         return bool(np.all(np.abs(state.v) * brake <= (1 - SHARE) * self.acceleration))
 
     def _judged(self, coefficients: Array, seconds: Seconds) -> "_Connection":
@@ -236,7 +236,7 @@ class Motion:
         self.path = path
         self.cruise = min(cruise, path.fastest)
         self.limit = limit
-        self._rest: State | None = None
+        self._rest: JointMotion | None = None
         """Where it stands once it is over, when somebody has asked."""
         # From rest the rate may jump: nothing moves yet. A path that starts in motion was built for rate 1.
         self._replan(start, 0.0, self.cruise if path.start.at_rest else 1.0)
@@ -286,7 +286,7 @@ class Motion:
     def rate(self, t: Seconds) -> float:
         return 0.0 if t >= self.end else self._piece(t).rate_at(t)
 
-    def at(self, t: Seconds) -> State:
+    def at(self, t: Seconds) -> JointMotion:
         """Where the joints are, and how they move."""
         if t >= self.end:
             if self._rest is None:
@@ -294,7 +294,7 @@ class Motion:
             return self._rest
         piece = self._piece(t)
         rate, state = piece.rate_at(t), self.path.at(min(piece.s_at(t), self._stop))
-        return State(state.q, state.v * rate, state.a * rate * rate + state.v * piece.slope)
+        return JointMotion(state.q, state.v * rate, state.a * rate * rate + state.v * piece.slope)
 
     def crossing(self, s: Seconds) -> Seconds | None:
         """When s is reached; None if it lies beyond the limit."""
@@ -366,7 +366,7 @@ def _top_rate(rate: float, cruise: float, left: Seconds, change: float, brake: f
     return top, top * top / (2 * brake)
 
 
-def _quintic(start: State, end: State, seconds: Seconds) -> Array:
+def _quintic(start: JointMotion, end: JointMotion, seconds: Seconds) -> Array:
     """Coefficients of the polynomial of degree five that joins two states in `seconds`."""
     t, h = seconds, end.q - start.q
     return np.array(
@@ -386,11 +386,11 @@ _FIRST = np.arange(1, 6)
 _SECOND = np.arange(2, 6) * np.arange(1, 5)
 
 
-def _evaluate(c: Array, t: Seconds) -> State:
+def _evaluate(c: Array, t: Seconds) -> JointMotion:
     powers = t**_POWERS
     first = powers[:5] * _FIRST
     second = powers[:4] * _SECOND
-    return State(powers @ c, first @ c[1:], second @ c[2:])
+    return JointMotion(powers @ c, first @ c[1:], second @ c[2:])
 
 
 def _sampled(c: Array, seconds: Seconds) -> tuple[Any, Any, Any]:

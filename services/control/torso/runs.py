@@ -9,7 +9,7 @@ from engage_hri.schemas.units import Seconds
 from engage_hri.services.control import variability
 from engage_hri.services.control.body import MovementAuthority
 from engage_hri.services.control.config import Stall, Variability
-from engage_hri.services.control.torso.course import Course, Point
+from engage_hri.services.control.torso.course import Course, CoursePoint
 from engage_hri.services.control.torso.motion import Leg, Motion, Path
 from engage_hri.services.control.torso.sizing import hurried
 from engage_hri.services.control.waiting import Bell
@@ -36,7 +36,7 @@ class Run:
         self.course = course
         self.authority = authority
         self.bell = Bell()
-        self.pending: list[Point] = list(course.points)
+        self.pending: list[CoursePoint] = list(course.points)
         self.holding = False
         self.cut_at: Seconds | None = None
         self.motion: Motion
@@ -103,7 +103,7 @@ class Run:
         coming = (point.sync for point in self.pending if marks.get(point.sync, 0.0) > here + 1e-9)
         return [(sync, planned[sync]) for sync in coming if sync in planned]
 
-    def due(self, point: Point) -> Seconds | None:
+    def due(self, point: CoursePoint) -> Seconds | None:
         """When it comes to `point`; None if it may not go so far. Where it rests it is in no hurry to say so."""
         mark = self.motion.path.marks[point.sync]
         crossing = self.motion.crossing(mark)
@@ -154,7 +154,7 @@ class Run:
             return
         legs = tuple(_marked(leg, fault, before) for leg in self.course.legs)
         self.course = replace(self.course, legs=legs)
-        self.pending.insert(index, Point(fault))
+        self.pending.insert(index, CoursePoint(fault))
 
 
 def _marked(leg: Leg, fault: str, before: str) -> Leg:

@@ -11,7 +11,7 @@ import numpy as np
 from engage_hri.schemas.body import BodyPose, JointLimit
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.control.torso import choreography, kinematics
-from engage_hri.services.control.torso.motion import Leg, Motion, Path, State, resting
+from engage_hri.services.control.torso.motion import JointMotion, Leg, Motion, Path, resting
 
 NECK = ("neck_yaw", "neck_pitch")
 GAZE_SHARE = 0.7
@@ -65,9 +65,9 @@ class Track:
     def play(self, motion: Motion, column: int = 0) -> None:
         self.motion, self._column = motion, column
 
-    def at(self, t: Seconds) -> State:
+    def at(self, t: Seconds) -> JointMotion:
         state, columns = self.motion.at(t), slice(self._column, self._column + len(self.joints))
-        return State(state.q[columns], state.v[columns], state.a[columns])
+        return JointMotion(state.q[columns], state.v[columns], state.a[columns])
 
     def angles(self, t: Seconds) -> tuple[float, ...]:
         columns = self.motion.at(t).q.tolist()
@@ -97,9 +97,9 @@ def limits_of(parts: Sequence[str]) -> tuple[JointLimit, ...]:
     return tuple(limit for part in parts for limit in LIMITS[part])
 
 
-def joined(states: Sequence[State]) -> State:
+def joined(states: Sequence[JointMotion]) -> JointMotion:
     """The states of several tracks as one, in their order."""
-    return State(
+    return JointMotion(
         np.concatenate([state.q for state in states]),
         np.concatenate([state.v for state in states]),
         np.concatenate([state.a for state in states]),

@@ -30,21 +30,21 @@ from engage_hri.schemas.blocks import Block
 from engage_hri.schemas.fragments import ReferenceChoice, TurnFragment
 from engage_hri.schemas.references import type_name
 from engage_hri.services.generation.block.ordering import ordered
-from engage_hri.services.generation.block.parts import Mention, Names, Parts
+from engage_hri.services.generation.block.parts import FreshIds, Mention, Parts
 from engage_hri.services.generation.block.profiles import after, as_in_the_figure, checking_back, same
 from engage_hri.services.generation.block.punctuation import joined
 from engage_hri.services.generation.block.rewriting import Operator, Rewriting, instants, points_named
 from engage_hri.services.generation.config import GenerationConfig
 from engage_hri.services.generation.permits import Permits
+from engage_hri.services.generation.turns.continuation import NO_CONTINUATION, Continuation, Stroke, first_met, stroke
 from engage_hri.services.generation.turns.policy import TurnPlan
-from engage_hri.services.generation.turns.trail import NOTHING, Stroke, Trail, first_met, stroke
 
 
 class Emission(Struct, frozen=True):
     """The block of a fragment; what it leaves for the next one; what of the input was left out, and why."""
 
     block: Block
-    trail: Trail
+    continuation: Continuation
     mentions: tuple[Mention, ...]
     warnings: tuple[str, ...]
 
@@ -56,7 +56,7 @@ def emit(
     config: GenerationConfig,
     permits: Permits,
     hands: Mapping[str, Hand] | None = None,
-    before: Trail = NOTHING,
+    before: Continuation = NO_CONTINUATION,
 ) -> Emission:
     """The block that performs `fragment`.
 
@@ -75,11 +75,11 @@ class _Emitter:
         config: GenerationConfig,
         permits: Permits,
         hands: Mapping[str, Hand],
-        before: Trail,
+        before: Continuation,
     ) -> None:
         self.fragment, self.turn, self.config, self.permits, self.hands = fragment, turn, config, permits, hands
         self.before = before
-        self.names = Names(fragment)
+        self.names = FreshIds(fragment)
         self.figure = config.profile == "figure-3.3"
         self.dropped = [behavior for behavior in fragment.behaviors if not permits.allows(behavior)]
         kept = [behavior for behavior in fragment.behaviors if permits.allows(behavior)]
@@ -128,10 +128,10 @@ class _Emitter:
         block = Block(
             id=self.fragment.id, behaviors=behaviors, constraints=tuple(self.constraints), unread=self.fragment.unread
         )
-        trail = Trail(self.speeches[-1] if self.speeches else "", self.last_glance, tuple(self.strokes))
+        continuation = Continuation(self.speeches[-1] if self.speeches else "", self.last_glance, tuple(self.strokes))
         mentions = tuple(parts.mention for parts in self.parts.values())
         left_out = tuple(f"{behavior.id} is left out: inhibited" for behavior in self.dropped)
-        return Emission(block, trail, mentions, left_out)
+        return Emission(block, continuation, mentions, left_out)
 
     def _speeches(self) -> list[str]:
         """Ids of plain speeches and phrases, in order."""

@@ -15,7 +15,7 @@ class Mention(Struct, frozen=True):
     by: Point
 
 
-class Names:
+class FreshIds:
     """Ids nobody in the fragment uses."""
 
     def __init__(self, fragment: TurnFragment) -> None:
@@ -37,7 +37,7 @@ class Parts:
         reference: Reference,
         choice: ReferenceChoice,
         closing: str,
-        names: Names,
+        names: FreshIds,
         turn: TurnPlan,
         hand: Hand | None,
     ):

@@ -56,4 +56,4 @@ class Discourse(Struct, frozen=True):
         return objects.pop() if len(objects) == 1 else ""
 
 
-SILENCE = Discourse()
+NO_DISCOURSE = Discourse()

@@ -7,12 +7,12 @@ from msgspec import Struct
 from engage_hri.schemas.behaviors import BlockBehavior, Gaze, Hand, Pointing
 from engage_hri.schemas.body import BodyPose, Estimate, EstimateItem
 
-HERE = ""
+CURRENT_POSE = ""
 """Where the body is now, as the place a motion starts from."""
 
 
 class Motions(Struct, frozen=True):
-    """Estimates by (since, target): a head or an arm that is on `since`, or HERE, goes to `target`.
+    """Estimates by (since, target): a head or an arm that is on `since`, or CURRENT_POSE, goes to `target`.
 
     glance: who is looked at after each point, before the next reference is made; "": nobody, the head stays.
     """
@@ -40,14 +40,14 @@ def hand_of(point: Estimate) -> Hand | None:
     return hands[0] if len(hands) == 1 else None
 
 
-class Pose(Struct, frozen=True):
+class ExpectedPose(Struct, frozen=True):
     """Where head and arms will be when what moves them now is on target; None: where they are."""
 
     head: BodyPose | None = None
     arms: BodyPose | None = None
 
 
-HERE_AND_NOW = Pose()
+HERE_AND_NOW = ExpectedPose()
 
 
 def last_motions(moving: Sequence[BlockBehavior]) -> tuple[EstimateItem, ...]:
@@ -57,19 +57,19 @@ def last_motions(moving: Sequence[BlockBehavior]) -> tuple[EstimateItem, ...]:
     return tuple(EstimateItem(behavior=behavior) for behavior in (*gazes[-1:], *points[-1:]))
 
 
-def pose_after(items: Sequence[EstimateItem], answers: Sequence[Estimate]) -> Pose:
+def pose_after(items: Sequence[EstimateItem], answers: Sequence[Estimate]) -> ExpectedPose:
     """answers: to `last_motions`."""
-    pose = Pose()
+    pose = ExpectedPose()
     for item, answer in zip(items, answers, strict=True):
         if isinstance(item.behavior, Pointing):
-            pose = Pose(pose.head, answer.pose_after)
+            pose = ExpectedPose(pose.head, answer.pose_after)
         else:
-            pose = Pose(answer.pose_after, pose.arms)
+            pose = ExpectedPose(answer.pose_after, pose.arms)
     return pose
 
 
 def from_here(
-    targets: Sequence[str], hand: Hand | None = None, pose: Pose = HERE_AND_NOW, glance: str = ""
+    targets: Sequence[str], hand: Hand | None = None, pose: ExpectedPose = HERE_AND_NOW, glance: str = ""
 ) -> tuple[EstimateItem, ...]:
     """First question: a gaze and a point at each of the distinct `targets`, from where the body is or will be.
 
@@ -95,15 +95,15 @@ def from_each_other(
     first = _from_here(sequence, answers, glance)
     items = []
     for since, target, one_arm in _steps(sequence, first):
-        pose = first.gaze(HERE, since).pose_after
+        pose = first.gaze(CURRENT_POSE, since).pose_after
         items.append(EstimateItem(behavior=_gaze(target), pose=pose))
         if one_arm:
             # The block will name this hand: no other may be asked about, whichever is nearer from there.
-            named = hand_of(first.point(HERE, target)) or hand
+            named = hand_of(first.point(CURRENT_POSE, target)) or hand
             pointing = Pointing(id=f"point at {target}", target=target, mode=named)
-            items.append(EstimateItem(behavior=pointing, pose=first.point(HERE, since).pose_after))
+            items.append(EstimateItem(behavior=pointing, pose=first.point(CURRENT_POSE, since).pose_after))
     for target in _after_glances(sequence, first):
-        items.append(EstimateItem(behavior=_gaze(target), pose=first.gaze(HERE, glance).pose_after))
+        items.append(EstimateItem(behavior=_gaze(target), pose=first.gaze(CURRENT_POSE, glance).pose_after))
     return tuple(items)
 
 
@@ -140,9 +140,9 @@ def _from_here(sequence: Sequence[str], answers: Sequence[Estimate], glance: str
     points: dict[tuple[str, str], Estimate] = {}
     each = answers[:-1] if glance else answers
     for target, gaze, point in zip(distinct(sequence), each[::2], each[1::2], strict=True):
-        gazes[HERE, target], points[HERE, target] = gaze, point
+        gazes[CURRENT_POSE, target], points[CURRENT_POSE, target] = gaze, point
     if glance and answers[-1].feasible:
-        gazes[HERE, glance] = answers[-1]
+        gazes[CURRENT_POSE, glance] = answers[-1]
         return Motions(gazes, points, glance)
     return Motions(gazes, points)
 
@@ -151,10 +151,10 @@ def _steps(sequence: Sequence[str], motions: Motions) -> Iterator[tuple[str, str
     """From each target to each later one, and whether one arm points at both."""
     seen: set[tuple[str, str]] = set()
     for index, target in enumerate(sequence):
-        there = motions.point(HERE, target)
+        there = motions.point(CURRENT_POSE, target)
         for since in sequence[:index]:
             if (since, target) not in seen:
                 seen.add((since, target))
-                before = motions.point(HERE, since)
+                before = motions.point(CURRENT_POSE, since)
                 one_arm = before.feasible and there.feasible and arm_of(before) == arm_of(there)
                 yield since, target, one_arm

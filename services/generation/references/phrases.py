@@ -19,7 +19,7 @@ from engage_hri.schemas.behaviors import Reference, SpeechOption
 from engage_hri.schemas.speakable import word_count
 from engage_hri.schemas.world import Entity, World
 from engage_hri.services.generation.config import GenerationConfig, PhraseAttribute
-from engage_hri.services.generation.references.discourse import SILENCE, Discourse
+from engage_hri.services.generation.references.discourse import NO_DISCOURSE, Discourse
 from engage_hri.services.generation.references.distractors import extent
 
 SPOKEN: tuple[PhraseAttribute, ...] = get_args(PhraseAttribute)
@@ -51,7 +51,7 @@ class Proposals(Struct, frozen=True):
 
 
 def proposed(
-    references: Sequence[Reference], world: World, config: GenerationConfig, discourse: Discourse = SILENCE
+    references: Sequence[Reference], world: World, config: GenerationConfig, discourse: Discourse = NO_DISCOURSE
 ) -> Proposals:
     """The same references, in the order in which they are made; those that came without phrases have some.
 

@@ -26,7 +26,7 @@ from engage_hri.services.generation.references.distractors import (
     in_zone,
     laid_out,
 )
-from engage_hri.services.generation.references.motions import HERE, Motions, arm_of, hand_of
+from engage_hri.services.generation.references.motions import CURRENT_POSE, Motions, arm_of, hand_of
 from engage_hri.services.generation.references.reliability import channel_reliability, reliability
 
 GESTURES: tuple[GestureChoice, ...] = get_args(GestureChoice)
@@ -36,7 +36,7 @@ ROUNDING = 9
 FROM_NOWHERE = "cannot be done from where the references before it leave the body"
 
 
-class Scene(Struct, frozen=True, kw_only=True, dict=True):
+class ReferenceScene(Struct, frozen=True, kw_only=True, dict=True):
     """Where references are made. no_gaze, no_point: why the robot may not look or point; empty when it may."""
 
     world: World
@@ -77,23 +77,23 @@ class Pair(Struct, frozen=True, kw_only=True):
         )  # fmt: skip
 
 
-class Posture(Struct, frozen=True):
-    """What the head looks at and each arm points at: a reference's target, who was glanced at, or HERE."""
+class HeadAndArms(Struct, frozen=True):
+    """What the head looks at and each arm points at: a reference's target, who was glanced at, or CURRENT_POSE."""
 
-    head: str = HERE
+    head: str = CURRENT_POSE
     arms: tuple[tuple[str, str], ...] = ()
     """(arm, target) of the arms that have moved, by arm."""
 
     def arm(self, arm: str) -> str:
-        return dict(self.arms).get(arm, HERE)
+        return dict(self.arms).get(arm, CURRENT_POSE)
 
-    def after(self, gesture: GestureChoice, target: str, motions: Motions) -> "Posture":
+    def after(self, gesture: GestureChoice, target: str, motions: Motions) -> "HeadAndArms":
         if gesture == "none":
             return self
         if gesture != "directed_gaze_with_pointing":
-            return Posture(target, self.arms)
-        arms = {**dict(self.arms), arm_of(motions.point(HERE, target)): target}
-        return Posture(motions.glance or target, tuple(sorted(arms.items())))
+            return HeadAndArms(target, self.arms)
+        arms = {**dict(self.arms), arm_of(motions.point(CURRENT_POSE, target)): target}
+        return HeadAndArms(motions.glance or target, tuple(sorted(arms.items())))
 
 
 class Choices(Struct, frozen=True):
@@ -119,15 +119,17 @@ class _Way(Struct, frozen=True):
     rank: tuple[float, tuple[tuple[bool, float, int, int], ...]]
     pairs: tuple[Pair | None, ...]
     """None: of a reference that cannot be made."""
-    postures: tuple[Posture, ...]
+    postures: tuple[HeadAndArms, ...]
     """Before each pair, and after the last."""
 
     @property
-    def posture(self) -> Posture:
+    def posture(self) -> HeadAndArms:
         return self.postures[-1]
 
 
-def choose(references: Sequence[Reference], scene: Scene, motions: Motions, config: GenerationConfig) -> Choices:
+def choose(
+    references: Sequence[Reference], scene: ReferenceScene, motions: Motions, config: GenerationConfig
+) -> Choices:
     """The pairs of least total cost for `references` in this order, each with the table it was chosen from.
 
     A reference none of whose pairs reaches its minimum gets one of its most reliable, with a warning (decision B10).
@@ -152,7 +154,9 @@ def choose(references: Sequence[Reference], scene: Scene, motions: Motions, conf
                 f"{reference.id}: nothing reaches the minimum reliability {minimum:g}; chose "
                 f"{_name(pair.gesture, pair.option.text)} with R {pair.reliability:.4g}"
             )
-        if choice.gesture == "directed_gaze_with_pointing" and (hand := hand_of(motions.point(HERE, choice.target))):
+        if choice.gesture == "directed_gaze_with_pointing" and (
+            hand := hand_of(motions.point(CURRENT_POSE, choice.target))
+        ):
             hands[choice.reference] = hand
     return Choices(choices, tuple(warnings), hands)
 
@@ -164,11 +168,13 @@ def _no_way(reference: Reference, table: Sequence[Pair]) -> Fault:
     return Fault(reason=f"no way to refer to {reference.target}: {'; '.join(reasons)}", where=reference.id)
 
 
-def considered(reference: Reference, scene: Scene, motions: Motions, config: GenerationConfig) -> tuple[Pair, ...]:
+def considered(
+    reference: Reference, scene: ReferenceScene, motions: Motions, config: GenerationConfig
+) -> tuple[Pair, ...]:
     """Every pair of J x S with its distractors and reliability."""
     target = reference.target
     universe = scene.universe - {target}
-    gaze, point = motions.gaze(HERE, target), motions.point(HERE, target)
+    gaze, point = motions.gaze(CURRENT_POSE, target), motions.point(CURRENT_POSE, target)
     gazed, pointed = universe, universe
     if gaze.ray is not None:
         gazed = in_gaze_cone(gaze.ray, scene.half_angle, scene.layout) - {target}
@@ -203,7 +209,7 @@ def considered(reference: Reference, scene: Scene, motions: Motions, config: Gen
     return tuple(pairs)
 
 
-def cost(pair: Pair, target: str, posture: Posture, motions: Motions, config: GenerationConfig) -> Seconds:
+def cost(pair: Pair, target: str, posture: HeadAndArms, motions: Motions, config: GenerationConfig) -> Seconds:
     """C(j, s) in seconds, from `posture`: head, wait for shared gaze (decision B7), arm, words."""
     seconds = _speaking(pair, config)
     if pair.gesture != "none":
@@ -211,7 +217,7 @@ def cost(pair: Pair, target: str, posture: Posture, motions: Motions, config: Ge
     if pair.gesture in ("directed_gaze", "directed_gaze_with_pointing"):
         seconds += config.wait_weight * config.expected_delay
     if pair.gesture == "directed_gaze_with_pointing":
-        arm = arm_of(motions.point(HERE, target))
+        arm = arm_of(motions.point(CURRENT_POSE, target))
         seconds += config.arm_cost(motions.point(posture.arm(arm), target).arm_degrees)
     return seconds
 
@@ -220,9 +226,9 @@ def _speaking(pair: Pair, config: GenerationConfig) -> Seconds:
     return config.seconds_per_word * pair.option.cost if pair.option.text else 0.0
 
 
-def _obstacles(target: str, scene: Scene, motions: Motions) -> tuple[str, str]:
+def _obstacles(target: str, scene: ReferenceScene, motions: Motions) -> tuple[str, str]:
     """Why the robot cannot look, or point, at `target` (decision B9)."""
-    gaze, point = motions.gaze(HERE, target), motions.point(HERE, target)
+    gaze, point = motions.gaze(CURRENT_POSE, target), motions.point(CURRENT_POSE, target)
     no_gaze = scene.no_gaze or _refusal("look", gaze)
     no_point = scene.no_point or _refusal("point", point)
     entity = scene.world.entity(target)
@@ -231,14 +237,14 @@ def _obstacles(target: str, scene: Scene, motions: Motions) -> tuple[str, str]:
     return no_gaze, no_point
 
 
-def _hindrance(gesture: GestureChoice, target: str, posture: Posture, motions: Motions) -> str:
+def _hindrance(gesture: GestureChoice, target: str, posture: HeadAndArms, motions: Motions) -> str:
     """Why the body cannot make `gesture` from `posture`; empty if it can."""
     if gesture == "none":
         return ""
     no_gaze = _refusal("look from there", motions.gaze(posture.head, target))
     if no_gaze or gesture != "directed_gaze_with_pointing":
         return no_gaze
-    arm = arm_of(motions.point(HERE, target))
+    arm = arm_of(motions.point(CURRENT_POSE, target))
     return _refusal("point from there", motions.point(posture.arm(arm), target))
 
 
@@ -273,7 +279,7 @@ def _cheapest_way(
 
     A reference that cannot be made is passed over.
     """
-    ways = [_Way(0.0, (0.0, ()), (), (Posture(),))]
+    ways = [_Way(0.0, (0.0, ()), (), (HeadAndArms(),))]
     for reference, table in zip(references, tables, strict=True):
         possible = [pair for pair in table if not pair.ruled_out]
         onward: list[_Way] = []
@@ -291,7 +297,7 @@ def _continued(
     ways: Sequence[_Way], pairs: Collection[Pair], target: str, motions: Motions, config: GenerationConfig
 ) -> list[_Way]:
     """The best way to each posture that one of `pairs` leads to from one of `ways`; none where the body cannot."""
-    best: dict[Posture, _Way] = {}
+    best: dict[HeadAndArms, _Way] = {}
     preferences = [(pair, pair.preference) for pair in pairs]
     for way in ways:
         for pair, preference in preferences:
@@ -310,7 +316,7 @@ def _explain(
     reference: Reference,
     table: tuple[Pair, ...],
     chosen: Pair | None,
-    posture: Posture,
+    posture: HeadAndArms,
     motions: Motions,
     config: GenerationConfig,
 ) -> ReferenceChoice:
@@ -359,7 +365,7 @@ def _explain(
     )
 
 
-def _doubts(reference: Reference, scene: Scene) -> list[str]:
+def _doubts(reference: Reference, scene: ReferenceScene) -> list[str]:
     """Warn of deictic phrases whose listed distractors are not everything else (decision B8)."""
     universe = scene.universe - {reference.target}
     return [

@@ -16,7 +16,7 @@ from engage_hri.schemas.units import Seconds
 from engage_hri.services.realizer.config import RealizerConfig
 from engage_hri.services.realizer.decide.effects import Begin, Effect, Extend, Pace
 from engage_hri.services.realizer.decide.outlook import SURPRISE, Outlook
-from engage_hri.services.realizer.decide.patience import Patience
+from engage_hri.services.realizer.decide.patience import LatenessWatch
 from engage_hri.services.realizer.plan.assembly import Member
 from engage_hri.services.realizer.plan.planner import Plan
 from engage_hri.services.realizer.plan.schedule import EPSILON
@@ -32,7 +32,7 @@ class Decisions(Outlook):
     def __init__(self, plan: Plan, began: Seconds, config: RealizerConfig) -> None:
         super().__init__(plan, began)
         self.config = config
-        self.patience = Patience(config)
+        self.patience = LatenessWatch(config)
         self._through: dict[str, int] = {}
         self._granted_at: dict[str, Seconds] = {}
         self.replan(plan)
@@ -187,7 +187,7 @@ class Decisions(Outlook):
     def deadline(self) -> Seconds | None:
         """When to ask again, whatever happens until then."""
         wake = self._wakes[0][0] if self._wakes else inf
-        patience, overdue = self.patience.deadline, self._overdue_at
+        patience, overdue = self.patience.deadline, self._next_lateness_check
         at = min(wake, inf if patience is None else patience, inf if overdue is None else overdue)
         return None if at == inf else at
 
@@ -267,7 +267,7 @@ class Decisions(Outlook):
         known, before = self._through[behavior], self.paces.get(behavior, ())
         through = self._furthest(behavior, now)
         after = pace(behavior, self, now)
-        if through > known or differs(before, after):
+        if through > known or differ_noticeably(before, after):
             self.paces[behavior] = after
             self._watch(behavior)
             yield Extend(behavior, self._points[behavior][through].sync, after)
@@ -363,7 +363,7 @@ def pace(behavior: str, decisions: "Decisions", now: Seconds) -> Pace:
     return tuple(planned) if is_paced else ()
 
 
-def differs(one: Pace, other: Pace) -> bool:
+def differ_noticeably(one: Pace, other: Pace) -> bool:
     """Noticeably?"""
     if not one or not other:
         return one != other

@@ -67,7 +67,7 @@ class Outlook(Facts):
         return {point: times[at[point]] for point in self._followed if point in at and point not in self.reached}
 
     @property
-    def _overdue_at(self) -> Seconds | None:
+    def _next_lateness_check(self) -> Seconds | None:
         """When to look who is late, though nothing here depends on it: others prepare for what comes after."""
         while self._arrivals and self._next.get(self._arrivals[0][2]) != self._arrivals[0][3]:
             heapq.heappop(self._arrivals)  # It has come.

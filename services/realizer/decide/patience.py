@@ -41,7 +41,7 @@ class _Awaited(Struct, frozen=True):
     stalled: Seconds
 
 
-class Patience:
+class LatenessWatch:
     """What each behavior under way is to report next, and when that becomes too late."""
 
     def __init__(self, config: RealizerConfig) -> None:
@@ -87,16 +87,16 @@ class Patience:
 
 
 def event_deadline(
-    event: Event, block: Block, reached: Mapping[Point, Seconds], config: RealizerConfig, *, is_heard: bool
+    event: Event, block: Block, reached: Mapping[Point, Seconds], config: RealizerConfig, *, is_received: bool
 ) -> Seconds:
     """When to give the event up as failed: its limit, from the latest of its start and the anchors realised by now.
 
-    is_heard: recognition has the request; then it is given far more time, since deciding is its business.
+    is_received: recognition has the request; then it is given far more time, since deciding is its business.
     """
     limit = config.limit_of(event.kind) if event.limit is None else event.limit
     anchors = (reached.get(_point(text, block)) for text in event.anchors)
     since = max(time for time in (reached[Point(event.id, "start")], *anchors) if time is not None)
-    return since + limit + (config.event_patience if is_heard else config.event_grace)
+    return since + limit + (config.event_patience if is_received else config.event_grace)
 
 
 def _point(text: str, block: Block) -> Point:

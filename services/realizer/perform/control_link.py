@@ -14,7 +14,7 @@ LONGEST_WAY: Seconds = 10.0
 """Home: a body that does not say that it is there is not asked for longer."""
 
 
-class BodyLink:
+class ControlLink:
     """request: the id of the block's; a behavior's is `<request>/<behavior>`. No behavior's id holds a colon."""
 
     def __init__(self, bus: Bus, requests: Requester, request: str, block: str) -> None:

@@ -21,7 +21,7 @@ from engage_hri.services.bus.interface import Containing
 from engage_hri.services.realizer.decide.decisions import Decisions
 from engage_hri.services.realizer.decide.effects import Begin, Effect, Extend
 from engage_hri.services.realizer.decide.patience import Late, Stalled
-from engage_hri.services.realizer.perform.control_link import BodyLink
+from engage_hri.services.realizer.perform.control_link import ControlLink
 from engage_hri.services.realizer.perform.feedback import Reporter
 from engage_hri.services.realizer.perform.live import Ending, Live
 from engage_hri.services.realizer.perform.recognition_link import RecognitionLink
@@ -47,7 +47,7 @@ class BlockPerformance:
         self._requests = around.requests
         self._config = around.config
         self._recognition = RecognitionLink(around.bus, around.requests, around.config, around.peers)
-        self._body = BodyLink(around.bus, around.requests, live.request.id, plan.block.id)
+        self._body = ControlLink(around.bus, around.requests, live.request.id, plan.block.id)
         self._report = Reporter(around.bus, plan.block.id, around.config.skew)
         self._begun: dict[str, asyncio.Future[None]] = {id: loop.create_future() for id in plan.chains}
         self._asked: dict[str, Begin | Extend] = {}
@@ -68,7 +68,7 @@ class BlockPerformance:
         self.spoken = Spoken(plan.block.behaviors)
         self._ending = live.ending
         self._timer = Timer(self._take_in)
-        self._is_stale = False
+        self._needs_replan = False
 
     def containing(self) -> Containing:
         """An exception in the body of `with` ends this block, and no other."""
@@ -88,8 +88,8 @@ class BlockPerformance:
         for problem in self.plan.problems:
             self._report.warn(problem.kind, problem.message, problem.behavior)
         for behavior in self.plan.dropped:
-            self._around.ledger.lose(self.plan.block.id, behavior)
-        self._around.ledger.reach(self.plan.block.id, Point(BLOCK_ITSELF, "start"), began)
+            self._around.live_blocks.lose(self.plan.block.id, behavior)
+        self._around.live_blocks.reach(self.plan.block.id, Point(BLOCK_ITSELF, "start"), began)
         try:
             async with asyncio.TaskGroup() as tasks:
                 self._running = {
@@ -98,8 +98,8 @@ class BlockPerformance:
                     )
                     for behavior in self.plan.behaviors
                 }
-                self._around.ledger.perform(self.plan.block.id, self)
-                with self._around.ledger.followed(self, self._foreign, self._elsewhere):
+                self._around.live_blocks.perform(self.plan.block.id, self)
+                with self._around.live_blocks.followed(self, self._foreign, self._elsewhere):
                     self._advance()
                     ending = await asyncio.shield(self._ending)  # which others wait for, too
                     await self._end_what_moves(ending)
@@ -108,7 +108,7 @@ class BlockPerformance:
         finally:
             self._close()
         self._report.ended(ending.status, began)
-        self._around.ledger.reach(self.plan.block.id, Point(BLOCK_ITSELF, "end"), self._bus.now())
+        self._around.live_blocks.reach(self.plan.block.id, Point(BLOCK_ITSELF, "end"), self._bus.now())
         return replace(
             self._live.outcome,
             spoken=self.spoken.texts,
@@ -210,7 +210,7 @@ class BlockPerformance:
     # -- what is decided, carried out --------------------------------------------------------------------------------
 
     def _advance(self) -> None:
-        if self._is_stale and not self._ending.done():
+        if self._needs_replan and not self._ending.done():
             self._replan()
         again = True
         while again and not self._ending.done():
@@ -218,7 +218,7 @@ class BlockPerformance:
             again = any(made_facts)
         if self.decisions.is_surprised and self._report.may_expect() and not self._ending.done():
             self._report.expect(self.decisions.plan, self.decisions.began, self.decisions.expected(self._bus.now()))
-        self._around.ledger.foresee(self.plan.block.id, self.decisions.ahead)
+        self._around.live_blocks.foresee(self.plan.block.id, self.decisions.ahead)
         if self.decisions.is_over:
             self._live.stop(Ending("done"))
         self._timer.set(None if self._ending.done() else self.decisions.deadline)
@@ -253,7 +253,7 @@ class BlockPerformance:
             came = self.decisions.arrived.get(each, arrived if each == point else None)
             self._report.reached(self.plan, self.decisions, each, arrived=came, by_body=by_body)
             self.spoken.reach(each)
-            self._around.ledger.reach(self.plan.block.id, each, at)
+            self._around.live_blocks.reach(self.plan.block.id, each, at)
 
     def _lose(self, id: str, fault: Fault, kind: WarningKind = "EXECUTION_FAILURE", *, at_rest: bool = False) -> None:
         """It cannot be finished: the block fails if it is required, else goes on without. at_rest: its parts are."""
@@ -269,12 +269,12 @@ class BlockPerformance:
                 self._go_home(self._parts(id), id)
             if id in self.plan.required:
                 self._live.stop(Ending("failed", Fault(reason=fault.reason, where=f"{self.plan.block.id}: {id}")))
-        self._is_stale = True  # Planned anew once for all that is lost in one go.
+        self._needs_replan = True  # Planned anew once for all that is lost in one go.
         asyncio.get_running_loop().call_soon(self._take_in)
 
     def _replan(self) -> None:
         """Go on as if what was dropped, or vanished elsewhere, had never been written."""
-        self._is_stale = False
+        self._needs_replan = False
         gone = (*self._dropped, *self._vanished)
         try:
             plan = plan_block(self.plan.block, self.plan.estimates.values(), dropped=gone, elsewhere=self._elsewhere)
@@ -283,7 +283,7 @@ class BlockPerformance:
             return
         self.decisions.replan(plan)
         for id in self._dropped:  # Only now that it goes on without: else those that follow it end with it.
-            self._around.ledger.lose(self.plan.block.id, id)
+            self._around.live_blocks.lose(self.plan.block.id, id)
         for problem in plan.problems:
             # What is too late now that something else is gone.
             if problem.behavior in plan.dropped and problem.behavior not in gone:

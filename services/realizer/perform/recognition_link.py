@@ -15,7 +15,7 @@ from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.interface import Bus
 from engage_hri.services.realizer.config import RealizerConfig
 from engage_hri.services.realizer.decide.patience import event_deadline
-from engage_hri.services.realizer.perform.surroundings import Presence
+from engage_hri.services.realizer.perform.surroundings import PeersThere
 from engage_hri.services.realizer.plan.schedule import EPSILON
 from engage_hri.services.realizer.points import Point
 from engage_hri.services.requests.ends import Pending, Requester, RequestRefused, ServerRestarted
@@ -31,7 +31,7 @@ class Decision(Struct, frozen=True):
 class RecognitionLink:
     """Asks recognition for the events of one block."""
 
-    def __init__(self, bus: Bus, requests: Requester, config: RealizerConfig, peers: Presence) -> None:
+    def __init__(self, bus: Bus, requests: Requester, config: RealizerConfig, peers: PeersThere) -> None:
         self._bus = bus
         self._requests = requests
         self._config = config
@@ -69,8 +69,8 @@ class RecognitionLink:
                     continue
                 at = self._bus.local(decided.at) if isinstance(decided, EventOutcome) else self._bus.now()
                 return Decision(at, True)
-            is_heard = pending is not None and "recognition" in self._peers
-            deadline = event_deadline(event, block, reached, self._config, is_heard=is_heard)
+            is_received = pending is not None and "recognition" in self._peers
+            deadline = event_deadline(event, block, reached, self._config, is_received=is_received)
             remaining = deadline - self._bus.now()
             if remaining <= EPSILON:
                 if pending is not None:

@@ -10,11 +10,11 @@ from engage_hri.schemas.body import SyncPointArrived, SyncPointReached
 from engage_hri.schemas.presence import PeerAlive, PeerGone
 from engage_hri.services.bus.interface import Bus, Containing
 from engage_hri.services.realizer.config import RealizerConfig
-from engage_hri.services.realizer.perform.ledger import Ledger
+from engage_hri.services.realizer.perform.live_blocks import LiveBlocks
 from engage_hri.services.requests.ends import Requester
 
 
-class Presence:
+class PeersThere:
     """Who is on the bus. changed: resolved when that changes next."""
 
     def __init__(self) -> None:
@@ -48,12 +48,12 @@ class Moving(Protocol):
 
 
 class Surroundings(Struct, frozen=True):
-    """routes: whose body requests are whose. others: all that are performed. ledger: what they may be tied to."""
+    """routes: the block of each request to the body. others: all that are performed. live_blocks: for ties."""
 
     bus: Bus
     requests: Requester
     config: RealizerConfig
-    peers: Presence
+    peers: PeersThere
     routes: MutableMapping[str, Moving]
     others: Callable[[], Iterable[Moving]]
-    ledger: Ledger
+    live_blocks: LiveBlocks

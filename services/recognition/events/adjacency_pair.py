@@ -7,7 +7,7 @@ that comes while the turn still goes on is known at once, but decided only when 
 from engage_hri.schemas.behaviors import Action
 from engage_hri.schemas.units import Probability, Seconds
 from engage_hri.services.recognition.events.limits import in_time
-from engage_hri.services.recognition.events.machine import IDLE, Ledger, Machine, Row, UnderWay, table
+from engage_hri.services.recognition.events.machine import IDLE, EventWriter, Machine, Row, UnderWay, table
 
 ROBOT_WAITING, HUMAN_WAITING = "robot_waiting", "human_waiting"
 INTERRUPTED, RESPONDING = "interrupted", "responding"
@@ -47,8 +47,8 @@ class AdjacencyPair(Machine):
 
     TABLE = TABLE
 
-    def __init__(self, ledger: Ledger, *, limit: Seconds, patience: Seconds) -> None:
-        super().__init__(ledger)
+    def __init__(self, writer: EventWriter, *, limit: Seconds, patience: Seconds) -> None:
+        super().__init__(writer)
         self._limit = limit
         self._patience = patience
         self._by_robot = False

@@ -5,7 +5,7 @@ whether it was one; longer speech is a change of floor, and so is speech that ou
 """
 
 from engage_hri.schemas.units import Seconds
-from engage_hri.services.recognition.events.machine import IDLE, Ledger, Machine, Row, UnderWay, table
+from engage_hri.services.recognition.events.machine import IDLE, EventWriter, Machine, Row, UnderWay, table
 
 UNDECIDED, BRIEF = "undecided", "brief"
 
@@ -28,8 +28,8 @@ class Backchannel(Machine):
 
     TABLE = TABLE
 
-    def __init__(self, ledger: Ledger, *, limit: Seconds) -> None:
-        super().__init__(ledger)
+    def __init__(self, writer: EventWriter, *, limit: Seconds) -> None:
+        super().__init__(writer)
         self._limit = limit
         self.last: tuple[Seconds, str] | None = None
         """Start and id of the last one that was published."""

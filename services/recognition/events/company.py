@@ -9,16 +9,16 @@ from collections.abc import Callable
 from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.world import World
 from engage_hri.services.recognition.config import RecognitionConfig
-from engage_hri.services.recognition.events.machine import Forgotten, Ledger, Mishap
+from engage_hri.services.recognition.events.machine import EventWriter, Forgotten, Mishap
 from engage_hri.services.recognition.events.person import Person
-from engage_hri.services.recognition.events.scene import Scene
+from engage_hri.services.recognition.events.scene import SessionScene
 from engage_hri.services.requests.deadlines import Deadlines
 
 
 class Company:
     """strict: a bug with one person raises; otherwise it costs that person's events (see `Session`)."""
 
-    def __init__(self, scene: Scene, config: RecognitionConfig, ledger: Ledger, *, strict: bool) -> None:
+    def __init__(self, scene: SessionScene, config: RecognitionConfig, writer: EventWriter, *, strict: bool) -> None:
         self.persons: dict[str, Person] = {}
         self._here: dict[str, Person] = {}
         """In the order of acquaintance."""
@@ -31,7 +31,7 @@ class Company:
         """As of the scene, when the times of all were last arranged."""
         self._scene = scene
         self._config = config
-        self._ledger = ledger
+        self._writer = writer
         self._strict = strict
 
     # -- who there is -------------------------------------------------------------------------------------------
@@ -40,7 +40,7 @@ class Company:
         """An acquaintance, old or new."""
         if id not in self.persons:
             self._met += 1
-            person = Person(id, self._met, self._scene, self._config, self._ledger)
+            person = Person(id, self._met, self._scene, self._config, self._writer)
             self.persons[id] = self._here[id] = person
         return self.persons[id]
 
@@ -75,17 +75,17 @@ class Company:
             self._agenda.clear(id)
             self._here.pop(id, None)
             del self.persons[id], self._unseen[id]
-            self._ledger.effects.append(Forgotten(id))
+            self._writer.effects.append(Forgotten(id))
             self._follow_speech(now)
 
     def lose_track(self, person: Person, at: Seconds) -> None:
         """Begin anew with somebody: open events end as lost, and what the person does has to be seen again."""
-        fresh = Person(person.id, person.number, self._scene, self._config, self._ledger)
+        fresh = Person(person.id, person.number, self._scene, self._config, self._writer)
         fresh.presence, fresh.news = person.presence, person.news
         self.persons[person.id] = fresh
         if person.id in self._here:
             self._here[person.id] = fresh
-        self._ledger.lose(person.id, at)
+        self._writer.lose(person.id, at)
         self._scene.stops(person.id, at)
         self._arrange(fresh)
         self._follow_speech(at)
@@ -137,7 +137,7 @@ class Company:
         except Exception as error:
             if self._strict:
                 raise
-            self._ledger.effects.append(Mishap(person.id, at, error))
+            self._writer.effects.append(Mishap(person.id, at, error))
             self.lose_track(person, at)
 
     def _arrange(self, person: Person) -> None:

@@ -11,21 +11,21 @@ from engage_hri.services.recognition.config import RecognitionConfig
 from engage_hri.services.recognition.events.adjacency_pair import AdjacencyPair
 from engage_hri.services.recognition.events.backchannel import BRIEF, UNDECIDED, Backchannel
 from engage_hri.services.recognition.events.limits import in_time
-from engage_hri.services.recognition.events.machine import IDLE, Ledger, UnderWay
-from engage_hri.services.recognition.events.scene import Scene
+from engage_hri.services.recognition.events.machine import IDLE, EventWriter, UnderWay
+from engage_hri.services.recognition.events.scene import SessionScene
 
 
 class Conversation:
     """Of one person with the robot."""
 
-    def __init__(self, id: str, scene: Scene, config: RecognitionConfig, ledger: Ledger) -> None:
+    def __init__(self, id: str, scene: SessionScene, config: RecognitionConfig, writer: EventWriter) -> None:
         self.id = id
         self.speaks_since: Seconds | None = None
         self.silent_since: Seconds | None = None
         self.acts_since: Seconds | None = None
-        self.pair = AdjacencyPair(ledger, limit=config.adjacency_pair_limit, patience=config.turn_patience)
-        self.own_backchannel = Backchannel(ledger, limit=config.backchannel_limit)
-        self.robot_backchannel = Backchannel(ledger, limit=config.backchannel_limit)
+        self.pair = AdjacencyPair(writer, limit=config.adjacency_pair_limit, patience=config.turn_patience)
+        self.own_backchannel = Backchannel(writer, limit=config.backchannel_limit)
+        self.robot_backchannel = Backchannel(writer, limit=config.backchannel_limit)
         self._speech_confidence: Probability = 1.0
         self._scene = scene
         self._config = config

@@ -5,7 +5,7 @@ matters only for how long the gaze was shared. When the human is there first the
 way: the sharing begins with its arrival.
 """
 
-from engage_hri.services.recognition.events.machine import IDLE, Ledger, Row, table
+from engage_hri.services.recognition.events.machine import IDLE, EventWriter, Row, table
 from engage_hri.services.recognition.events.shared_gaze import SharedGaze
 
 ROBOT_DIRECTING, HUMAN_DIRECTING, SHARED = "robot_directing", "human_directing", "shared"
@@ -42,6 +42,6 @@ class DirectedGaze(SharedGaze):
     ROBOT_BEGINS, HUMAN_BEGINS = "robot_directs", "human_directs"
     ROBOT_JOINS, HUMAN_JOINS = "robot_follows", "human_follows"
 
-    def __init__(self, ledger: Ledger, objects: tuple[str, ...]) -> None:
-        super().__init__(ledger)
+    def __init__(self, writer: EventWriter, objects: tuple[str, ...]) -> None:
+        super().__init__(writer)
         self.objects = objects

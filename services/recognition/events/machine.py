@@ -103,7 +103,7 @@ class UnderWay(Struct, kw_only=True):
         self.confidence = min(self.confidence, confidence)
 
 
-class Ledger:
+class EventWriter:
     """Numbers the events and turns their changes into messages, in `effects`.
 
     clock: of the stamps. session: prefix of the ids, so that a restarted service never reuses one.
@@ -172,10 +172,10 @@ class Machine:
 
     TABLE: ClassVar[Table]
 
-    def __init__(self, ledger: Ledger) -> None:
+    def __init__(self, writer: EventWriter) -> None:
         self.state = IDLE
         self.event: UnderWay | None = None
-        self._ledger = ledger
+        self._writer = writer
 
     @property
     def deadline(self) -> Seconds | None:
@@ -196,6 +196,6 @@ class Machine:
         self.state = row.next
         for state in row.publishes:
             assert self.event is not None, f"{type(self).__name__}: {given!r} publishes, but no event is under way"
-            self._ledger.publish(self.event, state, at)
+            self._writer.publish(self.event, state, at)
         if self.state == IDLE:
             self.event = None

@@ -11,11 +11,11 @@ from engage_hri.services.recognition.config import RecognitionConfig
 from engage_hri.services.recognition.events.conversation import Conversation
 from engage_hri.services.recognition.events.directed_gaze import HUMAN_DIRECTING, DirectedGaze
 from engage_hri.services.recognition.events.limits import LimitClock, in_time
-from engage_hri.services.recognition.events.machine import IDLE, Ledger, UnderWay
+from engage_hri.services.recognition.events.machine import IDLE, EventWriter, UnderWay
 from engage_hri.services.recognition.events.mutual_facial_gaze import HUMAN_WAITING, MutualFacialGaze
 from engage_hri.services.recognition.events.news import News
 from engage_hri.services.recognition.events.presence import Presence
-from engage_hri.services.recognition.events.scene import Gaze, Scene
+from engage_hri.services.recognition.events.scene import GazeState, SessionScene
 from engage_hri.services.recognition.events.shared_gaze import SharedGaze
 
 ACTIONS_KEPT = 64
@@ -39,20 +39,22 @@ class _Doing(NamedTuple):
 class Person:
     """The recognizers of one actor. number: in the order of acquaintance."""
 
-    def __init__(self, id: str, number: int, scene: Scene, config: RecognitionConfig, ledger: Ledger) -> None:
+    def __init__(
+        self, id: str, number: int, scene: SessionScene, config: RecognitionConfig, writer: EventWriter
+    ) -> None:
         self.id = id
         self.number = number
         self.presence = Presence(config.lost_face_grace)
-        self.gaze = Gaze()
+        self.gaze = GazeState()
         self.directed: list[DirectedGaze] = []
-        self.facial = MutualFacialGaze(ledger)
-        self.conversation = Conversation(id, scene, config, ledger)
+        self.facial = MutualFacialGaze(writer)
+        self.conversation = Conversation(id, scene, config, writer)
         self.news = News(ACTIONS_KEPT)
         self._doing: dict[Action, _Doing] = {}
         """Other than looking."""
         self._scene = scene
         self._config = config
-        self._ledger = ledger
+        self._writer = writer
         self._robot_directed: list[_Directed] = []
 
     # -- time ---------------------------------------------------------------------------------------------------
@@ -101,7 +103,7 @@ class Person:
         self.forget_idle(at)
         self.facial.person_gone(at, until)
         self.conversation.person_gone(at, until)
-        self.gaze = Gaze(since=until)
+        self.gaze = GazeState(since=until)
         self._doing.clear()
         self._scene.stops(self.id, until)
 
@@ -253,7 +255,7 @@ class Person:
         if robot_since is not None or not in_vain:
             self.facial.directed_gaze_begins(at, by_robot=False)
         human_on = self._scene.person_looks_at(self.gaze, objects)
-        one = DirectedGaze(self._ledger, objects)
+        one = DirectedGaze(self._writer, objects)
         self.directed.append(one)
         clock = LimitClock(since, limit)
         one.human_begins(event, clock, robot_since=robot_since, human_on=human_on, in_vain=in_vain, at=at)
@@ -266,7 +268,7 @@ class Person:
                 one.supersede(event.started)
         self.forget_idle(event.started)
         self.facial.directed_gaze_begins(event.started, by_robot=True)
-        one = DirectedGaze(self._ledger, event.objects)
+        one = DirectedGaze(self._writer, event.objects)
         self.directed.append(one)
         there = self._scene.person_looks_at(self.gaze, event.objects)
         self.gaze.spent = self.gaze.spent or there

@@ -27,7 +27,7 @@ class Covered(Struct, frozen=True):
     by: frozenset[Covering]
 
 
-class Gaze(Struct):
+class GazeState(Struct):
     """Where an actor looks, and since when. ended: it has looked away at that instant, unless it is still there."""
 
     targets: tuple[str, ...] = ()
@@ -65,13 +65,13 @@ class Gaze(Struct):
         return at
 
 
-class Scene:
+class SessionScene:
     """The robot and the world, shared by all persons of a session."""
 
     def __init__(self, robot: str, resolution: GazeResolution) -> None:
         self.robot = robot
         self.resolution = resolution
-        self.gaze = Gaze()
+        self.gaze = GazeState()
         self.robot_speaks_since: Seconds | None = None
         self.head_owner = Claim(kind="none", priority=0)
         self.people_in_world: frozenset[str] = frozenset()
@@ -137,7 +137,7 @@ class Scene:
             return True
         return not self._objects and entity != self.robot and not self._is_no_object(entity)
 
-    def person_looks_at(self, gaze: Gaze, objects: tuple[str, ...]) -> bool:
+    def person_looks_at(self, gaze: GazeState, objects: tuple[str, ...]) -> bool:
         """Does a person's look count as one at `objects`? At resolution `table` anything on the table will do."""
         if any(target in objects for target in gaze.targets):
             return True

@@ -25,10 +25,10 @@ from engage_hri.schemas.world import World
 from engage_hri.services.recognition.config import RecognitionConfig
 from engage_hri.services.recognition.events.company import Company
 from engage_hri.services.recognition.events.limits import BLOCKS_KEPT, ROUNDING, Blocks, LimitClock
-from engage_hri.services.recognition.events.machine import Effect, Ledger, UnderWay
+from engage_hri.services.recognition.events.machine import Effect, EventWriter, UnderWay
 from engage_hri.services.recognition.events.news import Latest, News
 from engage_hri.services.recognition.events.person import Person
-from engage_hri.services.recognition.events.scene import Covered, Scene
+from engage_hri.services.recognition.events.scene import Covered, SessionScene
 
 Observation = (
     ActionBegan | ActionEnded | ActorFound | ActorLost | RequestEvent | SignalTurn | Cancel
@@ -54,10 +54,10 @@ class Session:
     ) -> None:
         self.robot = robot
         self.blocks = Blocks()
-        self.scene = Scene(robot, config.gaze_resolution)
+        self.scene = SessionScene(robot, config.gaze_resolution)
         self._config = config
-        self._ledger = Ledger(clock, name)
-        self._company = Company(self.scene, config, self._ledger, strict=strict)
+        self._writer = EventWriter(clock, name)
+        self._company = Company(self.scene, config, self._writer, strict=strict)
         self._ended_turns: Latest[str, Seconds] = Latest(TURNS_KEPT)
         self._aborted_turns: Latest[str, Seconds] = Latest(TURNS_KEPT)
         self._robot_does: dict[tuple[str, Action], ActionBegan] = {}
@@ -161,7 +161,7 @@ class Session:
         return self._take()
 
     def _take(self) -> list[Effect]:
-        effects = self._ledger.take()
+        effects = self._writer.take()
         for effect in effects:
             if isinstance(effect, EventOutcome):
                 self._live.pop(effect.id, None)
@@ -234,9 +234,9 @@ class Session:
             return
         fault = self._fault_in(request)
         if fault is not None:
-            self._ledger.effects.append(Refused(id=request.id, fault=fault))
+            self._writer.effects.append(Refused(id=request.id, fault=fault))
             return
-        self._ledger.effects.append(Accepted(id=request.id))
+        self._writer.effects.append(Accepted(id=request.id))
         wanted = request.event
         event = UnderWay(
             kind=wanted.kind, initiator=self.robot, responder=wanted.responder, started=at, objects=wanted.objects,
@@ -246,8 +246,8 @@ class Session:
         self._live[request.id] = event
         self._company.let(wanted.responder, at, lambda person: self._begin(person, event, wanted))
         if event.request and not event.id:  # a bug has shown before the event could be told
-            self._ledger.publish(event, "started", at)
-            self._ledger.publish(event, "lost", at)
+            self._writer.publish(event, "started", at)
+            self._writer.publish(event, "lost", at)
 
     def _begin(self, person: Person, event: UnderWay, wanted: Event) -> None:
         """The robot's event with this person."""
@@ -310,7 +310,7 @@ class Session:
         backchannel = person.conversation.robot_backchannel
         noticed = backchannel.last
         if noticed is not None and abs(event.started - noticed[0]) <= self._config.backchannel_limit:
-            self._ledger.answer(event.request, noticed[1], event.started)
+            self._writer.answer(event.request, noticed[1], event.started)
             event.request = ""
         else:
             backchannel.announced(event)
@@ -339,7 +339,7 @@ class Session:
             case "aborted":
                 self._aborted_turns[signal.turn] = at
                 self._let_addressees(signal.actor, at, lambda person: person.abort(at, turn=signal.turn))
-        self._ledger.effects.append(TurnOutcome(id=request.id, at=self._ledger.stamp(at)))
+        self._writer.effects.append(TurnOutcome(id=request.id, at=self._writer.stamp(at)))
 
     def _let_addressees(self, actor: str, at: Seconds, happen: Callable[[Person], object]) -> None:
         """actor: empty for all."""

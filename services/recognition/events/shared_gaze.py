@@ -7,8 +7,8 @@ from typing import ClassVar
 
 from engage_hri.schemas.units import Probability, Seconds
 from engage_hri.services.recognition.events.limits import LimitClock
-from engage_hri.services.recognition.events.machine import IDLE, Ledger, Machine, UnderWay
-from engage_hri.services.recognition.events.scene import Gaze
+from engage_hri.services.recognition.events.machine import IDLE, EventWriter, Machine, UnderWay
+from engage_hri.services.recognition.events.scene import GazeState
 
 
 class SharedGaze(Machine):
@@ -26,8 +26,8 @@ class SharedGaze(Machine):
     ROBOT_JOINS: ClassVar[str]
     HUMAN_JOINS: ClassVar[str]
 
-    def __init__(self, ledger: Ledger) -> None:
-        super().__init__(ledger)
+    def __init__(self, writer: EventWriter) -> None:
+        super().__init__(writer)
         self.by_robot = False
         self.clock: LimitClock | None = None
         self._robot_on = self._human_on = self._robot_came = False
@@ -44,7 +44,7 @@ class SharedGaze(Machine):
         never_shown = self.clock is not None and self.clock.waiting
         self.step("withdraw" if never_shown else "limit", at)
 
-    def robot_begins(self, event: UnderWay, clock: LimitClock, *, robot_on: bool, look: Gaze | None) -> None:
+    def robot_begins(self, event: UnderWay, clock: LimitClock, *, robot_on: bool, look: GazeState | None) -> None:
         """The robot's request. look: the person's, if it is there already."""
         self._begin(event, clock, by_robot=True, robot_on=robot_on, human_on=look is not None)
         if look is None:

@@ -20,7 +20,7 @@ from engage_hri.schemas.world import World
 from engage_hri.services.recognition.config import RecognitionConfig
 from engage_hri.services.recognition.events.presence import NEVER
 from engage_hri.services.recognition.events.scene import Covered
-from engage_hri.services.recognition.perceive.gaze_targets import Sight, is_direction, is_place
+from engage_hri.services.recognition.perceive.gaze_targets import GazeTargets, is_direction, is_place
 from engage_hri.services.recognition.perceive.looks import ROUNDING, Change, Looking
 from engage_hri.services.recognition.perceive.manipulation import Manipulation
 from engage_hri.services.recognition.perceive.speech import Voice
@@ -78,7 +78,7 @@ class Attention:
         self._robot = robot
         self._config = config
         self._clock = clock
-        self._sight = Sight(robot, config)
+        self._sight = GazeTargets(robot, config)
         self._manipulation = Manipulation(robot, config)
         self._actors: dict[str, _Actor] = {}
         self._attended: dict[str, _Actor] = {}

@@ -106,7 +106,7 @@ class _Gaze:
         return _is_inside([(corner[0] - x, corner[1] - y) for corner in surface.outline])
 
 
-class Sight:
+class GazeTargets:
     """The things around, for gazes to be on. robot: its face is known without being seen."""
 
     def __init__(self, robot: str, config: RecognitionConfig) -> None:

@@ -17,13 +17,13 @@ JUST_AFTER: Seconds = 0.001
 """The estimate must have passed the threshold, not be on it."""
 
 
-class Estimate(NamedTuple):
+class EngagementEstimate(NamedTuple):
     value: Probability | None
     level: Level
     reasons: tuple[str, ...]
 
 
-UNKNOWN = Estimate(None, "unknown", ("no connection event yet",))
+UNKNOWN = EngagementEstimate(None, "unknown", ("no connection event yet",))
 
 
 def pace(usual: Seconds, recent: Seconds | None, open: Seconds) -> Probability:
@@ -57,7 +57,7 @@ class Engagement:
         self._tally = tally
         self._busy_until: Seconds = float("-inf")
 
-    def update(self, now: Seconds, *, busy: bool) -> Estimate:
+    def update(self, now: Seconds, *, busy: bool) -> EngagementEstimate:
         """The estimate now. busy: with a task, so that it stays as it was when that began."""
         if self.busy and not busy:
             self._busy_until = now
@@ -75,14 +75,14 @@ class Engagement:
         last = self._tally.starts.last
         return self._busy_until if last is None else max(last, self._busy_until)
 
-    def _estimate(self, now: Seconds, open: Seconds) -> Estimate:
+    def _estimate(self, now: Seconds, open: Seconds) -> EngagementEstimate:
         usual, recent = self._usual, self._recent(now)
         failed, judged = self._tally.judged(now)
         quality = share_of_good(failed, judged)
         speed = pace(usual, recent, open)
         value = speed * quality
         between = f"{recent:.1f} s between recent events" if recent is not None else "no recent pace"
-        return Estimate(
+        return EngagementEstimate(
             value,
             next_level(self.estimate.level, value, self._config),
             (

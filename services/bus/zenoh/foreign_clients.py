@@ -17,7 +17,7 @@ from engage_hri.schemas.messages import Message, decode, encode, encode_json, en
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.zenoh.order import KEPT, Written
 from engage_hri.services.bus.zenoh.peers import finish, pack
-from engage_hri.services.bus.zenoh.session import Doorway
+from engage_hri.services.bus.zenoh.session import LoopBridge
 
 BATCH = 32
 """Replies in one go: a question for everything must not hold up the loop."""
@@ -25,16 +25,16 @@ BATCH = 32
 Kept = tuple[Written, zenoh.Timestamp]
 
 
-class Visitors:
+class ForeignClients:
     """What this process has published, kept under the timestamps it was published with, and given to who asks."""
 
-    def __init__(self, session: zenoh.Session, doorway: Doorway) -> None:
+    def __init__(self, session: zenoh.Session, bridge: LoopBridge) -> None:
         self._loop = asyncio.get_running_loop()
         self._states: dict[str, Kept] = {}
         self._recent: deque[Kept] = deque(maxlen=KEPT)
         self._open = True
         self._declared = tuple(
-            session.declare_queryable(keys.of_class(kind), doorway.entrance(self._asked))
+            session.declare_queryable(keys.of_class(kind), bridge.on_loop(self._asked))
             for kind in ("state", "evt", "cmd")
         )
 

@@ -13,20 +13,20 @@ from engage_hri.services.requests.deadlines import Deadlines
 EVERYBODY = ""
 
 
-class _Standing:
+class _OfOne:
     def __init__(self, config: RecognitionConfig, clock: str) -> None:
         self.tally = Tally(config.window, clock)
         self.engagement = Engagement(config, self.tally)
 
 
-class Standings:
+class PublishedStatistics:
     """robot: whoever else takes part in an event is the person it counts for. clock: of the stamps."""
 
     def __init__(self, robot: str, config: RecognitionConfig, clock: str = "loop") -> None:
         self._robot = robot
         self._config = config
         self._clock = clock
-        self._standings: dict[str, _Standing] = {EVERYBODY: _Standing(config, clock)}
+        self._published: dict[str, _OfOne] = {EVERYBODY: _OfOne(config, clock)}
         self._agenda: Deadlines[str] = Deadlines(str)
         self._busy: frozenset[str] = frozenset()
 
@@ -40,12 +40,12 @@ class Standings:
         touched = set(iter(lambda: self._agenda.due(now), None))
         for change in changes:
             if isinstance(change, Forgotten):
-                self._standings.pop(change.actor, None)
+                self._published.pop(change.actor, None)
                 self._agenda.clear(change.actor)
                 touched.discard(change.actor)
                 continue
             for name in (change.person(self._robot), EVERYBODY):
-                self._standing(name).tally.feed(change)
+                self._statistics_of(name).tally.feed(change)
                 touched.add(name)
         if busy != self._busy:
             touched |= {EVERYBODY, *(busy ^ self._busy)}
@@ -56,13 +56,13 @@ class Standings:
         """Of all together, as they are."""
         return self._statistics(EVERYBODY, now)
 
-    def _standing(self, actor: str) -> _Standing:
-        if actor not in self._standings:
-            self._standings[actor] = _Standing(self._config, self._clock)
-        return self._standings[actor]
+    def _statistics_of(self, actor: str) -> _OfOne:
+        if actor not in self._published:
+            self._published[actor] = _OfOne(self._config, self._clock)
+        return self._published[actor]
 
     def _statistics(self, actor: str, now: Seconds) -> Statistics:
-        one = self._standing(actor)
+        one = self._statistics_of(actor)
         busy = bool(self._busy) if actor == EVERYBODY else actor in self._busy
         estimate = one.engagement.update(now, busy=busy)
         statistics = Statistics(

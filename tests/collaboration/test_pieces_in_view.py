@@ -9,9 +9,9 @@ from hypothesis import strategies as st
 from msgspec.structs import replace
 
 from engage_hri.schemas.world import Entity, World
+from engage_hri.services.collaboration.pieces_in_view import PiecesInView
 from engage_hri.services.collaboration.placement import has_been_placed
 from engage_hri.services.collaboration.relations import Relation, relation
-from engage_hri.services.collaboration.sight import Sight
 from engage_hri.services.collaboration.task import Instruction, check
 from engage_hri.services.tangram.table import tangram_table
 
@@ -32,14 +32,14 @@ def moved(piece: Entity, x: float = 0.0, y: float = 0.0, yaw: float = 0.0) -> En
     return replace(piece, position=(px + x, py + y, pz), yaw=piece.yaw + math.radians(yaw))
 
 
-def seeing(*frames: tuple[float, tuple[Entity, ...]], steady: float = 0.5) -> Sight:
-    sight = Sight(steady)
+def seeing(*frames: tuple[float, tuple[Entity, ...]], steady: float = 0.5) -> PiecesInView:
+    sight = PiecesInView(steady)
     for at, entities in frames:
         sight.see(World(entities=entities), at)
     return sight
 
 
-def piece(sight: Sight, now: float, id: str = "blue-square") -> Entity:
+def piece(sight: PiecesInView, now: float, id: str = "blue-square") -> Entity:
     return next(it for it in sight.pieces(now) if it.id == id)
 
 
@@ -139,7 +139,7 @@ def test_noise_of_many_frames_gives_the_relation_that_single_frames_often_miss(s
         return moved(entity, chance.gauss(0, 0.006), chance.gauss(0, 0.006), chance.gauss(0, 5.0))
 
     frames = [(FRAME * n, (seen(BLUE), seen(BASE))) for n in range(320)]
-    sight, missed, wrong = Sight(0.5), 0, 0
+    sight, missed, wrong = PiecesInView(0.5), 0, 0
     for at, entities in frames:
         sight.see(World(entities=entities), at)
         missed += not check(WANTED, entities).right
@@ -164,7 +164,7 @@ def test_noise_of_many_frames_gives_the_relation_that_single_frames_often_miss(s
 def test_whatever_is_seen_every_piece_ever_seen_lies_within_what_was_seen(
     frames: list[tuple[float, Entity | None, bool]],
 ) -> None:
-    sight, now, places = Sight(0.5), 0.0, []
+    sight, now, places = PiecesInView(0.5), 0.0, []
     for pause, blue, covered in frames:
         now += pause
         places += [blue.position] if blue else []

@@ -47,7 +47,7 @@ class _View(Struct):
         return replace(last, position=place, yaw=last.yaw + turned)
 
 
-class Sight:
+class PiecesInView:
     """steady: how long a piece must have been in view before its place is believed."""
 
     def __init__(self, steady: Seconds) -> None:

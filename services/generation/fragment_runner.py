@@ -24,15 +24,15 @@ from engage_hri.services.generation.head.arbiter import Arbiter
 from engage_hri.services.generation.head.inhibitions import Leases
 from engage_hri.services.generation.performance import FragmentPerformance, GazesOfFragments
 from engage_hri.services.generation.pipeline import glance, plan, targets
-from engage_hri.services.generation.references.discourse import SILENCE, Discourse
+from engage_hri.services.generation.references.discourse import NO_DISCOURSE, Discourse
+from engage_hri.services.generation.turns.continuation import NO_CONTINUATION, Continuation
 from engage_hri.services.generation.turns.events import TurnEvents, TurnOutcomes
 from engage_hri.services.generation.turns.policy import Aborted, TurnPlan, TurnPolicy
-from engage_hri.services.generation.turns.trail import NOTHING, Trail
 from engage_hri.services.requests.ends import Pending, RequestDesk, Requester, RequestRefused
 from engage_hri.services.requests.serving import GRACE
 
 
-class Conductor:
+class FragmentRunner:
     """Any number of fragments at once. `deadline`: when to `settle` at the latest."""
 
     def __init__(
@@ -59,7 +59,7 @@ class Conductor:
         self._gazes = GazesOfFragments()
         self._body = BodyLink(bus, config.body_patience)
         self._world: World | None = None
-        self._discourse = SILENCE
+        self._discourse = NO_DISCOURSE
         self._live: dict[str, FragmentPerformance] = {}
         """By request id: from acceptance to outcome."""
         self._line: asyncio.Queue[FragmentPerformance] = asyncio.Queue()
@@ -228,7 +228,7 @@ class Conductor:
                 body = self._body.capabilities
                 if body is not None:
                     self._arbiter.gaze_perceived_within(body.gaze_half_angle)
-                before = reduce(Trail.then, (each.trail for each in company), NOTHING)
+                before = reduce(Continuation.then, (each.continuation for each in company), NO_CONTINUATION)
                 heard = self._heard_in(turn)
                 made = plan(fragment, turn, self._world, body, motions, permits(), self._config, before, heard)
                 performance.begin(made)

@@ -13,7 +13,7 @@ from engage_hri.services.realizer.plan.schedule import EPSILON
 from engage_hri.services.realizer.points import Point
 
 
-class Follower(Protocol):
+class TiedBlock(Protocol):
     """A block that is tied to points of others. Their behaviors are named `block:behavior`."""
 
     def hear(self, point: Point, at: Seconds) -> None:
@@ -46,10 +46,10 @@ class _Page:
         self.expected: dict[Point, Seconds] = {}
         self.reached: dict[Point, Seconds] = {}
         self.lost: set[str] = set()
-        self.followers: list[Follower] = []
+        self.followers: list[TiedBlock] = []
 
 
-class Ledger:
+class LiveBlocks:
     """All live blocks, from their request to their end. Ids are free again after that."""
 
     def __init__(self) -> None:
@@ -79,7 +79,7 @@ class Ledger:
         page = self._pages[block]
         page.reached[point] = at
         for follower in list(page.followers):
-            follower.hear(_abroad(block, point), at)
+            follower.hear(_qualified(block, point), at)
 
     def perform(self, block: str, author: Author) -> None:
         """It begins."""
@@ -106,7 +106,7 @@ class Ledger:
         while self._untold:
             page, point, at = self._untold.popleft()
             for follower in list(page.followers):
-                follower.foresee(_abroad(page.block.id, point), at)
+                follower.foresee(_qualified(page.block.id, point), at)
 
     def lose(self, block: str, behavior: str) -> None:
         """A behavior of a live block is dropped. Said again, it is no news."""
@@ -118,7 +118,7 @@ class Ledger:
             follower.miss((f"{block}:{behavior}",))
 
     @contextmanager
-    def followed(self, follower: Follower, points: Iterable[Point], blocks: Mapping[str, Block]) -> Iterator[None]:
+    def followed(self, follower: TiedBlock, points: Iterable[Point], blocks: Mapping[str, Block]) -> Iterator[None]:
         """Tell `follower` what becomes of these points of other `blocks`, and what already has.
 
         A block that has taken the id of one of them since is another block.
@@ -150,7 +150,7 @@ class Ledger:
                 page.followers.remove(follower)
 
 
-def _abroad(block: str, point: Point) -> Point:
+def _qualified(block: str, point: Point) -> Point:
     """As other blocks name it."""
     return Point(f"{block}:{point.behavior}", point.sync)
 

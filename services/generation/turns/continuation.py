@@ -28,10 +28,10 @@ class Stroke(Struct, frozen=True):
     over: str = "stroke_end"
 
 
-class Trail(Struct, frozen=True):
+class Continuation(Struct, frozen=True):
     """Ids of a block's last speech or phrase, of its last glance and of its strokes. "": it has none.
 
-    In the trail of a turn they are `block:behavior`.
+    In the continuation of a turn they are `block:behavior`.
     """
 
     speech: str = ""
@@ -43,28 +43,28 @@ class Trail(Struct, frozen=True):
         """The sync point that the next fragment takes for its block's start; "": the block's own."""
         return f"{self.speech}:end" if self.speech else ""
 
-    def pending(self, block: str, reached: Reached) -> "Trail":
-        """Of this trail of `block`, named from elsewhere, what has not been `reached`."""
+    def pending(self, block: str, reached: Reached) -> "Continuation":
+        """Of this continuation of `block`, named from elsewhere, what has not been `reached`."""
         ahead = tuple(
             Stroke(f"{block}:{each.behavior}", each.limb, each.over)
             for each in self.strokes
             if (each.behavior, each.over) not in reached
         )
-        return Trail(
+        return Continuation(
             speech=f"{block}:{self.speech}" if self.speech and (self.speech, "end") not in reached else "",
             glance=f"{block}:{self.glance}" if self.glance and (self.glance, "stroke") not in reached else "",
             strokes=ahead,
         )
 
-    def then(self, later: "Trail") -> "Trail":
-        return Trail(later.speech or self.speech, later.glance or self.glance, (*self.strokes, *later.strokes))
+    def then(self, later: "Continuation") -> "Continuation":
+        return Continuation(later.speech or self.speech, later.glance or self.glance, (*self.strokes, *later.strokes))
 
     def frees(self, limb: Limb) -> Iterator[str]:
         """The sync points before which `limb` is in use."""
         return (f"{each.behavior}:{each.over}" for each in self.strokes if _may_be_one(each.limb, limb))
 
 
-NOTHING = Trail()
+NO_CONTINUATION = Continuation()
 
 
 def stroke(behavior: Behavior, hand: Hand | None = None) -> Stroke | None:
