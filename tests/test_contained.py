@@ -2,7 +2,7 @@
 
 import asyncio
 import logging
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from contextlib import suppress
 from typing import Any
 
@@ -39,7 +39,7 @@ def breaking(attribute: str) -> Callable[..., Any]:
 @pytest.mark.parametrize(
     ("place", "what"),
     [
-        ("engage_hri.services.generation.fragment_runner.Conductor.admit", "perform"),
+        ("engage_hri.services.generation.fragment_runner.FragmentRunner.admit", "perform"),
         ("engage_hri.services.generation.pipeline.plan", "perform"),
         ("engage_hri.services.generation.fragment_runner.plan", "perform"),
         ("engage_hri.services.realizer.service.plan_steps", "realize"),
@@ -181,7 +181,16 @@ async def test_what_cannot_be_sent_is_refused_and_other_requests_live_on(hub: Me
         assert (await other).status == "done"
 
 
+@pytest.fixture
+def unlogged() -> Iterator[None]:
+    """What pytest could not write down, either."""
+    logging.disable(logging.CRITICAL)
+    yield
+    logging.disable(logging.NOTSET)
+
+
 @pytest.mark.contained
+@pytest.mark.usefixtures("unlogged")
 @pytest.mark.parametrize("text", ["j\udcf6rg/beat.qi", None], ids=["surrogate", "none"])
 async def test_an_error_of_a_driver_that_cannot_even_be_written_down_ends_one_behavior(
     hub: MemoryHub, monkeypatch: pytest.MonkeyPatch, text: str | None
@@ -193,7 +202,6 @@ async def test_an_error_of_a_driver_that_cannot_even_be_written_down_ends_one_be
     def broken(*arguments: object) -> Any:
         raise Odd
 
-    monkeypatch.setattr(logging.root.manager, "disable", logging.CRITICAL)  # pytest can't write it down, either
     async with whole_robot(hub) as robot:
         with monkeypatch.context() as patch:
             patch.setattr("engage_hri.services.control.torso.body.SimulatedBody.perform", broken)
