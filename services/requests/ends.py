@@ -108,13 +108,11 @@ class Requester:
         """
         if self._broken is not None:
             return self._failed(key, request, self._broken)
-        known = self._pending.get(request.id)
         effects = self._asking.send(key, request, self._bus.now(), within)
         match effects:
             case [asking.TellEnd(end=EngageError() as error)]:
                 return self._failed(key, request, error)
-        pending = known
-        if pending is None:
+        if (pending := self._pending.get(request.id)) is None:
             pending = self._pending[request.id] = Pending(key, request)
         pending.request = self._asking.request(request.id) or request
         self._carry_out(effects)
@@ -133,10 +131,11 @@ class Requester:
         self._carry_out(self._asking.cancel(id, reason, self._bus.now()))
 
     def state(self, id: str) -> State:
+        """State of request `id`; ENDED if it is not known."""
         return self._asking.state(id)
 
     def feed(self, received: Received) -> bool:
-        """Take a message of `PATTERNS`; False if it was none of ours."""
+        """Take a message of `PATTERNS`; False for a message of any other type."""
         message = received.message
         if isinstance(message, Answer):
             effects = self._asking.hear(message, self._bus.now(), keys.server_of(received.key))
@@ -157,7 +156,7 @@ class Requester:
         for effect in effects:  # by isinstance: with each message, and twice as quick as patterns
             if isinstance(effect, asking.Publish):
                 try:
-                    self._publish(effect.expression, _as_message(effect.message))
+                    self._publish(effect.expression, effect.message)  # type: ignore[arg-type]
                 except Exception as error:
                     self._could_not_send(effect.message.id, error)
             elif isinstance(effect, asking.TellAccepted):
@@ -175,7 +174,7 @@ class Requester:
         self._alarm.set(self._asking.deadline)
 
     def _could_not_send(self, id: str, error: Exception) -> None:
-        """What has no encoded form, half a character for instance, ends this request and leaves the others alone."""
+        """End a request that has no encoded form (half a character in its text, for instance); the others go on."""
         self._asking.forget(id)
         fault = Fault(
             reason=str(error), where=id, advice="text in Unicode, numbers in their range, fields of their type"
@@ -193,7 +192,7 @@ class Requester:
         self._fail_all(self._broken or RunFailed("the client is closed"))
 
     def _fail_all(self, error: EngageError) -> None:
-        """Nothing is sent or awaited any more."""
+        """End all requests with `error`, and refuse all that come later."""
         self._broken = error
         self._alarm.stop()
         for pending in self._pending.values():
@@ -214,7 +213,7 @@ class Requester:
                     self.feed(received)
 
     def _stopped_listening(self, task: "asyncio.Task[None]") -> None:
-        """It ends with the client and not before; who awaits an answer would wait for ever."""
+        """Fail all requests if listening broke: their callers would wait for ever."""
         if self._broken is not None or task.cancelled():
             return
         error = task.exception()
@@ -276,7 +275,7 @@ class RequestDesk:
 
     @property
     def live(self) -> int:
-        """How many requests have not ended."""
+        """Number of requests that have not ended."""
         return self._serving.live
 
     def asked(self, name: str) -> Request:
@@ -294,7 +293,7 @@ class RequestDesk:
             return self._take(message, received, self._bus.now()) if is_ours else None
         match message:
             case Unreadable(id=id, life=life, kind=kind, fault=fault) if id:
-                # As far as it could be read it is this request, which may be live, or have ended.
+                # What could be read names the request, which may be live, or have ended.
                 requester, life = keys.requester_of(received.key), life or received.life
                 known = Cancel(id=id, requester=requester, life=life, of=kind)
                 return self._carry_out(self._serving.refuse(known, fault))
@@ -305,7 +304,7 @@ class RequestDesk:
         return None
 
     def _take(self, message: Request | KeepAlive, received: Received, now: Seconds) -> Request | None:
-        # A requester of ours that is still there sends it again; one that has left wants it no more.
+        # An old command: its requester, if still there, sends it again; one that has left does not want it any more.
         if received.past and (message.life or self._serving.is_there(keys.requester_of(received.key))):
             return None
         requester = keys.requester_of(received.key) or message.requester
@@ -319,9 +318,11 @@ class RequestDesk:
         return self._carry_out(self._serving.take(message, now))
 
     def accept(self, name: str) -> None:
+        """Tell the requester that the request is being performed."""
         self._answer(name, Accepted(id=name))
 
     def refuse(self, name: str, fault: Fault) -> None:
+        """End the request: it will not be performed."""
         self._answer(name, Refused(id=name, fault=fault))
 
     def end(self, outcome: Message) -> None:
@@ -336,7 +337,7 @@ class RequestDesk:
         self._carry_out(self._serving.tick(self._bus.now()))
 
     def _carry_out(self, effects: list[serving.Effect], /) -> Request | None:
-        """The one request to be handed over at once; what more there is goes to the clerks."""
+        """Carry out the effects; returns the request that has just come, if the service is to see it."""
         handed: Request | None = None
         for effect in effects:
             if isinstance(effect, serving.Publish):
@@ -345,7 +346,7 @@ class RequestDesk:
                 if effect.is_asked:
                     handed = effect.request
                 else:
-                    self._hand_to_clerk(effect.request)
+                    self._call_back(effect.request)
             elif effect.is_ours:
                 self._bus.report(effect.fault)
             else:
@@ -353,7 +354,7 @@ class RequestDesk:
         self._alarm.set(self._serving.deadline)
         return handed
 
-    def _hand_to_clerk(self, request: Request) -> None:
+    def _call_back(self, request: Request) -> None:
         with self._bus.containing(request):
             if isinstance(request, Cancel):
                 self._on_cancel(request)
@@ -373,7 +374,7 @@ class RequestDesk:
 
 
 def _misplaced(request: Request, key: str) -> Fault | None:
-    """What is wrong with sending this request there."""
+    """A fault if this request must not be sent on this key, or has no id; None otherwise."""
     expression = keys.expression_of(key)
     expected = COMMANDS.get(expression, ())
     if request.id and (isinstance(request, expected) or (expression and isinstance(request, Cancel))):
@@ -382,13 +383,7 @@ def _misplaced(request: Request, key: str) -> Fault | None:
     if not request.id:
         return Fault(reason=f"{name} without an id", where=key, service=server, advice="make one up: `id`")
     home = next((known for known, kinds in COMMANDS.items() if isinstance(request, kinds)), keys.cancel(server))
-    takes = (
-        f", which takes {' and '.join(kind.__name__ for kind in expected)}" if expected else ", which is no command"
-    )
-    who = key.split("/")[4:6] if expression else ["<role>", "<requester>"]
-    advice = f"send it on {home.replace('*/*', '/'.join(who))}" if home else ""
-    return Fault(reason=f"{name} came on {key}{takes}", where=request.id, service=server, advice=advice)
-
-
-def _as_message(request: Request) -> Message:
-    return request  # type: ignore[return-value]
+    takes = f"takes {' and '.join(kind.__name__ for kind in expected)}" if expected else "is no command"
+    sender = key.split("/")[4:6] if expression else ["<role>", "<requester>"]
+    advice = f"send it on {home.replace('*/*', '/'.join(sender))}" if home else ""
+    return Fault(reason=f"{name} came on {key}, which {takes}", where=request.id, service=server, advice=advice)
