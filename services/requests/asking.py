@@ -146,7 +146,7 @@ class Asking:
 
     @property
     def ids(self) -> tuple[str, ...]:
-        """Ids of the requests whose end the caller has not been told."""
+        """Ids of the requests that have not ended for the caller."""
         return tuple(id for id, asked in self._asked.items() if asked.state is not State.GIVEN_UP)
 
     # -- events ---------------------------------------------------------------------------------------------------

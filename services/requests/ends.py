@@ -76,7 +76,7 @@ class Pending:
         for future in (self.accepted, self.outcome):
             if not future.done():
                 future.set_exception(end)
-                future.exception()  # seen: a caller may care for only one of the two
+                future.exception()  # marked as seen: a caller may await only one of the two
 
 
 class Requester:
@@ -153,7 +153,7 @@ class Requester:
         self._carry_out(self._asking.tick(self._bus.now()))
 
     def _carry_out(self, effects: list[asking.Effect]) -> None:
-        for effect in effects:  # by isinstance: with each message, and twice as quick as patterns
+        for effect in effects:  # isinstance is twice as quick as patterns, and this is done for each message
             if isinstance(effect, asking.Publish):
                 try:
                     self._publish(effect.expression, effect.message)  # type: ignore[arg-type]
@@ -239,7 +239,7 @@ class RequestDesk:
         match desk.take(received):
             case PerformBlock() as request: ...         # new, or updated (`desk.is_live` was true before)
             case Cancel(id=id): ...                     # only for live requests
-            case None: ...                              # not ours, a duplicate, or already ended
+            case None: ...                              # of another server, a duplicate, or already ended
 
     `request.id` is its name at this server: its own id, or `id~2` where another requester's, or a former life's, has
     that. The answers carry the id that was asked with.
@@ -326,7 +326,7 @@ class RequestDesk:
         self._answer(name, Refused(id=name, fault=fault))
 
     def end(self, outcome: Message) -> None:
-        """Answer the request whose name is the outcome's id with a terminal state."""
+        """End a request with its outcome, which has the request's name as its id."""
         assert isinstance(outcome, Outcome)
         self._answer(outcome.id, outcome)
 
