@@ -202,7 +202,7 @@ class Requester:
     # -- listening by itself ----------------------------------------------------------------------------------------
 
     def check(self) -> None:
-        """Raises RunFailed if this hears nothing any more."""
+        """Raise RunFailed if answers are not heard any more."""
         if self._broken is not None:
             raise self._broken
 
@@ -286,7 +286,7 @@ class RequestDesk:
         return request
 
     def take(self, received: Received) -> Request | None:
-        """The request, if it is new, changed or a cancellation of a live one; each of these once."""
+        """The request in a message that the service has not seen: new, changed, or the cancellation of a live one."""
         message = received.message
         if isinstance(message, _COMMANDS):
             is_ours = keys.is_command_of(self._server, received.key)
@@ -362,7 +362,7 @@ class RequestDesk:
                 self._on_extend(request)
 
     def serving(self, request: Request) -> Containing:
-        """An exception in the body of `with` ends this request, and nothing else."""
+        """Contain exceptions in the body of `with`: they end this request, and nothing else."""
         return self._bus.containing(request, partial(self._refuse_if_live, request.id))
 
     def _refuse_if_live(self, name: str, fault: Fault) -> None:

@@ -16,7 +16,7 @@ from engage_hri.schemas.units import Seconds
 from engage_hri.services.realizer.config import RealizerConfig
 from engage_hri.services.realizer.decide.effects import Begin, Effect, Extend, Pace
 from engage_hri.services.realizer.decide.expectations import SURPRISE, Expectations
-from engage_hri.services.realizer.decide.patience import LatenessWatch
+from engage_hri.services.realizer.decide.lateness import LatenessWatch
 from engage_hri.services.realizer.plan.assembly import Member
 from engage_hri.services.realizer.plan.planner import Plan
 from engage_hri.services.realizer.plan.schedule import EPSILON
@@ -32,7 +32,7 @@ class Decisions(Expectations):
     def __init__(self, plan: Plan, began: Seconds, config: RealizerConfig) -> None:
         super().__init__(plan, began)
         self.config = config
-        self.patience = LatenessWatch(config)
+        self.lateness_watch = LatenessWatch(config)
         self._through: dict[str, int] = {}
         self._granted_at: dict[str, Seconds] = {}
         self.replan(plan)
@@ -66,7 +66,7 @@ class Decisions(Expectations):
                 for point in points:
                     self.forecast.require(plan.at[point])
             if behavior not in plan.chains:
-                self.patience.forget(behavior)
+                self.lateness_watch.forget(behavior)
             elif not self.has_ended(behavior):
                 self._await(behavior)
 
@@ -166,7 +166,7 @@ class Decisions(Expectations):
             self.paces[behavior] = pace(behavior, self, now)
             effects.append(Begin(behavior, self._points[behavior][through].sync, self.paces[behavior]))
             self._watch(behavior)
-        effects += self.patience.overdue(now)
+        effects += self.lateness_watch.overdue(now)
         return effects
 
     def _decide_all(self, now: Seconds) -> list[str]:
@@ -187,8 +187,8 @@ class Decisions(Expectations):
     def deadline(self) -> Seconds | None:
         """Time at which to call `advance` even if nothing happens until then; None: there is no need."""
         wake = self._wakes[0][0] if self._wakes else inf
-        patience, overdue = self.patience.deadline, self._next_lateness_check
-        at = min(wake, inf if patience is None else patience, inf if overdue is None else overdue)
+        report_due, check_due = self.lateness_watch.deadline, self._next_lateness_check
+        at = min(wake, inf if report_due is None else report_due, inf if check_due is None else check_due)
         return None if at == inf else at
 
     def _conclude(self, now: Seconds) -> None:
@@ -299,24 +299,24 @@ class Decisions(Expectations):
         chain = self.plan.chains.get(behavior)
         if chain is None or behavior not in self.begun or performer(chain.behavior) != "body":
             return
-        points, number = chain.points, self._next.get(behavior, 0)
+        points, number = chain.points, self.next_number(behavior)
         if number >= len(points):
-            self.patience.forget(behavior)
+            self.lateness_watch.forget(behavior)
             return
         is_there = self.holds(points[number])
         if is_there and not self.may_pass(self.member(points[number]).point):
-            self.patience.forget(behavior)
+            self.lateness_watch.forget(behavior)
             return
         since = self.reached[points[number - 1]] if number else self.begun[behavior]
         natural = chain.segments[number - 1].natural if number else 0.0
         asked = self._asked(points[number], since + natural)
         expected = max(since + natural, asked, self._granted_at[behavior] if is_there else 0.0)
-        self.patience.expect(behavior, points[number].sync, expected, natural)
+        self.lateness_watch.expect(behavior, points[number].sync, expected, natural)
 
     def _await(self, behavior: str) -> None:
         """Look at the next point where the behavior must ask, and expect its next report."""
         points = self._points[behavior]
-        for point in points[self._next.get(behavior, 0) :]:
+        for point in points[self.next_number(behavior) :]:
             # Only now that it is under way can be told whether it comes on time to the point where it must ask next.
             if not self.may_pass(point):
                 self._dirty.add(self.plan.at[point])

@@ -3,7 +3,7 @@
 from msgspec import Struct
 
 from engage_hri.schemas.units import Seconds
-from engage_hri.services.realizer.decide.patience import Late, Stalled
+from engage_hri.services.realizer.decide.lateness import Late, Stalled
 
 Pace = tuple[tuple[str, Seconds], ...]
 """Sync points and their instants, by loop time, where the behavior's natural pace would miss them; else empty."""

@@ -70,7 +70,7 @@ class Expectations(Facts):
     @property
     def _next_lateness_check(self) -> Seconds | None:
         """Next time to check for delays that only other blocks depend on."""
-        while self._arrivals and self._next.get(self._arrivals[0][2]) != self._arrivals[0][3]:
+        while self._arrivals and self.next_number(self._arrivals[0][2]) != self._arrivals[0][3]:
             heapq.heappop(self._arrivals)  # The behavior has arrived there.
         return self._arrivals[0][0] + SURPRISE if self._followed and self._arrivals else None
 
@@ -79,7 +79,7 @@ class Expectations(Facts):
     def _learn(self, point: Point, at: Seconds) -> None:
         """Correct the estimates of the same parts by a measured phase, unless it was hurried or held up."""
         chain = self.plan.chains.get(point.behavior)
-        number = self._next.get(point.behavior, 0)
+        number = self.next_number(point.behavior)
         if chain is None or number == 0 or chain.points[number] != point or self.paces.get(point.behavior):
             return
         if performer(chain.behavior) == "body":
@@ -90,7 +90,7 @@ class Expectations(Facts):
 
     def _expect_next(self, behavior: str) -> None:
         """Note from when on the behavior is overdue at its next point."""
-        points, number = self._points[behavior], self._next.get(behavior, 0)
+        points, number = self._points[behavior], self.next_number(behavior)
         if self.forecast is not None and 0 < number < len(points):
             self.not_before.pop(behavior, None)
             expected = self.reached[points[number - 1]] + self._phase(behavior, number)
@@ -106,7 +106,7 @@ class Expectations(Facts):
         while self._arrivals and self._arrivals[0][0] < now - EPSILON:
             _, expected, behavior, number = heapq.heappop(self._arrivals)
             points = self._points.get(behavior, ())
-            if self._next.get(behavior) != number or number >= len(points) or self.holds(points[number]):
+            if self.next_number(behavior) != number or number >= len(points) or self.holds(points[number]):
                 continue
             expected = max(expected, self._asked(points[number], expected))
             until = expected
@@ -122,7 +122,7 @@ class Expectations(Facts):
 
     def _arrival(self, member: Member) -> Seconds | None:
         """Expected time at which a behavior comes to its hold point; None if it has not begun."""
-        points, number = self._points[member.behavior], self._next.get(member.behavior, 0)
+        points, number = self._points[member.behavior], self.next_number(member.behavior)
         if not number:
             return None
         at = self.reached[points[number - 1]]

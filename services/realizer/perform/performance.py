@@ -20,7 +20,7 @@ from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.interface import Containing
 from engage_hri.services.realizer.decide.decisions import Decisions
 from engage_hri.services.realizer.decide.effects import Begin, Effect, Extend
-from engage_hri.services.realizer.decide.patience import Late, Stalled
+from engage_hri.services.realizer.decide.lateness import Late, Stalled
 from engage_hri.services.realizer.perform.control_link import ControlLink
 from engage_hri.services.realizer.perform.feedback import Reporter
 from engage_hri.services.realizer.perform.live import Ending, Live

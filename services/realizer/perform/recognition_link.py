@@ -14,7 +14,7 @@ from engage_hri.schemas.recognition import EventOutcome, RequestEvent, SignalTur
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.interface import Bus
 from engage_hri.services.realizer.config import RealizerConfig
-from engage_hri.services.realizer.decide.patience import event_deadline
+from engage_hri.services.realizer.decide.lateness import event_deadline
 from engage_hri.services.realizer.perform.shared_context import Presence
 from engage_hri.services.realizer.plan.schedule import EPSILON
 from engage_hri.services.realizer.points import Point

@@ -7,6 +7,7 @@ from typing import NamedTuple
 from engage_hri.schemas.faults import Fault
 from engage_hri.services.realizer.net.petri_net import Bound, PetriNet, Place
 from engage_hri.services.realizer.plan.assembly import Assembly
+from engage_hri.services.realizer.plan.handover import Turn
 from engage_hri.services.realizer.plan.instants import Classes
 from engage_hri.services.realizer.plan.phases import Chain
 from engage_hri.services.realizer.plan.prediction import Circle, Impossible
@@ -14,9 +15,6 @@ from engage_hri.services.realizer.plan.relations import BlockRefused
 from engage_hri.services.realizer.plan.schedule import EPSILON
 from engage_hri.services.realizer.plan.steps import Steps
 from engage_hri.services.realizer.points import Point
-
-Turn = tuple[str, Point]
-"""A behavior, and the point of another that it waits for before it takes its part."""
 
 
 class Loss(NamedTuple):

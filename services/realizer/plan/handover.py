@@ -23,6 +23,8 @@ _OTHER: dict[str, tuple[str, Hand]] = {
 }
 _STROKE, _STROKE_END, _RELAX = (SYNC_POINTS.index(each) for each in ("stroke", "stroke_end", "relax"))
 """Numbers of these points: every behavior that hands over has all seven."""
+Turn = tuple[str, Point]
+"""A behavior, and the point of another that it waits for before it takes its part."""
 
 
 class Arrangement(Struct, frozen=True):
@@ -38,7 +40,7 @@ class Arrangement(Struct, frozen=True):
     lasting: tuple[str, ...] = ()
     successors: Mapping[str, tuple[str, Point]] = {}
     cuts: Mapping[str, int] = {}
-    turns: frozenset[tuple[str, Point]] = frozenset()
+    turns: frozenset[Turn] = frozenset()
 
 
 class Conflict(NamedTuple):
@@ -47,7 +49,7 @@ class Conflict(NamedTuple):
     turn: the later, and the point of the earlier that it has to wait for. hand: the one that can use the other hand.
     """
 
-    turn: tuple[str, Point] | None
+    turn: Turn | None
     hand: tuple[str, Hand] | None
 
 

@@ -21,7 +21,7 @@ from engage_hri.schemas.units import Seconds
 from engage_hri.services.realizer.net.petri_net import PetriNet
 from engage_hri.services.realizer.plan.assembly import Assembler, Assembly, Member, assembling
 from engage_hri.services.realizer.plan.deadlocks import Losses, clashes, judge
-from engage_hri.services.realizer.plan.handover import Arrangement, Conflict, arrange, entering
+from engage_hri.services.realizer.plan.handover import Arrangement, Conflict, Turn, arrange, entering
 from engage_hri.services.realizer.plan.instants import Classes
 from engage_hri.services.realizer.plan.phases import Chain, chain, natural_ends
 from engage_hri.services.realizer.plan.prediction import Impossible, predict
@@ -124,8 +124,8 @@ class _Planner:
         self.barred = barred
         self.dropped = dict.fromkeys(dropped)
         """Behaviors, in the order in which they were dropped; the values mean nothing."""
-        self.turns: frozenset[tuple[str, Point]] = frozenset()
-        self.overlaps: set[tuple[str, Point]] = set()
+        self.turns: frozenset[Turn] = frozenset()
+        self.overlaps: set[Turn] = set()
         """Turns that there is no time to wait for."""
         self.hands: dict[str, Hand] = {}
         self.chains: dict[str, Chain] = {}
