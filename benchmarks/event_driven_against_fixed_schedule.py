@@ -200,7 +200,7 @@ async def planned(block: Block, bus: Bus) -> Plan:
         items = tuple(EstimateItem(behavior=each, pose=before.get(each.id)) for each in block.behaviors)
         estimates = await bus.query(keys.ESTIMATE, EstimateBehaviors(items=items), timeout=1.0)
         assert isinstance(estimates, Estimates)
-        plan = plan_block(block, estimates)
+        plan = plan_block(block, estimates.items)
     return plan
 
 

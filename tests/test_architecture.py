@@ -34,7 +34,7 @@ SHELLS = {
     "services/realizer/perform/control_link.py",  # asks the body
     "services/realizer/perform/recognition_link.py",  # asks recognition
     "services/realizer/perform/feedback.py",  # publishes feedback
-    "services/realizer/perform/surroundings.py",  # what performances share: the bus, too
+    "services/realizer/perform/shared_context.py",  # what performances share: the bus, too
     "services/realizer/perform/live.py",  # resolved when a block has ended
     "services/generation/body_link.py",  # asks the body
     "services/generation/fragment_runner.py",  # awaits the blocks of fragments

@@ -1,11 +1,11 @@
 """The realizer: a block of behaviors and constraints goes in, a closed-loop performance comes out.
 
-    service   the realizer's life on the bus
-    perform   live blocks on the event loop: one task for each behavior, and what is said about it
+    service   the realizer on the bus
+    perform   live blocks on the event loop: one task for each behavior, and the feedback about it
     decide    what may move now, given what has been measured; no clock
     plan      from a block and estimates to a net and its earliest schedule; no clock
     net       the Petri net as data, and as PNML
-    points    sync points, and what each can wait for
+    points    sync points, and how a behavior can wait at each
     export    a plan as text, JSON or DOT
 
 Each may use those below it. A sync point is what the body reports, never what the clock says.

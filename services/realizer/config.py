@@ -1,4 +1,4 @@
-"""How patient the realizer is."""
+"""Time limits and sizes of the realizer."""
 
 from msgspec import Struct
 
@@ -8,24 +8,27 @@ from engage_hri.schemas.units import Seconds
 
 
 class RealizerConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """Limits, in seconds. Where a factor stands beside one, it is multiplied with the phase's natural duration.
+    """Limits, in seconds. Each factor is multiplied with the natural duration of a phase, and added to its limit.
 
-    late, late_factor: a phase may take this much longer than natural before the realizer warns. Ours.
-    stall, stall_factor: and this much before its behavior counts as failed. Motors of 1x-4x must pass. Ours.
-    lead: how long before an instant a behavior is told to pass it that will come just then; more than braking takes.
-    gap: the same of an utterance at a word gap: more than a message takes. The later, the more is known of others.
+    late, late_factor: a phase may take so much longer than natural before the realizer warns. Ours.
+    stall, stall_factor: a phase may take so much longer than natural before its behavior counts as failed. Motors of
+    1x-4x must pass. Ours.
+    lead: how long before an instant a behavior that comes just in time is told to pass it; more than braking takes.
+    gap: how long before a word gap an utterance is told to go on; more than a message takes. Later is better, since
+    more is known of the others then.
     skew: a sync point that misses its instant by more is reported as LATE. Below what people notice (0.1 s).
     estimate: how long the body may take to answer what it expects of a block.
     abort: how long the body may take to end what was aborted before the block ends without it.
-    pulse: between two renewals of what the body, and recognition, are asked for. lease: how long movement authority
-    lasts that is not renewed, so that a body stops by itself when the realizer is gone. At least three pulses.
+    pulse: time between two renewals of the requests to the body and to recognition.
+    lease: how long movement authority lasts that is not renewed, so that a body stops by itself when the realizer is
+    gone. At least three pulses.
     utterance: characters of one speech, some five minutes; a block with a longer one is refused.
-    blocks: live blocks; one more is refused. The default is the most with which a command follows its sync point
-        within 50 ms in 99 of 100 cases on two cores, if they begin at once, too (benchmarks/live_blocks.py).
-    event_grace: an event ends as failed this much after its limit if recognition is not there to decide it.
-    event_patience: and this much if it is there, but says nothing.
+    blocks: number of live blocks; one more is refused. The default is the most with which a command follows its sync
+        point within 50 ms in 99 of 100 cases on two cores, if they begin at once, too (benchmarks/live_blocks.py).
+    event_grace: how long after its limit an event ends as failed if recognition is not there to decide it.
+    event_patience: how long after its limit an event ends as failed if recognition is there, but says nothing.
     most: behaviors, marks and sync references in a block; more is refused. Planning takes 0.1 ms each.
-    *_limit: of an event that names no limit: recognition's own (its design page), the longer for a pair.
+    *_limit: limit of an event that names none: recognition's own (its design page), the longer for a pair.
     """
 
     late: Seconds = 0.5
@@ -59,4 +62,5 @@ class RealizerConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
             )
 
     def limit_of(self, kind: EventKind) -> Seconds:
+        """Limit of an event of this kind that names none."""
         return float(getattr(self, f"{kind}_limit"))

@@ -2,10 +2,11 @@
 
 import json
 
+from msgspec.structs import asdict
+
 from engage_hri.services.realizer.net import pnml
 from engage_hri.services.realizer.net.petri_net import Bound, Place, is_live, is_safe
 from engage_hri.services.realizer.plan.planner import Plan, plan_block
-from engage_hri.services.realizer.points import Point
 
 __all__ = ["as_dot", "as_json", "as_pnml", "as_text", "plan_block"]
 
@@ -26,7 +27,7 @@ def as_text(plan: Plan) -> str:
         for each in by_time
     ]
     ties = [_tie(plan, place) for place in net.places if place.kind not in ("phase", "idle") and place.source]
-    ties += [_tie(plan, bound) for bound in plan.bounds if bound.kind != "phase"]
+    ties += [_tie(plan, bound) for bound in net.bounds if bound.kind != "phase"]
     lines += ["", *ties] if ties else []
     lines += [f"ends when something takes its place, or with the block: {id}" for id in sorted(plan.natural)]
     return "\n".join(lines) + "\n"
@@ -48,31 +49,8 @@ def as_json(plan: Plan) -> str:
             {"name": transition.name, "points": list(map(str, transition.points)), "time": round(time, 6)}
             for transition, time in zip(net.transitions, plan.schedule, strict=True)
         ],
-        "places": [
-            {
-                "kind": place.kind,
-                "source": place.source,
-                "target": place.target,
-                "lag": place.lag,
-                "shortest": place.shortest,
-                "behavior": place.behavior,
-                "lines": list(place.lines),
-                "tokens": tokens,
-            }
-            for place, tokens in zip(net.places, net.initial, strict=True)
-        ],
-        "bounds": [
-            {
-                "kind": bound.kind,
-                "source": bound.source,
-                "target": bound.target,
-                "lag": bound.lag,
-                "stretch": bound.stretch,
-                "behavior": bound.behavior,
-                "lines": list(bound.lines),
-            }
-            for bound in net.bounds
-        ],
+        "places": [asdict(place) | {"tokens": tokens} for place, tokens in zip(net.places, net.initial, strict=True)],
+        "bounds": [asdict(bound) for bound in net.bounds],
         "critical": list(plan.critical),
         "live": is_live(net),
         "safe": is_safe(net),
@@ -96,7 +74,7 @@ def as_pnml(plan: Plan) -> str:
 
 
 def as_dot(plan: Plan) -> str:
-    """The net for Graphviz: transitions are bars (on the critical path, framed), places circles, bounds dashed."""
+    """The net for Graphviz: bars are transitions (framed if critical), circles places, dashed arrows bounds."""
     net = plan.net
     critical = frozenset(plan.critical)
     lines = [f"digraph {_quoted(plan.block.id)} {{", "  rankdir=LR;", '  node [fontname="sans-serif", fontsize=10];']
@@ -109,7 +87,7 @@ def as_dot(plan: Plan) -> str:
         constraint = ", constraint=false" if place.kind == "idle" else ""
         lines.append(f"  p{number} [shape=circle, label={_quoted(text)}, tooltip={_quoted(place.kind)}];")
         lines.append(f"  t{place.source} -> p{number}; p{number} -> t{place.target} [style=solid{constraint}];")
-    for bound in plan.bounds:
+    for bound in net.bounds:
         if bound.kind != "phase":
             label = _quoted(f"{bound.lag:g}")
             lines.append(f"  t{bound.source} -> t{bound.target} [style=dashed, constraint=false, label={label}];")
@@ -118,8 +96,3 @@ def as_dot(plan: Plan) -> str:
 
 def _quoted(text: str) -> str:
     return json.dumps(text, ensure_ascii=False)
-
-
-def times(plan: Plan) -> dict[Point, float]:
-    """When each point is expected, seconds from the block's start."""
-    return {point: plan.predicted(point) for chain in plan.chains.values() for point in chain.points}

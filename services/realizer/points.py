@@ -1,6 +1,6 @@
-"""Sync points as the realizer needs them: what each can wait for, and the seconds between them.
+"""Sync points for the realizer: how a behavior can wait at each, and the seconds between them.
 
-What a type of behavior is stands in schemas/behavior_types.py.
+Each type of behavior has a row in schemas/behavior_types.py.
 """
 
 from functools import lru_cache
@@ -28,27 +28,28 @@ ORIGIN = Point("", "start")
 """The start of the block itself."""
 
 Gate = Literal["start", "hold", "prompt", "passive"]
-"""How an instant of a behavior can be made to wait: not yet begun, holding there, or not at all.
+"""How a behavior can be made to wait at an instant.
 
-prompt: holding there too, but it sets out so late that it need not. Who looks too early misleads.
+start: it is not begun yet. hold: it comes there and holds. passive: it cannot wait there.
+prompt: it could hold, but sets out so late that it need not. (A look that is on its target too early misleads.)
 """
 
 WITH_STROKE = named(has_stroke=True)
 ON_TARGET = named(lasts=True, performer="body")
-"""They last: having arrived, they stay until something ends them."""
-BENEATH = named(turns_base=True)
-"""They turn what a gaze returns to: one that starts during a gaze moves nothing, and ends at once."""
+"""Types that stay where they are, once arrived, until something ends them."""
+SHIFTS = named(turns_base=True)
+"""Types that turn what a gaze returns to. One that starts during a gaze moves nothing, and ends at once."""
 
 NOMINAL_PER_CHARACTER: Seconds = 0.07
 GUESSED_SHORTEST: Seconds = 0.01
 NOMINAL_DELAY: dict[str, Seconds] = {
     "directed_gaze": 0.3, "mutual_facial_gaze": 0.7, "adjacency_pair": 0.4, "backchannel": 0.0,
 }  # fmt: skip
-"""Mean delays of Table 2.1: what the decision of an event is expected to take."""
+"""Mean delays of Table 2.1: the expected seconds until the decision of an event."""
 
 
 class Segment(NamedTuple):
-    """From one point of a behavior to its next: seconds, and whether it can wait at the end."""
+    """Phase from one point of a behavior to its next: seconds, and whether the behavior can wait at its end."""
 
     since: str
     to: str
@@ -62,44 +63,34 @@ def performer(behavior: Behavior) -> Performer:
 
 
 def family(type: str) -> str:
-    """Types of one family take each other's place: a later gaze takes over from an earlier one."""
+    """Name that is common to types that take each other's place: a later gaze takes over from an earlier one."""
     return TYPES[type].family or type
-
-
-def hold_points(type: str) -> tuple[str, ...]:
-    """Where it can wait for as long as it must, once begun. `start` of everything can wait too: it isn't sent."""
-    return TYPES[type].holds
-
-
-def one_instant(type: str) -> tuple[tuple[str, ...], ...]:
-    """Points of a type that always coincide."""
-    return TYPES[type].one_instant
 
 
 @lru_cache(maxsize=1024)
 def gate(type: str, syncs: tuple[str, ...]) -> Gate:
-    """How a behavior can wait at the instant that holds its points `syncs`, in order.
+    """The way in which a behavior can wait at the instant that holds its points `syncs`, in order.
 
-    Where it comes to the first of them it must wait for all: holding at a later one would let the first pass alone.
+    The first of them decides: a behavior that holds at a later one has passed the first alone.
     """
     if syncs[0] == "start":
         return "start"
     here = gate_point(type, syncs)
-    if here not in hold_points(type):
+    if here not in TYPES[type].holds:
         return "passive"
     return "prompt" if here == "stroke" else "hold"
 
 
 @lru_cache(maxsize=1024)
 def gate_point(type: str, syncs: tuple[str, ...]) -> str:
-    """Of its points in one instant (in order), the one whose report says that the behavior is there."""
-    first = next((group for group in one_instant(type) if syncs[0] in group), syncs[:1])
-    return next((sync for sync in syncs if sync in first and sync in hold_points(type)), syncs[0])
+    """The point that is reported when the behavior has come to the instant of its points `syncs` (in order)."""
+    first = next((group for group in TYPES[type].one_instant if syncs[0] in group), syncs[:1])
+    return next((sync for sync in syncs if sync in first and sync in TYPES[type].holds), syncs[0])
 
 
 def segments(behavior: Behavior, estimate: Estimate | None) -> tuple[Segment, ...]:
     """The phases of a behavior: as the body estimates them, nominal where it does not."""
-    points, holds = sync_points(behavior), hold_points(type_name(behavior))
+    points, holds = sync_points(behavior), TYPES[type_name(behavior)].holds
     nominal = _nominal(behavior, points)
     known = {(phase.since, phase.to): phase for phase in estimate.phases} if estimate else {}
     total = sum(phase.natural for phase in known.values())
@@ -111,7 +102,7 @@ def segments(behavior: Behavior, estimate: Estimate | None) -> tuple[Segment, ..
         if phase := known.get((since, to)):
             shortest, natural = phase.shortest, phase.natural
         else:
-            # A guess must not be what refuses a block: nearly no time at all is thought possible.
+            # A guess must not cause the refusal of a block: nearly no time at all counts as possible.
             shortest, natural = seconds if isinstance(behavior, Wait) else min(GUESSED_SHORTEST, seconds), seconds
         result.append(Segment(since, to, min(shortest, natural), natural, to in holds))
     return tuple(result)

@@ -31,7 +31,7 @@ from engage_hri.services.realizer.perform.control_link import LONGEST_WAY
 from engage_hri.services.realizer.perform.live import Ending, Live
 from engage_hri.services.realizer.perform.live_blocks import LiveBlocks
 from engage_hri.services.realizer.perform.performance import BlockPerformance
-from engage_hri.services.realizer.perform.surroundings import Moving, PeersThere, Surroundings
+from engage_hri.services.realizer.perform.shared_context import Moving, Presence, SharedContext
 from engage_hri.services.realizer.plan.planner import Plan, plan_steps
 from engage_hri.services.realizer.plan.poses import poses_before, poses_left
 from engage_hri.services.realizer.plan.relations import BlockRefused, extent, relation_steps
@@ -42,7 +42,7 @@ from engage_hri.services.runtime.service import Ready
 
 Result = TypeVar("Result")
 SLICE = 512
-"""Elements, see `steps`: one to five milliseconds of processor. Counted, not timed: equal runs stay equal."""
+"""Elements that are worked on in one go (see `steps`): one to five milliseconds. Counted: equal runs stay equal."""
 
 
 class _Realizer:
@@ -53,13 +53,13 @@ class _Realizer:
         self.desk = RequestDesk(bus, "realizer", self.cancel)
         self.live: dict[str, Live] = {}
         self.performances: dict[str, BlockPerformance] = {}
-        """By the id of the request: of those of `live` that are being performed."""
+        """Blocks of `live` that are being performed, by the id of the request."""
         self.routes: dict[str, Moving] = {}
-        self.peers = PeersThere()
+        self.peers = Presence()
         self.live_blocks = LiveBlocks()
         self.homing: set[asyncio.Future[Outcome]] = set()
-        """Outcomes of what was sent home for a block that replaces others, as long as it is on its way."""
-        self.around = Surroundings(
+        """Outcomes of the parts that are on their way home, sent by blocks that replace others."""
+        self.shared = SharedContext(
             bus, self.requests, config, self.peers, self.routes, self.performing, self.live_blocks
         )
 
@@ -88,7 +88,7 @@ class _Realizer:
                 if len(self.live) >= self.config.blocks:
                     self.desk.refuse(request.id, self._too_many(request.block.id))
                     return
-                live = self.admit(request)
+                live = self.live[request.id] = Live(request, tuple(self.live.values()))
                 tasks.create_task(self._perform(live), name=f"block {request.block.id}")
             case InterruptBehavior():
                 tasks.create_task(self.interrupt(request), name=f"interruption {request.id}")
@@ -115,36 +115,27 @@ class _Realizer:
             live.stop(Ending("interrupted", Fault(reason=reason, where=live.request.block.id)))
 
     async def interrupt(self, request: InterruptBehavior) -> None:
-        """End one behavior of a block, and say what came of it."""
-        with self.desk.serving(request):
-            await self._interrupt(request)
-
-    async def _interrupt(self, request: InterruptBehavior) -> None:
+        """End one behavior of a block, and answer what came of it."""
         block, behavior = request.block, request.behavior
-        performance = next((each for each in self.performing() if each.plan.block.id == block), None)
-        if performance is None or not performance.is_going_on(behavior):
-            self.desk.refuse(request.id, Fault(reason="it is not being performed", where=f"{block}: {behavior}"))
-            return
-        self.desk.accept(request.id)
-        was_done = await performance.interrupt(behavior)
-        spoken = performance.spoken.of(behavior)
-        text = spoken.text if spoken is not None else ""
-        self.desk.end(
-            BehaviorInterrupted(id=request.id, block=block, behavior=behavior, spoken=text, was_done=was_done)
-        )
+        with self.desk.serving(request):
+            performance = next((each for each in self.performing() if each.plan.block.id == block), None)
+            if performance is None or not performance.is_going_on(behavior):
+                self.desk.refuse(request.id, Fault(reason="it is not being performed", where=f"{block}: {behavior}"))
+                return
+            self.desk.accept(request.id)
+            was_done = await performance.interrupt(behavior)
+            said = performance.spoken.of(behavior)
+            text = said.text if said is not None else ""
+            end = BehaviorInterrupted(id=request.id, block=block, behavior=behavior, spoken=text, was_done=was_done)
+            self.desk.end(end)
 
     def _hear_word(self, word: WordSpoken) -> None:
         for performance in self.performing():
             if performance.plan.block.id == word.block:
                 performance.spoken.hear(word.behavior, word.position)
 
-    def admit(self, request: PerformBlock) -> Live:
-        live = Live(request, tuple(self.live.values()))
-        self.live[request.id] = live
-        return live
-
     async def _perform(self, live: Live) -> None:
-        """A block from request to outcome. What nobody has foreseen ends this block, and takes its parts home."""
+        """Perform a block; an exception that nothing else catches ends this block only, and takes its parts home."""
         with self.bus.containing(f"block {live.request.block.id}", lambda fault: self._abandon(live, fault)):
             await self.perform(live)
 
@@ -159,7 +150,7 @@ class _Realizer:
                 performance.abandon()
 
     async def perform(self, live: Live) -> None:
-        """A block from request to outcome."""
+        """Answer a request for a block: refuse it, or perform the block to its outcome."""
         block = live.request.block
         elsewhere = self.live_blocks.blocks
         if block.id in elsewhere:
@@ -185,11 +176,14 @@ class _Realizer:
                 return
             named = {point.behavior.partition(":")[0] for point in plan.foreign}
             tied_to = {id: elsewhere[id] for id in named}
-            performance = self.performances[live.request.id] = BlockPerformance(live, plan, self.around, tied_to)
+            performance = self.performances[live.request.id] = BlockPerformance(live, plan, self.shared, tied_to)
             await self._end(live, await performance.run())
 
     async def _plan(self, block: Block, elsewhere: Mapping[str, Block]) -> Plan:
-        """The body is asked again from where it will be by then, and about the hands that the plan has chosen."""
+        """The plan of a block.
+
+        The body is asked again from where it will be by then, and about the hands that the plan has chosen.
+        """
         for each in block.behaviors:
             if isinstance(each, Speech) and len(each.text) > self.config.utterance:
                 reason = f"{len(each.text)} characters of speech, at most {self.config.utterance} are said in one go"
@@ -201,7 +195,7 @@ class _Realizer:
             reason = f"{held} behaviors, marks and sync references; at most {self.config.most} can be planned in time"
             advice = "send several (blocks with APPEND, fragments of one turn); `realizer.most` is the limit"
             raise BlockRefused(Fault(reason=reason, where=block.id, advice=advice))
-        await unhurried(relation_steps(block, elsewhere))  # A bad reference is seen without asking the body.
+        await unhurried(relation_steps(block, elsewhere))  # Finds a bad reference before the body is asked.
         block = sound(block)
         barred: set[tuple[str, Hand]] = set()
         chosen, estimates = block, await self._estimates(block, {})
@@ -218,7 +212,7 @@ class _Realizer:
                 chosen, estimates, is_asked_again = block, first, False
 
     def _left_for(self, plan: Plan) -> dict[str, BodyPose]:
-        """How the blocks that `plan` is tied to will leave the body for it, by part: the last of them says."""
+        """Poses in which the blocks that `plan` is tied to leave the body for it, by part; the last tie says when."""
         others = {each.plan.block.id: each.decisions for each in self.performing()}
         named = {point: point.behavior.partition(":")[0::2] for point in plan.foreign}
         times = {block: others[block].times() for block, _ in named.values() if block in others}
@@ -232,7 +226,7 @@ class _Realizer:
         return poses
 
     async def _estimates(self, block: Block, before: Mapping[str, BodyPose]) -> tuple[Estimate, ...]:
-        """before: where the body will be when a behavior starts; the others are asked for from where it is now."""
+        """Estimates of the body. before: poses in which behaviors start; without one, from where the body is now."""
         behaviors = [behavior for behavior in block.behaviors if performer(behavior) == "body"]
         if not behaviors:
             return ()
@@ -253,7 +247,7 @@ class _Realizer:
         return answer.items
 
     async def _await_turn(self, live: Live, plan: Plan, elsewhere: Mapping[str, Block]) -> Plan:
-        """What composition asks of the blocks that are already there; the plan, anew if that took its time."""
+        """Wait for earlier blocks if composition asks for that. Returns the plan, made anew if that took time."""
         earlier, live.earlier = live.earlier, []
         replaces, block = live.request.block.composition == "REPLACE", live.request.block.id
         is_free = not earlier and not (replaces and self.homing)
@@ -269,11 +263,11 @@ class _Realizer:
         if replaces:
             self._send_home(live, replaced)
             if self.homing:
-                # Also those that a block has sent home which was itself replaced before it began.
+                # Among them are parts sent home by a block that was itself replaced before it began.
                 _, lost = await asyncio.wait(self.homing, timeout=self.config.abort)
                 self.homing -= lost
         try:
-            # The body is elsewhere by now.
+            # Asked again: the body is elsewhere by now.
             estimates = await self._estimates(plan.block, poses_before(plan))
             return await unhurried(plan_steps(plan.block, estimates, elsewhere=elsewhere))
         except EngageError as error:
@@ -305,7 +299,7 @@ class _Realizer:
         self._forget(live)
 
     async def _end(self, live: Live, outcome: BlockOutcome) -> None:
-        """Who ended with what he follows says so after that has: its outcome is the cause."""
+        """Send the outcome; if the block ended with one that it follows, after that: its outcome is the cause."""
         if live.ended_by is not None:
             await asyncio.wait([live.ended_by.ended])
         self.desk.end(outcome)
@@ -318,7 +312,7 @@ class _Realizer:
 
 
 async def _result_or_stopped(stopped: asyncio.Future[Ending], work: Coroutine[Any, Any, Result]) -> Result | None:
-    """What comes of `work`; None, and it is given up, once `stopped`."""
+    """The result of `work`; None, and `work` is cancelled, if `stopped` is done first."""
     task = asyncio.ensure_future(work)
     try:
         either: list[asyncio.Future[Any]] = [task, stopped]
@@ -330,20 +324,20 @@ async def _result_or_stopped(stopped: asyncio.Future[Ending], work: Coroutine[An
 
 
 def unread(block: str, fault: Fault) -> WarningFeedback:
-    """The warning about what came as a block and is none. block: empty where nobody knows whose it was."""
+    """The warning about a message that came as a block and could not be read. block: its id; empty: not known."""
     return WarningFeedback(block=block or None, kind="PARSING_FAILURE", message=str(fault))
 
 
 def _hands_refused(block: Block, chosen: Block, estimates: Iterable[Estimate]) -> set[tuple[str, Hand]]:
-    """Hands that `block` leaves open and `chosen` does not, with which the body cannot do it."""
+    """Hands that `block` leaves open and `chosen` does not, with which the body cannot perform a behavior."""
     impossible = {each.behavior for each in estimates if not each.feasible}
     return {
-        (ours.id, ours.mode)
-        for theirs, ours in zip(block.behaviors, chosen.behaviors, strict=True)
-        if ours is not theirs
-        and isinstance(ours, Pointing | Gesture)
-        and ours.mode is not None
-        and ours.id in impossible
+        (after.id, after.mode)
+        for before, after in zip(block.behaviors, chosen.behaviors, strict=True)
+        if after is not before
+        and isinstance(after, Pointing | Gesture)
+        and after.mode is not None
+        and after.id in impossible
     }
 
 
@@ -364,7 +358,7 @@ async def realize(bus: Bus, ready: Ready, config: RealizerConfig) -> None:
 
 
 async def unhurried(steps: Steps[T]) -> T:
-    """What long work returns, done a slice at a time: whatever else is due comes in between.
+    """The result of long work, done a slice at a time: whatever else is due comes in between.
 
     A cancellation takes effect at the end of the slice.
     """

@@ -1,1 +1,1 @@
-"""Long requests: two pure machines, the tables that they follow, and both ends on the bus."""
+"""Long requests: two pure state machines, the tables that they follow, and both ends on the bus."""

@@ -36,43 +36,45 @@ from engage_hri.services.requests.patience import Patience
 
 
 class Publish(Struct, frozen=True):
-    """Send this. expression: of the key, for all requesters."""
+    """Publish this message. expression: the key expression of the command, as in `schemas/keys.py`."""
 
     expression: str
     message: Request
 
 
 class Renew(Struct, frozen=True):
-    """Send `server` a `KeepAlive` of these."""
+    """Send `server` a `KeepAlive` for these requests."""
 
     server: str
     live: tuple[Kept, ...]
 
 
 class TellAccepted(Struct, frozen=True):
+    """Tell the caller that the server has accepted the request."""
+
     id: str
 
 
 class TellEnd(Struct, frozen=True):
-    """How the request has ended for its caller: told exactly once."""
+    """Tell the caller how the request has ended. There is exactly one for each request."""
 
     id: str
     end: Outcome | EngageError
 
 
 class Complain(Struct, frozen=True):
-    """Everybody is to know."""
+    """Publish this fault for all to see."""
 
     fault: Fault
 
 
 Effect = Publish | Renew | TellAccepted | TellEnd | Complain
 _Said = Answer | None
-"""By the server, if that is the event."""
+"""The answer of the server that is the event; None with all other events."""
 
 
 class _Asked:
-    """One request. run: the life of its server that accepted it."""
+    """One request. run: the life of the server that accepted it."""
 
     def __init__(self, expression: str, request: Request) -> None:
         self.expression = expression
@@ -86,7 +88,10 @@ class _Asked:
 
 
 class _Server:
-    """What one server is to be told to keep. period: between two `KeepAlive`; soon: the next one comes after this."""
+    """The requests that one server is asked to keep alive.
+
+    period: seconds between two `KeepAlive`. soon: seconds until the one after the next.
+    """
 
     def __init__(self, period: Seconds) -> None:
         self.kept: dict[str, _Asked] = {}
@@ -95,19 +100,17 @@ class _Server:
 
 
 SHORTEST_PULSE: Seconds = 0.05
-"""Whatever the lease: a shorter one would flood the bus."""
+"""Least time between two `KeepAlive`, whatever the lease: a shorter one would flood the bus."""
 ANEW = "send it again under a new id"
 
-# Asked for with each message, and an enum is slow to give a member.
+# Members that are used with each message: an enum is slow to look one up.
 _ENDED, _FINISHED = State.ENDED, Event.FINISHED
 _OVER = (State.GIVEN_UP, State.ENDED)
 _RESEND, _GRACE, _PATIENCE, _CANCEL, _SWALLOW = _CLOCKS = (
     Event.RESEND_DUE, Event.GRACE_OVER, Event.PATIENCE_OVER, Event.CANCELLED, Event.SWALLOW_OVER,
 )  # fmt: skip
-_ANSWERS = {
-    Heard: Event.HEARD, Accepted: Event.ACCEPTED, Outdated: Event.OUTDATED, Refused: Event.REFUSED,
-}  # fmt: skip
-"""What an answer of the server is; each other one is an end."""
+_ANSWERS = {Heard: Event.HEARD, Accepted: Event.ACCEPTED, Outdated: Event.OUTDATED, Refused: Event.REFUSED}
+"""The event that an answer of the server is; every other answer is an end."""
 
 
 class Asking:
@@ -120,16 +123,16 @@ class Asking:
         self._asked: dict[str, _Asked] = {}
         self._servers: dict[str, _Server] = {}
         self._runs: dict[str, str] = {}
-        """Participants that are there."""
+        """Participants that are there: the life of each."""
         self._deadlines: Deadlines[tuple[Event | None, str]] = Deadlines()
-        """Of a request by event and id; of the next `KeepAlive` by None and server."""
+        """Deadlines of requests, by event and id; of the next `KeepAlive`, by None and server."""
         self._effects: list[Effect] = []
 
-    # -- what is known --------------------------------------------------------------------------------------------
+    # -- questions ------------------------------------------------------------------------------------------------
 
     @property
     def deadline(self) -> Seconds | None:
-        """When to `tick`; what was due then may have been settled since."""
+        """Time at which to call `tick`; there may be nothing to do by then."""
         return None if self._deadlines.look == inf else self._deadlines.look
 
     def state(self, id: str) -> State:
@@ -137,57 +140,48 @@ class Asking:
         return State.ENDED if asked is None else asked.state
 
     def request(self, id: str) -> Request | None:
-        """Its newest content."""
+        """The newest content of the request; None if it has ended."""
         asked = self._asked.get(id)
         return None if asked is None else asked.request
 
     @property
     def ids(self) -> tuple[str, ...]:
-        """Of all requests whose caller has not been told an end."""
+        """Ids of the requests that have not ended for the caller."""
         return tuple(id for id, asked in self._asked.items() if asked.state is not State.GIVEN_UP)
 
     # -- events ---------------------------------------------------------------------------------------------------
 
     def send(self, expression: str, request: Request, now: Seconds, within: Seconds | None = None) -> list[Effect]:
-        """A new request, or other content of a live one. One of another kind, or given up, is refused by name.
+        """Send a new request, or other content of a live one.
 
-        within: seconds after which it is cancelled if it has not ended.
+        The id of a request that was given up, or of a live one of another kind, is refused.
+        within: seconds after which the request is cancelled if it has not ended.
         """
         asked = self._asked.get(request.id)
         if asked is None:
             request = replace(request, requester=self._requester, life=self._life, lease=self._lease(request))
             asked = self._asked[request.id] = _Asked(expression, request)
-        elif (fault := self._taken(asked, request)) is not None:
+        elif (fault := _id_taken(asked, request)) is not None:
             return [TellEnd(request.id, RequestRefused(fault))]
         elif asked.cancel is None:
-            of = asked.request
-            asked.request = replace(
-                request, requester=of.requester, life=of.life, lease=of.lease, revision=of.revision + 1
-            )
+            known = asked.request
+            same = {"requester": known.requester, "life": known.life, "lease": known.lease}
+            asked.request = replace(request, **same, revision=known.revision + 1)
         if within is not None:
             self._deadlines.set((_CANCEL, request.id), now + within)
         self._step(asked, Event.ASKED, now)
-        return self._told()
+        return self._new_effects()
 
     def _lease(self, request: Request) -> Seconds:
         return request.term if 0.0 < request.term < inf else self._patience.lease
 
-    def _taken(self, asked: _Asked, request: Request) -> Fault | None:
-        theirs, ours = asked.kind, kind_of(request)
-        if asked.state is State.GIVEN_UP:
-            reason = f"{theirs} {request.id!r} was given up, and may still be answered"
-        elif theirs != ours:
-            reason = f"{request.id!r} is the id of a live {theirs}"
-        else:
-            return None
-        return Fault(reason=reason, where=request.id, advice=f"give this {ours} another id")
-
     def cancel(self, id: str, reason: str, now: Seconds) -> list[Effect]:
+        """Cancel the request; without effect if it has ended or is being cancelled."""
         self._cancel(id, reason, now)
-        return self._told()
+        return self._new_effects()
 
     def forget(self, id: str) -> None:
-        """It could not even be sent."""
+        """Forget a request that could not even be sent."""
         if (asked := self._asked.pop(id, None)) is not None:
             self._let_go(asked)
             for clock in _CLOCKS:
@@ -200,7 +194,7 @@ class Asking:
             self._step(asked, Event.CANCELLED, now)
 
     def hear(self, answer: Answer, now: Seconds, server: str) -> list[Effect]:
-        """What a server says. An answer of another server, to somebody else, or to another life changes nothing."""
+        """Take an answer; one from another server, or to another requester or life, changes nothing."""
         asked = self._asked.get(answer.id)
         if asked is None or answer.life != self._life or answer.requester != self._requester:
             return []
@@ -209,24 +203,26 @@ class Asking:
         if isinstance(answer, Accepted):
             asked.run = self._runs.get(server, asked.run)
         self._step(asked, _ANSWERS.get(type(answer), _FINISHED), now, answer)
-        return self._told()
+        return self._new_effects()
 
     def server_gone(self, server: str, now: Seconds) -> list[Effect]:
+        """Take the news that the presence token of a server has gone."""
         self._runs.pop(server, None)
-        for asked in self._of(server):
+        for asked in self._asked_of(server):
             self._step(asked, Event.GONE, now)
-        return self._told()
+        return self._new_effects()
 
     def server_there(self, server: str, run: str, now: Seconds) -> list[Effect]:
-        """Its token has come. run: which life of it; empty: unknown."""
+        """Take the news that the presence token of a server is there. run: its life; empty: unknown."""
         self._runs[server] = run
-        for asked in self._of(server):
+        for asked in self._asked_of(server):
             is_another = bool(asked.run and run and asked.run != run)
             self._step(asked, Event.REBORN if is_another else Event.BACK, now)
             asked.run = asked.run or run
-        return self._told()
+        return self._new_effects()
 
     def tick(self, now: Seconds) -> list[Effect]:
+        """Carry out all that is due by now."""
         while (due := self._deadlines.due(now)) is not None:
             event, name = due
             if event is None:
@@ -235,22 +231,24 @@ class Asking:
                 self._cancel(name, "it has taken too long", now)
             elif (asked := self._asked.get(name)) is not None:
                 self._step(asked, event, now)
-        return self._told()
+        return self._new_effects()
 
     # -- one request ----------------------------------------------------------------------------------------------
 
-    def _of(self, server: str) -> Iterable[_Asked]:
+    def _asked_of(self, server: str) -> Iterable[_Asked]:
         return [asked for asked in self._asked.values() if asked.server == server]
 
-    def _told(self) -> list[Effect]:
+    def _new_effects(self) -> list[Effect]:
+        """All effects since the last call."""
         effects, self._effects = self._effects, []
         return effects
 
     def _step(self, asked: _Asked, event: Event, now: Seconds, answer: Answer | None = None) -> None:
+        """Let `event` happen to a request: take its row of the table and do what that says."""
         before = asked.state
         asked.state, actions = TABLE[before][event]
         for action in actions:
-            _ACTS[action](self, asked, now, answer)
+            _ACTIONS[action](self, asked, now, answer)
         if asked.state is not before and asked.state in _OVER:
             self._let_go(asked)
             id = asked.request.id
@@ -260,16 +258,11 @@ class Asking:
             if asked.state is _ENDED:
                 del self._asked[id]
 
-    def _send_anew(self, asked: _Asked, now: Seconds, answer: _Said) -> None:
-        self._send_and_repeat(asked, now, self._patience.first_resend)
-
-    def _send_again(self, asked: _Asked, now: Seconds, answer: _Said) -> None:
-        self._send_and_repeat(asked, now, min(2 * asked.resend_after, self._patience.longest_resend))
-
-    def _send_and_repeat(self, asked: _Asked, now: Seconds, after: Seconds) -> None:
-        asked.resend_after = after
+    def _send_and_repeat(self, asked: _Asked, now: Seconds, answer: _Said, *, is_first: bool) -> None:
+        longer = min(2 * asked.resend_after, self._patience.longest_resend)
+        asked.resend_after = self._patience.first_resend if is_first else longer
         self._send(asked, now, None)
-        self._deadlines.set((_RESEND, asked.request.id), now + after)
+        self._deadlines.set((_RESEND, asked.request.id), now + asked.resend_after)
 
     def _send(self, asked: _Asked, now: Seconds, answer: _Said) -> None:
         expression = asked.expression if asked.cancel is None else keys.cancel(asked.server)
@@ -293,11 +286,11 @@ class Asking:
     def _stop_grace(self, asked: _Asked, now: Seconds, answer: _Said) -> None:
         self._deadlines.clear((_GRACE, asked.request.id))
 
-    def _hope(self, asked: _Asked, now: Seconds, answer: _Said) -> None:
+    def _await_answer(self, asked: _Asked, now: Seconds, answer: _Said) -> None:
         if asked.server in self._runs:
             self._deadlines.set((_PATIENCE, asked.request.id), now + self._patience.silence)
 
-    def _be_patient(self, asked: _Asked, now: Seconds, answer: _Said) -> None:
+    def _await_end(self, asked: _Asked, now: Seconds, answer: _Said) -> None:
         self._deadlines.set((_PATIENCE, asked.request.id), now + self._patience.cancel)
 
     def _swallow(self, asked: _Asked, now: Seconds, answer: _Said) -> None:
@@ -359,7 +352,7 @@ class Asking:
             self._deadlines.set((None, name), min(inf if at is None else at, now + after))
 
     def _renew(self, name: str, now: Seconds) -> None:
-        """Each time after twice as long, up to the period: a change that was lost is found soon."""
+        """Send `server` a `KeepAlive`. Each wait is twice the last, up to the period: a lost change shows soon."""
         server = self._servers[name]
         requests = [asked.request for asked in server.kept.values()]
         kept = [Kept(kind_of(each), each.id, each.revision, each.authority, each.lease) for each in requests]
@@ -368,9 +361,21 @@ class Asking:
         server.soon = min(2 * server.soon, server.period)
 
 
-_ACTS: Mapping[Do, Callable[[Asking, _Asked, Seconds, _Said], None]] = {
-    Do.SEND: Asking._send_anew,
-    Do.SEND_AGAIN: Asking._send_again,
+def _id_taken(asked: _Asked, request: Request) -> Fault | None:
+    """A fault if `request` must not have the id of `asked`; None if it is an update of that."""
+    known, kind = asked.kind, kind_of(request)
+    if asked.state is State.GIVEN_UP:
+        reason = f"{known} {request.id!r} was given up, and may still be answered"
+    elif known != kind:
+        reason = f"{request.id!r} is the id of a live {known}"
+    else:
+        return None
+    return Fault(reason=reason, where=request.id, advice=f"give this {kind} another id")
+
+
+_ACTIONS: Mapping[Do, Callable[[Asking, _Asked, Seconds, _Said], None]] = {
+    Do.SEND: partial(Asking._send_and_repeat, is_first=True),
+    Do.SEND_AGAIN: partial(Asking._send_and_repeat, is_first=False),
     Do.SEND_ONCE: Asking._send,
     Do.CANCEL_ONCE: Asking._cancel_once,
     Do.KEEP: Asking._keep,
@@ -379,8 +384,8 @@ _ACTS: Mapping[Do, Callable[[Asking, _Asked, Seconds, _Said], None]] = {
     Do.LET_GO: Asking._let_go,
     Do.WAIT_GRACE: Asking._wait_grace,
     Do.STOP_GRACE: Asking._stop_grace,
-    Do.HOPE: Asking._hope,
-    Do.BE_PATIENT: Asking._be_patient,
+    Do.AWAIT_ANSWER: Asking._await_answer,
+    Do.AWAIT_END: Asking._await_end,
     Do.SWALLOW: Asking._swallow,
     Do.TELL_ACCEPTED: Asking._tell_accepted,
     Do.TELL_OUTCOME: Asking._tell_outcome,

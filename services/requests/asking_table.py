@@ -1,6 +1,6 @@
-"""What becomes of a request at its requester: each state has a row for each event. Data, drawn in docs/bus.md.
+"""The states of a request at its requester: each has a row for each event. Data, drawn in docs/bus.md.
 
-Nothing that a caller, a server, the bus or the clock does at any moment is undefined. asking.py follows it.
+Nothing that a caller, a server, the bus or the clock does at any moment is undefined. asking.py follows this table.
 """
 
 from collections.abc import Mapping
@@ -10,10 +10,10 @@ from engage_hri.services.requests.transitions import Name, rows
 
 
 class State(Name):
-    """Of one request."""
+    """State of one request at its requester."""
 
     SENT = auto()
-    """No decisive answer yet: it is sent again."""
+    """The server has neither accepted nor ended it yet: it is sent again and again."""
     ACCEPTED = auto()
     """The server performs it: `KeepAlive` names it."""
     WITHDRAWING = auto()
@@ -21,30 +21,30 @@ class State(Name):
     STOPPING = auto()
     """Cancelled after it was accepted."""
     GIVEN_UP = auto()
-    """Its caller has been told that it failed; answers that come late are swallowed."""
+    """The caller has been told that it failed; answers that come late are ignored."""
     ENDED = auto()
-    """Or never made. Nothing is known of it any more."""
+    """Nothing is known of it any more; or it was never sent."""
 
 
 class Event(Name):
-    """What can happen to one request."""
+    """Event in the life of one request."""
 
     ASKED = auto()
-    """The caller sends it: for the first time, or with other content."""
+    """The caller sends the request: for the first time, or with other content."""
     CANCELLED = auto()
     HEARD = auto()
     ACCEPTED = auto()
     OUTDATED = auto()
-    """The server has an older content."""
+    """The server has older content."""
     REFUSED = auto()
     FINISHED = auto()
-    """Its outcome has come."""
+    """The server has sent its outcome."""
     GONE = auto()
-    """The server's token has gone."""
+    """The presence token of the server has gone."""
     BACK = auto()
     """The server's token is there, of the same life as far as is known."""
     REBORN = auto()
-    """The token of another life than the one that accepted it."""
+    """The server's token is there, but of another life than the one that accepted the request."""
     RESEND_DUE = auto()
     GRACE_OVER = auto()
     PATIENCE_OVER = auto()
@@ -52,41 +52,41 @@ class Event(Name):
 
 
 class Do(Name):
-    """What follows from an event."""
+    """Action that follows from an event."""
 
     SEND = auto()
-    """Publish the request, or its cancellation once there is one, and again after a while."""
+    """Publish the request, or its cancellation once there is one, and repeat that after a while."""
     SEND_AGAIN = auto()
-    """The same; the next time after twice as long."""
+    """The same; the wait until the next time is twice as long."""
     SEND_ONCE = auto()
-    """Publish it; `KeepAlive` finds out whether it got there."""
+    """Publish the request; `KeepAlive` finds out whether it got there."""
     CANCEL_ONCE = auto()
-    """Publish a cancellation that nobody waits for."""
+    """Publish a cancellation without waiting for its effect."""
     KEEP = auto()
-    """Name it in `KeepAlive` from now on instead of sending it again."""
+    """Name the request in `KeepAlive` from now on instead of sending it again."""
     KEEP_SOON = auto()
     """Send the next `KeepAlive` soon: the content has changed."""
     KEEP_NOW = auto()
     LET_GO = auto()
-    """Name it no longer."""
+    """Name the request in `KeepAlive` no longer."""
     WAIT_GRACE = auto()
     STOP_GRACE = auto()
-    HOPE = auto()
-    """Wait anew for a decisive answer of a server that is there."""
-    BE_PATIENT = auto()
-    """Wait so long for the end of what was cancelled."""
+    AWAIT_ANSWER = auto()
+    """Count the time anew that a server that is there has for a decisive answer."""
+    AWAIT_END = auto()
+    """Limit how long the cancelled request may take to end."""
     SWALLOW = auto()
-    """Forget it after a while."""
+    """Forget the request after a while."""
     TELL_ACCEPTED = auto()
     TELL_OUTCOME = auto()
     TELL_REFUSED = auto()
     TELL_FORGOTTEN = auto()
-    """The server does not know what it has accepted."""
+    """Tell the caller that the server does not know what it has accepted."""
     TELL_GONE = auto()
     TELL_REBORN = auto()
     TELL_SILENT = auto()
     TELL_UNSTOPPABLE = auto()
-    """The cancellation was in vain, which everybody is to know."""
+    """Tell the caller, and publish a fault: the cancellation was in vain."""
 
 
 Row = tuple[State, tuple[Do, ...]]
@@ -94,23 +94,23 @@ Row = tuple[State, tuple[Do, ...]]
 S, E = State, Event
 TABLE: Mapping[State, Mapping[Event, Row]] = {
     S.SENT: rows(S.SENT, {
-        E.ASKED: (S.SENT, Do.SEND, Do.HOPE),
-        E.CANCELLED: (S.WITHDRAWING, Do.SEND, Do.BE_PATIENT),
-        E.HEARD: (S.SENT, Do.HOPE),
+        E.ASKED: (S.SENT, Do.SEND, Do.AWAIT_ANSWER),
+        E.CANCELLED: (S.WITHDRAWING, Do.SEND, Do.AWAIT_END),
+        E.HEARD: (S.SENT, Do.AWAIT_ANSWER),
         E.ACCEPTED: (S.ACCEPTED, Do.TELL_ACCEPTED, Do.KEEP),
-        E.OUTDATED: (S.SENT, Do.SEND, Do.HOPE),
+        E.OUTDATED: (S.SENT, Do.SEND, Do.AWAIT_ANSWER),
         E.REFUSED: (S.ENDED, Do.TELL_REFUSED),
         E.FINISHED: (S.ENDED, Do.TELL_OUTCOME),
         E.GONE: (S.SENT, Do.WAIT_GRACE),
-        E.BACK: (S.SENT, Do.STOP_GRACE, Do.SEND, Do.HOPE),
-        E.REBORN: (S.SENT, Do.STOP_GRACE, Do.SEND, Do.HOPE),
+        E.BACK: (S.SENT, Do.STOP_GRACE, Do.SEND, Do.AWAIT_ANSWER),
+        E.REBORN: (S.SENT, Do.STOP_GRACE, Do.SEND, Do.AWAIT_ANSWER),
         E.RESEND_DUE: (S.SENT, Do.SEND_AGAIN),
         E.GRACE_OVER: (S.GIVEN_UP, Do.TELL_GONE, Do.CANCEL_ONCE, Do.SWALLOW),
         E.PATIENCE_OVER: (S.GIVEN_UP, Do.TELL_SILENT, Do.CANCEL_ONCE, Do.SWALLOW),
     }, E.SWALLOW_OVER),
     S.ACCEPTED: rows(S.ACCEPTED, {
         E.ASKED: (S.ACCEPTED, Do.SEND_ONCE, Do.KEEP_SOON),
-        E.CANCELLED: (S.STOPPING, Do.LET_GO, Do.SEND, Do.BE_PATIENT),
+        E.CANCELLED: (S.STOPPING, Do.LET_GO, Do.SEND, Do.AWAIT_END),
         E.OUTDATED: (S.ACCEPTED, Do.SEND_ONCE, Do.KEEP_SOON),
         E.REFUSED: (S.ENDED, Do.TELL_FORGOTTEN),
         E.FINISHED: (S.ENDED, Do.TELL_OUTCOME),
@@ -141,8 +141,8 @@ TABLE: Mapping[State, Mapping[Event, Row]] = {
         E.PATIENCE_OVER: (S.GIVEN_UP, Do.TELL_UNSTOPPABLE, Do.SWALLOW),
     }, E.ASKED, E.CANCELLED, E.HEARD, E.ACCEPTED, E.OUTDATED, E.SWALLOW_OVER),
     S.GIVEN_UP: rows(S.GIVEN_UP, {
-        # A server that still works for nobody hears of it by the lease, which is not renewed. To answer what it says
-        # with a cancellation each time, which the server answers in turn, would never end.
+        # A server that still performs it stops when the lease is over, since nobody renews that. A cancellation for
+        # each of its messages, which it would answer in turn, would never end.
         E.REFUSED: (S.ENDED,),
         E.FINISHED: (S.ENDED,),
         E.BACK: (S.GIVEN_UP, Do.CANCEL_ONCE),

@@ -1,4 +1,4 @@
-"""Instants by name, the earliest first. Pure."""
+"""Deadlines by name, the earliest first. Pure."""
 
 import heapq
 from collections.abc import Callable, Hashable
@@ -10,31 +10,31 @@ from engage_hri.schemas.units import Seconds
 
 K = TypeVar("K", bound=Hashable)
 SLACK = 64
-"""So many outdated entries are always tolerated."""
+"""Outdated entries that are always tolerated."""
 
 
 class Deadlines(Generic[K]):
-    """At most one instant for each name. Setting, clearing and asking for the earliest take logarithmic time.
+    """One deadline at most for each name. Setting, clearing and asking for the earliest take logarithmic time.
 
-    order: of the names whose instants are equal; without it the one that was set first comes first.
-    look: when to ask for what is due, not after the earliest instant; infinite if there is none. What was cleared
-    may hold it back until then.
+    order: sort key of names that have equal deadlines; without it the one that was set first comes first.
+    look: when to call `due`, not after the earliest deadline; infinite if there is none. It may be too early, since
+    `clear` does not change it.
     """
 
     def __init__(self, order: Callable[[K], Any] | None = None) -> None:
         self.look = inf
         self._at: dict[K, Seconds] = {}
         self._heap: list[tuple[Seconds, Any, int, K]] = []
-        """Outdated entries stay until they reach the top, or until they are many more than the others."""
+        """Entries, outdated ones too: these go when they reach the top, or when they outnumber the others by far."""
         self._order = order
         self._count = count()
 
     def clear(self, name: K) -> None:
-        """It has no instant any more."""
+        """Remove the deadline of `name`, if it has one."""
         self._at.pop(name, None)
 
     def set(self, name: K, at: Seconds | None) -> None:
-        """Its instant from now on; None: it has none any more."""
+        """Give `name` this deadline instead of any other; None removes it."""
         if at is None:
             self.clear(name)
         elif self._at.get(name) != at:
@@ -50,6 +50,7 @@ class Deadlines(Generic[K]):
 
     @property
     def earliest(self) -> Seconds | None:
+        """The earliest deadline; None if there is none."""
         heap = self._heap
         while heap and self._at.get(heap[0][-1]) != heap[0][0]:
             heapq.heappop(heap)
@@ -57,11 +58,11 @@ class Deadlines(Generic[K]):
 
     @property
     def first(self) -> K | None:
-        """The name of the earliest instant."""
+        """The name that has the earliest deadline; None if there is none."""
         return None if self.earliest is None else self._heap[0][-1]
 
     def due(self, now: Seconds) -> K | None:
-        """The name of the earliest instant that has come, which is cleared; None if there is none."""
+        """Remove the earliest deadline that has come and return its name; None if none has come."""
         earliest = self.earliest
         if earliest is None or earliest > now:
             self.look = inf if earliest is None else earliest

@@ -76,7 +76,7 @@ class Pending:
         for future in (self.accepted, self.outcome):
             if not future.done():
                 future.set_exception(end)
-                future.exception()  # seen: a caller may care for only one of the two
+                future.exception()  # marked as seen: a caller may await only one of the two
 
 
 class Requester:
@@ -108,13 +108,11 @@ class Requester:
         """
         if self._broken is not None:
             return self._failed(key, request, self._broken)
-        known = self._pending.get(request.id)
         effects = self._asking.send(key, request, self._bus.now(), within)
         match effects:
             case [asking.TellEnd(end=EngageError() as error)]:
                 return self._failed(key, request, error)
-        pending = known
-        if pending is None:
+        if (pending := self._pending.get(request.id)) is None:
             pending = self._pending[request.id] = Pending(key, request)
         pending.request = self._asking.request(request.id) or request
         self._carry_out(effects)
@@ -133,10 +131,11 @@ class Requester:
         self._carry_out(self._asking.cancel(id, reason, self._bus.now()))
 
     def state(self, id: str) -> State:
+        """State of request `id`; ENDED if it is not known."""
         return self._asking.state(id)
 
     def feed(self, received: Received) -> bool:
-        """Take a message of `PATTERNS`; False if it was none of ours."""
+        """Take a message of `PATTERNS`; False for a message of any other type."""
         message = received.message
         if isinstance(message, Answer):
             effects = self._asking.hear(message, self._bus.now(), keys.server_of(received.key))
@@ -154,10 +153,10 @@ class Requester:
         self._carry_out(self._asking.tick(self._bus.now()))
 
     def _carry_out(self, effects: list[asking.Effect]) -> None:
-        for effect in effects:  # by isinstance: with each message, and twice as quick as patterns
+        for effect in effects:  # isinstance is twice as quick as patterns, and this is done for each message
             if isinstance(effect, asking.Publish):
                 try:
-                    self._publish(effect.expression, _as_message(effect.message))
+                    self._publish(effect.expression, effect.message)  # type: ignore[arg-type]
                 except Exception as error:
                     self._could_not_send(effect.message.id, error)
             elif isinstance(effect, asking.TellAccepted):
@@ -175,7 +174,7 @@ class Requester:
         self._alarm.set(self._asking.deadline)
 
     def _could_not_send(self, id: str, error: Exception) -> None:
-        """What has no encoded form, half a character for instance, ends this request and leaves the others alone."""
+        """End a request that has no encoded form (half a character in its text, for instance); the others go on."""
         self._asking.forget(id)
         fault = Fault(
             reason=str(error), where=id, advice="text in Unicode, numbers in their range, fields of their type"
@@ -193,7 +192,7 @@ class Requester:
         self._fail_all(self._broken or RunFailed("the client is closed"))
 
     def _fail_all(self, error: EngageError) -> None:
-        """Nothing is sent or awaited any more."""
+        """End all requests with `error`, and refuse all that come later."""
         self._broken = error
         self._alarm.stop()
         for pending in self._pending.values():
@@ -203,7 +202,7 @@ class Requester:
     # -- listening by itself ----------------------------------------------------------------------------------------
 
     def check(self) -> None:
-        """Raises RunFailed if this hears nothing any more."""
+        """Raise RunFailed if answers are not heard any more."""
         if self._broken is not None:
             raise self._broken
 
@@ -214,7 +213,7 @@ class Requester:
                     self.feed(received)
 
     def _stopped_listening(self, task: "asyncio.Task[None]") -> None:
-        """It ends with the client and not before; who awaits an answer would wait for ever."""
+        """Fail all requests if listening broke: their callers would wait for ever."""
         if self._broken is not None or task.cancelled():
             return
         error = task.exception()
@@ -240,7 +239,7 @@ class RequestDesk:
         match desk.take(received):
             case PerformBlock() as request: ...         # new, or updated (`desk.is_live` was true before)
             case Cancel(id=id): ...                     # only for live requests
-            case None: ...                              # not ours, a duplicate, or already ended
+            case None: ...                              # of another server, a duplicate, or already ended
 
     `request.id` is its name at this server: its own id, or `id~2` where another requester's, or a former life's, has
     that. The answers carry the id that was asked with.
@@ -276,7 +275,7 @@ class RequestDesk:
 
     @property
     def live(self) -> int:
-        """How many requests have not ended."""
+        """Number of requests that have not ended."""
         return self._serving.live
 
     def asked(self, name: str) -> Request:
@@ -287,14 +286,14 @@ class RequestDesk:
         return request
 
     def take(self, received: Received) -> Request | None:
-        """The request, if it is new, changed or a cancellation of a live one; each of these once."""
+        """The request in a message that the service has not seen: new, changed, or the cancellation of a live one."""
         message = received.message
         if isinstance(message, _COMMANDS):
             is_ours = keys.is_command_of(self._server, received.key)
             return self._take(message, received, self._bus.now()) if is_ours else None
         match message:
             case Unreadable(id=id, life=life, kind=kind, fault=fault) if id:
-                # As far as it could be read it is this request, which may be live, or have ended.
+                # What could be read names the request, which may be live, or have ended.
                 requester, life = keys.requester_of(received.key), life or received.life
                 known = Cancel(id=id, requester=requester, life=life, of=kind)
                 return self._carry_out(self._serving.refuse(known, fault))
@@ -305,7 +304,7 @@ class RequestDesk:
         return None
 
     def _take(self, message: Request | KeepAlive, received: Received, now: Seconds) -> Request | None:
-        # A requester of ours that is still there sends it again; one that has left wants it no more.
+        # An old command: its requester, if still there, sends it again; one that has left does not want it any more.
         if received.past and (message.life or self._serving.is_there(keys.requester_of(received.key))):
             return None
         requester = keys.requester_of(received.key) or message.requester
@@ -319,13 +318,15 @@ class RequestDesk:
         return self._carry_out(self._serving.take(message, now))
 
     def accept(self, name: str) -> None:
+        """Tell the requester that the request is being performed."""
         self._answer(name, Accepted(id=name))
 
     def refuse(self, name: str, fault: Fault) -> None:
+        """End the request: it will not be performed."""
         self._answer(name, Refused(id=name, fault=fault))
 
     def end(self, outcome: Message) -> None:
-        """Answer the request whose name is the outcome's id with a terminal state."""
+        """End a request with its outcome, which has the request's name as its id."""
         assert isinstance(outcome, Outcome)
         self._answer(outcome.id, outcome)
 
@@ -336,7 +337,7 @@ class RequestDesk:
         self._carry_out(self._serving.tick(self._bus.now()))
 
     def _carry_out(self, effects: list[serving.Effect], /) -> Request | None:
-        """The one request to be handed over at once; what more there is goes to the clerks."""
+        """Carry out the effects; returns the request that has just come, if the service is to see it."""
         handed: Request | None = None
         for effect in effects:
             if isinstance(effect, serving.Publish):
@@ -345,7 +346,7 @@ class RequestDesk:
                 if effect.is_asked:
                     handed = effect.request
                 else:
-                    self._hand_to_clerk(effect.request)
+                    self._call_back(effect.request)
             elif effect.is_ours:
                 self._bus.report(effect.fault)
             else:
@@ -353,7 +354,7 @@ class RequestDesk:
         self._alarm.set(self._serving.deadline)
         return handed
 
-    def _hand_to_clerk(self, request: Request) -> None:
+    def _call_back(self, request: Request) -> None:
         with self._bus.containing(request):
             if isinstance(request, Cancel):
                 self._on_cancel(request)
@@ -361,7 +362,7 @@ class RequestDesk:
                 self._on_extend(request)
 
     def serving(self, request: Request) -> Containing:
-        """An exception in the body of `with` ends this request, and nothing else."""
+        """Contain exceptions in the body of `with`: they end this request, and nothing else."""
         return self._bus.containing(request, partial(self._refuse_if_live, request.id))
 
     def _refuse_if_live(self, name: str, fault: Fault) -> None:
@@ -373,7 +374,7 @@ class RequestDesk:
 
 
 def _misplaced(request: Request, key: str) -> Fault | None:
-    """What is wrong with sending this request there."""
+    """A fault if this request must not be sent on this key, or has no id; None otherwise."""
     expression = keys.expression_of(key)
     expected = COMMANDS.get(expression, ())
     if request.id and (isinstance(request, expected) or (expression and isinstance(request, Cancel))):
@@ -382,13 +383,7 @@ def _misplaced(request: Request, key: str) -> Fault | None:
     if not request.id:
         return Fault(reason=f"{name} without an id", where=key, service=server, advice="make one up: `id`")
     home = next((known for known, kinds in COMMANDS.items() if isinstance(request, kinds)), keys.cancel(server))
-    takes = (
-        f", which takes {' and '.join(kind.__name__ for kind in expected)}" if expected else ", which is no command"
-    )
-    who = key.split("/")[4:6] if expression else ["<role>", "<requester>"]
-    advice = f"send it on {home.replace('*/*', '/'.join(who))}" if home else ""
-    return Fault(reason=f"{name} came on {key}{takes}", where=request.id, service=server, advice=advice)
-
-
-def _as_message(request: Request) -> Message:
-    return request  # type: ignore[return-value]
+    takes = f"takes {' and '.join(kind.__name__ for kind in expected)}" if expected else "is no command"
+    sender = key.split("/")[4:6] if expression else ["<role>", "<requester>"]
+    advice = f"send it on {home.replace('*/*', '/'.join(sender))}" if home else ""
+    return Fault(reason=f"{name} came on {key}, which {takes}", where=request.id, service=server, advice=advice)

@@ -1,4 +1,4 @@
-"""How long a requester waits, and for what. Pure."""
+"""Time limits of a requester. Pure."""
 
 from msgspec import Struct
 
@@ -6,13 +6,13 @@ from engage_hri.schemas.units import Seconds
 
 
 class Patience(Struct, frozen=True, kw_only=True):
-    """How a requester waits, in seconds.
+    """Time limits of a requester, in seconds.
 
-    first_resend: until what nobody answers is sent again; doubling up to longest_resend.
-    grace: how long the other side may be gone before its requests fail: a router's restart looks like a death.
+    first_resend: until a request that nobody has answered is sent again; the wait doubles up to longest_resend.
+    grace: how long the server may be gone before its requests fail: a restart of the router looks like a death.
     pulse: between two `KeepAlive`. lease: how long a request that is not renewed stays alive at its server.
     cancel: how long after its cancellation a request may take to end. silence: how long a server that is there may
-    leave a request without any answer. swallow: how long answers to what was given up may still come.
+    leave a request without any answer. swallow: how long late answers to a request that was given up are ignored.
     """
 
     first_resend: Seconds = 0.3

@@ -36,32 +36,32 @@ from engage_hri.services.requests.names import Names
 from engage_hri.services.requests.serving_table import TABLE, Do, Event, State
 
 GRACE: Seconds = 2.0
-"""How long a requester may be gone before its requests end: a router's restart looks like a death."""
+"""Seconds that a requester may be gone before its requests end: a restart of the router looks like a death."""
 ENDED_KEPT = 1024
-"""How many ended requests are remembered, to answer what comes again."""
+"""Number of ended requests that are remembered, to answer them if they come again."""
 LIFELESS_KEPT: Seconds = 10.0
-"""How long those of a requester that names no life are: longer than anything is sent again after."""
+"""Seconds for which an ended request that names no life is remembered: longer than any wait to send one again."""
 LAPSED = "nobody has renewed it"
 GONE = "requester is gone"
 
-# Asked for with each message, and an enum is slow to give a member.
+# Members that are used with each message: an enum is slow to look one up.
 _ENDED, _UNKNOWN = State.ENDED, State.UNKNOWN
 _STOPPED = (State.CANCELLED, State.ENDED)
 _GRACE_OVER, _LEASE_OVER = Event.GRACE_OVER, Event.LEASE_OVER
 _DECISIONS = {Accepted: Event.ACCEPT, Refused: Event.REFUSE}
-"""What an answer of the service is; each other one is an end."""
+"""The event that an answer of the service is; every other answer is an end."""
 
 
 class Publish(Struct, frozen=True):
-    """Send this answer."""
+    """Publish this answer."""
 
     answer: Answer
 
 
 class Hand(Struct, frozen=True):
-    """Give this to the service: a request, new or changed, or a `Cancel`; `id` is its name here.
+    """Give this to the service: a request, new or changed, or a `Cancel`. Its `id` is its name at this server.
 
-    is_asked: it is what has just come; else it follows from something else.
+    is_asked: the message itself has just come; otherwise it was made here, as after a lease is over.
     """
 
     request: Request
@@ -69,7 +69,7 @@ class Hand(Struct, frozen=True):
 
 
 class Complain(Struct, frozen=True):
-    """Everybody is to know. is_ours: a mistake of the service itself."""
+    """Publish this fault for all to see. is_ours: it is a mistake of the service itself."""
 
     fault: Fault
     is_ours: bool
@@ -77,9 +77,9 @@ class Complain(Struct, frozen=True):
 
 Effect = Publish | Hand | Complain
 _Cause = Request | Answer | Kept | None
-"""What has come with an event."""
+"""The message, or the part of a `KeepAlive`, that is the event; None with all other events."""
 _Key = tuple[str, str, str]
-"""Requester, life, id: what is live under it has one kind."""
+"""Requester, life and id. Only one request of a key is live at a time."""
 
 
 class _Record:
@@ -94,22 +94,22 @@ class _Record:
         self.key = _key(request)
         self.kind = kind_meant(request)
         self.lease = (_LEASE_OVER, name)
-        """Its clock among the deadlines."""
+        """Name of its lease among the deadlines."""
         self.state = _UNKNOWN
         self.answer: Answer | None = None
         self.ended_at: Seconds = inf
 
 
 class Serving:
-    """All requests to one server. term: the lease of a request that names none; None: it has none."""
+    """All requests to one server. term: lease in seconds of a request that names none; None: without limit."""
 
     def __init__(self, server: str, term: Seconds | None = None) -> None:
         self._server = server
         self._term = term
         self._known: dict[tuple[_Key, str], _Record] = {}
-        """By kind, too."""
+        """Requests by key and kind, live or ended."""
         self._newest: dict[_Key, _Record] = {}
-        """Of whatever kind."""
+        """The newest request of each key, of any kind."""
         self._named: dict[str, _Record] = {}
         self._ended: OrderedDict[str, _Record] = OrderedDict()
         self._names = Names()
@@ -117,11 +117,11 @@ class Serving:
         self._deadlines: Deadlines[tuple[Event, str]] = Deadlines()
         self._effects: list[Effect] = []
 
-    # -- what is known --------------------------------------------------------------------------------------------
+    # -- questions ------------------------------------------------------------------------------------------------
 
     @property
     def deadline(self) -> Seconds | None:
-        """When to `tick`; what was due then may have been settled since."""
+        """Time at which to call `tick`; there may be nothing to do by then."""
         return None if self._deadlines.look == inf else self._deadlines.look
 
     def is_live(self, name: str) -> bool:
@@ -129,11 +129,11 @@ class Serving:
 
     @property
     def live(self) -> int:
-        """How many requests have not ended."""
+        """Number of requests that have not ended."""
         return len(self._named) - len(self._ended)
 
     def asked(self, name: str) -> Request | None:
-        """The request as it came, with its own id."""
+        """The request as it came, with its own id; None if it was never made, or is forgotten."""
         record = self._named.get(name)
         return None if record is None else record.request
 
@@ -143,7 +143,7 @@ class Serving:
     # -- events ---------------------------------------------------------------------------------------------------
 
     def take(self, request: Request, now: Seconds) -> list[Effect]:
-        """A command that has come; `requester` as its key names it."""
+        """Take a command that has come; its `requester` is the one that its key names."""
         key, kind = _key(request), kind_meant(request)
         newest = self._newest.get(key)
         if newest is not None and newest.state is not _ENDED and kind not in ("", newest.kind):
@@ -155,19 +155,21 @@ class Serving:
             if record is None or self._is_new(record, request, now):
                 record = self._new(request)
             self._step(record, _event(record, request), now, request)
-        return self._told()
+        return self._new_effects()
 
     def refuse(self, request: Request, fault: Fault) -> list[Effect]:
-        """It came on a wrong key, or could not be read. The same request, if live here or ended, is as it was."""
+        """Refuse a request that came on a wrong key, or could not be read.
+
+        If the same request is live here, or has ended, it stays as it is.
+        """
         record = self._record(_key(request), kind_meant(request))
         if record is not None and record.state is not _ENDED:
             return [Complain(fault, False)]
-        if record is not None and record.answer is not None:
-            return [Publish(answering(request, record.answer))]
-        return [Publish(answering(request, Refused(id=request.id, fault=fault)))]
+        known = None if record is None else record.answer
+        return [Publish(answering(request, known or Refused(id=request.id, fault=fault)))]
 
     def keep_alive(self, message: KeepAlive, sent: Seconds, now: Seconds) -> list[Effect]:
-        """sent: local time, not after `now`."""
+        """Renew the requests that a `KeepAlive` names. sent: when it was sent, by local time, not after `now`."""
         for kept in message.live:
             record = self._known.get(((message.requester, message.life, kept.id), kept.kind))
             if record is None:
@@ -175,51 +177,57 @@ class Serving:
                 record = _Record(kept.id, unknown, "")
             is_newer = record.request.is_updatable and kept.revision > record.request.revision
             self._step(record, Event.EXTENDED if is_newer else Event.NAMED, sent, kept)
-        return self._told()
+        return self._new_effects()
 
     def answer(self, name: str, answer: Answer, now: Seconds) -> list[Effect]:
-        """What the service says of the request that it knows by `name`."""
+        """Take the service's answer to the request that it knows by `name`."""
         record = self._named.get(name)
         if record is None:
             self._warn_ended(name, answer, "was never made")
         else:
             self._step(record, _DECISIONS.get(type(answer), Event.END), now, answer)
-        return self._told()
+        return self._new_effects()
 
     def requester_gone(self, requester: str, now: Seconds) -> list[Effect]:
+        """Take the news that the presence token of a requester has gone."""
         self._runs.pop(requester, None)
-        for record in self._of(requester):
+        for record in self._live_of(requester):
             self._step(record, Event.GONE, now)
-        return self._told()
+        return self._new_effects()
 
     def requester_there(self, requester: str, run: str, now: Seconds) -> list[Effect]:
-        """Its token has come. run: which life of it; empty: unknown."""
+        """Take the news that the presence token of a requester is there. run: its life; empty: unknown."""
         self._runs[requester] = run
-        for record in self._of(requester):
+        for record in self._live_of(requester):
             is_another = bool(record.run and run and record.run != run)
             self._step(record, Event.REBORN if is_another else Event.BACK, now)
             record.run = run
-        return self._told()
+        return self._new_effects()
 
     def tick(self, now: Seconds) -> list[Effect]:
+        """Carry out all that is due by now."""
         while (due := self._deadlines.due(now)) is not None:
             event, name = due
             if (record := self._named.get(name)) is not None:
                 self._step(record, event, now)
-        return self._told()
+        return self._new_effects()
 
     # -- one request ----------------------------------------------------------------------------------------------
 
-    def _told(self) -> list[Effect]:
+    def _new_effects(self) -> list[Effect]:
+        """All effects since the last call."""
         effects, self._effects = self._effects, []
         return effects
 
-    def _of(self, requester: str) -> Iterable[_Record]:
+    def _live_of(self, requester: str) -> Iterable[_Record]:
         live = (record for record in self._named.values() if record.state is not _ENDED)
         return [record for record in live if record.request.requester == requester]
 
     def _is_new(self, record: _Record, request: Request, now: Seconds) -> bool:
-        """Is it another than the one that has ended? Without a life nobody can tell a repetition for ever."""
+        """True if `request` is another than the one of `record`, which has ended.
+
+        With a life it never is. Without one it is taken for another if its content differs, or after `LIFELESS_KEPT`.
+        """
         if record.state is not _ENDED or request.life:
             return False
         may_differ = not isinstance(request, Cancel) and not isinstance(record.request, Cancel)
@@ -227,7 +235,7 @@ class Serving:
         return differs or now - record.ended_at > LIFELESS_KEPT
 
     def _record(self, key: _Key, kind: str) -> _Record | None:
-        """What is known by these. Who does not say the kind means what is live, or was last."""
+        """The request of this key and kind; the newest of the key if no kind is given, or that one has none."""
         newest = self._newest.get(key)
         if newest is not None and (not kind or (not newest.kind and (key, kind) not in self._known)):
             return newest
@@ -236,9 +244,9 @@ class Serving:
     def _new(self, request: Request) -> _Record:
         run = self._runs.get(request.requester, "")
         if not is_life_of(request.life, run):
-            run = ""  # of a new life, whose token is still on its way
+            run = ""  # The token of its new life is still on its way.
         while (name := self._names.unique(request.id)) in self._named:
-            pass  # a live one from so long ago that its name is forgotten
+            pass  # A live request from so long ago that `Names` has forgotten its name has this one.
         record = _Record(name, request, run)
         known = (record.key, record.kind)
         if (before := self._known.get(known)) is not None:
@@ -255,10 +263,11 @@ class Serving:
             del self._newest[record.key]
 
     def _step(self, record: _Record, event: Event, now: Seconds, cause: _Cause = None) -> None:
+        """Let `event` happen to a request: take its row of the table and do what that says."""
         before = record.state
         record.state, actions = TABLE[before][event]
         for action in actions:
-            _ACTS[action](self, record, now, cause)
+            _ACTIONS[action](self, record, now, cause)
         if record.state is not before and record.state in _STOPPED:
             self._deadlines.clear((_GRACE_OVER, record.name))
             self._deadlines.clear(record.lease)
@@ -268,7 +277,7 @@ class Serving:
                 if len(self._ended) > ENDED_KEPT:
                     self._forget(next(iter(self._ended.values())))
 
-    # -- what follows: one for each of `Do`, with what has caused it ----------------------------------------------
+    # -- actions of the table, each with the message that has caused it -------------------------------------------
 
     def _hand_asked(self, record: _Record, now: Seconds, cause: _Cause) -> None:
         assert isinstance(cause, Request)
@@ -277,12 +286,12 @@ class Serving:
         self._hand(record, cause, is_asked=True)
 
     def _hand_extended(self, record: _Record, now: Seconds, cause: _Cause) -> None:
-        """The content itself is still the older one: the answer says so, and brings the newest."""
+        """Hand over the old content with new authority; the answer `Outdated` then asks for the newest content."""
         assert isinstance(cause, Kept)
         self._hand(record, record.request.with_authority(cause.authority))
 
     def _renew(self, record: _Record, now: Seconds, cause: _Cause) -> None:
-        """A late message never shortens what a newer one has granted."""
+        """Extend the lease. A late message never shortens what a newer one has granted."""
         term = cause.valid if isinstance(cause, Kept) else record.request.term
         if not 0.0 < term < inf:
             if self._term is None:
@@ -305,7 +314,7 @@ class Serving:
         self._effects.append(Publish(record.answer))
 
     def _repeat(self, record: _Record, now: Seconds, cause: _Cause) -> None:
-        """To whoever asks now: of a request whose cancellation came first, that did not say which kind it is."""
+        """Answer again: the request that comes now, since a cancellation of no kind may have come before it."""
         asks = cause if isinstance(cause, Request) and not isinstance(cause, Cancel) else record.request
         self._effects.append(Publish(answering(asks, record.answer or Heard(id=record.name))))
 
@@ -334,7 +343,7 @@ class Serving:
         asked = record.request
         self._hand(record, Cancel(id=asked.id, requester=asked.requester, life=asked.life, reason=reason))
 
-    # -- what is wrong --------------------------------------------------------------------------------------------
+    # -- faults ---------------------------------------------------------------------------------------------------
 
     def _fault(self, where: str, reason: str, advice: str = "") -> Fault:
         return Fault(reason=reason, where=where, advice=advice, service=self._server)
@@ -356,7 +365,7 @@ def _key(request: Request) -> _Key:
 
 
 def _event(record: _Record, request: Request) -> Event:
-    """What this command is to what is known."""
+    """The event that this command is for the request of `record`."""
     if isinstance(request, Cancel):
         return Event.CANCEL
     known = record.request
@@ -368,11 +377,11 @@ def _event(record: _Record, request: Request) -> Event:
 
 
 def _content(request: Request) -> Request:
-    """Without what does not count as content."""
+    """The request without the fields that are no content."""
     return replace(request, revision=0, lease=0.0)
 
 
-_ACTS: Mapping[Do, Callable[[Serving, _Record, Seconds, _Cause], None]] = {
+_ACTIONS: Mapping[Do, Callable[[Serving, _Record, Seconds, _Cause], None]] = {
     Do.HAND: Serving._hand_asked,
     Do.HAND_EXTENDED: Serving._hand_extended,
     Do.HAND_CANCEL: Serving._hand_asked,

@@ -1,7 +1,7 @@
-"""What becomes of a request at its server: each state has a row for each event. Data, drawn in docs/bus.md.
+"""The states of a request at its server: each has a row for each event. Data, drawn in docs/bus.md.
 
-Nothing that a requester, the service itself, the bus or the clock does at any moment is undefined.
-services/requests/serving.py follows it.
+Nothing that a requester, the service itself, the bus or the clock does at any moment is undefined. serving.py follows
+this table.
 """
 
 from collections.abc import Mapping
@@ -11,76 +11,76 @@ from engage_hri.services.requests.transitions import Name, rows
 
 
 class State(Name):
-    """Of one request."""
+    """State of one request at its server."""
 
     UNKNOWN = auto()
-    """It has never come, or was forgotten long after its end."""
+    """The request has never come, or was forgotten long after its end."""
     TAKEN = auto()
-    """The service has it, and has not decided yet."""
+    """The service has the request, and has not decided yet."""
     ACCEPTED = auto()
     CANCELLED = auto()
-    """The service has been told to end it, and has not yet."""
+    """The service has been told to end the request, and has not done so yet."""
     ENDED = auto()
-    """Its terminal state is kept for whoever asks again."""
+    """The last answer is kept, for a requester that asks again."""
 
 
 class Event(Name):
-    """What can happen to one request."""
+    """Event in the life of one request."""
 
     CAME = auto()
-    """The request, for the first time or as it is known."""
+    """The request has come, for the first time or with the content that is known."""
     CHANGED = auto()
-    """The request with newer content, which its kind allows."""
+    """The request has come with newer content, and its kind allows that."""
     DIFFERED = auto()
-    """The request with other content, which its kind does not allow."""
+    """The request has come with other content, and its kind does not allow that."""
     CANCEL = auto()
     NAMED = auto()
-    """A `KeepAlive` wants it alive."""
+    """A `KeepAlive` names the request, to keep it alive."""
     EXTENDED = auto()
-    """The same, with newer content than is known here."""
+    """A `KeepAlive` names the request, with newer content than is known here."""
     ACCEPT = auto()
-    """The service's own answers."""
+    """The service itself answers, here and in the next two."""
     REFUSE = auto()
     END = auto()
     GONE = auto()
-    """The requester's token has gone."""
+    """The presence token of the requester has gone."""
     BACK = auto()
     REBORN = auto()
-    """The requester is there as another life."""
+    """The requester is there, but in another life."""
     GRACE_OVER = auto()
     LEASE_OVER = auto()
 
 
 class Do(Name):
-    """What follows from an event."""
+    """Action that follows from an event."""
 
     HAND = auto()
-    """Give the request, as it has just come, to the service."""
+    """Give the service the request as it has just come."""
     HAND_EXTENDED = auto()
-    """Give the service the request with the authority that `KeepAlive` grants."""
+    """Give the service the request with the movement authority that `KeepAlive` grants."""
     HAND_CANCEL = auto()
     HAND_GONE = auto()
-    """Tell the service to end it: the requester is gone."""
+    """Tell the service to end the request: the requester is gone."""
     HAND_LAPSED = auto()
-    """Tell the service to end it: nobody has renewed it."""
+    """Tell the service to end the request: its lease is over."""
     RENEW = auto()
-    """Its lease counts from now."""
+    """Count the lease from now."""
     WAIT_GRACE = auto()
     STOP_GRACE = auto()
     SAY_OUTDATED = auto()
-    """Ask for the newest content."""
+    """Ask the requester for the newest content."""
     REPEAT = auto()
-    """Answer with the last state; before there is one, that it was heard."""
+    """Answer with the last answer; before there is one, that the request was heard."""
     ANSWER = auto()
-    """With what the service says."""
+    """Send the answer of the service."""
     REFUSE_UNHEARD = auto()
-    """The request of this cancellation never came, and it is too late for it now."""
+    """Refuse the cancelled request: it has not come, and will be refused if it does."""
     REFUSE_FORGOTTEN = auto()
-    """A `KeepAlive` names what is not known here."""
+    """Refuse what a `KeepAlive` names: it is not known here."""
     WARN_DIFFERENT = auto()
-    """The other content is ignored, and everybody is told. Of a request that names no life it would be a new one."""
+    """Publish a fault: the other content is ignored. (A request that names no life would be a new one.)"""
     WARN_ENDED = auto()
-    """The service answers what has ended or never was: a mistake of its own."""
+    """Report a mistake of the service: it answers a request that has ended or never was."""
 
 
 Row = tuple[State, tuple[Do, ...]]

@@ -1,4 +1,4 @@
-"""How a table of states and events is written down: each state has a row for each event. Pure."""
+"""Helpers to write a table of states and events, with a row for each event in each state. Pure."""
 
 from collections.abc import Mapping
 from enum import Enum
@@ -6,7 +6,7 @@ from typing import TypeVar
 
 
 class Name(Enum):
-    """Looked up with each message: by identity, at the speed of an object."""
+    """Member of a table. It is looked up with each message, so it hashes as any object does: faster than an enum."""
 
     __hash__ = object.__hash__
 
@@ -19,6 +19,6 @@ DoT = TypeVar("DoT", bound=Name)
 def rows(
     state: StateT, changes: Mapping[EventT, tuple[StateT, *tuple[DoT, ...]]], *ignored: EventT
 ) -> dict[EventT, tuple[StateT, tuple[DoT, ...]]]:
-    """What `state` becomes with each event, and what follows. ignored: events that change nothing."""
+    """The rows of `state`: for each event the state after it, and what to do. ignored: events that change nothing."""
     unchanged: dict[EventT, tuple[StateT, tuple[DoT, ...]]] = dict.fromkeys(ignored, (state, ()))
     return unchanged | {event: (after, tuple(actions)) for event, (after, *actions) in changes.items()}

@@ -45,7 +45,7 @@ def test_the_forecast_that_is_kept_is_the_one_from_scratch(
             return
         kept.update()
         scratch = authority.from_scratch()
-        known = [each for each in range(len(plan.members)) if kept.is_kept(each)]
+        known = [each for each in range(len(plan.members)) if kept.is_kept[each]]
         assert [round(kept.times[each], 5) for each in known] == [round(scratch.times[each], 5) for each in known]
 
     Player(plan, lambda id: slow.get(id, 1.0), compare).play()

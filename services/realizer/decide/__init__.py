@@ -1,1 +1,1 @@
-"""What to do next, from what was measured. No clock."""
+"""Decisions from what was measured: what to do next. No clock."""

@@ -1,11 +1,11 @@
-"""How far each behavior may go, given the sync points measured so far: the realizer's decisions, without a clock.
+"""Decisions of the realizer, without a clock: how far each behavior may go, given the sync points measured so far.
 
 Facts go in (`arrive`, `reach`), `advance(now)` says what to do about them, `deadline` when to ask again.
 
-An instant fires when all who share it are there and all it waits for has been measured. Until then those who are
-early hold; the last to come is told to pass, and never stops. What cannot hold is kept back where it last can, so
-that by prediction it comes on time, and told to be faster or slower if that does not do; every new fact corrects
-the prediction. Only what a fact touches is looked at again.
+An instant fires when all behaviors that share it are there and all it waits for has been measured. Until then
+behaviors that are early hold; the last to come is told to pass, and never stops. A behavior that cannot hold is kept
+back where it last can, so that by prediction it comes on time, and told to be faster or slower if that is not enough;
+every new fact corrects the prediction. Only what a fact touches is looked at again.
 """
 
 import heapq
@@ -15,24 +15,24 @@ from math import inf, isfinite
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.realizer.config import RealizerConfig
 from engage_hri.services.realizer.decide.effects import Begin, Effect, Extend, Pace
-from engage_hri.services.realizer.decide.outlook import SURPRISE, Outlook
-from engage_hri.services.realizer.decide.patience import LatenessWatch
+from engage_hri.services.realizer.decide.expectations import SURPRISE, Expectations
+from engage_hri.services.realizer.decide.lateness import LatenessWatch
 from engage_hri.services.realizer.plan.assembly import Member
 from engage_hri.services.realizer.plan.planner import Plan
 from engage_hri.services.realizer.plan.schedule import EPSILON
 from engage_hri.services.realizer.points import Point, performer
 
 NOTICEABLE: Seconds = 0.02
-"""Planned instants that differ by less are not worth a message."""
+"""Seconds; planned instants that differ by less are not worth a message."""
 
 
-class Decisions(Outlook):
+class Decisions(Expectations):
     """The state of one performance. began: loop time of the block's start; all times are of that clock."""
 
     def __init__(self, plan: Plan, began: Seconds, config: RealizerConfig) -> None:
         super().__init__(plan, began)
         self.config = config
-        self.patience = LatenessWatch(config)
+        self.lateness_watch = LatenessWatch(config)
         self._through: dict[str, int] = {}
         self._granted_at: dict[str, Seconds] = {}
         self.replan(plan)
@@ -43,8 +43,8 @@ class Decisions(Outlook):
         self._set_plan(plan)
         self._look_ahead()
         size = len(plan.net.transitions)
-        self._unmet = [len(sources) for sources in self._wiring.waits_for]
-        """Of each transition: what has not been measured that it waits for, and who has not begun that is to come."""
+        self._unmet = [len(sources) for sources in self._index.waits_for]
+        """For each transition, the number of those it waits for, and of its behaviors that have not begun."""
         for transition, members in enumerate(plan.members):
             self._unmet[transition] += sum(self._is_to_come(member) for member in members)
         self._unreached = [len(members) for members in plan.members]
@@ -66,14 +66,14 @@ class Decisions(Outlook):
                 for point in points:
                     self.forecast.require(plan.at[point])
             if behavior not in plan.chains:
-                self.patience.forget(behavior)
+                self.lateness_watch.forget(behavior)
             elif not self.has_ended(behavior):
                 self._await(behavior)
 
     # -- facts ---------------------------------------------------------------------------------------------------
 
     def arrive(self, point: Point, at: Seconds) -> None:
-        """The behavior holds at `point`. What cannot be true is ignored."""
+        """Note that the behavior holds at `point`. A report that cannot be true is ignored."""
         if isfinite(at) and point not in self.arrived and self._is_ahead(point):
             at = self._heard[point.behavior] = self._not_before_last(point.behavior, at)
             self._learn(point, at)
@@ -82,13 +82,13 @@ class Decisions(Outlook):
             self._watch(point.behavior)
 
     def reach(self, point: Point, at: Seconds) -> tuple[Point, ...]:
-        """The behavior has passed `point`: it, and earlier points whose report was lost, unless known already.
+        """Note that the behavior has passed `point`, and earlier ones that were not reported; returns what is news.
 
-        What cannot be true is ignored.
+        A report that cannot be true is ignored.
         """
         if not isfinite(at):
             return ()
-        if point in self._wiring.foreign:
+        if point in self._index.foreign:
             if point not in self.reached:
                 self.reached[point] = at
                 self._note(point)
@@ -114,7 +114,7 @@ class Decisions(Outlook):
     def _note(self, point: Point) -> None:
         """Count a point that is reached, or arrived at, into its instant."""
         transition = self.plan.at[point]
-        member = self._wiring.members.get(point)
+        member = self._index.members.get(point)
         at = self.reached.get(point)
         self._dirty.add(transition)
         if self.forecast is not None:
@@ -129,7 +129,7 @@ class Decisions(Outlook):
 
     def _fire(self, transition: int, at: Seconds) -> None:
         self._instants[transition] = at
-        for target in self._wiring.awaited_by[transition]:
+        for target in self._index.awaited_by[transition]:
             self._unmet[target] -= 1
             if not self._unmet[target]:
                 self._open(target)
@@ -137,20 +137,20 @@ class Decisions(Outlook):
             self.forecast.fix(transition, at)
 
     def _open(self, transition: int) -> None:
-        """All that it waits for has been measured."""
+        """Take up an instant: all that it waits for has been measured."""
         self._dirty.add(transition)
         if self.forecast is not None:
             self.forecast.require(transition)
 
     @property
     def is_over(self) -> bool:
-        """Has everything ended that the block waits for?"""
+        """True if everything has ended that the end of the block waits for."""
         return not self._unended
 
     # -- decisions -----------------------------------------------------------------------------------------------
 
     def advance(self, now: Seconds) -> list[Effect]:
-        """What to do now. Extensions come before beginnings: who hands over leaves before his successor comes."""
+        """Decide what to do now. Extensions come first: a behavior hands over before another takes its place."""
         self._conclude(now)
         while self._wakes and self._wakes[0][0] <= now + EPSILON:
             self._dirty.add(heapq.heappop(self._wakes)[1])
@@ -160,17 +160,17 @@ class Decisions(Outlook):
             if behavior in self.begun and not self.has_ended(behavior):
                 effects += self._extension(behavior, now)
         self._touched.clear()
-        # Of two that begin together on one part, the body leaves it to the later: who that is stands in the plan.
+        # Of two that begin together on one part, the body leaves it to the later command: the plan has the order.
         for behavior in sorted(beginning, key=self.plan.entering.index) if len(beginning) > 1 else beginning:
             through = self._furthest(behavior, now)
             self.paces[behavior] = pace(behavior, self, now)
             effects.append(Begin(behavior, self._points[behavior][through].sync, self.paces[behavior]))
             self._watch(behavior)
-        effects += self.patience.overdue(now)
+        effects += self.lateness_watch.overdue(now)
         return effects
 
     def _decide_all(self, now: Seconds) -> list[str]:
-        """Decide what is to be, until nothing follows from it; who begins."""
+        """Decide the instants that something has changed for until nothing follows; returns behaviors that begin."""
         beginning: list[str] = []
         count = 0
         while self._dirty:
@@ -185,14 +185,14 @@ class Decisions(Outlook):
 
     @property
     def deadline(self) -> Seconds | None:
-        """When to ask again, whatever happens until then."""
+        """Time at which to call `advance` even if nothing happens until then; None: there is no need."""
         wake = self._wakes[0][0] if self._wakes else inf
-        patience, overdue = self.patience.deadline, self._next_lateness_check
-        at = min(wake, inf if patience is None else patience, inf if overdue is None else overdue)
+        report_due, check_due = self.lateness_watch.deadline, self._next_lateness_check
+        at = min(wake, inf if report_due is None else report_due, inf if check_due is None else check_due)
         return None if at == inf else at
 
     def _conclude(self, now: Seconds) -> None:
-        """What is expected at another time than before is decided anew."""
+        """Decide again about instants that are expected at another time than before."""
         for transition in self._changes(now):
             if transition < len(self.plan.members):
                 if not self._unmet[transition]:
@@ -206,16 +206,16 @@ class Decisions(Outlook):
         missing = [member for member in members if member.kind != "start" and not self._is_there(member)]
         may_pass = missing[0] if len(missing) == 1 and missing[0].can_wait else None
         ready = max(
-            (self._instants[source] + lag for source, lag in self._wiring.waits_for[transition]), default=self.began
+            (self._instants[source] + lag for source, lag in self._index.waits_for[transition]), default=self.began
         )
         due = ready if self.forecast is None else max(ready, self.forecast.times[transition])
         for member in missing:
-            if self._wiring.pauses(member.point):
+            if member.point in self._index.pauses:
                 self._decide_pause(transition, member, due, now)
         if due > now + EPSILON:
             self._wake(transition, due)
             if may_pass is not None and (arrival := self._arrival(may_pass)) is not None and arrival >= due - EPSILON:
-                # Told no earlier than it needs to know: should it be faster than expected, it must wait after all.
+                # Not told earlier than necessary: if the behavior is faster than expected, it must wait after all.
                 if ready - self.config.lead > now + EPSILON:
                     self._wake(transition, ready - self.config.lead)
                 else:
@@ -230,11 +230,11 @@ class Decisions(Outlook):
                     beginning.append(member.behavior)
 
     def _is_to_come(self, member: Member) -> bool:
-        """Is it of a behavior that has not even begun, and later than its start?"""
+        """True if the behavior has not begun and comes to the instant later than with its start."""
         return member.kind != "start" and member.behavior in self._points and member.behavior not in self.begun
 
     def _follow(self, behavior: str, now: Seconds) -> None:
-        """It begins: when its points are to be matters from now on."""
+        """Forecast the points of a behavior that begins: its instants no longer wait for its beginning."""
         for transition in {self.plan.at[point] for point in self._points.get(behavior, ())}:
             member = next(each for each in self.plan.members[transition] if each.behavior == behavior)
             if member.kind != "start":
@@ -248,7 +248,7 @@ class Decisions(Outlook):
         self._conclude(now)
 
     def _decide_pause(self, transition: int, member: Member, due: Seconds, now: Seconds) -> None:
-        """An utterance goes through a word gap unless it would be noticeably early; it is told just before."""
+        """Let an utterance through a word gap unless it would be noticeably early; it is told just before."""
         arrival = self._arrival(member)
         if arrival is None or (transition, member.behavior) in self._granted:
             return
@@ -263,7 +263,7 @@ class Decisions(Outlook):
             self._touched.add(member.behavior)
 
     def _extension(self, behavior: str, now: Seconds) -> Iterable[Extend]:
-        """Its new authority, if that is further than before or asks for another pace."""
+        """The command to go on, if the behavior may go further than before or is to go at another pace."""
         known, before = self._through[behavior], self.paces.get(behavior, ())
         through = self._furthest(behavior, now)
         after = pace(behavior, self, now)
@@ -273,7 +273,7 @@ class Decisions(Outlook):
             yield Extend(behavior, self._points[behavior][through].sync, after)
 
     def _furthest(self, behavior: str, now: Seconds) -> int:
-        """The number of the last point that it may go through."""
+        """Number of the last point that the behavior may go through."""
         points = self._points[behavior]
         known = furthest = self._through.get(behavior, -1)
         for number in range(known + 1, len(points)):
@@ -286,38 +286,38 @@ class Decisions(Outlook):
         return max(0, furthest)
 
     def may_pass(self, point: Point) -> bool:
-        if point in self.reached or not (self.member(point).can_wait or self._wiring.pauses(point)):
+        if point in self.reached or not (self.member(point).can_wait or point in self._index.pauses):
             return True
         return (self.plan.at[point], point.behavior) in self._granted
 
     def _wake(self, transition: int, at: Seconds) -> None:
         heapq.heappush(self._wakes, (at, transition))
 
-    # -- who owes a report ---------------------------------------------------------------------------------------
+    # -- reports that are due ------------------------------------------------------------------------------------
 
     def _watch(self, behavior: str) -> None:
         chain = self.plan.chains.get(behavior)
         if chain is None or behavior not in self.begun or performer(chain.behavior) != "body":
             return
-        points, number = chain.points, self._next.get(behavior, 0)
+        points, number = chain.points, self.next_number(behavior)
         if number >= len(points):
-            self.patience.forget(behavior)
+            self.lateness_watch.forget(behavior)
             return
         is_there = self.holds(points[number])
         if is_there and not self.may_pass(self.member(points[number]).point):
-            self.patience.forget(behavior)
+            self.lateness_watch.forget(behavior)
             return
         since = self.reached[points[number - 1]] if number else self.begun[behavior]
         natural = chain.segments[number - 1].natural if number else 0.0
         asked = self._asked(points[number], since + natural)
         expected = max(since + natural, asked, self._granted_at[behavior] if is_there else 0.0)
-        self.patience.expect(behavior, points[number].sync, expected, natural)
+        self.lateness_watch.expect(behavior, points[number].sync, expected, natural)
 
     def _await(self, behavior: str) -> None:
-        """What is expected of it next, now that it has come so far."""
+        """Look at the next point where the behavior must ask, and expect its next report."""
         points = self._points[behavior]
-        for point in points[self._next.get(behavior, 0) :]:
-            # Whether it comes on time to where it must ask next can be told only now that it is under way.
+        for point in points[self.next_number(behavior) :]:
+            # Only now that it is under way can be told whether it comes on time to the point where it must ask next.
             if not self.may_pass(point):
                 self._dirty.add(self.plan.at[point])
                 break
@@ -326,7 +326,7 @@ class Decisions(Outlook):
     # -- other blocks --------------------------------------------------------------------------------------------
 
     def follow(self, points: Iterable[Point]) -> None:
-        """Others want to know when these are to be: see `ahead`."""
+        """Forecast these points from now on: other blocks are tied to them (see `ahead`)."""
         self._followed.update(points)
         if self.forecast is None:
             self.replan(self.plan)
@@ -336,7 +336,7 @@ class Decisions(Outlook):
 
 
 def pace(behavior: str, decisions: "Decisions", now: Seconds) -> Pace:
-    """When it is to come to its points, up to the next where it must ask; empty if that is when it comes anyway."""
+    """Instants for the behavior's points up to the next where it must ask; empty if it will come to them anyway."""
     forecast, plan = decisions.forecast, decisions.plan
     if forecast is None or behavior not in plan.chains:
         return ()
@@ -364,7 +364,7 @@ def pace(behavior: str, decisions: "Decisions", now: Seconds) -> Pace:
 
 
 def differ_noticeably(one: Pace, other: Pace) -> bool:
-    """Noticeably?"""
+    """True if `other` has a new point, or moves one by more than NOTICEABLE, or if only one of the two is empty."""
     if not one or not other:
         return one != other
     before = dict(one)

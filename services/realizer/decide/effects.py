@@ -1,16 +1,16 @@
-"""What is to be done: the realizer's decisions, as its shell carries them out."""
+"""Decisions as values: what `Decisions.advance` says is to be done."""
 
 from msgspec import Struct
 
 from engage_hri.schemas.units import Seconds
-from engage_hri.services.realizer.decide.patience import Late, Stalled
+from engage_hri.services.realizer.decide.lateness import Late, Stalled
 
 Pace = tuple[tuple[str, Seconds], ...]
-"""Sync points and their instants, by loop time, where a behavior's own pace would miss them. Empty: as is natural."""
+"""Sync points and their instants, by loop time, where the behavior's natural pace would miss them; else empty."""
 
 
 class Begin(Struct, frozen=True):
-    """Start `behavior`; it may go through `through` without asking. pace: see `Pace`; empty: as is natural."""
+    """Start `behavior`; it may go through `through` without asking."""
 
     behavior: str
     through: str
@@ -18,7 +18,7 @@ class Begin(Struct, frozen=True):
 
 
 class Extend(Struct, frozen=True):
-    """`behavior` may now go through `through`, and is to come to its points as `pace` says."""
+    """Let `behavior` go through `through` now, and come to its points as `pace` says."""
 
     behavior: str
     through: str

@@ -1,4 +1,4 @@
-"""How fast the parts of a body have been so far: what estimates are corrected with."""
+"""Measured speed of the parts of a body, to correct its estimates with."""
 
 from collections import deque
 from collections.abc import Iterable, Mapping
@@ -10,15 +10,21 @@ from engage_hri.schemas.units import Seconds
 SHORT: Seconds = 0.05
 """A phase shorter than this says nothing about speed."""
 PLAUSIBLE = (0.5, 4.0)
-"""Times its estimate. Who needs less was nearer than believed, who needs more stood still: neither is a speed."""
+"""Least and most ratio of measured to estimated time that says something about speed.
+
+Less, and the part was nearer than believed; more, and it stood still.
+"""
 NOISE = 0.05
-"""Nearer to 1 than this, the estimate is right."""
+"""Difference of a ratio from 1 below which the estimate counts as right."""
 REMEMBERED = 9
-"""Phases of a part that count."""
+"""Number of the latest phases of a part that count."""
 
 
 class Experience:
-    """estimates: by behavior. A joint that was twice as slow will be twice as slow in the next phases too."""
+    """Measured speed of each part. A joint that was twice as slow will be twice as slow in the next phases, too.
+
+    estimates: of the body, by behavior.
+    """
 
     def __init__(self, estimates: Mapping[str, Estimate]) -> None:
         self._parts = {id: estimate.parts for id, estimate in estimates.items()}
@@ -30,11 +36,11 @@ class Experience:
         self._factor: dict[str, float] = {}
 
     def factor(self, behavior: str) -> float:
-        """How many times longer than estimated it is expected to take."""
+        """Factor by which the behavior is expected to take longer than estimated."""
         return max((self._factor.get(part, 1.0) for part in self._parts.get(behavior, ())), default=1.0)
 
     def learn(self, behavior: str, expected: Seconds, took: Seconds) -> Iterable[str]:
-        """A phase of `behavior` took so long; the behaviors of which more, or less, is expected now."""
+        """Note that a phase of `behavior` took so long; returns the behaviors that have another `factor` now."""
         if expected < SHORT or not PLAUSIBLE[0] <= took / expected <= PLAUSIBLE[1]:
             return ()
         changed: dict[str, None] = {}

@@ -1,4 +1,4 @@
-"""When each instant of a running block will be, as far as is known: a fact costs what it changes, not the whole net.
+"""Forecast of the instants of a running block: a new fact costs what it changes, not the whole net.
 
 Longest paths from what was measured, through phases at the pace measured so far and through bounds. What stretches
 (a phase within the body's shortest and longest time) gives way where a bound could not be kept otherwise.
@@ -15,13 +15,14 @@ from engage_hri.services.realizer.plan.schedule import EPSILON
 from engage_hri.services.realizer.points import Point
 
 REPAIRS = 200
-"""Bounds that are made way for in one go, before those that are left are given up for this time."""
+"""Most bounds that are made way for in one `update`; those that cannot be kept then are given up for this time."""
 
 
 class Forecast(LongestPaths):
-    """times: of each transition that was measured, that is required, or that those depend on.
+    """Expected times of the transitions: those that were measured, that are required, or that those depend on.
 
-    factor: how much longer than estimated a behavior takes, by its id. foreseen: points of other blocks.
+    factor: how many times longer than estimated a behavior takes, by its id. foreseen: expected times of points of
+    other blocks.
     """
 
     def __init__(
@@ -31,12 +32,12 @@ class Forecast(LongestPaths):
         size = len(net.transitions)
         super().__init__(size, began)
         self._there: list[Seconds] = [began] * size
-        """When the last of those was there who are there."""
+        """Time at which the latest of those behaviors came that are at the instant."""
         self._factor = factor
         self._phase_to: dict[tuple[str, int], int] = {}
         self._phase_from: dict[tuple[str, int], int] = {}
         self._natural: dict[int, tuple[Seconds, Seconds]] = {}
-        """Of arcs of phases: asked and least as estimated."""
+        """Of the arcs of phases: `asked` and `least` as estimated."""
         self._of_behavior: dict[str, list[int]] = {}
         self._node_of: dict[str, int] = {}
         self._given_way: set[int] = set()
@@ -44,7 +45,7 @@ class Forecast(LongestPaths):
         for rank, transition in enumerate(order(net) or range(size)):
             self._rank[transition] = rank
         for place in net.places:
-            # Nothing is earlier than the block's start anyway.
+            # Other places from the block's start say nothing: no instant is earlier than that.
             if place.kind != "idle" and (place.source or place.lag > 0.0):
                 behavior = place.behavior if place.kind == "phase" else ""
                 arc = self._add(place.source, place.target, place.lag, min(place.shortest, place.lag), behavior)
@@ -55,12 +56,12 @@ class Forecast(LongestPaths):
             for bound in net.bounds
             if bound.kind == "phase"
         }
-        for bound in plan.bounds:
+        for bound in net.bounds:
             behavior = bound.behavior if bound.kind == "phase" else ""
             least = bound.lag if not behavior else -inf if bound.stretch is None else bound.lag - bound.stretch
             self._add(bound.source, bound.target, bound.lag, least, behavior, is_bound=True)
         self._elsewhere: dict[int, int] = {}
-        """Of instants with points of other blocks: the arc that keeps them to what those foresee."""
+        """For each instant with points of other blocks, the arc that keeps it no earlier than those blocks expect."""
         for point in plan.foreign:
             transition = plan.at[point]
             if transition not in self._elsewhere:
@@ -90,7 +91,7 @@ class Forecast(LongestPaths):
         return number
 
     def _drop_idle_bounds(self) -> None:
-        """A phase need not be bounded from above where nothing but the phase itself makes its end come late."""
+        """Switch off upper bounds of phases that nothing but the phase itself can make end late."""
         pending = {arc.source for arc in self._arcs if arc.is_bound and arc.behavior}
         while pending:
             here = pending.pop()
@@ -106,24 +107,24 @@ class Forecast(LongestPaths):
     # -- facts ---------------------------------------------------------------------------------------------------
 
     def fix(self, transition: int, at: Seconds) -> None:
-        """The instant was at `at`."""
-        expected, was_known = self.times[transition], self._is_known[transition]
-        self._is_fact[transition] = self._is_known[transition] = True
+        """Set the instant: all of it has happened, at `at`."""
+        expected, was_kept = self.times[transition], self.is_kept[transition]
+        self._is_fact[transition] = self.is_kept[transition] = True
         for number in self._in[transition]:
             if self._arcs[number].is_bound and not self._arcs[number].behavior:
                 self.require(self._arcs[number].source)
-        if was_known and abs(at - expected) <= FINEST:
+        if was_kept and abs(at - expected) <= FINEST:
             self._uncause(transition)
             return
         self._set(transition, at, -1)
-        if was_known and at < expected:
+        if was_kept and at < expected:
             for effect in list(self._effects[transition]):
                 self._invalidate(effect)
             for number in self._in[transition]:
                 self._touch(self._arcs[number].source)
 
     def passed(self, behavior: str, transition: int, at: Seconds) -> None:
-        """The behavior has passed its point there; the others of the instant perhaps not yet."""
+        """Note that the behavior has passed its point there; the others of the instant perhaps not yet."""
         self.come(behavior, transition, at)
         if (number := self._phase_from.get((behavior, transition))) is None:
             return
@@ -142,18 +143,18 @@ class Forecast(LongestPaths):
             self._loosen(number)
             self._touch(node)
         for other in self._of_behavior[behavior]:
-            # What has begun to run no longer keeps its beginning back.
+            # A phase that has begun can no longer keep its own beginning back.
             if self._arcs[other].is_bound and self._arcs[other].target == transition:
                 self._switch_off(other)
 
     def _whereabouts(self, behavior: str) -> int:
-        """An instant of its own: when the behavior passed its latest point."""
+        """The node for the time at which the behavior passed its latest point; it belongs to no instant."""
         if (node := self._node_of.get(behavior)) is None:
             node = self._node_of[behavior] = self._new_node()
         return node
 
     def come(self, behavior: str, transition: int, at: Seconds) -> None:
-        """The behavior is at its point there, or past it."""
+        """Note that the behavior is at its point there, or past it."""
         self._there[transition] = max(self._there[transition], at)
         number = self._phase_to.get((behavior, transition))
         if number is None or not self._arcs[number].is_on:
@@ -171,12 +172,12 @@ class Forecast(LongestPaths):
             self._set(transition, self._base[transition], -1)
 
     def overdue(self, transition: int, at: Seconds) -> None:
-        """What was to come there has not; it is not expected before `at`."""
+        """Expect the instant no earlier than `at`: it has not come yet."""
         if not self._is_fact[transition]:
             self._raise_base(transition, at)
 
     def foresee(self, transition: int, at: Seconds) -> None:
-        """Another block expects its point there at `at` now."""
+        """Expect the points of other blocks at this instant at `at`."""
         number = self._elsewhere[transition]
         node = self._arcs[number].source
         before, self.times[node] = self.times[node], at
@@ -185,7 +186,7 @@ class Forecast(LongestPaths):
         self._touch(node)
 
     def relearn(self, behaviors: Iterable[str]) -> None:
-        """The factors of these have changed."""
+        """Take over the changed factors of these behaviors."""
         for behavior in behaviors:
             factor = self._factor(behavior)
             for number in self._of_behavior.get(behavior, ()):
@@ -197,23 +198,23 @@ class Forecast(LongestPaths):
     # -- questions -----------------------------------------------------------------------------------------------
 
     def phase(self, behavior: str, target: int) -> Seconds:
-        """How long the phase that ends there is to take."""
+        """Expected seconds of the behavior's phase that ends at `target`."""
         number = self._phase_to.get((behavior, target))
         return 0.0 if number is None else self._arcs[number].seconds
 
     def longest(self, behavior: str, target: int) -> Seconds:
-        """How long the phase that ends there may take; inf where the body can wait."""
+        """Most seconds that the phase may take that ends at `target`; inf where the body can wait."""
         return self._longest.get((behavior, target), inf) * self._factor(behavior)
 
     def is_hurried(self, behavior: str) -> bool:
-        """Is it to be faster than is natural?"""
-        if not self._given_way:  # as is usual
+        """True if a phase of the behavior is to be faster than is natural."""
+        if not self._given_way:  # the usual case
             return False
         hurried = (number for number in self._given_way if not self._arcs[number].is_bound)
         return any(self._arcs[number].behavior == behavior for number in hurried)
 
     def update(self) -> set[int]:
-        """Draw the conclusions of all facts since the last time; the transitions whose time has changed."""
+        """Draw the conclusions of all facts since the last time; returns the transitions that have moved."""
         if not self._todo and not self._old:
             return set()
         if self._given_way or self._broken:
@@ -230,15 +231,13 @@ class Forecast(LongestPaths):
             if excess is None:
                 break
             arc = self._arcs[excess]
-            self._make_way([*self._reasons(arc.source), excess], self._violation(arc))
+            missed_by = self.times[arc.source] + arc.seconds - self.times[arc.target]
+            self._make_way([*self._reasons(arc.source), excess], missed_by)
         else:
             self._give_up()
         changed = {each for each, old in self._old.items() if abs(self.times[each] - old) > FINEST}
         self._old.clear()
         return changed
-
-    def _violation(self, arc: Arc) -> Seconds:
-        return self.times[arc.source] + arc.seconds - self.times[arc.target]
 
     def _switch_off(self, number: int) -> None:
         self._given_way.discard(number)
@@ -294,7 +293,7 @@ def full_forecast(
     arrived: Mapping[Point, Seconds],
     instants: Mapping[int, Seconds],
 ) -> Forecast:
-    """Of every instant, from scratch: points that are reached or arrived at, and instants that are over."""
+    """Forecast of every instant, from scratch. instants: those that are over."""
     forecast = Forecast(plan, began, factor, foreseen)
     for point, at in reached.items():
         if point in plan.at:

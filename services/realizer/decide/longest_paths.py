@@ -10,14 +10,14 @@ from engage_hri.schemas.units import Seconds
 from engage_hri.services.realizer.plan.schedule import EPSILON
 
 FINEST: Seconds = 1e-8
-"""Changes below are rounding."""
+"""Seconds; smaller changes are rounding."""
 
 
 class Arc(Struct, gc=False):
-    """`target` is no earlier than `source` + `seconds`.
+    """Lower bound: `target` is no earlier than `source` + `seconds`.
 
-    asked: what `seconds` is when nothing gives way. least: what it may give way to. behavior: whose phase it is.
-    is_bound: may be broken if nothing else gives way. is_on: False once it says nothing any more.
+    asked: what `seconds` is when nothing gives way. least: what it may give way to. behavior: set if it is a phase.
+    is_bound: may be broken if nothing else gives way. is_on: False once it has no effect any more.
     """
 
     source: int
@@ -31,42 +31,41 @@ class Arc(Struct, gc=False):
 
 
 class Circle(Exception):
-    """These arcs lead back to their start and take longer than no time at all."""
+    """A cycle of arcs that takes more than no time: no times satisfy all of them."""
 
     def __init__(self, arcs: Sequence[int]) -> None:
         self.arcs = tuple(arcs)
 
 
 class LongestPaths:
-    """times: of each node that is a fact, or required, or that those depend on. The earliest that the arcs allow."""
+    """Earliest times that the arcs allow, for each node that is a fact, or required, or that those depend on.
+
+    is_kept: whether the time of a node is kept up to date; not needed while no decision depends on it.
+    """
 
     def __init__(self, size: int, began: Seconds) -> None:
         self.times: list[Seconds] = [began] * size
         self._base: list[Seconds] = [began] * size
-        """What a node is never earlier than, whatever the arcs say."""
+        """Time that a node is never earlier than, whatever the arcs say."""
         self._is_fact = [False] * size
-        self._is_known = [False] * size
-        """Is its time kept? What no decision depends on yet need not be known."""
+        self.is_kept = [False] * size
         self._cause: list[int] = [-1] * size
         self._effects: defaultdict[int, set[int]] = defaultdict(set)
         self._arcs: list[Arc] = []
         self._out: list[list[int]] = [[] for _ in range(size)]
         self._in: list[list[int]] = [[] for _ in range(size)]
         self._rank = [0] * size
-        """Nodes are looked at in this order."""
+        """Order in which nodes are looked at."""
         self._old: dict[int, Seconds] = {}
         self._todo: list[tuple[int, int]] = []
 
-    def is_kept(self, transition: int) -> bool:
-        return self._is_known[transition]
-
     def require(self, transition: int) -> None:
-        """Keep its time from now on, and all that it depends on."""
+        """Keep the time of this node, and of all that it depends on, from now on."""
         stack, found = [transition], []
         while stack:
             here = stack.pop()
-            if not self._is_known[here] and not self._is_fact[here]:
-                self._is_known[here] = True
+            if not self.is_kept[here] and not self._is_fact[here]:
+                self.is_kept[here] = True
                 found.append(here)
                 stack += [self._arcs[number].source for number in self._in[here] if self._arcs[number].is_on]
         for here in sorted(found, key=self._rank.__getitem__):
@@ -75,7 +74,7 @@ class LongestPaths:
     # -- propagation ---------------------------------------------------------------------------------------------
 
     def _relax(self) -> int | None:
-        """Move what is too early; the bound on a fact that cannot be kept then, if any. Raises Circle."""
+        """Move what is too early. Returns a bound on a fact that cannot be kept then, if any. Raises Circle."""
         violated: list[int] = []
         moves = 0
         while self._todo:
@@ -90,7 +89,7 @@ class LongestPaths:
                     if is_late and at > self.times[arc.target] + EPSILON:
                         violated.append(number)
                     continue
-                if not self._is_known[arc.target]:
+                if not self.is_kept[arc.target]:
                     continue
                 self._set(arc.target, at, number)
                 moves += 1
@@ -122,7 +121,7 @@ class LongestPaths:
             self._cause[transition] = -1
 
     def _invalidate(self, transition: int) -> None:
-        """Forget why `transition`, and all that follows from it, is as late as it is; and find out anew."""
+        """Forget why `transition`, and all that follows from it, is as late as it is; and compute that again."""
         stack, found = [transition], []
         seen = {transition}
         while stack:
@@ -137,7 +136,7 @@ class LongestPaths:
             self._recompute(here)
 
     def _recompute(self, transition: int) -> None:
-        if self._is_fact[transition] or not self._is_known[transition]:
+        if self._is_fact[transition] or not self.is_kept[transition]:
             return
         for number in self._in[transition]:
             arc = self._arcs[number]
@@ -166,7 +165,7 @@ class LongestPaths:
     def _set_seconds(self, number: int, seconds: Seconds) -> None:
         arc = self._arcs[number]
         before, arc.seconds = arc.seconds, seconds
-        # What is the same as before changes nothing: to find it out anew would only take time.
+        # Equal seconds change nothing: to compute the times again would only cost time.
         if seconds < before:
             self._loosen(number)
         elif seconds > before:
@@ -195,11 +194,11 @@ class LongestPaths:
         return path
 
     def _new_node(self) -> int:
-        """A fact that nothing leads to."""
+        """Add a node that is a fact, without arcs; returns its number."""
         self.times.append(0.0)
         self._base.append(0.0)
         self._is_fact.append(True)
-        self._is_known.append(True)
+        self.is_kept.append(True)
         self._cause.append(-1)
         self._out.append([])
         self._in.append([])

@@ -22,9 +22,13 @@ from engage_hri.schemas.units import Seconds
 from engage_hri.services.realizer.points import Point
 
 PlaceKind = Literal["phase", "delay", "order", "series", "handover", "idle"]
-"""handover: where the start of its successor cuts a behavior short. Nobody waits for it: who is early goes home."""
+"""Kinds of places and bounds.
+
+handover: the start of the successor cuts a behavior short. The successor does not wait for that: a behavior that
+is early goes home. series: nothing in the block asks for this order in so many words.
+"""
 Marking = bytes
-"""Tokens in each place; a byte each, so that the next marking is a copy and not a walk."""
+"""Tokens in each place, a byte for each: to copy a marking is quick."""
 
 
 class Transition(Struct, frozen=True, gc=False):
@@ -35,10 +39,11 @@ class Transition(Struct, frozen=True, gc=False):
 
 
 class Place(Struct, frozen=True, gc=False):
-    """From transition `source` to `target`, taking at least `lag` seconds. lines: of the XML that asks for it.
+    """Place from transition `source` to `target`; a token takes at least `lag` seconds through it.
 
-    shortest: what the lag can be at the very least; differs from `lag` only for the phase of a behavior.
-    behavior: whose phase it is, or who waits there for the sake of a later point of his that cannot.
+    shortest: the least that the lag can be; only the phase of a behavior has less than `lag`.
+    behavior: the one that has this phase, or that waits here since it cannot wait at a later point.
+    lines: of the XML that asks for it.
     """
 
     kind: PlaceKind
@@ -51,9 +56,10 @@ class Place(Struct, frozen=True, gc=False):
 
 
 class Bound(Struct, frozen=True, gc=False):
-    """`target` is no earlier than `source` + `lag`, and `lag` is negative: `source` is no later than ...
+    """Upper bound: `target` is no earlier than `source` + `lag`, so `source` is no later than `target` - `lag`.
 
-    kind phase: a behavior cannot wait in this phase, `stretch` seconds more than natural at most (None: any).
+    lag: negative, but for bounds on the start of the block. kind phase: a behavior cannot wait in this phase; it can
+    take `stretch` seconds more than natural (None: any).
     """
 
     kind: PlaceKind
@@ -66,7 +72,7 @@ class Bound(Struct, frozen=True, gc=False):
 
 
 class PetriNet(Struct, frozen=True, dict=True):
-    """Transition 0 is the start of the block, the last one its end."""
+    """A timed marked graph. Transition 0 is the start of the block, the last one its end."""
 
     transitions: tuple[Transition, ...]
     places: tuple[Place, ...]
@@ -74,16 +80,17 @@ class PetriNet(Struct, frozen=True, dict=True):
 
     @cached_property
     def initial(self) -> Marking:
+        """The marking before the block starts: a token in each `idle` place."""
         return bytes(place.kind == "idle" for place in self.places)
 
     @cached_property
     def inputs(self) -> Sequence[Sequence[int]]:
-        """Of each transition, the places it takes a token from."""
+        """For each transition, the places that it takes a token from."""
         return self._by_transition([place.target for place in self.places])
 
     @cached_property
     def outputs(self) -> Sequence[Sequence[int]]:
-        """Of each transition, the places it puts a token into."""
+        """For each transition, the places that it puts a token into."""
         return self._by_transition([place.source for place in self.places])
 
     def _by_transition(self, ends: list[int]) -> list[list[int]]:
@@ -94,7 +101,7 @@ class PetriNet(Struct, frozen=True, dict=True):
 
 
 def enabled(net: PetriNet, marking: Marking, among: Iterable[int] | None = None) -> tuple[int, ...]:
-    """The transitions (of those `among`, or all) whose every input place holds a token."""
+    """The transitions that have a token in each input place. among: those to look at; None: all."""
     inputs = net.inputs
     each = range(len(net.transitions)) if among is None else among
     return tuple(one for one in each if all(marking[place] for place in inputs[one]))
@@ -113,7 +120,7 @@ def fire(net: PetriNet, marking: Marking, transition: int) -> Marking:
 
 
 class Firing(NamedTuple):
-    """fired: in order. marking: after the last of them."""
+    """Result of firing. fired: the transitions, in order. marking: after the last of them."""
 
     fired: tuple[int, ...]
     marking: Marking
@@ -150,35 +157,24 @@ def fire_once_each(net: PetriNet, marking: Marking) -> Firing:
 
 
 def is_live(net: PetriNet) -> bool:
-    """Can every transition always fire again? For a marked graph: does every cycle hold a token?
+    """True if every transition can always fire again; in a marked graph, if every cycle holds a token.
 
-    It does if the transitions can be put in order along the places that hold none.
+    That is so if the transitions can be put in order along the places that hold none.
     """
     return order(net) is not None
 
 
 def order(net: PetriNet) -> tuple[int, ...] | None:
-    """The transitions in an order along all places without a token; None if there is none."""
-    initial, places = net.initial, net.places
-    missing = [sum([not initial[place] for place in into]) for into in net.inputs]
-    found = [each for each, count in enumerate(missing) if not count]
-    for here in found:  # it grows
-        for place in net.outputs[here]:
-            if not initial[place]:
-                missing[target := places[place].target] -= 1
-                if not missing[target]:
-                    found.append(target)
-    return tuple(found) if len(found) == len(net.transitions) else None
+    """The transitions in an order along all places without a token; None if there is no such order."""
+    fired, _ = fire_once_each(net, net.initial)
+    return fired if len(fired) == len(net.transitions) else None
 
 
 def is_safe(net: PetriNet) -> bool:
-    """Does no place ever hold a second token? For a live marked graph: is each on a cycle that holds one alone?"""
-    tokens = {(place.source, place.target) for place, count in zip(net.places, net.initial, strict=True) if count}
-    open_places = {
-        (place.source, place.target)
-        for place, count in zip(net.places, net.initial, strict=True)
-        if not count and (place.target, place.source) not in tokens
-    }
+    """True if no place ever holds two tokens; in a live marked graph, if each place is on a cycle with one token."""
+    ends = [((place.source, place.target), count) for place, count in zip(net.places, net.initial, strict=True)]
+    tokens = {pair for pair, count in ends if count}
+    open_places = {pair for pair, count in ends if not count and pair[::-1] not in tokens}
     for source, target in sorted(tokens, key=lambda ends: ends[0] - ends[1], reverse=True):
         if not open_places:
             break
@@ -188,7 +184,7 @@ def is_safe(net: PetriNet) -> bool:
 
 
 def _reachable(net: PetriNet, start: int, *, forward: bool) -> set[int]:
-    """Along places that hold no token."""
+    """The transitions that a path from `start` leads to, or back to, through places that hold no token."""
     found, todo = {start}, [start]
     while todo:
         here = todo.pop()

@@ -1,7 +1,7 @@
 """A net as PNML (ISO/IEC 15909-2, place/transition nets) and back, for the tools of others.
 
-What a P/T net has no word for (seconds, sync points, XML lines, bounds) stands in `toolspecific` elements of ours,
-which other tools pass over.
+P/T nets have no words for seconds, sync points, XML lines and bounds. These stand in `toolspecific` elements of
+ours, which other tools pass over.
 """
 
 from collections.abc import Iterator

@@ -1,1 +1,1 @@
-"""Live blocks on the event loop."""
+"""Live blocks on the event loop: they send, receive and tell what happens."""

@@ -1,4 +1,4 @@
-"""What one block asks of the body."""
+"""Requests of one block to the body."""
 
 from collections.abc import Iterable
 
@@ -11,11 +11,14 @@ from engage_hri.services.realizer.decide.effects import Begin, Extend
 from engage_hri.services.requests.ends import Pending, Requester
 
 LONGEST_WAY: Seconds = 10.0
-"""Home: a body that does not say that it is there is not asked for longer."""
+"""Most seconds on the way home; a body that does not say that it is there is not asked for longer."""
 
 
 class ControlLink:
-    """request: the id of the block's; a behavior's is `<request>/<behavior>`. No behavior's id holds a colon."""
+    """Sends the body what one block asks of it.
+
+    request: the id of the block's request; that of a behavior is `<request>/<behavior>`, and ids hold no colon.
+    """
 
     def __init__(self, bus: Bus, requests: Requester, request: str, block: str) -> None:
         self._bus = bus
@@ -24,24 +27,25 @@ class ControlLink:
         self._block = block
 
     def id(self, behavior: str) -> str:
-        """Of the request for a behavior, whoever performs it."""
+        """Id of the request for a behavior, to whatever service performs it."""
         return f"{self._request}/{behavior}"
 
     def perform(self, behavior: BlockBehavior, asked: Begin | Extend) -> Pending:
-        """Begin, or go on as far as is asked."""
+        """Ask the body to begin a behavior, or to go on as far as is asked."""
         perform = PerformBehavior(
             id=self.id(behavior.id),
             block=self._block,
             behavior=behavior,
-            through=asked.through.partition(":")[0],  # nobody asks for a repetition
+            through=asked.through.partition(":")[0],  # without the number of a repeated stroke
             pace=tuple(PlannedInstant(sync=sync, at=self._bus.stamp(at)) for sync, at in asked.pace),
         )
         return self._requests.send(keys.BEHAVIOR, perform)
 
     def abort(self, behavior: str) -> None:
+        """Cancel the request for a behavior."""
         self._requests.cancel(self.id(behavior), "aborted")
 
     def go_home(self, parts: Iterable[str], behavior: str = "") -> None:
-        """behavior: for whose sake; empty: the block's."""
+        """Send these parts home. behavior: the one that used them; empty: the whole block."""
         going = GoHome(id=f"{self.id(behavior)}:home", parts=tuple(sorted(parts)))
         self._requests.send(keys.BEHAVIOR, going, within=LONGEST_WAY)

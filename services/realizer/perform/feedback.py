@@ -1,4 +1,4 @@
-"""What the realizer says about a block while it runs, in the words of the block's dialect."""
+"""Feedback about a block while it runs, in the words of the block's dialect."""
 
 from collections.abc import Iterable, Mapping
 from math import inf
@@ -15,7 +15,6 @@ from engage_hri.schemas.feedback import (
     WarningFeedback,
     WarningKind,
 )
-from engage_hri.schemas.references import type_name
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.interface import Bus
 from engage_hri.services.realizer.decide.decisions import Decisions
@@ -23,47 +22,46 @@ from engage_hri.services.realizer.plan.planner import Plan
 from engage_hri.services.realizer.points import Point
 
 NOTICEABLE: Seconds = 0.1
-"""What people notice between what they see and what they hear; a prediction that moves less is not worth telling."""
+"""Seconds that people notice between what they see and hear; a prediction that moves by less is not told again."""
 
 AGAIN: Seconds = 0.001
-"""How long after a prediction the next may follow, for each point that it told: what it costs grows with these."""
+"""Seconds between predictions, for each point that the last one told: the cost grows with their number."""
 
 
 def moved_noticeably(old: Mapping[Point, Seconds], new: Mapping[Point, Seconds]) -> bool:
-    """Is any point of `new` expected at another time than `old` said, by more than people notice, or unheard of?
+    """True if a point of `new` is not in `old`, or has moved by more than people notice.
 
-    Points that `new` lacks have been, or were dropped: their feedback says so.
+    Points that `new` lacks have been, or were dropped: other feedback says so.
     """
     return any(point not in old or abs(time - old[point]) > NOTICEABLE for point, time in new.items())
 
 
 class Reporter:
-    """The feedback of one block. It never goes back in time: what is told late is told as of the last message."""
+    """The feedback of one block. It never goes back in time: what is told late gets the time of the last message."""
 
     def __init__(self, bus: Bus, block: str, tolerance: Seconds) -> None:
-        """tolerance: what misses its instant by more is late."""
+        """tolerance: seconds by which a point may miss its instant before it is reported as late."""
         self._bus = bus
         self._block = block
         self._tolerance = tolerance
         self._spelling: dict[Point, str | None] = {}
         self._late: set[Point] = set()
-        """Instants of behaviors of which that has been said."""
+        """Instants of behaviors that were reported as late."""
         self._character = ""
         self._latest: Seconds = -inf
-        """Of all that was told: nothing after it is told as of an earlier instant."""
+        """Time of the latest message; none after it has an earlier one."""
         self._predicted: Mapping[Point, Seconds] = {}
         self._not_before = 0.0
-        """When to look again whether the prediction has moved."""
+        """Earliest time for the next prediction."""
 
     def started(self, plan: Plan, began: Seconds) -> None:
         self._character = plan.block.character_id
         at = self._bus.stamp(self._no_earlier(began))
-        start = BlockProgress(block=self._block, progress="start", at=at, character_id=self._character)
-        self._say(start)
+        self._say(BlockProgress(block=self._block, progress="start", at=at, character_id=self._character))
         self._predict(plan, began, {point: plan.predicted(point) for point in _points(plan)})
 
     def may_expect(self) -> bool:
-        """Is it time to find out what is expected now?"""
+        """True if it is time to predict again."""
         return self._bus.now() >= self._not_before
 
     def expect(self, plan: Plan, began: Seconds, times: Mapping[Point, Seconds]) -> None:
@@ -78,7 +76,7 @@ class Reporter:
         points = []
         for point, time in times.items():
             if (sync := self._spelled(point, plan)) is not None:
-                type = type_name(plan.chains[point.behavior].behavior)
+                type = plan.chains[point.behavior].type
                 points.append(PlannedPoint(behavior=point.behavior, sync=sync, time=time, type=type))
         prediction = PredictionFeedback(
             block=self._block, points=tuple(points), at=self._bus.stamp(began), character_id=self._character
@@ -115,7 +113,7 @@ class Reporter:
             self.late(decisions.member(point).point, f"{point.sync} came {late:.2f} s later than it should")
 
     def late(self, instant: Point, message: str) -> None:
-        """Once for each instant of a behavior."""
+        """Warn that a behavior is late for an instant: once for each."""
         if instant not in self._late:
             self._late.add(instant)
             self.warn("LATE", message, instant.behavior)
@@ -132,7 +130,7 @@ class Reporter:
         self._say(warning)
 
     def interrupted(self, behavior: str, spoken: SpokenText | None) -> None:
-        """Somebody has asked for its end."""
+        """Warn that a behavior was ended on request."""
         said = f" after {spoken.text!r}" if spoken is not None else ""
         self.warn("INTERRUPTED", f"interrupted{said}", behavior)
 
@@ -149,7 +147,7 @@ class Reporter:
         self._say(progress)
 
     def _no_earlier(self, at: Seconds) -> Seconds:
-        """`at`, or when the last message was if that is later; the next is no earlier than that."""
+        """`at`, or the time of the latest message if that is later; the next message is no earlier than this."""
         self._latest = max(self._latest, at)
         return self._latest
 
@@ -157,15 +155,12 @@ class Reporter:
         self._bus.publish(keys.FEEDBACK, feedback)
 
     def _spelled(self, point: Point, plan: Plan) -> str | None:
-        """As the block's dialect has it; None of what feedback does not tell: what is no default point there."""
-        try:
-            return self._spelling[point]
-        except KeyError:
+        """The point's name in the block's dialect; None if feedback does not tell it: no default point there."""
+        if point not in self._spelling:
             is_repetition = point.sync.startswith("stroke:")
-            type = type_name(plan.chains[point.behavior].behavior)
-            spelled = None if is_repetition else dialect_sync(point.sync, type, plan.block.dialect)
-            self._spelling[point] = spelled
-            return spelled
+            type = plan.chains[point.behavior].type
+            self._spelling[point] = None if is_repetition else dialect_sync(point.sync, type, plan.block.dialect)
+        return self._spelling[point]
 
 
 def _points(plan: Plan) -> Iterable[Point]:

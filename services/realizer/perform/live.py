@@ -1,4 +1,4 @@
-"""A block from its request to its outcome: how it ends, and who ends with it."""
+"""The life of a block, from its request to its outcome: how it ends, and which blocks end with it."""
 
 import asyncio
 from collections import deque
@@ -14,7 +14,7 @@ Status = Literal["done", "failed", "interrupted"]
 
 
 class Ending(Struct, frozen=True):
-    """Why a block ends."""
+    """Reason for the end of a block."""
 
     status: Status
     fault: Fault | None = None
@@ -24,7 +24,7 @@ class Ending(Struct, frozen=True):
 class Live:
     """A block from its request to its outcome.
 
-    earlier: those that were there when it came. ended: resolved when its outcome is out. ending: how it is to end.
+    earlier: blocks that were live when it came. ended: resolved when its outcome is out. ending: how it is to end.
     """
 
     def __init__(self, request: PerformBlock, earlier: Sequence["Live"]) -> None:
@@ -33,11 +33,11 @@ class Live:
         self.earlier = list(earlier)
         self.ended: asyncio.Future[None] = loop.create_future()
         self.ending: asyncio.Future[Ending] = loop.create_future()
-        there = {each.request.block.id: each for each in reversed(earlier)}  # a second of an id is refused
+        there = {each.request.block.id: each for each in reversed(earlier)}  # a second one with an id is refused
         self.leaders = tuple([there[id] for id in request.follows if id in there])
-        """Those whose turn it goes on with: it ends with any of them that is not done."""
+        """Blocks that it continues (`follows`): it ends with any of them that ends otherwise than done."""
         self.ended_by: Live | None = None
-        """The one of them that it ends with."""
+        """The leader that it ends with."""
         self._followers: list[Live] = []
         for leader in self.leaders:
             leader._followers.append(self)
@@ -45,7 +45,7 @@ class Live:
                 self._end_with(leader)
 
     def stop(self, ending: Ending) -> None:
-        """End it now. The first to end it decides how. Its followers end at once: before they hear what is lost."""
+        """End it now, as the first call says. Its followers end at once, before they hear what is lost."""
         if self.ending.done():
             return
         self.ending.set_result(ending)
@@ -55,7 +55,7 @@ class Live:
             todo += [each for each in leader._followers if each._end_with(leader)]
 
     def _end_with(self, leader: "Live") -> bool:
-        """Whether it does."""
+        """End it because its leader ends; False if that is no reason, or it ends already."""
         ending = leader.ending.result()
         if ending.status == "done" or self.ending.done():
             return False
@@ -74,7 +74,7 @@ class Live:
 
     @property
     def outcome(self) -> BlockOutcome:
-        """As it is if nothing of it was performed."""
+        """The outcome if nothing of it was performed."""
         ending = self.ending.result()
         return BlockOutcome(
             id=self.request.id,

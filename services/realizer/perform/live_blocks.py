@@ -1,4 +1,4 @@
-"""What live blocks may be to one another: whose points others can name, when each is to be, or was, or never will."""
+"""Sync points of live blocks that other live blocks refer to: expected, reached or lost."""
 
 from collections import deque
 from collections.abc import Iterable, Iterator, Mapping
@@ -17,31 +17,32 @@ class TiedBlock(Protocol):
     """A block that is tied to points of others. Their behaviors are named `block:behavior`."""
 
     def hear(self, point: Point, at: Seconds) -> None:
-        """A point of another block is reached."""
+        """Take the news that a point of another block is reached."""
 
     def foresee(self, point: Point, at: Seconds) -> None:
-        """A point of another block is expected at another time than before."""
+        """Take the news that a point of another block is expected at another time than before."""
 
     def miss(self, behaviors: Iterable[str]) -> None:
-        """What has not been reached of these never will be."""
+        """Take the news that no more points of these behaviors will be reached."""
 
 
-class Author(Protocol):
-    """A block that is being performed."""
+class FollowedBlock(Protocol):
+    """A block that is being performed and that others may be tied to."""
 
     def follow(self, points: Iterable[Point]) -> None:
-        """Others are tied to these points of it: tell them from now on when they are expected."""
+        """Tell from now on when these points are expected: others are tied to them."""
 
 
-class _Page:
-    """Of one live block. lost: behaviors that were dropped. named: its points that others are tied to.
+class _Tracked:
+    """Points of one live block that others may be tied to.
 
-    expected: when these are to be, as far as is known and has been told.
+    lost: behaviors that were dropped. named: points that others are tied to. expected: the last expected time of each
+    of these points that was told.
     """
 
     def __init__(self, block: Block) -> None:
         self.block = block
-        self.author: Author | None = None
+        self.performance: FollowedBlock | None = None
         self.named: set[Point] = set()
         self.expected: dict[Point, Seconds] = {}
         self.reached: dict[Point, Seconds] = {}
@@ -53,68 +54,66 @@ class LiveBlocks:
     """All live blocks, from their request to their end. Ids are free again after that."""
 
     def __init__(self) -> None:
-        self._pages: dict[str, _Page] = {}
-        self._untold: deque[tuple[_Page, Point, Seconds]] = deque()
-        """What followers have not been told yet: they foresee otherwise for it, and theirs are told after that."""
+        self._tracked: dict[str, _Tracked] = {}
+        self._untold: deque[tuple[_Tracked, Point, Seconds]] = deque()
+        """Expected times that followers have yet to be told. What these expect because of them is told after that."""
         self._is_telling = False
 
     @contextmanager
     def opened(self, block: Block) -> Iterator[None]:
-        """The block lives inside."""
-        page = self._pages[block.id] = _Page(block)
+        """Keep the block as live inside the `with`."""
+        tracked = self._tracked[block.id] = _Tracked(block)
         try:
             yield
         finally:
-            del self._pages[block.id]
+            del self._tracked[block.id]
             ends = (BLOCK_ITSELF, *(behavior.id for behavior in block.behaviors))
-            for follower in list(page.followers):
+            for follower in list(tracked.followers):
                 follower.miss(f"{block.id}:{id}" for id in ends)
 
     @property
     def blocks(self) -> Mapping[str, Block]:
-        return {id: page.block for id, page in self._pages.items()}
+        """The live blocks, by id."""
+        return {id: tracked.block for id, tracked in self._tracked.items()}
 
     def reach(self, block: str, point: Point, at: Seconds) -> None:
-        """A point of a live block is reached. The block itself is the behavior `bml`."""
-        page = self._pages[block]
-        page.reached[point] = at
-        for follower in list(page.followers):
+        """Tell followers that a point of a live block is reached. The block itself is the behavior `bml`."""
+        tracked = self._tracked[block]
+        tracked.reached[point] = at
+        for follower in list(tracked.followers):
             follower.hear(_qualified(block, point), at)
 
-    def perform(self, block: str, author: Author) -> None:
-        """It begins."""
-        page = self._pages[block]
-        page.author = author
-        author.follow(page.named)
+    def perform(self, block: str, performance: FollowedBlock) -> None:
+        """Note that the block is performed now, by `performance`, which is asked for its expected times."""
+        tracked = self._tracked[block]
+        tracked.performance = performance
+        performance.follow(tracked.named)
 
     def foresee(self, block: str, expected: Mapping[Point, Seconds]) -> None:
-        """When points of a live block are to be. What is no news is not told."""
-        page = self._pages[block]
+        """Tell followers when points of a live block are expected, if that is news."""
+        tracked = self._tracked[block]
         for point, at in expected.items():
-            if abs(at - page.expected.get(point, inf)) > EPSILON:
-                page.expected[point] = at
-                self._untold.append((page, point, at))
-        if not self._is_telling:
-            self._is_telling = True
-            try:
-                self._tell()
-            finally:
-                self._is_telling = False
-
-    def _tell(self) -> None:
-        """One after the other: a turn may be a chain of more blocks than calls may be nested."""
-        while self._untold:
-            page, point, at = self._untold.popleft()
-            for follower in list(page.followers):
-                follower.foresee(_qualified(page.block.id, point), at)
+            if abs(at - tracked.expected.get(point, inf)) > EPSILON:
+                tracked.expected[point] = at
+                self._untold.append((tracked, point, at))
+        if self._is_telling:
+            return  # The call below tells it: a chain of blocks may be longer than calls may be nested.
+        self._is_telling = True
+        try:
+            while self._untold:
+                tracked, point, at = self._untold.popleft()
+                for follower in list(tracked.followers):
+                    follower.foresee(_qualified(tracked.block.id, point), at)
+        finally:
+            self._is_telling = False
 
     def lose(self, block: str, behavior: str) -> None:
-        """A behavior of a live block is dropped. Said again, it is no news."""
-        page = self._pages[block]
-        if behavior in page.lost:
+        """Tell followers that a behavior of a live block is dropped; once for each behavior."""
+        tracked = self._tracked[block]
+        if behavior in tracked.lost:
             return
-        page.lost.add(behavior)
-        for follower in list(page.followers):
+        tracked.lost.add(behavior)
+        for follower in list(tracked.followers):
             follower.miss((f"{block}:{behavior}",))
 
     @contextmanager
@@ -124,37 +123,37 @@ class LiveBlocks:
         A block that has taken the id of one of them since is another block.
         """
         wanted = sorted(points)
-        there = ((id, self._pages.get(id)) for id in map(_home, wanted))
-        pages = {id: page for id, page in there if page is not None and page.block is blocks.get(id)}
-        for page in pages.values():
-            page.followers.append(follower)
+        known = {id: self._tracked[id] for id in map(_block_of, wanted) if id in self._tracked}
+        homes = {id: tracked for id, tracked in known.items() if tracked.block is blocks.get(id)}
+        for tracked in homes.values():
+            tracked.followers.append(follower)
         for point in wanted:
-            block = _home(point)
+            block = _block_of(point)
             named = Point(point.behavior.removeprefix(f"{block}:"), point.sync)
-            page_or_none = pages.get(block)
-            if page_or_none is None or named.behavior in page_or_none.lost:
+            home = homes.get(block)
+            if home is None or named.behavior in home.lost:
                 follower.miss((point.behavior,))
-            elif (at := page_or_none.reached.get(named)) is not None:
+            elif (at := home.reached.get(named)) is not None:
                 follower.hear(point, at)
             else:
-                page_or_none.named.add(named)
-                if (expected := page_or_none.expected.get(named)) is not None:
+                home.named.add(named)
+                if (expected := home.expected.get(named)) is not None:
                     follower.foresee(point, expected)
-        for page in pages.values():
-            if page.author is not None:
-                page.author.follow(page.named)
+        for tracked in homes.values():
+            if tracked.performance is not None:
+                tracked.performance.follow(tracked.named)
         try:
             yield
         finally:
-            for page in pages.values():
-                page.followers.remove(follower)
+            for tracked in homes.values():
+                tracked.followers.remove(follower)
 
 
 def _qualified(block: str, point: Point) -> Point:
-    """As other blocks name it."""
+    """The point as other blocks name it."""
     return Point(f"{block}:{point.behavior}", point.sync)
 
 
-def _home(point: Point) -> str:
-    """The block of a point that is named from elsewhere."""
+def _block_of(point: Point) -> str:
+    """Id of the block of a qualified point."""
     return point.behavior.partition(":")[0]

@@ -1,6 +1,6 @@
-"""One live block on the event loop: one task per behavior, one future per beginning, one timer.
+"""Performance of one live block on the event loop: for each behavior a task and a future (its beginning); one timer.
 
-Decides nothing: what was measured goes to the `Decisions`, and what that says is sent to whoever performs.
+It decides nothing: what was measured goes to the `Decisions`, and their effects are carried out here.
 """
 
 import asyncio
@@ -20,13 +20,13 @@ from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.interface import Containing
 from engage_hri.services.realizer.decide.decisions import Decisions
 from engage_hri.services.realizer.decide.effects import Begin, Effect, Extend
-from engage_hri.services.realizer.decide.patience import Late, Stalled
+from engage_hri.services.realizer.decide.lateness import Late, Stalled
 from engage_hri.services.realizer.perform.control_link import ControlLink
 from engage_hri.services.realizer.perform.feedback import Reporter
 from engage_hri.services.realizer.perform.live import Ending, Live
 from engage_hri.services.realizer.perform.recognition_link import RecognitionLink
+from engage_hri.services.realizer.perform.shared_context import SharedContext
 from engage_hri.services.realizer.perform.spoken import Spoken
-from engage_hri.services.realizer.perform.surroundings import Surroundings
 from engage_hri.services.realizer.plan.planner import Plan, plan_block
 from engage_hri.services.realizer.plan.relations import DROPPED
 from engage_hri.services.realizer.points import Point, performer
@@ -37,45 +37,45 @@ from engage_hri.services.runtime.alarm import Timer
 class BlockPerformance:
     """A block being performed."""
 
-    def __init__(self, live: Live, plan: Plan, around: Surroundings, elsewhere: Mapping[str, Block]) -> None:
-        """elsewhere: the blocks whose points the plan may name."""
+    def __init__(self, live: Live, plan: Plan, shared: SharedContext, elsewhere: Mapping[str, Block]) -> None:
+        """elsewhere: other blocks, which the plan may name points of."""
         loop = asyncio.get_running_loop()
         self._live = live
         self.plan = plan
-        self._around = around
-        self._bus = around.bus
-        self._requests = around.requests
-        self._config = around.config
-        self._recognition = RecognitionLink(around.bus, around.requests, around.config, around.peers)
-        self._body = ControlLink(around.bus, around.requests, live.request.id, plan.block.id)
-        self._report = Reporter(around.bus, plan.block.id, around.config.skew)
+        self._shared = shared
+        self._bus = shared.bus
+        self._requests = shared.requests
+        self._config = shared.config
+        self._recognition = RecognitionLink(shared.bus, shared.requests, shared.config, shared.peers)
+        self._body = ControlLink(shared.bus, shared.requests, live.request.id, plan.block.id)
+        self._report = Reporter(shared.bus, plan.block.id, shared.config.skew)
         self._begun: dict[str, asyncio.Future[None]] = {id: loop.create_future() for id in plan.chains}
         self._asked: dict[str, Begin | Extend] = {}
-        """Of each behavior, what it was last told."""
+        """The last command to each behavior."""
         self._pending: dict[str, Pending] = {}
         self._running: dict[str, asyncio.Task[None]] = {}
         why = {each.behavior: each.message.removesuffix(DROPPED) for each in reversed(plan.problems)}
         self._dropped = {id: why.get(id, "") for id in plan.dropped}
-        """And why."""
-        self._unwanted: set[str] = set()
-        """Whose end somebody has asked for."""
+        """Behaviors that were dropped, each with the reason."""
+        self._interrupted: set[str] = set()
+        """Behaviors that are ended on request."""
         self._elsewhere = elsewhere
         self._foreign = frozenset(plan.foreign)
         self._vanished: set[str] = set()
-        """Behaviors of other blocks, of which some point will never be."""
+        """Behaviors of other blocks of which some point will never be reached."""
         self._performed: dict[str, BlockBehavior] = {}
-        """As they were begun: a later plan may have chosen another hand."""
+        """Behaviors as they were begun: a later plan may have chosen another hand."""
         self.spoken = Spoken(plan.block.behaviors)
         self._ending = live.ending
         self._timer = Timer(self._take_in)
         self._needs_replan = False
 
     def containing(self) -> Containing:
-        """An exception in the body of `with` ends this block, and no other."""
+        """Contain exceptions in the body of `with`: they end this block, and no other."""
         return self._bus.containing(self._live, self._live.fail)
 
     def abandon(self) -> None:
-        """Its end has gone wrong, too: stop what it asked for, and take its parts home."""
+        """Cancel all that the block has asked for and take its parts home: its regular end has failed."""
         for behavior in self._pending:
             self._requests.cancel(self._body.id(behavior), "its block broke")
         self._go_home(self.parts_used)
@@ -88,8 +88,8 @@ class BlockPerformance:
         for problem in self.plan.problems:
             self._report.warn(problem.kind, problem.message, problem.behavior)
         for behavior in self.plan.dropped:
-            self._around.live_blocks.lose(self.plan.block.id, behavior)
-        self._around.live_blocks.reach(self.plan.block.id, Point(BLOCK_ITSELF, "start"), began)
+            self._shared.live_blocks.lose(self.plan.block.id, behavior)
+        self._shared.live_blocks.reach(self.plan.block.id, Point(BLOCK_ITSELF, "start"), began)
         try:
             async with asyncio.TaskGroup() as tasks:
                 self._running = {
@@ -98,33 +98,33 @@ class BlockPerformance:
                     )
                     for behavior in self.plan.behaviors
                 }
-                self._around.live_blocks.perform(self.plan.block.id, self)
-                with self._around.live_blocks.followed(self, self._foreign, self._elsewhere):
+                self._shared.live_blocks.perform(self.plan.block.id, self)
+                with self._shared.live_blocks.followed(self, self._foreign, self._elsewhere):
                     self._advance()
-                    ending = await asyncio.shield(self._ending)  # which others wait for, too
-                    await self._end_what_moves(ending)
+                    ending = await asyncio.shield(self._ending)  # others wait for it, too
+                    await self._end_behaviors(ending)
                 for task in self._running.values():
                     task.cancel()
         finally:
             self._close()
         self._report.ended(ending.status, began)
-        self._around.live_blocks.reach(self.plan.block.id, Point(BLOCK_ITSELF, "end"), self._bus.now())
+        self._shared.live_blocks.reach(self.plan.block.id, Point(BLOCK_ITSELF, "end"), self._bus.now())
         return replace(
             self._live.outcome,
             spoken=self.spoken.texts,
-            dropped=tuple(id for id in self._dropped if id not in self._unwanted),
-            reasons=tuple(why for id, why in self._dropped.items() if id not in self._unwanted),
-            interrupted=tuple(id for id in self._dropped if id in self._unwanted),
+            dropped=tuple(id for id in self._dropped if id not in self._interrupted),
+            reasons=tuple(why for id, why in self._dropped.items() if id not in self._interrupted),
+            interrupted=tuple(id for id in self._dropped if id in self._interrupted),
         )
 
     def is_going_on(self, behavior: str) -> bool:
-        """Is it of this block, and has it neither ended nor been dropped?"""
+        """True if the behavior is of this block and has neither ended nor been dropped."""
         return not self._ending.done() and behavior in self._running and not self.decisions.has_ended(behavior)
 
     async def interrupt(self, behavior: str) -> bool:
-        """End one behavior on request; the others go on. Returns once it has ended: had it come to its end before?"""
+        """End one behavior on request; the others go on. Returns once it has ended: True if it came to its end."""
         task = self._running[behavior]
-        self._unwanted.add(behavior)
+        self._interrupted.add(behavior)
         if behavior in self._pending and performer(self._performed[behavior]) == "body":
             self._body.abort(behavior)
             await asyncio.wait([task])
@@ -136,7 +136,7 @@ class BlockPerformance:
         return behavior not in self._dropped and self.decisions.has_ended(behavior)
 
     def feed(self, message: SyncPointArrived | SyncPointReached) -> None:
-        """A body's report about a behavior of this block."""
+        """Take a report of the body about a behavior of this block."""
         pending = self._pending.get(message.behavior)
         if pending is None or pending.request.id != message.id or pending.outcome.done():
             return
@@ -152,22 +152,22 @@ class BlockPerformance:
     # -- other blocks ------------------------------------------------------------------------------------------------
 
     def hear(self, point: Point, at: Seconds) -> None:
-        """A point of another block is reached."""
+        """Note that a point of another block is reached."""
         if point in self._foreign:
             self._take_in(partial(self.decisions.reach, point, at))
 
     def foresee(self, point: Point, at: Seconds) -> None:
-        """A point of another block is expected at `at` now."""
+        """Note that a point of another block is expected at `at` now."""
         if point in self._foreign:
             self._take_in(partial(self.decisions.foresee, point, at))
 
     def follow(self, points: Iterable[Point]) -> None:
-        """Other blocks are tied to these."""
+        """Tell from now on when these points are expected: other blocks are tied to them."""
         if points:
             self._take_in(partial(self.decisions.follow, points))
 
     def miss(self, behaviors: Iterable[str]) -> None:
-        """What has not been reached of these, in other blocks, never will be."""
+        """Plan without these behaviors of other blocks if a point of them is needed that is not reached."""
         lost = {point.behavior for point in self._foreign - self.decisions.reached.keys()}.intersection(behaviors)
         lost -= self._vanished
         if lost:
@@ -175,12 +175,13 @@ class BlockPerformance:
             self._take_in(self._replan)
 
     def _take_in(self, news: Callable[[], object] = lambda: None) -> None:
+        """Take in `news`, and do what follows from it, unless the block is ending."""
         if not self._ending.done():
             with self.containing():
                 news()
                 self._advance()
 
-    async def _end_what_moves(self, ending: Ending) -> None:
+    async def _end_behaviors(self, ending: Ending) -> None:
         """Abort what still runs, and wait until all has ended, or for as long as the body is given."""
         moving, running = dict[asyncio.Task[None], str](), self._running
         for behavior in self.plan.block.behaviors:
@@ -195,7 +196,7 @@ class BlockPerformance:
                 self._requests.cancel(self._body.id(behavior.id), f"block {ending.status}")
         if moving:
             _, stuck = await asyncio.wait(moving, timeout=self._config.abort)
-            for task in stuck:  # Nobody is to keep alive what has come to its end, and does not say so.
+            for task in stuck:  # Its request is not to be kept alive: it is over, though the body does not say so.
                 self._requests.cancel(self._body.id(moving[task]), "its block has ended")
         if ending.status == "failed":
             self._go_home(self.parts_used)
@@ -203,7 +204,7 @@ class BlockPerformance:
     def _close(self) -> None:
         self._timer.set(None)
         for behavior in self.plan.block.behaviors:
-            self._around.routes.pop(self._body.id(behavior.id), None)
+            self._shared.routes.pop(self._body.id(behavior.id), None)
         for future in self._begun.values():
             future.cancel()
 
@@ -218,13 +219,13 @@ class BlockPerformance:
             again = any(made_facts)
         if self.decisions.is_surprised and self._report.may_expect() and not self._ending.done():
             self._report.expect(self.decisions.plan, self.decisions.began, self.decisions.expected(self._bus.now()))
-        self._around.live_blocks.foresee(self.plan.block.id, self.decisions.ahead)
+        self._shared.live_blocks.foresee(self.plan.block.id, self.decisions.ahead)
         if self.decisions.is_over:
             self._live.stop(Ending("done"))
         self._timer.set(None if self._ending.done() else self.decisions.deadline)
 
     def _apply(self, effect: Effect) -> bool:
-        """Do what was decided; whether that made new facts at once."""
+        """Carry out one decision; True if that made a new fact at once."""
         match effect:
             case Extend(behavior=id):
                 self._asked[id] = effect
@@ -234,11 +235,11 @@ class BlockPerformance:
                     return True
                 if behavior is not None and id in self._pending and performer(behavior) == "body":
                     self._send(behavior)
-            case Begin(behavior=id) if not self._begun[id].done():  # else its task has been cancelled
+            case Begin(behavior=id) if not self._begun[id].done():  # done: its task was cancelled
                 self._asked[id] = effect
                 self._begun[id].set_result(None)
             case Late(behavior=id, sync=sync, overdue=overdue):
-                if not self._around.peers.has_left("control"):
+                if not self._shared.peers.has_left("control"):
                     instant = self.decisions.member(Point(id, sync)).point
                     self._report.late(instant, f"{sync} is {overdue:.1f} s overdue")
                 self.decisions.is_surprised = True
@@ -253,14 +254,14 @@ class BlockPerformance:
             came = self.decisions.arrived.get(each, arrived if each == point else None)
             self._report.reached(self.plan, self.decisions, each, arrived=came, by_body=by_body)
             self.spoken.reach(each)
-            self._around.live_blocks.reach(self.plan.block.id, each, at)
+            self._shared.live_blocks.reach(self.plan.block.id, each, at)
 
     def _lose(self, id: str, fault: Fault, kind: WarningKind = "EXECUTION_FAILURE", *, at_rest: bool = False) -> None:
-        """It cannot be finished: the block fails if it is required, else goes on without. at_rest: its parts are."""
+        """Drop a behavior that cannot be finished; if it is required, the block fails. at_rest: its parts rest."""
         if id in self._dropped or self._ending.done():
             return
         self._dropped[id] = str(fault)
-        if id in self._unwanted:
+        if id in self._interrupted:
             # Its parts go home by themselves: the body does not need to be told, nor to forget what it looked at.
             self._report.interrupted(id, self.spoken.of(id))
         else:
@@ -269,7 +270,7 @@ class BlockPerformance:
                 self._go_home(self._parts(id), id)
             if id in self.plan.required:
                 self._live.stop(Ending("failed", Fault(reason=fault.reason, where=f"{self.plan.block.id}: {id}")))
-        self._needs_replan = True  # Planned anew once for all that is lost in one go.
+        self._needs_replan = True  # later and once, for all that is lost in one go
         asyncio.get_running_loop().call_soon(self._take_in)
 
     def _replan(self) -> None:
@@ -282,10 +283,10 @@ class BlockPerformance:
             self._live.stop(Ending("failed", error.fault))
             return
         self.decisions.replan(plan)
-        for id in self._dropped:  # Only now that it goes on without: else those that follow it end with it.
-            self._around.live_blocks.lose(self.plan.block.id, id)
+        for id in self._dropped:  # Told only now that the block goes on: its followers would end with it.
+            self._shared.live_blocks.lose(self.plan.block.id, id)
         for problem in plan.problems:
-            # What is too late now that something else is gone.
+            # Without the dropped ones, others may be too late now.
             if problem.behavior in plan.dropped and problem.behavior not in gone:
                 if problem.behavior in self._pending:
                     self._body.abort(problem.behavior)
@@ -310,7 +311,7 @@ class BlockPerformance:
                 await self._by_body(behavior)
 
     async def _by_body(self, behavior: BlockBehavior) -> None:
-        self._around.routes[self._body.id(behavior.id)] = self
+        self._shared.routes[self._body.id(behavior.id)] = self
         try:
             outcome = await self._send(behavior).outcome
         except (RequestRefused, NeverEnded) as error:
@@ -343,19 +344,19 @@ class BlockPerformance:
         return pending
 
     def _go_home(self, parts: set[str], name: str = "") -> None:
-        """But not what another behavior moves by now."""
-        others = (other for other in self._around.others() if name or other is not self)
+        """Send parts home, except those that another behavior moves by now. name: the behavior that used them."""
+        others = (other for other in self._shared.others() if name or other is not self)
         if parts := parts.difference(*(other.parts_moving for other in others)):
             self._body.go_home(parts, name)
 
     @property
     def parts_used(self) -> set[str]:
-        """Of the body, by what has begun so far."""
+        """Parts of the body used by behaviors that have begun so far."""
         return {part for id in self.decisions.begun for part in self._parts(id)}
 
     @property
     def parts_moving(self) -> set[str]:
-        """By what has begun and not ended."""
+        """Parts of the body used by behaviors that have begun and not ended."""
         moving = self._performed.keys() - set(self._dropped)
         return {part for id in moving if not self.decisions.has_ended(id) for part in self._parts(id)}
 

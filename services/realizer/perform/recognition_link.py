@@ -1,4 +1,4 @@
-"""Connection events and turn signals: the behaviors that recognition realizes, and the clock if it is not there."""
+"""Requests of one block to recognition: connection events and turn signals. The clock decides if it is not there."""
 
 import asyncio
 from collections.abc import Mapping
@@ -14,15 +14,15 @@ from engage_hri.schemas.recognition import EventOutcome, RequestEvent, SignalTur
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.interface import Bus
 from engage_hri.services.realizer.config import RealizerConfig
-from engage_hri.services.realizer.decide.patience import event_deadline
-from engage_hri.services.realizer.perform.surroundings import PeersThere
+from engage_hri.services.realizer.decide.lateness import event_deadline
+from engage_hri.services.realizer.perform.shared_context import Presence
 from engage_hri.services.realizer.plan.schedule import EPSILON
 from engage_hri.services.realizer.points import Point
 from engage_hri.services.requests.ends import Pending, Requester, RequestRefused, ServerRestarted
 
 
 class Decision(Struct, frozen=True):
-    """When an event was decided; by recognition, or by us for want of it."""
+    """Time of an event's decision; by recognition, or by the realizer if recognition does not decide."""
 
     at: Seconds
     by_recognition: bool
@@ -31,14 +31,14 @@ class Decision(Struct, frozen=True):
 class RecognitionLink:
     """Asks recognition for the events of one block."""
 
-    def __init__(self, bus: Bus, requests: Requester, config: RealizerConfig, peers: PeersThere) -> None:
+    def __init__(self, bus: Bus, requests: Requester, config: RealizerConfig, peers: Presence) -> None:
         self._bus = bus
         self._requests = requests
         self._config = config
         self._peers = peers
 
     def signal(self, id: str, block: str, signal: TurnSignal) -> None:
-        """Tell it what became of a turn. Nobody waits for the answer."""
+        """Tell recognition what became of a turn. The answer does not matter."""
         message = SignalTurn(id=id, signal=signal, at=self._bus.stamp(), block=block)
         if "recognition" in self._peers:
             self._requests.send(keys.TURN, message)
@@ -46,7 +46,7 @@ class RecognitionLink:
             self._bus.publish(keys.TURN, message)
 
     def ask(self, id: str, block: str, event: Event, began: Seconds) -> Pending | None:
-        """Request the event; None if nobody is there to decide it."""
+        """Request the event; None if recognition is not there to decide it."""
         if "recognition" not in self._peers:
             return None
         request = RequestEvent(id=id, block=block, event=event, at=self._bus.stamp(began))
@@ -55,7 +55,7 @@ class RecognitionLink:
     async def decision(
         self, event: Event, block: Block, pending: Pending | None, reached: Mapping[Point, Seconds]
     ) -> Decision:
-        """Wait for it, however it comes about. reached: the facts so far, as they grow. Raises RequestRefused."""
+        """Wait for the decision of an event. reached: the facts so far, as they grow. Raises RequestRefused."""
         while True:
             if pending is not None and pending.outcome.done():
                 try:
@@ -65,7 +65,7 @@ class RecognitionLink:
                 except ServerRestarted:
                     return Decision(self._bus.now(), False)  # Its new life knows nothing of the event.
                 except EngageError:
-                    pending = None  # It died.
+                    pending = None  # Recognition has died.
                     continue
                 at = self._bus.local(decided.at) if isinstance(decided, EventOutcome) else self._bus.now()
                 return Decision(at, True)
@@ -76,7 +76,7 @@ class RecognitionLink:
                 if pending is not None:
                     self._requests.cancel(pending.request.id, "no decision in time")
                 return Decision(self._bus.now(), False)
-            # Asked again then: an anchor may have been realised meanwhile, and the limit runs from there.
+            # The deadline is computed again after this: the limit counts from an anchor that was reached meanwhile.
             news: list[asyncio.Future[Any]] = [self._peers.changed]
             if pending is not None:
                 news.append(pending.outcome)

@@ -1,1 +1,1 @@
-"""From a block to a Petri net and its schedule. No clock."""
+"""Planning: from a block to a Petri net and its schedule. No clock."""

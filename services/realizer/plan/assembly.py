@@ -8,6 +8,7 @@ from operator import or_
 from msgspec import Struct
 from msgspec.structs import replace
 
+from engage_hri.schemas.behavior_types import TYPES
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.realizer.net.petri_net import Bound, PetriNet, Place, PlaceKind, Transition
 from engage_hri.services.realizer.plan.cycles import components
@@ -18,20 +19,11 @@ from engage_hri.services.realizer.plan.phases import Chain
 from engage_hri.services.realizer.plan.relations import Order, Relations
 from engage_hri.services.realizer.plan.schedule import EPSILON
 from engage_hri.services.realizer.plan.steps import PORTION, Steps, portions
-from engage_hri.services.realizer.points import (
-    ORIGIN,
-    WITH_STROKE,
-    Gate,
-    Point,
-    gate,
-    gate_point,
-    one_instant,
-    performer,
-)
+from engage_hri.services.realizer.points import ORIGIN, WITH_STROKE, Gate, Point, gate, gate_point, performer
 
 
 class Member(Struct, frozen=True, gc=False):
-    """A behavior's part in an instant: how it can be made to wait there, and the point whose report counts."""
+    """A behavior's part in an instant: how it can be made to wait there, and the point that is reported then."""
 
     behavior: str
     kind: Gate
@@ -39,22 +31,22 @@ class Member(Struct, frozen=True, gc=False):
 
     @property
     def can_wait(self) -> bool:
-        """Under way, and there before the others?"""
+        """True if it can hold there, once begun."""
         return self.kind in ("hold", "prompt")
 
 
 class Assembly(Struct, frozen=True):
-    """is_ordered: transitions are numbered as they can fire; else some wait for each other."""
+    """A net. is_ordered: its transitions are numbered as they can fire; otherwise some wait for each other."""
 
     net: PetriNet
     is_ordered: bool
     at: Mapping[Point, int]
     """The transition of each point."""
     members: tuple[tuple[Member, ...], ...]
-    """Of each transition."""
+    """The behaviors' parts in each transition."""
 
     def waits(self, ties: Iterable[Place | Bound]) -> set[tuple[str, str]]:
-        """Those of `ties` that only make sure of an order: from which transition for which, by their names."""
+        """Waits among `ties` that only make sure of an order: pairs of transition names; the first fires first."""
         names = [each.name for each in self.net.transitions]
         return {
             (names[tie.source], names[tie.target])
@@ -64,9 +56,9 @@ class Assembly(Struct, frozen=True):
 
 
 class Assembler:
-    """chains: in document order. waited_for: behaviors that the end of the block waits for.
+    """Makes the net of a block; `assembling` prepares one.
 
-    `assembling` makes one.
+    chains: in document order. waited_for: behaviors that the end of the block waits for.
     """
 
     def __init__(
@@ -79,7 +71,7 @@ class Assembler:
         self.waived: set[tuple[str, str]] = set()
 
     def prepare(self) -> Steps[None]:
-        """What does not depend on an arrangement."""
+        """Compute all that does not depend on an arrangement."""
         chains, relations = self.chains, self.relations
         foreign = sorted(point for point in relations.named if ":" in point.behavior)
         own = [point for id in sorted(chains) for point in chains[id].points]
@@ -94,7 +86,7 @@ class Assembler:
             yield len(portion)
         yield len(found) // 8
         self.kinds = {
-            (member.behavior, number): member.kind for number, those in enumerate(self.members) for member in those
+            (each.behavior, number): each.kind for number, members in enumerate(self.members) for each in members
         }
         self.transitions = [
             *(Transition(" = ".join(map(str, instant.points)), instant.points) for instant in found),
@@ -114,6 +106,7 @@ class Assembler:
         self._fixed = (self.places, self.bounds)
 
     def assemble(self, arrangement: Arrangement) -> Steps[Assembly]:
+        """The net for this arrangement."""
         self.arrangement = arrangement
         places, bounds = self._fixed
         self.places, self.bounds = list(places), list(bounds)
@@ -159,14 +152,14 @@ class Assembler:
                 self.bounds.append(Bound("delay", target, source, -seconds))
 
     def _set_out_late(self, class_ids: Sequence[int]) -> Steps[None]:
-        """Whose stroke comes after a point of another block, but not his start, comes just in time.
+        """Let movements set out just in time if their stroke, not their start, comes after a point of another block.
 
-        Ours begins when it is sent, which may be long before: nobody is to hold his arm up all the while.
+        Our block begins when it is sent, which may be long before that point: no arm is to be held up all the while.
         class_ids: of each instant.
         """
         bits = {class_ids[here]: 1 << number for number, here in enumerate(sorted(self._foreign))}
         after = [bits.get(each, 0) for each in class_ids]
-        """Which of those points each instant comes after, or is tied to: a bit for each."""
+        """Points of other blocks that each instant comes after, or is tied to: a bit for each."""
         out: dict[int, list[int]] = {}
         for place in self.places:
             out.setdefault(place.source, []).append(place.target)
@@ -174,7 +167,7 @@ class Assembler:
             for since, to in pairwise(chain.points):
                 out.setdefault(self.at[since], []).append(self.at[to])
         yield self.size // 8
-        for circle in (yield from components(self.size, out)):  # what comes before it has been here
+        for circle in (yield from components(self.size, out)):  # predecessors first
             known = reduce(or_, (after[each] for each in circle))
             yield len(circle)
             for here in circle:
@@ -191,14 +184,14 @@ class Assembler:
                     )
 
     def _clock(self, number: int, at: Seconds) -> None:
-        """Each time is counted from the block's start, whatever else was late."""
+        """Tie an instant to the block's start by `at` seconds, whatever else is late."""
         if at >= 0.0:
             self.places.append(Place("delay", 0, number, at, at))
         self.bounds.append(Bound("delay", number, 0, -at))
 
     def _phases(self, chain: Chain) -> None:
         id, lines, at = chain.behavior.id, _lines(chain.behavior.line), self.at
-        always = {pair for group in one_instant(chain.type) for pair in pairwise(group)}
+        always = {pair for group in TYPES[chain.type].one_instant for pair in pairwise(group)}
         cut = self.arrangement.cuts.get(id)
         if (start := at[chain.points[0]]) != 0:
             self.places.append(Place("order", 0, start, behavior=id, lines=lines))
@@ -237,7 +230,7 @@ class Assembler:
             self.bounds.append(Bound("order", source, target, seconds, lines=lines))
 
     def _series(self) -> None:
-        """Thesis 4.5.2: what nothing is said about follows the previous of its type. Nothing waits for it."""
+        """Put a behavior that nothing names after the previous of its type (thesis 4.5.2); nothing waits for it."""
         named = {point.behavior for point in self.relations.named}
         previous: dict[str, Chain] = {}
         for id, chain in self.chains.items():
@@ -248,7 +241,7 @@ class Assembler:
             other = before.behavior.id
             sync, seconds = "end", 0.0
             if other in self.arrangement.natural:
-                # It would last until this one takes over: this one does as soon as it is on target.
+                # The previous one lasts until this one takes over, which is as soon as the previous is on target.
                 sync = "stroke"
                 seconds = sum(each.natural for each in before.segments if each.since in ("stroke", "stroke_end"))
             self._follow(Point(other, sync), Point(id, "start"), seconds, lines=_lines(chain.behavior.line))
@@ -279,10 +272,10 @@ class Assembler:
             self.places.append(Place(kind, source, target, seconds, seconds, behavior, lines))
 
     def _never_too_soon(self) -> Steps[None]:
-        """An order on a point that cannot wait is kept for certain by where its behavior can: it waits there.
+        """Make sure of orders on points that cannot wait: the behavior waits where it last can before such a point.
 
-        Unless what it would wait for waits for it in turn, or it has no time to; then prediction must do. So it does
-        where others of the instant wait for another block: words that follow its words do not wait for a stroke, too.
+        Prediction must do instead if the awaited one waits for it in turn, if there is no time, or if others of the
+        instant wait for another block. (Words after that block's words do not wait for a stroke, too.)
         """
         waits = []
         for number, place in enumerate(self.places):
@@ -313,11 +306,11 @@ class Assembler:
         return self.transitions[transition].name
 
     def waive(self, ties: Iterable[tuple[str, str]]) -> None:
-        """Do without these waits: from one transition for another, by their names."""
+        """Leave out these waits from now on; see `Assembly.waits`."""
         self.waived |= set(ties)
 
     def _last_wait(self, chain: Chain, transition: int) -> tuple[int, Seconds]:
-        """Where the behavior can last wait before `transition`, and how long it takes from there."""
+        """The last transition before `transition` where the behavior can wait, and the seconds from there."""
         stations = [self.at[point] for point in chain.points]
         seconds = 0.0
         for number in range(stations.index(transition) - 1, -1, -1):
@@ -328,9 +321,9 @@ class Assembler:
         return stations[0], seconds
 
     def _ending(self, end: int) -> None:
-        """Everything follows the start and leads to the end, or it could happen again before that has come.
+        """Let everything follow the start and lead to the end, so that nothing can happen twice.
 
-        What may outlast the block holds a token from its end to its start instead: it is not begun again before.
+        A behavior that may outlast the block holds a token from its own end to its start: so it begins once, too.
         """
         self.places.append(Place("order", 0, end))
         for id, chain in self.chains.items():

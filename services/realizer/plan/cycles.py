@@ -1,4 +1,4 @@
-"""What waits for each other in a circle."""
+"""Strongly connected components: nodes that wait for each other in a circle."""
 
 from collections.abc import Mapping, Sequence
 
@@ -22,7 +22,7 @@ def components(size: int, out: Mapping[int, Sequence[int]]) -> Steps[list[list[i
             continue
         taken[root] = 1
         group = [root]
-        for here in group:  # it grows
+        for here in group:  # which grows meanwhile
             for source in into.get(here, ()):
                 if not taken[source]:
                     taken[source] = 1

@@ -1,4 +1,4 @@
-"""Who is to blame for points that wait for each other in a circle: a behavior that is dropped, or the whole block."""
+"""Blame for points that wait for each other in a circle: a behavior is dropped, or the whole block refused."""
 
 from collections.abc import Collection, Container, Iterable, Mapping, Sequence
 from itertools import accumulate
@@ -7,6 +7,7 @@ from typing import NamedTuple
 from engage_hri.schemas.faults import Fault
 from engage_hri.services.realizer.net.petri_net import Bound, PetriNet, Place
 from engage_hri.services.realizer.plan.assembly import Assembly
+from engage_hri.services.realizer.plan.handover import Turn
 from engage_hri.services.realizer.plan.instants import Classes
 from engage_hri.services.realizer.plan.phases import Chain
 from engage_hri.services.realizer.plan.prediction import Circle, Impossible
@@ -15,12 +16,9 @@ from engage_hri.services.realizer.plan.schedule import EPSILON
 from engage_hri.services.realizer.plan.steps import Steps
 from engage_hri.services.realizer.points import Point
 
-Turn = tuple[str, Point]
-"""Who waits for which point of another before it takes its part."""
-
 
 class Loss(NamedTuple):
-    """A behavior that cannot be on time, and why. turn: that it, or another, would have to wait for."""
+    """A behavior that cannot be on time, and why. turn: the wait that is impossible, if it is one."""
 
     behavior: str
     reason: str
@@ -28,7 +26,7 @@ class Loss(NamedTuple):
 
 
 class Losses(Exception):
-    """What cannot be on time, in document order."""
+    """Behaviors that cannot be on time, in document order: planning goes on without them."""
 
     def __init__(self, losses: Sequence[Loss]) -> None:
         self.losses = tuple(losses)
@@ -38,11 +36,11 @@ class Losses(Exception):
 def clashes(
     turns: Iterable[Turn], chains: Mapping[str, Chain], required: Collection[str], classes: Classes
 ) -> Steps[list[Loss]]:
-    """Turns that cannot be waited for, whatever the rest of the block: what ties the two leaves no time for both."""
+    """Losses by turns that cannot be waited for, whatever the rest of the block: ties leave no time for both."""
     rank = {id: number for number, id in enumerate(chains)}
     losses: dict[str, Loss] = {}
     stays: dict[str, str] = {}
-    """Who has the part instead of who is lost."""
+    """For each lost behavior, the one that keeps the part instead."""
     for later, (earlier, sync) in sorted(turns, key=lambda turn: (rank[turn[0]], rank[turn[1].behavior])):
         yield 16
         earlier = stays.get(earlier, earlier)
@@ -56,7 +54,7 @@ def clashes(
 
 
 def _clash(earlier: Chain, sync: str, later: Chain, classes: Classes) -> bool:
-    """Is there a point of each so close to the other's that `later` has to start before `earlier` is at `sync`?"""
+    """True if two of their points are tied so closely that `later` has to start before `earlier` is at `sync`."""
     last = next(number for number, point in enumerate(earlier.points) if point.sync == sync)
     since_start = list(accumulate((each.shortest for each in later.segments), initial=0.0))
     left = list(accumulate((each.shortest for each in reversed(earlier.segments[:last])), initial=0.0))[::-1]
@@ -76,8 +74,9 @@ def judge(
     block: str,
     turns: Collection[Turn],
 ) -> Steps[Losses | BlockRefused]:
-    """A time that cannot be met costs a behavior, the later in the document; waiting for each other costs the block.
+    """The losses of impossible circles, or the refusal of the block.
 
+    A time that cannot be met costs a behavior, the later in the document; waiting for each other costs the block.
     Each circle costs a behavior, unless one that is lost already was part of it.
     """
     net = assembly.net
@@ -102,10 +101,10 @@ def _loss(
     chains: Container[str],
     turns: Mapping[tuple[int, int], Turn],
 ) -> Loss | None:
-    """Who is to blame for a circle, if not the block. rank: in the document, of those that may be dropped.
+    """The behavior that is to blame for a circle; None: the block. rank: place in the document if it may be dropped.
 
-    Two that must have the same part at the same time: the later of them. A phase that is too long for the time it
-    is given: whose phase it is; else whose phase would have to be longer than it can be.
+    Of two that must have the same part at the same time, the later. For a phase that is too long for the time it is
+    given, its behavior; else the behavior with a phase that would have to be longer than it can be.
     """
     ties = [tie for tie, _ in circle]
     series = ((tie.source, tie.target) for tie in ties if tie.kind == "series")
@@ -144,7 +143,7 @@ def _route(net: PetriNet, circle: Circle) -> str:
 
 
 def _lines_of_instants(ties: list[Place | Bound], net: PetriNet, classes: Classes) -> set[int]:
-    """Where it is written that the points of these instants belong together."""
+    """Lines that say that the points of these instants belong together."""
     lines: set[int] = set()
     for before, after in zip([ties[-1], *ties], ties, strict=False):
         came, goes = before.behavior, after.behavior

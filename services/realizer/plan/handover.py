@@ -1,4 +1,4 @@
-"""Behaviors of one block that move the same part: who takes it from whom, and who must wait for his turn."""
+"""Behaviors of one block that move the same part: which takes it from which, and which must wait."""
 
 from collections.abc import Collection, Container, Iterable, Iterator, Mapping, Sequence
 from itertools import pairwise
@@ -15,38 +15,41 @@ from engage_hri.services.realizer.plan.phases import Chain
 from engage_hri.services.realizer.plan.relations import Relations
 from engage_hri.services.realizer.plan.schedule import EPSILON
 from engage_hri.services.realizer.plan.steps import Steps
-from engage_hri.services.realizer.points import BENEATH, WITH_STROKE, Point
+from engage_hri.services.realizer.points import SHIFTS, WITH_STROKE, Point
 
 _OTHER: dict[str, tuple[str, Hand]] = {
     "left_arm": ("right_arm", "RIGHT_HAND"),
     "right_arm": ("left_arm", "LEFT_HAND"),
 }
 _STROKE, _STROKE_END, _RELAX = (SYNC_POINTS.index(each) for each in ("stroke", "stroke_end", "relax"))
-"""Numbers of these points: everything that is handed over has all seven."""
+"""Numbers of these points: every behavior that hands over has all seven."""
+Turn = tuple[str, Point]
+"""A behavior, and the point of another that it waits for before it takes its part."""
 
 
 class Arrangement(Struct, frozen=True):
-    """natural: behaviors that end when something takes their place, or with the block; lasting: those with the block.
+    """Order in which behaviors use parts of the body.
 
-    successors: who takes a behavior's part, and the first of its points that this brings about.
+    natural: behaviors that end when something takes their place, or with the block; lasting: those with the block.
+    successors: for a behavior, the one that takes its part, and the first of its points that this brings about.
     cuts: number of the first segment that is not given its time, because a successor has the part by then.
-    turns: who waits for which point of another behavior before it takes its part.
+    turns: behaviors that wait for a point of another before they take its part.
     """
 
     natural: frozenset[str] = frozenset()
     lasting: tuple[str, ...] = ()
     successors: Mapping[str, tuple[str, Point]] = {}
     cuts: Mapping[str, int] = {}
-    turns: frozenset[tuple[str, Point]] = frozenset()
+    turns: frozenset[Turn] = frozenset()
 
 
 class Conflict(NamedTuple):
-    """Two that would have the same part at the same time.
+    """Two behaviors that would have the same part at the same time.
 
-    turn: the later, and the point of the earlier that it has to wait for. hand: who can use which other arm instead.
+    turn: the later, and the point of the earlier that it has to wait for. hand: the one that can use the other hand.
     """
 
-    turn: tuple[str, Point] | None
+    turn: Turn | None
     hand: tuple[str, Hand] | None
 
 
@@ -59,10 +62,9 @@ def arrange(
     rounds: Mapping[Point, int],
     barred: Container[tuple[str, Hand]] = (),
 ) -> Steps[tuple[Arrangement, list[Conflict]]]:
-    """Who else takes whose place in a schedule made with `before` and where that would break what was asked for.
+    """The arrangement for a schedule that was made with `before`, and conflicts where it breaks what was asked for.
 
-    rounds: which comes before which, of points that come at one time.
-    barred: hands with which a behavior cannot be done.
+    rounds: order of points that come at one time. barred: hands with which a behavior cannot be done.
     """
     held = relations.held
     awaited: dict[str, set[Point]] = {}
@@ -82,7 +84,7 @@ def arrange(
         yield 1
         chain = chains[id]
         if before.successors.get(successor, ("",))[0] == id:
-            # Cut short by the other, each comes first. So nobody is: the one that was to be the later waits.
+            # Either would come first if the other cut it short. So neither is cut: the one meant to be later waits.
             conflicts.append(Conflict((id, chains[successor].points[-1]), None))
             continue
         if chain.type == "speech" and _is_tied(chains[successor], chain, classes):
@@ -91,16 +93,16 @@ def arrange(
         first = next((number for number, point in enumerate(chain.points) if times[point] > taken + EPSILON), 0)
         is_natural = id in before.natural
         if first:
-            # Cut short, what the successor itself is to come after would come at once.
+            # Points that the successor itself is to come after are kept: cut short, they would come at once.
             own = awaited.get(successor, set())
             kept = {point for point in chain.points if point in held or point in own}
             is_asked = successor in mentioned or _is_overlaid(chain, chains[successor])
             last = _not_given_up(chain, first, kept, is_natural, is_asked=is_asked)
             turn = (successor, chain.points[last]) if last is not None else None
-            # Who has made his stroke hands over; else the other arm is better, if that is free.
+            # A behavior that has made its stroke hands over; for one that has not, a free other arm is better.
             is_worth_it = turn is not None or first <= _STROKE_END
             hand = _free_hand((successor, id), chains, times, barred) if is_worth_it else None
-            yield 1 + len(chains) // 32  # it has looked at all others
+            yield 1 + len(chains) // 32  # `_free_hand` has looked at all others
             if turn or hand:
                 conflicts.append(Conflict(turn, hand))
         if id in successors:
@@ -120,7 +122,7 @@ def entering(
     times: Mapping[Point, Seconds],
     rounds: Mapping[Point, int],
 ) -> tuple[str, ...]:
-    """Who takes his parts before whom. Of those that start together what nobody mentions comes last."""
+    """Behaviors in the order in which they take parts. Of those that start together, unmentioned ones come last."""
     rank = {
         id: (round(times[start := chain.points[0]], 6), rounds[start], id not in mentioned, number)
         for number, (id, chain) in enumerate(chains.items())
@@ -131,9 +133,9 @@ def entering(
 def _not_given_up(
     chain: Chain, first: int, kept: Collection[Point], is_natural: bool, *, is_asked: bool
 ) -> int | None:
-    """The last of its points from number `first` on that a successor must wait for.
+    """Number of the last point, from `first` on, that a successor must wait for; None if there is none.
 
-    What shares an instant with others or waits for them; and all of it, if nobody has asked for the successor now.
+    Points count that share an instant with others or wait for them; all do if nothing asks for the successor now.
     Words are never given up.
     """
     broken = [number for number in range(first, len(chain.points)) if chain.points[number] in kept]
@@ -145,13 +147,13 @@ def _not_given_up(
 
 
 def _is_tied(later: Chain, speech: Chain, classes: Classes) -> bool:
-    """Is it said in so many words that one begins while the other speaks? It is for the voice to say no."""
+    """True if the block itself says that `later` begins while the speech is spoken. The voice decides about that."""
     begins = classes.find(later.points[0])[0]
     return any(classes.find(point)[0] == begins for point in speech.points)
 
 
 def _users(chains: Mapping[str, Chain], order: Iterable[str]) -> Mapping[str, Sequence[str]]:
-    """Of each part, in the order in which they take it."""
+    """For each part, the behaviors that use it, in the order in which they take it."""
     users: dict[str, list[str]] = {}
     for id in order:
         for part in chains[id].parts:
@@ -162,36 +164,36 @@ def _users(chains: Mapping[str, Chain], order: Iterable[str]) -> Mapping[str, Se
 def _successors(
     chains: Mapping[str, Chain], ranked: Sequence[str], users: Mapping[str, Sequence[str]]
 ) -> dict[str, str]:
-    """The next of each behavior on any of its parts."""
+    """For each behavior, the next that takes any of its parts."""
     rank = {id: number for number, id in enumerate(ranked)}
     found: dict[str, str] = {}
-    for those in users.values():
-        for earlier, later in _pairs(those, chains):
+    for ids in users.values():
+        for earlier, later in _pairs(ids, chains):
             if earlier not in found or rank[later] < rank[found[earlier]]:
                 found[earlier] = later
     return found
 
 
 def _pairs(users: Sequence[str], chains: Mapping[str, Chain]) -> Iterator[tuple[str, str]]:
-    """Each user of a part, in order, with the next that takes it from him: a shift takes nothing from a gaze."""
-    above = [id for id in users if chains[id].type not in BENEATH]
+    """Each user of a part, in order, and the next that takes it over: a shift takes nothing from a gaze."""
+    above = [id for id in users if chains[id].type not in SHIFTS]
     yield from pairwise(above)
-    yield from ((one, other) for one, other in pairwise(users) if chains[one].type in BENEATH)
+    yield from ((one, other) for one, other in pairwise(users) if chains[one].type in SHIFTS)
 
 
 def _is_overlaid(earlier: Chain, later: Chain) -> bool:
-    return earlier.type in BENEATH and later.type not in BENEATH
+    return earlier.type in SHIFTS and later.type not in SHIFTS
 
 
 def _overlaid(
     chains: Mapping[str, Chain], users: Mapping[str, Sequence[str]], times: Mapping[Point, Seconds]
 ) -> Iterator[str]:
     """Shifts that start during a gaze."""
-    for those in users.values():
+    for ids in users.values():
         until = -inf
-        for id in those:
+        for id in ids:
             since, to = _window(chains[id], times)
-            if chains[id].type not in BENEATH:
+            if chains[id].type not in SHIFTS:
                 until = max(until, to)
             elif since < until - EPSILON:
                 yield id
@@ -203,7 +205,7 @@ def _free_hand(
     times: Mapping[Point, Seconds],
     barred: Container[tuple[str, Hand]],
 ) -> tuple[str, Hand] | None:
-    """Which of the two can use the other arm instead, since it names none and the arm is free all the while."""
+    """The one of the two that can use the other arm, since it names none and the arm is free all the while."""
     for id in rivals:
         chain = chains[id]
         other = _OTHER.get(chain.parts[0]) if len(chain.parts) == 1 else None

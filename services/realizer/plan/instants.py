@@ -17,9 +17,9 @@ from engage_hri.services.realizer.points import ORIGIN, Point
 
 
 class Instant(Struct, frozen=True, gc=False):
-    """Points that happen together. class_id, offset: its place within its class, lowest offset 0.
+    """Points that happen together.
 
-    at: seconds from the block's start, if that is what is asked for.
+    class_id, offset: its class, and seconds from the first instant of that. at: seconds from the block's start.
     """
 
     points: tuple[Point, ...]
@@ -29,7 +29,7 @@ class Instant(Struct, frozen=True, gc=False):
 
 
 class Classes:
-    """Which points are tied together, and by how many seconds.
+    """Classes of points that are tied together, each so many seconds from the others.
 
     Times of the clock contradict each other as well, but make no class: two behaviors that are both to end at 10 s
     do not wait for each other.
@@ -37,18 +37,19 @@ class Classes:
 
     def __init__(self) -> None:
         self._clock: dict[Point, Seconds] = {}
-        """When a representative is to happen, seconds from the block's start, if that is said."""
+        """Seconds from the block's start at which a representative is to happen, if given."""
         self._parent: dict[Point, Point] = {}
         self._offset: dict[Point, Seconds] = {}
-        """Of a point to its parent: when it happens, counted from the parent."""
+        """Seconds from a point's parent to the point."""
         self._links: dict[Point, list[tuple[Point, Term]]] = defaultdict(list)
 
     def add(self, point: Point) -> None:
+        """Take in a point, in a class of its own."""
         if point not in self._parent:
             self._parent[point], self._offset[point] = point, 0.0
 
     def find(self, point: Point) -> tuple[Point, Seconds]:
-        """The representative of the point's class, and when the point happens, counted from it."""
+        """The representative of the point's class, and the seconds from it to the point."""
         path = []
         while self._parent[point] != point:
             path.append(point)
@@ -60,7 +61,7 @@ class Classes:
         return point, offset
 
     def at(self, point: Point) -> Seconds | None:
-        """When it is to happen, seconds from the block's start, if that is said."""
+        """Seconds from the block's start at which the point is to happen; None if not given."""
         if point == ORIGIN:
             return 0.0
         root, offset = self.find(point)
@@ -76,7 +77,7 @@ class Classes:
         return None if since is None or to is None else to - since
 
     def tie(self, equal: Equal, block: str) -> None:
-        """Merge. Raises BlockRefused if that contradicts what is known, naming points and lines."""
+        """Merge the classes of these points. Raises BlockRefused, with points and lines, at a contradiction."""
         first, *others = sorted(equal.terms, key=lambda term: term.point == ORIGIN)
         for term in others:
             self.add(first.point)
@@ -102,7 +103,7 @@ class Classes:
             self._clock[root] = clock - self._offset[joined]
 
     def tie_if_possible(self, equal: Equal) -> bool:
-        """Merge, unless that contradicts what is known."""
+        """Merge the classes of these points; False if that contradicts what is known."""
         try:
             self.tie(equal, "")
         except BlockRefused:
@@ -110,7 +111,7 @@ class Classes:
         return True
 
     def lines(self, *points: Point) -> set[int]:
-        """Where it is written that the first of `points` and the last are tied, if they are."""
+        """Lines that tie the first of `points` to the last; empty if nothing does."""
         return {term.line for term in self._chain(points[0], points[-1])} - {0} if len(points) > 1 else set()
 
     def _contradiction(self, first: Term, second: Term, known: Seconds, block: str) -> BlockRefused:

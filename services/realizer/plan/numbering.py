@@ -1,22 +1,24 @@
 """The transitions of a net, numbered in an order in which they can fire: the same for any order of elements."""
 
 import heapq
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from math import inf
+from typing import TypeVar
 
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.realizer.net.petri_net import Bound, PetriNet, Place, PlaceKind, Transition
 from engage_hri.services.realizer.plan.steps import PORTION, Steps, portions
 
 _Tie = tuple[int, int, PlaceKind, Seconds, str, tuple[int, ...], Seconds]
+TieT = TypeVar("TieT", Place, Bound)
 
 
 def numbered(
     transitions: Sequence[Transition], places: Sequence[Place], bounds: Sequence[Bound]
 ) -> Steps[tuple[PetriNet, list[int], bool]]:
-    """The net, the former number of each of its transitions, and whether they can all fire in this order.
+    """The net, the former number of each transition, and whether they can all fire in this order.
 
-    Those that wait for each other come last, before the end.
+    Transitions that wait for each other come last, before the end.
     """
     ranked = yield from _firing_order(len(transitions), places)
     is_ordered = len(ranked) == len(transitions)
@@ -26,20 +28,8 @@ def numbered(
     number = [0] * len(ranked)
     for new, old in enumerate(ranked):
         number[old] = new
-    ties: list[_Tie] = []
-    for portion in portions(places):
-        ties += [
-            (number[it.source], number[it.target], it.kind, it.lag, it.behavior, it.lines, it.shortest)
-            for it in portion
-        ]
-        yield len(portion) // 8
-    limits: list[_Tie] = []
-    for part in portions(bounds):
-        limits += [
-            (number[it.source], number[it.target], it.kind, it.lag, it.behavior, it.lines, _sortable(it.stretch))
-            for it in part
-        ]
-        yield len(part) // 8
+    ties = yield from _renumbered(places, number, lambda place: place.shortest)
+    limits = yield from _renumbered(bounds, number, lambda bound: inf if bound.stretch is None else bound.stretch)
     placed: list[Place] = []
     for tied in portions(_sorted(ties)):
         placed += [
@@ -58,8 +48,19 @@ def numbered(
     return net, ranked, is_ordered
 
 
+def _renumbered(ties: Sequence[TieT], number: Sequence[int], last: Callable[[TieT], Seconds]) -> Steps[list[_Tie]]:
+    """Each place or bound as a tuple that can be sorted, with the new numbers of its ends."""
+    found: list[_Tie] = []
+    for portion in portions(ties):
+        found += [
+            (number[it.source], number[it.target], it.kind, it.lag, it.behavior, it.lines, last(it)) for it in portion
+        ]
+        yield len(portion) // 8
+    return found
+
+
 def _firing_order(size: int, places: Sequence[Place]) -> Steps[list[int]]:
-    """The transitions as they can fire, the last one last, without those that wait for each other."""
+    """The transitions as they can fire, but the last one and those that wait for each other."""
     out: list[list[int]] = [[] for _ in range(size)]
     missing = [0] * size
     for portion in portions(places):
@@ -82,10 +83,6 @@ def _firing_order(size: int, places: Sequence[Place]) -> Steps[list[int]]:
 
 
 def _sorted(ties: list[_Tie]) -> list[_Tie]:
-    """In order, each once."""
+    """The ties in order, without repetitions."""
     ties.sort()
     return [tie for tie, before in zip(ties, [None, *ties], strict=False) if tie != before]
-
-
-def _sortable(stretch: Seconds | None) -> Seconds:
-    return inf if stretch is None else stretch

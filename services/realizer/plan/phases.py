@@ -1,4 +1,4 @@
-"""What the planner knows of each behavior: its points, the seconds between them, and the parts it moves."""
+"""Points of each behavior, the seconds between them, and the parts that the behavior moves."""
 
 from collections.abc import Mapping
 
@@ -18,7 +18,7 @@ _ARMS = {"LEFT_HAND": ("left_arm",), "RIGHT_HAND": ("right_arm",), "BOTH_HANDS":
 class Chain(Struct, frozen=True):
     """A behavior with the seconds between its points.
 
-    longest: of each segment; None: it can be stretched without limit. parts: what it takes from another that has it.
+    longest: of each segment; None: without limit. parts: those that it takes from a behavior that has them.
     """
 
     behavior: BlockBehavior
@@ -46,7 +46,7 @@ def chain(behavior: BlockBehavior, estimate: Estimate | None) -> Chain:
 
 
 def _stroke_by_stroke(parts: tuple[Segment, ...], estimate: Estimate) -> tuple[Segment, ...]:
-    """With each repetition of a movement, if the body says that it will tell of them: `stroke:2` and on."""
+    """The phases with each repetition of a movement, if the body says that it will tell of them: `stroke:2` etc."""
     syncs = [phase.since for phase in estimate.phases]
     if "stroke" not in syncs or "stroke_end" not in syncs:
         return parts
@@ -71,7 +71,7 @@ def _parts(behavior: BlockBehavior, estimate: Estimate | None) -> tuple[str, ...
 
 
 def natural_ends(chains: Mapping[str, Chain], relations: Relations) -> frozenset[str]:
-    """Behaviors that last until something else takes their place or all ends: nobody has said when they end."""
+    """Behaviors that last until something takes their place or all ends: the block does not say when they end."""
     constrained = relations.constrained
     return frozenset(
         id

@@ -1,8 +1,8 @@
-"""From a block and what the body expects of its behaviors to a plan: the net and its earliest schedule.
+"""Planning: from a block and what the body expects of its behaviors to the net and its earliest schedule.
 
 Refused here, before anything moves: references to nothing, contradictions, and circles of waiting. Dropped here,
-each with a warning: what the body cannot do, and what cannot be on time. Document order decides only between
-equals; any other permutation of a block gives the same net.
+each with a warning: behaviors that the body cannot do, and those that cannot be on time. Document order decides only
+between equals; any other permutation of a block gives the same net.
 """
 
 from collections.abc import Collection, Container, Iterable, Mapping, Sequence
@@ -11,16 +11,17 @@ from typing import get_args
 from msgspec import Struct
 from msgspec.structs import replace
 
+from engage_hri.schemas.behavior_types import TYPES
 from engage_hri.schemas.behaviors import BlockBehavior, Event, Hand, Head, Unknown
 from engage_hri.schemas.blocks import Block
-from engage_hri.schemas.body import Estimate, Estimates
+from engage_hri.schemas.body import Estimate
 from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.feedback import WarningKind
 from engage_hri.schemas.units import Seconds
-from engage_hri.services.realizer.net.petri_net import Bound, PetriNet
+from engage_hri.services.realizer.net.petri_net import PetriNet
 from engage_hri.services.realizer.plan.assembly import Assembler, Assembly, Member, assembling
 from engage_hri.services.realizer.plan.deadlocks import Losses, clashes, judge
-from engage_hri.services.realizer.plan.handover import Arrangement, Conflict, arrange, entering
+from engage_hri.services.realizer.plan.handover import Arrangement, Conflict, Turn, arrange, entering
 from engage_hri.services.realizer.plan.instants import Classes
 from engage_hri.services.realizer.plan.phases import Chain, chain, natural_ends
 from engage_hri.services.realizer.plan.prediction import Impossible, predict
@@ -38,12 +39,13 @@ from engage_hri.services.realizer.plan.relations import (
 )
 from engage_hri.services.realizer.plan.schedule import EPSILON, Solution
 from engage_hri.services.realizer.plan.steps import PORTION, Steps, finished, portions
-from engage_hri.services.realizer.points import ORIGIN, Point, one_instant
+from engage_hri.services.realizer.points import ORIGIN, Point
 
 
 class Plan(Struct, frozen=True, kw_only=True):
-    """schedule: of each transition of the net, seconds from the block's start, if all goes as estimated.
+    """A planned block.
 
+    schedule: of each transition of the net, seconds from the block's start, if all goes as estimated.
     block: with a hand for each gesture that must use a certain one. critical: the transitions that make the block as
     long as it is, from first to last.
     entering: behaviors in the order in which they take their parts: of two that begin at one instant, too.
@@ -69,6 +71,7 @@ class Plan(Struct, frozen=True, kw_only=True):
     problems: tuple[Problem, ...] = ()
 
     def predicted(self, point: Point) -> Seconds:
+        """Seconds from the block's start to the point, if all goes as estimated."""
         return self.schedule[self.at[point]]
 
     @property
@@ -76,14 +79,10 @@ class Plan(Struct, frozen=True, kw_only=True):
         """Points of other blocks that this one is tied to."""
         return tuple([point for point in self.at if ":" in point.behavior])
 
-    @property
-    def bounds(self) -> tuple[Bound, ...]:
-        return self.net.bounds
-
 
 def plan_block(
     block: Block,
-    estimates: Estimates | Iterable[Estimate] = (),
+    estimates: Iterable[Estimate] = (),
     *,
     dropped: Iterable[str] = (),
     elsewhere: Elsewhere | None = None,
@@ -99,15 +98,14 @@ def plan_block(
 
 def plan_steps(
     block: Block,
-    estimates: Estimates | Iterable[Estimate] = (),
+    estimates: Iterable[Estimate] = (),
     *,
     dropped: Iterable[str] = (),
     elsewhere: Elsewhere | None = None,
     barred: Container[tuple[str, Hand]] = (),
 ) -> Steps[Plan]:
-    """See `plan_block`."""
-    items = estimates.items if isinstance(estimates, Estimates) else tuple(estimates)
-    planner = _Planner(block, {each.behavior: each for each in items}, dropped, barred)
+    """Plan as `plan_block` does, in steps."""
+    planner = _Planner(block, {each.behavior: each for each in estimates}, dropped, barred)
     yield from planner.read(elsewhere)
     return (yield from planner.plan())
 
@@ -125,9 +123,9 @@ class _Planner:
         self.estimates = estimates
         self.barred = barred
         self.dropped = dict.fromkeys(dropped)
-        """In the order in which they were; the values say nothing."""
-        self.turns: frozenset[tuple[str, Point]] = frozenset()
-        self.overlaps: set[tuple[str, Point]] = set()
+        """Behaviors, in the order in which they were dropped; the values mean nothing."""
+        self.turns: frozenset[Turn] = frozenset()
+        self.overlaps: set[Turn] = set()
         """Turns that there is no time to wait for."""
         self.hands: dict[str, Hand] = {}
         self.chains: dict[str, Chain] = {}
@@ -165,7 +163,7 @@ class _Planner:
         self.problems.append(Problem(kind, at_line(self.lines[id], f"{reason}{DROPPED}"), id))
 
     def plan(self) -> Steps[Plan]:
-        """What cannot be on time is dropped, until the rest can be."""
+        """The plan; behaviors that cannot be on time are dropped until the rest can be."""
         while True:
             present, classes = yield from self._present()
             try:
@@ -181,7 +179,7 @@ class _Planner:
                         self._drop(loss.behavior, "IMPOSSIBLE_TO_SCHEDULE", loss.reason)
 
     def _plan(self, present: Relations, classes: Classes) -> Steps[Plan]:
-        """Raises Losses: what cannot be on time."""
+        """The plan of the behaviors that are left. Raises Losses: those that cannot be on time."""
         natural = natural_ends(self.chains, present)
         waited_for = frozenset(self.chains) - self._unawaited_events(present)
         arrangement = Arrangement(natural=natural)
@@ -229,35 +227,35 @@ class _Planner:
         )
 
     def _present(self) -> Steps[tuple[Relations, Classes]]:
-        """What is said about the points of those that are performed, and which of them are one instant."""
+        """Relations of the behaviors that are not dropped, and the classes of their points."""
 
-        def there(term: Term) -> bool:
+        def is_left(term: Term) -> bool:
             return term.point.behavior not in self.dropped
 
-        shown = self._timed
+        timed = self._timed
         equals = [
-            Equal(tuple(map(shown, kept)))
+            Equal(tuple(map(timed, kept)))
             for equal in self.relations.equals
-            if (kept := tuple(filter(there, equal.terms))) and (len(kept) > 1 or len(equal.terms) == 1)
+            if (kept := tuple(filter(is_left, equal.terms))) and (len(kept) > 1 or len(equal.terms) == 1)
         ]
         yield len(equals)
         classes = yield from self._classes(equals)
         equals += [equal for equal in self._left_over() if classes.tie_if_possible(equal)]
         yield len(equals)
-        orders = [each for each in self.relations.orders if there(each.earlier) and there(each.later)]
+        orders = [each for each in self.relations.orders if is_left(each.earlier) and is_left(each.later)]
         present = Relations(
             tuple(equals),
-            tuple([Order(shown(each.earlier), shown(each.later)) for each in orders]),
+            tuple([Order(timed(each.earlier), timed(each.later)) for each in orders]),
             self.relations.required - self.dropped.keys(),
         )
         return present, classes
 
     def _left_over(self) -> list[Equal]:
-        """What the points of a dropped behavior tied together stays tied, unless they could not have been."""
+        """Ties through points of dropped behaviors: they stay, unless they could not have been kept."""
         torn = [
             Equal(tuple(map(self._timed, equal.terms)))
             for equal in self.relations.equals
-            if equal.behavior not in self.dropped  # else it goes with the timing written on it
+            if equal.behavior not in self.dropped  # a dropped behavior's own timing is dropped, too
             and any(term.point.behavior in self.dropped for term in equal.terms)
         ]
         through = Classes()
@@ -283,7 +281,7 @@ class _Planner:
         return found
 
     def _timed(self, term: Term) -> Term:
-        """A later stroke as a point of its own, if the body tells of it; else as so much later than the first."""
+        """The term of a later stroke: a point of its own if the body tells of it, otherwise an offset to stroke 1."""
         if term.stroke < 2 or (movement := self.chains.get(term.point.behavior)) is None:
             return term
         later = Point(term.point.behavior, f"{term.point.sync}:{term.stroke}")
@@ -298,7 +296,7 @@ class _Planner:
         classes = Classes()
         for portion in portions(self.chains.values()):
             for each in portion:
-                for syncs in one_instant(each.type):
+                for syncs in TYPES[each.type].one_instant:
                     classes.tie(Equal(tuple([Term(Point(each.behavior.id, sync), 0.0, sync) for sync in syncs])), "")
             yield 2 * len(portion)
         for equal in equals:
@@ -307,7 +305,7 @@ class _Planner:
         return classes
 
     def _unawaited_events(self, present: Relations) -> frozenset[str]:
-        """Events whose decision nothing in the block waits for."""
+        """Events with a decision that nothing in the block waits for."""
         events = {id for id, each in self.chains.items() if isinstance(each.behavior, Event)}
         awaited = {point.behavior for point in present.constrained if point.sync == "end"} if events else ()
         return frozenset(events.difference(awaited))
@@ -315,7 +313,10 @@ class _Planner:
     def _solved(
         self, assembler: Assembler, arrangement: Arrangement, classes: Classes
     ) -> Steps[tuple[Assembler, Assembly, Solution]]:
-        """What waits for each other without delay is made one instant. Raises Losses, or BlockRefused: a deadlock."""
+        """The net and its schedule; points in a circle without delay become one instant.
+
+        Raises Losses, or BlockRefused: a deadlock.
+        """
         while True:
             assembly = yield from assembler.assemble(arrangement)
             if assembly.is_ordered or not (circles := (yield from assembler.circles())):
@@ -337,11 +338,11 @@ class _Planner:
             ) from None
 
     def _may_speak_at_once(self, id: str, present: Relations) -> bool:
-        """Of an utterance that only begins the block nobody has said that it must be over by then: the voice will."""
+        """True for an utterance that no constraint mentions: the voice decides whether it has to wait."""
         return self.chains[id].type == "speech" and all(point.behavior != id for point in present.constrained)
 
     def _resolve(self, conflict: Conflict) -> None:
-        """Use the other arm, or wait for one's turn."""
+        """Settle a conflict: one of the two uses the other arm, or waits for its turn."""
         if conflict.hand is None:
             assert conflict.turn is not None
             self.turns |= {conflict.turn}
@@ -365,7 +366,7 @@ def _kind(warning: str) -> WarningKind:
 
 
 def _rounds(assembly: Assembly, times: Sequence[Seconds]) -> dict[Point, int]:
-    """How many measured events in a row each point waits for at its own time: who waits for one comes after it."""
+    """Number of measured events in a row that each point waits for at its own time. It orders simultaneous points."""
     rounds = [0] * len(times)
     for place in sorted(assembly.net.places, key=lambda place: place.source):  # numbered in firing order
         if place.kind != "idle" and place.source and times[place.target] - times[place.source] < EPSILON:
@@ -374,7 +375,7 @@ def _rounds(assembly: Assembly, times: Sequence[Seconds]) -> dict[Point, int]:
 
 
 def _critical(solution: Solution) -> tuple[int, ...]:
-    """From the end of the block back along what keeps each instant from being earlier."""
+    """Transitions from the start of the block to its end, each the reason why the next is not earlier."""
     path = [len(solution.times) - 1]
     while (cause := solution.causes.get(path[-1])) is not None:
         path.append(cause.source)

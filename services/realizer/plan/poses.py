@@ -1,4 +1,4 @@
-"""Where the body will be when a behavior starts: on the target of the one before it, or home again."""
+"""Poses of the body when a behavior starts: on the target of the one before it, or home again."""
 
 from collections.abc import Mapping
 
@@ -6,24 +6,22 @@ from engage_hri.schemas.body import BodyPose, Estimate
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.realizer.plan.planner import Plan
 from engage_hri.services.realizer.plan.schedule import EPSILON
-from engage_hri.services.realizer.points import BENEATH, Point, family
-
-EVERYTHING_HOME: Mapping[str, BodyPose] = {}
+from engage_hri.services.realizer.points import SHIFTS, Point, family
 
 
-def poses_before(plan: Plan, left: Mapping[str, BodyPose] = EVERYTHING_HOME) -> dict[str, BodyPose]:
-    """Where the body will be when a behavior takes another's place, by the id of the later: on the earlier's target.
+def poses_before(plan: Plan, left: Mapping[str, BodyPose] = {}) -> dict[str, BodyPose]:
+    """Poses in which behaviors start that take another's place, by their ids: on the target of the earlier one.
 
     How long a look takes depends on what was looked at before it, not on where the head is as the block comes in.
-    left: how other blocks will leave parts, see `poses_left`.
+    left: poses in which other blocks leave parts, see `poses_left`.
     """
     latest: dict[str, Estimate] = {}
     base: BodyPose | None = None
-    """Where a look goes home to, once a shift has been made."""
+    """Pose to which a look goes home, once a shift has been made."""
     poses = {}
     order = {id: (plan.predicted(each.points[0]), number) for number, (id, each) in enumerate(plan.chains.items())}
     for id in sorted(plan.chains, key=order.__getitem__):
-        estimate, is_shift = plan.estimates.get(id), plan.chains[id].type in BENEATH
+        estimate, is_shift = plan.estimates.get(id), plan.chains[id].type in SHIFTS
         for part in plan.chains[id].parts:
             before = latest.get(part)
             if before is None and part in left:
@@ -41,7 +39,7 @@ def poses_before(plan: Plan, left: Mapping[str, BodyPose] = EVERYTHING_HOME) -> 
 
 
 def poses_left(plan: Plan, times: Mapping[Point, Seconds], until: Seconds) -> dict[str, BodyPose]:
-    """Where the body will be at `until`, by part: on the target of what goes on then. times: when each point is."""
+    """Poses of the body at `until`, by part: on the target of what goes on then. times: of each point."""
     going = [
         (times[chain.points[0]], number, chain.parts, estimate.pose_after)
         for number, (id, chain) in enumerate(plan.chains.items())
@@ -53,14 +51,14 @@ def poses_left(plan: Plan, times: Mapping[Point, Seconds], until: Seconds) -> di
 
 
 def _is_overlaid(plan: Plan, shift: str) -> bool:
-    """Has it no time to move the head, since a gaze has it or takes it?"""
+    """True if the shift has no time to move the head, since a gaze has it or takes it."""
     since, to = (plan.predicted(point) for point in plan.chains[shift].points)
     return to < since + EPSILON
 
 
 def _is_home(plan: Plan, earlier: str, later: str) -> bool:
-    """Has the earlier had the time to take its part home? A shift leaves it where it is."""
-    if plan.chains[earlier].type in BENEATH:
+    """True if the earlier had the time to take its part home. A shift leaves it where it is."""
+    if plan.chains[earlier].type in SHIFTS:
         return False
     relax, end = (plan.predicted(point) for point in plan.chains[earlier].points[-2:])
     return relax + EPSILON < end <= plan.predicted(plan.chains[later].points[0]) + EPSILON

@@ -9,11 +9,11 @@ from engage_hri.services.realizer.plan.schedule import EPSILON, Lag, PositiveCyc
 from engage_hri.services.realizer.plan.steps import PORTION, Steps
 
 Circle = tuple[tuple[Place | Bound, Seconds], ...]
-"""Ties that lead back to their start, in order, each with the seconds it asks for: more than none in all."""
+"""Ties that lead back to their start, in order, each with its seconds: the sum is more than 0."""
 
 
 class Impossible(Exception):
-    """No schedule, with every phase of these circles as short or long as can be.
+    """Raised if there is no schedule, with every phase of these circles as short or long as can be.
 
     circles: all that were found, no two of which share an instant other than the start of the block.
     """
@@ -28,8 +28,8 @@ def predict(
 ) -> Steps[Solution]:
     """The earliest schedule; `reason` of a cause is the number of the place or, after them, of the bound.
 
-    What a cycle takes too long is shared by its phases, each according to the room it has. Raises Impossible; also
-    for a cycle with a tie that nobody insists on: no phase is hurried for its sake.
+    A cycle that takes too long is shortened: each phase by a share of its room. Raises Impossible; also for a cycle
+    with ties that are dispensable: no phase is hurried for their sake.
     """
     ties: tuple[Place | Bound, ...] = (*net.places, *net.bounds)
     lags = []
@@ -60,20 +60,18 @@ def predict(
 
 
 def _shortened(cycle: tuple[Lag, ...], room: list[Seconds], excess: Seconds) -> list[Lag]:
-    """The lags of the cycle that give way, by `excess` in all, each according to its `room`."""
+    """The lags of the cycle that give way, by `excess` in all, each in proportion to its `room`."""
+    if sum(room) == inf:
+        room = [float(each == inf) for each in room]
     total = sum(room)
-    if total == inf:
-        shares = [float(each == inf) for each in room]
-        shares = [share / sum(shares) for share in shares]
-    else:
-        shares = [each / total for each in room]
+    shares = [each / total for each in room]
     return [
         lag._replace(seconds=lag.seconds - excess * share) for lag, share in zip(cycle, shares, strict=True) if share
     ]
 
 
 def _least(tie: Place | Bound) -> Seconds:
-    """What the lag may be reduced to."""
+    """The least that the lag may be."""
     if isinstance(tie, Place):
         return tie.shortest
     return -inf if tie.stretch is None else tie.lag - tie.stretch

@@ -1,4 +1,4 @@
-"""What a block says about its sync points, read into relations between points: which are one instant, which in order.
+"""Relations between sync points, read from a block: which are one instant, and which come in order.
 
 Constraints and inline timing mean the same thing and become the same relations; so do `before` and `after`.
 """
@@ -27,12 +27,12 @@ from engage_hri.schemas.feedback import WarningKind
 from engage_hri.schemas.references import type_name
 from engage_hri.schemas.syncref import BLOCK_ITSELF, SyncRef
 from engage_hri.schemas.units import Seconds
-from engage_hri.services.realizer.plan.steps import PORTION, Steps, finished, portions
+from engage_hri.services.realizer.plan.steps import PORTION, Steps, portions
 from engage_hri.services.realizer.points import ORIGIN, Point
 
 
 class BlockRefused(InputRefused):
-    """The whole block is refused. kind: of the warning that says so."""
+    """Raised if the whole block is refused. kind: of the warning that says so."""
 
     def __init__(self, fault: Fault, kind: WarningKind = "PARSING_FAILURE") -> None:
         super().__init__(fault)
@@ -40,11 +40,11 @@ class BlockRefused(InputRefused):
 
 
 Elsewhere = Mapping[str, Block | None]
-"""Other live blocks, by id. None: it is not known what is in it, so any point may be."""
+"""Other live blocks, by id. None: the content of the block is not known, so any point may be in it."""
 
 
 class Term(Struct, frozen=True, gc=False):
-    """A point and an offset: the instant `offset` seconds after the point. text: as its author wrote it.
+    """A point and an offset: the instant `offset` seconds after the point. text: as the block has it.
 
     stroke: of a repeated movement, which of its strokes is meant, from 1; 0 of anything else.
     """
@@ -57,7 +57,7 @@ class Term(Struct, frozen=True, gc=False):
 
 
 class Equal(Struct, frozen=True, gc=False):
-    """All terms are one instant; a single one is only named. behavior: whose own timing says so, if any does."""
+    """Terms that are one instant; a single term is only named. behavior: the one that says so in its own timing."""
 
     terms: tuple[Term, ...]
     behavior: str = ""
@@ -71,7 +71,7 @@ class Order(Struct, frozen=True, gc=False):
 
 
 DROPPED = "; the behavior is dropped"
-"""What the message of a problem that costs a behavior ends with."""
+"""End of the message of a problem that costs a behavior."""
 
 
 class Problem(Struct, frozen=True):
@@ -88,7 +88,10 @@ def at_line(line: int, reason: str) -> str:
 
 
 class Relations(Struct, frozen=True, dict=True):
-    """unusable: behaviors that cannot be performed as written. required: those whose loss fails the block."""
+    """Everything that a block says about its points.
+
+    unusable: behaviors that cannot be performed as written. required: those without which the block fails.
+    """
 
     equals: tuple[Equal, ...]
     orders: tuple[Order, ...]
@@ -103,7 +106,7 @@ class Relations(Struct, frozen=True, dict=True):
 
     @cached_property
     def constrained(self) -> frozenset[Point]:
-        """Every point that has to do with another."""
+        """Every point that is tied to another."""
         return self.held | {order.earlier.point for order in self.orders}
 
     @cached_property
@@ -119,7 +122,7 @@ class _Reader:
         self.block = block
         self.elsewhere = elsewhere
         self.theirs: dict[str, Mapping[str, Behavior]] = {}
-        """Behaviors of other blocks that are named, by id."""
+        """Behaviors of other blocks that are named, by block and id."""
         self.behaviors: Mapping[str, Behavior] = {behavior.id: behavior for behavior in block.behaviors}
         self.points = {id: frozenset(sync_points(behavior)) for id, behavior in self.behaviors.items()}
         self.equals: list[Equal] = []
@@ -129,26 +132,25 @@ class _Reader:
         self.required = {behavior.id for behavior in block.behaviors if behavior.required}
 
     def term(self, text: str, where: str, line: int) -> Term | Problem:
-        """The point and offset of a reference; a Problem if it names a sync point that its behavior lacks."""
+        """The point and offset of a reference; a Problem if its behavior has no such sync point."""
         try:
             ref = SyncRef.parse(text)
             if isinstance(speech := self.behaviors.get(ref.behavior), Speech) and speech.marks:
                 ref = SyncRef.parse(text, [mark.id for mark in speech.marks])
         except ValueError as error:
             raise self.refusal(str(error), where, line) from error
-        here = ref.block in ("", self.block.id)
-        if not ref.behavior or ref.behavior == BLOCK_ITSELF:
-            if ref.sync == "end" and here:
-                raise self.refusal(f"{text!r}: nothing in a block can wait for its own end", where, line)
-            return Term(ORIGIN, ref.offset, text, line) if here else self._elsewhere(ref, text, where, line)
-        if not here:
+        if ref.block not in ("", self.block.id):
             return self._elsewhere(ref, text, where, line)
+        if ref.behavior in ("", BLOCK_ITSELF):
+            if ref.sync == "end":
+                raise self.refusal(f"{text!r}: nothing in a block can wait for its own end", where, line)
+            return Term(ORIGIN, ref.offset, text, line)
         behavior = self.behaviors.get(ref.behavior)
         if behavior is None:
             raise self.refusal(f"unknown behavior {ref.behavior!r}", where, line, self._advice())
         sync = canonical_sync(ref.sync, type_name(behavior), self.block.dialect)
         if isinstance(behavior, Unknown):
-            return Term(Point(behavior.id, sync), ref.offset, text, line)  # It will vanish with its behavior.
+            return Term(Point(behavior.id, sync), ref.offset, text, line)  # It is dropped with its behavior.
         strokes = behavior.repetition if isinstance(behavior, Head) else 1
         if not self._has(behavior, sync) or ref.repetition > strokes:
             return Problem(
@@ -157,13 +159,13 @@ class _Reader:
         return Term(Point(behavior.id, sync), ref.offset, text, line, ref.repetition)
 
     def _has(self, behavior: Behavior, sync: str) -> bool:
-        """BML 1.0 knows fewer points than the drafts. Of an unknown element any may be."""
+        """True if the behavior has this point in the block's dialect, or is unknown: then it may have any point."""
         spelled = dialect_sync(sync, type_name(behavior), self.block.dialect)
         is_known = spelled is not None and sync in self.points[behavior.id]
         return is_known or isinstance(behavior, Unknown)
 
     def _elsewhere(self, ref: SyncRef, text: str, where: str, line: int) -> Term:
-        """A point of another block, spelled as in this one."""
+        """The term for a point of another block, spelled as in this one."""
         other = self.elsewhere.get(ref.block)
         if other is not None and ref.block not in self.theirs:
             self.theirs[ref.block] = {each.id: each for each in other.behaviors}
@@ -232,26 +234,21 @@ class _Reader:
             yield 4 * len(portion)
 
     def _read_timing_of(self, behavior: BlockBehavior) -> None:
-        relations: list[Equal] = []
+        equals: list[Equal] = []
         for timing in behavior.timing:
             sync = canonical_sync(timing.sync, type_name(behavior), self.block.dialect)
-            own = f"{behavior.id}:{timing.sync}"
-            problem: Problem | None = None
-            if not self._has(behavior, sync):
-                problem = Problem("PARSING_FAILURE", f"{type_name(behavior)} has no sync point {timing.sync!r}")
-            else:
+            if self._has(behavior, sync):
                 other = self.term(timing.ref, behavior.id, behavior.line)
-                if isinstance(other, Problem):
-                    problem = other
-                else:
-                    term = Term(Point(behavior.id, sync), 0.0, own, behavior.line)
-                    relations.append(Equal((term, other), behavior.id))
-            if problem is not None:
+            else:
+                other = Problem("PARSING_FAILURE", f"{type_name(behavior)} has no sync point {timing.sync!r}")
+            if isinstance(other, Problem):
                 self.unusable.add(behavior.id)
-                message = at_line(behavior.line, f"{problem.message}{DROPPED}")
+                message = at_line(behavior.line, f"{other.message}{DROPPED}")
                 self.problems.append(Problem("PARSING_FAILURE", message, behavior.id))
                 return
-        self.equals += relations
+            own = Term(Point(behavior.id, sync), 0.0, f"{behavior.id}:{timing.sync}", behavior.line)
+            equals.append(Equal((own, other), behavior.id))
+        self.equals += equals
 
     def result(self) -> Relations:
         found = Relations(
@@ -261,12 +258,9 @@ class _Reader:
             tuple(self.problems),
             frozenset(self.unusable),
         )
+        message = "wait has neither a duration nor an end; it ends at once"
         endless = tuple(
-            Problem(
-                "PARSING_FAILURE",
-                at_line(behavior.line, "wait has neither a duration nor an end; it ends at once"),
-                behavior.id,
-            )
+            Problem("PARSING_FAILURE", at_line(behavior.line, message), behavior.id)
             for behavior in self.block.behaviors
             if isinstance(behavior, Wait)
             and behavior.duration is None
@@ -275,16 +269,11 @@ class _Reader:
         return replace(found, problems=found.problems + endless)
 
 
-def relations(block: Block, elsewhere: Elsewhere | None = None) -> Relations:
-    """Everything `block` says about its points. Raises InputRefused: a malformed or dangling reference.
+def relation_steps(block: Block, elsewhere: Elsewhere | None = None) -> Steps[Relations]:
+    """Read everything that `block` says about its points. Raises InputRefused: a malformed or dangling reference.
 
     elsewhere: other live blocks, by id. Their points become `Point("block:behavior", sync)`.
     """
-    return finished(relation_steps(block, elsewhere))
-
-
-def relation_steps(block: Block, elsewhere: Elsewhere | None = None) -> Steps[Relations]:
-    """See `relations`."""
     reader = _Reader(block, elsewhere or {})
     yield from reader.read_constraints()
     yield from reader.read_timing()
@@ -292,7 +281,7 @@ def relation_steps(block: Block, elsewhere: Elsewhere | None = None) -> Steps[Re
 
 
 def extent(block: Block) -> int:
-    """How much there is to plan: behaviors, marks in speech, and sync references."""
+    """Number of elements to plan: behaviors, marks in speech, and sync references."""
     marks = sum(len(each.marks) for each in block.behaviors if isinstance(each, Speech))
     inline = sum(len(each.timing) for each in block.behaviors)
     operators = (operator for constraint in block.constraints for operator in constraint.operators)

@@ -1,4 +1,4 @@
-"""The earliest instants that satisfy lower and upper bounds: longest paths, and the cycles that forbid them."""
+"""Schedule of the earliest instants within lower and upper bounds: longest paths, and the cycles that forbid them."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from typing import NamedTuple
@@ -7,14 +7,14 @@ from engage_hri.schemas.units import Seconds
 from engage_hri.services.realizer.plan.steps import Steps
 
 EPSILON: Seconds = 1e-6
-"""Times closer than this are the same instant."""
+"""Seconds; times closer than this are the same instant."""
 
 LAGS_AN_ELEMENT = 32
-"""How many are looked at in the time that others take for an element of a block: see `steps`."""
+"""Number of lags that take as long as one element of a block: see `steps`."""
 
 
 class Lag(NamedTuple):
-    """`target` is no earlier than `source` + `seconds`; which may be negative. reason: the caller's index."""
+    """Lower bound: `target` is no earlier than `source` + `seconds`, perhaps negative. reason: the caller's index."""
 
     source: int
     target: int
@@ -23,7 +23,7 @@ class Lag(NamedTuple):
 
 
 class PositiveCycle(Exception):
-    """No schedule: these lags lead back to their start and take longer than no time at all.
+    """Raised if there is no schedule: these lags lead back to their start and take more than no time.
 
     cycles: all that were found, no two of which share an instant other than the first. lags: of the first.
     """
@@ -35,14 +35,14 @@ class PositiveCycle(Exception):
 
 
 class Solution(NamedTuple):
-    """times: of each instant. causes: what keeps an instant from being earlier; none where nothing does."""
+    """Schedule. times: of each instant. causes: for each that could not be earlier, the lag because of which."""
 
     times: list[Seconds]
     causes: dict[int, Lag]
 
 
 def solve(size: int, lags: Sequence[Lag]) -> Steps[Solution]:
-    """Least instants, none before 0, that satisfy `lags`. Raises PositiveCycle.
+    """The least instants, none before 0, that satisfy `lags`. Raises PositiveCycle.
 
     Sweeps go to and fro over the lags. Where these are in an order in which they can be met, forward lags need one
     sweep, what backward ones push back another; only what is pushed to and fro costs more (Yen's Bellman-Ford).
@@ -77,7 +77,10 @@ def solve(size: int, lags: Sequence[Lag]) -> Steps[Solution]:
 
 
 def _round_trips(late: Iterable[Lag], causes: Mapping[int, Lag], at_once: Mapping[int, Lag]) -> list[list[Lag]]:
-    """From instant 0 along what makes each of `late` too late, and by that back. at_once: lags of no time from 0."""
+    """Cycles from instant 0 along what makes each of `late` too late, and by that lag back.
+
+    at_once: lags of no time from instant 0, by target.
+    """
     found = []
     visited: set[int] = set()
     for last in late:

@@ -1,8 +1,7 @@
-"""Work that can be done a piece at a time: a generator that pauses, so that others may have their turn in between.
+"""Long work a piece at a time: a generator that pauses, so that other work may have its turn in between.
 
 `yield n` says that about `n` elements have been looked at since the last pause, or will be until the next: some two
-microseconds each.
-What is worked on must not change meanwhile. `finished` does it all in one go.
+microseconds each. What is worked on must not change meanwhile. `finished` does it all in one go.
 """
 
 from collections.abc import Collection, Generator, Iterator, Sequence
@@ -11,14 +10,14 @@ from typing import TypeVar
 T = TypeVar("T")
 
 Steps = Generator[int, None, T]
-"""Returns what the work is for."""
+"""Work in steps; returns its result."""
 
 PORTION = 64
-"""Of a block's elements that are looked at between two pauses."""
+"""Number of a block's elements that are looked at between two pauses."""
 
 
 def finished(steps: Steps[T]) -> T:
-    """Without a pause."""
+    """The result of the work, done without a pause."""
     while True:
         try:
             next(steps)
@@ -28,6 +27,6 @@ def finished(steps: Steps[T]) -> T:
 
 
 def portions(elements: Collection[T], size: int = PORTION) -> Iterator[Sequence[T]]:
-    """`elements` in order, so many at a time."""
+    """The elements in order, in lists of at most `size`."""
     listed = elements if isinstance(elements, list | tuple) else tuple(elements)
     return (listed[since : since + size] for since in range(0, len(listed), size))

@@ -4,7 +4,7 @@ from engage_hri.schemas.behaviors import Gesture
 from engage_hri.services.realizer.config import RealizerConfig
 from engage_hri.services.realizer.decide.decisions import Decisions
 from engage_hri.services.realizer.decide.effects import Extend
-from engage_hri.services.realizer.decide.patience import Late, LatenessWatch, Stalled
+from engage_hri.services.realizer.decide.lateness import Late, LatenessWatch, Stalled
 from engage_hri.services.realizer.plan.planner import plan_block
 from engage_hri.services.realizer.points import Point
 from tests.realizer.fake_body import FakeBody
@@ -14,24 +14,24 @@ CONFIG = RealizerConfig(late=0.5, late_factor=1.0, stall=3.0, stall_factor=5.0)
 
 
 def test_what_does_not_come_is_late_once_and_given_up_once() -> None:
-    patience = LatenessWatch(CONFIG)
-    patience.expect("b", "stroke", 1.0, 1.0)
+    watch = LatenessWatch(CONFIG)
+    watch.expect("b", "stroke", 1.0, 1.0)
 
-    assert patience.deadline == 2.5
-    assert patience.overdue(2.4) == []
-    assert patience.overdue(2.5) == [Late("b", "stroke", 1.5)]
-    assert patience.deadline == 9.0
-    assert patience.overdue(8.9) == []
-    assert patience.overdue(9.0) == [Stalled("b", "stroke", 8.0)]
-    assert patience.deadline is None
+    assert watch.deadline == 2.5
+    assert watch.overdue(2.4) == []
+    assert watch.overdue(2.5) == [Late("b", "stroke", 1.5)]
+    assert watch.deadline == 9.0
+    assert watch.overdue(8.9) == []
+    assert watch.overdue(9.0) == [Stalled("b", "stroke", 8.0)]
+    assert watch.deadline is None
 
 
 def test_who_comes_to_look_long_after_gives_up_at_once() -> None:
-    patience = LatenessWatch(CONFIG)
-    patience.expect("b", "stroke", 1.0, 1.0)
+    watch = LatenessWatch(CONFIG)
+    watch.expect("b", "stroke", 1.0, 1.0)
 
-    assert patience.overdue(20.0) == [Stalled("b", "stroke", 19.0)]
-    assert patience.overdue(20.0) == []
+    assert watch.overdue(20.0) == [Stalled("b", "stroke", 19.0)]
+    assert watch.overdue(20.0) == []
 
 
 def test_who_holds_where_it_may_pass_is_late_from_when_it_was_told_that() -> None:

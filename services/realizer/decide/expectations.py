@@ -1,4 +1,4 @@
-"""What is expected of a running block: when each instant will be, from what was measured and what others foresee."""
+"""Expected times of a running block, from what was measured and what other blocks expect."""
 
 import heapq
 from collections.abc import Iterable, Mapping
@@ -14,14 +14,15 @@ from engage_hri.services.realizer.plan.schedule import EPSILON
 from engage_hri.services.realizer.points import Point, performer
 
 SURPRISE: Seconds = 0.1
-"""What comes as far from when it was expected as this moves what depends on it noticeably."""
+"""Difference from the expected time, in seconds, from which predictions are computed again."""
 
 
-class Outlook(Facts):
-    """paces: at what pace each behavior was last told to go. is_surprised: see `SURPRISE`, since `expected`.
+class Expectations(Facts):
+    """Facts and what is expected.
 
-    not_before: when a behavior that is overdue is expected at its next point. foreseen: when other blocks expect
-    those of their points that this one is tied to. forecast: None where nothing in the block needs one.
+    paces: the pace that each behavior was last told. is_surprised: something has moved by `SURPRISE` since the last
+    call of `expected`. not_before: when a behavior that is overdue is expected at its next point. foreseen: expected
+    times of points of other blocks that this one is tied to. forecast: None if nothing in the block needs one.
     """
 
     forecast: Forecast | None
@@ -34,16 +35,16 @@ class Outlook(Facts):
         self.foreseen: dict[Point, Seconds] = {}
         self.is_surprised = False
         self._followed: set[Point] = set()
-        """Points that other blocks are tied to."""
+        """Points of this block that other blocks are tied to."""
         self._expected = {point: began + plan.predicted(point) for point in plan.at}
 
     def _look_ahead(self) -> None:
-        """With the plan there is now."""
+        """Begin a forecast of the plan, if it needs one."""
         self.is_surprised = True
         self._arrivals: list[tuple[Seconds, Seconds, str, int]] = []
-        """Until when and since when each behavior is expected at its next point: overdue from there."""
+        """Behaviors and numbers of their next points: until when, and since when, each is expected there."""
         self.forecast = None
-        if self._wiring.is_predictive or self._followed:
+        if self._index.is_predictive or self._followed:
             self.forecast = Forecast(self.plan, self.began, self.experience.factor, self.foreseen)
             for point in self._followed & self.plan.at.keys():
                 self.forecast.require(self.plan.at[point])
@@ -51,7 +52,7 @@ class Outlook(Facts):
     # -- other blocks --------------------------------------------------------------------------------------------
 
     def foresee(self, point: Point, at: Seconds) -> None:
-        """The block that `point` is of expects it at `at` now."""
+        """Note that the other block that has `point` expects it at `at` now."""
         if point in self.plan.at and point not in self.reached:
             self.is_surprised = self.is_surprised or abs(at - self.foreseen.get(point, self.began)) > SURPRISE
             self.foreseen[point] = at
@@ -60,7 +61,7 @@ class Outlook(Facts):
 
     @property
     def ahead(self) -> Mapping[Point, Seconds]:
-        """When the points that other blocks are tied to are expected, of those that are still to come."""
+        """Expected times of the points that other blocks are tied to and that are still to come."""
         if not self._followed or self.forecast is None:
             return {}
         at, times = self.plan.at, self.forecast.times
@@ -68,17 +69,17 @@ class Outlook(Facts):
 
     @property
     def _next_lateness_check(self) -> Seconds | None:
-        """When to look who is late, though nothing here depends on it: others prepare for what comes after."""
-        while self._arrivals and self._next.get(self._arrivals[0][2]) != self._arrivals[0][3]:
-            heapq.heappop(self._arrivals)  # It has come.
+        """Next time to check for delays that only other blocks depend on."""
+        while self._arrivals and self.next_number(self._arrivals[0][2]) != self._arrivals[0][3]:
+            heapq.heappop(self._arrivals)  # The behavior has arrived there.
         return self._arrivals[0][0] + SURPRISE if self._followed and self._arrivals else None
 
     # -- behaviors under way -------------------------------------------------------------------------------------
 
     def _learn(self, point: Point, at: Seconds) -> None:
-        """Correct what is expected of the same parts by how long a phase took that nobody has hurried or held up."""
+        """Correct the estimates of the same parts by a measured phase, unless it was hurried or held up."""
         chain = self.plan.chains.get(point.behavior)
-        number = self._next.get(point.behavior, 0)
+        number = self.next_number(point.behavior)
         if chain is None or number == 0 or chain.points[number] != point or self.paces.get(point.behavior):
             return
         if performer(chain.behavior) == "body":
@@ -88,21 +89,24 @@ class Outlook(Facts):
                 self.forecast.relearn(changed)
 
     def _expect_next(self, behavior: str) -> None:
-        """It has come as far as it has: from when on it is overdue at its next point."""
-        points, number = self._points[behavior], self._next.get(behavior, 0)
+        """Note from when on the behavior is overdue at its next point."""
+        points, number = self._points[behavior], self.next_number(behavior)
         if self.forecast is not None and 0 < number < len(points):
             self.not_before.pop(behavior, None)
             expected = self.reached[points[number - 1]] + self._phase(behavior, number)
             heapq.heappush(self._arrivals, (expected, expected, behavior, number))
 
     def _changes(self, now: Seconds) -> Iterable[int]:
-        """Instants that are expected at another time than before. Who is overdue will be late by as much again."""
+        """Instants that are expected at another time than before.
+
+        A behavior that is overdue by a second is expected a second from now.
+        """
         if self.forecast is None:
             return ()
         while self._arrivals and self._arrivals[0][0] < now - EPSILON:
             _, expected, behavior, number = heapq.heappop(self._arrivals)
             points = self._points.get(behavior, ())
-            if self._next.get(behavior) != number or number >= len(points) or self.holds(points[number]):
+            if self.next_number(behavior) != number or number >= len(points) or self.holds(points[number]):
                 continue
             expected = max(expected, self._asked(points[number], expected))
             until = expected
@@ -113,12 +117,12 @@ class Outlook(Facts):
         return self.forecast.update()
 
     def _asked(self, point: Point, natural: Seconds) -> Seconds:
-        """When its behavior was told to be there; `natural` if it was left to it."""
+        """Time at which the behavior was told to be at `point`; `natural` if it was told none."""
         return dict(self.paces.get(point.behavior, ())).get(point.sync, natural)
 
     def _arrival(self, member: Member) -> Seconds | None:
-        """When a behavior under way will come to its hold point; None if it has not begun."""
-        points, number = self._points[member.behavior], self._next.get(member.behavior, 0)
+        """Expected time at which a behavior comes to its hold point; None if it has not begun."""
+        points, number = self._points[member.behavior], self.next_number(member.behavior)
         if not number:
             return None
         at = self.reached[points[number - 1]]
@@ -129,16 +133,16 @@ class Outlook(Facts):
         return at
 
     def _phase(self, behavior: str, number: int) -> Seconds:
-        """How long it is expected to take from the point before to the one of that number."""
+        """Expected seconds from the point before to the point of that number."""
         if self.forecast is None:
             return self.plan.chains[behavior].segments[number - 1].natural * self.experience.factor(behavior)
         before, here = (self.plan.at[point] for point in self._points[behavior][number - 1 : number + 1])
         return 0.0 if before == here else self.forecast.phase(behavior, here)
 
-    # -- what is told of it --------------------------------------------------------------------------------------
+    # -- expected times ------------------------------------------------------------------------------------------
 
     def expected(self, now: Seconds) -> dict[Point, Seconds]:
-        """When each point of the block that is still to come is expected, seconds from the block's start."""
+        """Expected times of all points of the block that are still to come, in seconds from the block's start."""
         forecast = self.from_scratch()
         for transition in range(len(self.plan.members)):
             forecast.overdue(transition, now)
@@ -149,11 +153,11 @@ class Outlook(Facts):
         return {point: self._expected[point] - self.began for point in coming}
 
     def times(self) -> dict[Point, Seconds]:
-        """When each point of the plan was, or is expected."""
+        """Time of each point of the plan, measured or expected, by the clock of the loop."""
         forecast = self.from_scratch()
         return {point: self.reached.get(point, forecast.times[at]) for point, at in self.plan.at.items()}
 
     def from_scratch(self) -> Forecast:
-        """When each instant will be: what the forecast kept up to date says of those it keeps, and all others."""
+        """A forecast of all instants; for those that the kept forecast has, it says the same."""
         facts = (self.foreseen, self.reached, self.arrived, self._instants)
         return full_forecast(self.plan, self.began, self.experience.factor, *facts)

@@ -1,4 +1,4 @@
-"""What the performances of one realizer share."""
+"""The context that all performances of one realizer share."""
 
 import asyncio
 from collections.abc import Callable, Iterable, MutableMapping
@@ -14,8 +14,8 @@ from engage_hri.services.realizer.perform.live_blocks import LiveBlocks
 from engage_hri.services.requests.ends import Requester
 
 
-class PeersThere:
-    """Who is on the bus. changed: resolved when that changes next."""
+class Presence:
+    """Participants that are on the bus. changed: resolved at the next change."""
 
     def __init__(self) -> None:
         self._there: set[str] = set()
@@ -31,7 +31,7 @@ class PeersThere:
         self.changed = self._loop.create_future()
 
     def has_left(self, participant: str) -> bool:
-        """It was there, and is not now. Who never showed himself has not."""
+        """True if the participant was there and is not now."""
         return participant in self._left
 
     def __contains__(self, participant: str) -> bool:
@@ -39,7 +39,7 @@ class PeersThere:
 
 
 class Moving(Protocol):
-    """What a performance is to the others, and to the reports of the body."""
+    """A performance, as the others and the reports of the body see it."""
 
     @property
     def parts_moving(self) -> set[str]: ...
@@ -47,13 +47,17 @@ class Moving(Protocol):
     def feed(self, message: SyncPointArrived | SyncPointReached) -> None: ...
 
 
-class Surroundings(Struct, frozen=True):
-    """routes: the block of each request to the body. others: all that are performed. live_blocks: for ties."""
+class SharedContext(Struct, frozen=True):
+    """Context of every performance.
+
+    routes: for the id of each request to the body, the performance that sent it. others: all performances.
+    live_blocks: for ties between blocks.
+    """
 
     bus: Bus
     requests: Requester
     config: RealizerConfig
-    peers: PeersThere
+    peers: Presence
     routes: MutableMapping[str, Moving]
     others: Callable[[], Iterable[Moving]]
     live_blocks: LiveBlocks

@@ -1,17 +1,22 @@
 """A plan, indexed by what decisions ask of it."""
 
+from collections.abc import Container
+
 from engage_hri.schemas.behaviors import Speech
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.realizer.plan.planner import Plan
 from engage_hri.services.realizer.points import Point
 
 
-class Wiring:
-    """points: of each behavior, in order. foreign: points of other blocks. members: of each point, the part of its
-    behavior in the point's instant.
+class PlanIndex:
+    """Tables of a plan that decisions look things up in.
 
-    waits_for: of each transition, what must have been measured, and how many seconds before. awaited_by: those that
-    wait for it. not_after: those that it may be later than by no more than so many seconds.
+    points: of each behavior, in order. foreign: points of other blocks. members: for each point, the part that its
+    behavior has in the point's instant. pauses: word gaps at which an utterance waits, so as not to be too early.
+
+    waits_for: for each transition, those that must fire so many seconds before it. awaited_by: the reverse.
+    not_after: for each transition, those that it may be later than by no more than so many seconds.
+    is_predictive: the block can only be on time if it is foreseen when points will be.
     """
 
     def __init__(self, plan: Plan) -> None:
@@ -36,24 +41,20 @@ class Wiring:
                 self.waits_for[place.target].append((place.source, place.lag))
                 self.awaited_by[place.source].append(place.target)
                 if place.kind != "series":
-                    # Who is predicted, or is of another block, may have been there before those it waits for.
+                    # Points that are predicted, or of another block, may come before those that they wait for.
                     self.not_after[place.source].append((place.target, -place.lag))
         for bound in plan.net.bounds:
             if bound.kind != "phase":
                 self.not_after[bound.source].append((bound.target, -bound.lag))
-        self.is_predictive = _is_predictive(plan)
-        self._pauses = _pauses(plan)
-
-    def pauses(self, point: Point) -> bool:
-        """Can an utterance that has begun wait there, at a word gap, where it should not be too early?"""
-        return point in self._pauses
+        constrained = {transition for transition, sources in enumerate(self.waits_for) if sources}
+        self.is_predictive = _is_predictive(plan, constrained)
+        self.pauses = _pauses(plan, constrained)
 
 
-def _is_predictive(plan: Plan) -> bool:
-    """Is anything bounded from above, or constrained and cannot or should not wait? Else prediction is not needed."""
-    if any(bound.kind != "phase" for bound in plan.bounds):
+def _is_predictive(plan: Plan, constrained: Container[int]) -> bool:
+    """True if a time is bounded from above, or a point that cannot or should not wait is tied to another."""
+    if any(bound.kind != "phase" for bound in plan.net.bounds):
         return True
-    constrained = _constrained(plan)
     return any(
         any(member.kind in ("passive", "prompt") for member in members)
         and (len(members) > 1 or transition in constrained)
@@ -61,13 +62,7 @@ def _is_predictive(plan: Plan) -> bool:
     )
 
 
-def _constrained(plan: Plan) -> set[int]:
-    """Transitions that must not be before something."""
-    return {place.target for place in plan.net.places if place.kind in ("order", "delay", "series")}
-
-
-def _pauses(plan: Plan) -> frozenset[Point]:
-    constrained = _constrained(plan)
+def _pauses(plan: Plan, constrained: Container[int]) -> frozenset[Point]:
     found: set[Point] = set()
     for id, chain in plan.chains.items():
         if isinstance(chain.behavior, Speech) and (estimate := plan.estimates.get(id)) is not None:

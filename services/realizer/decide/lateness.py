@@ -1,4 +1,4 @@
-"""How long the realizer waits: for the next report of a behavior under way, and for the decision of an event."""
+"""Time limits while a block runs: for the next report of a behavior under way, and for the decision of an event."""
 
 from collections.abc import Mapping
 
@@ -33,7 +33,7 @@ class Stalled(Struct, frozen=True):
 
 
 class _Awaited(Struct, frozen=True):
-    """What a behavior is to report next."""
+    """The next report of a behavior: when it is expected, late, and so late that the behavior is stalled."""
 
     sync: str
     expected: Seconds
@@ -42,7 +42,7 @@ class _Awaited(Struct, frozen=True):
 
 
 class LatenessWatch:
-    """What each behavior under way is to report next, and when that becomes too late."""
+    """The next report of each behavior under way, and when it becomes too late."""
 
     def __init__(self, config: RealizerConfig) -> None:
         self._config = config
@@ -51,7 +51,7 @@ class LatenessWatch:
         self._alarms: Deadlines[str] = Deadlines(str)
 
     def expect(self, behavior: str, sync: str, expected: Seconds, natural: Seconds) -> None:
-        """Its next report is `sync`, about at `expected`; natural: the duration of the phase before."""
+        """Expect `sync` as the next report, about at `expected`. natural: the duration of the phase before it."""
         limits = self._config
         late = expected + limits.late + limits.late_factor * natural
         stalled = expected + limits.stall + limits.stall_factor * natural
@@ -61,17 +61,17 @@ class LatenessWatch:
             self._alarms.set(behavior, stalled if behavior in self._warned else late)
 
     def forget(self, behavior: str) -> None:
-        """It owes no report: it has ended, or waits for us."""
+        """Stop expecting a report: the behavior has ended, or holds until it may go on."""
         self._awaited.pop(behavior, None)
         self._alarms.clear(behavior)
 
     @property
     def deadline(self) -> Seconds | None:
-        """When to ask again."""
+        """Time of the next call of `overdue` that may find something; None if no report is expected."""
         return self._alarms.earliest
 
     def overdue(self, now: Seconds) -> list[Late | Stalled]:
-        """Who is late, once each, and who has been for too long."""
+        """Behaviors that are late (told once for each), and behaviors that have been late for too long."""
         found: list[Late | Stalled] = []
         for behavior in [*iter(lambda: self._alarms.due(now + EPSILON), None)]:
             awaited = self._awaited[behavior]
@@ -89,9 +89,10 @@ class LatenessWatch:
 def event_deadline(
     event: Event, block: Block, reached: Mapping[Point, Seconds], config: RealizerConfig, *, is_received: bool
 ) -> Seconds:
-    """When to give the event up as failed: its limit, from the latest of its start and the anchors realised by now.
+    """Time at which to give an event up as failed: its limit after its start, or after the last of its anchors.
 
-    is_received: recognition has the request; then it is given far more time, since deciding is its business.
+    Anchors that are not reached by now do not count. is_received: recognition has the request; then it is given far
+    more time, since deciding is its business.
     """
     limit = config.limit_of(event.kind) if event.limit is None else event.limit
     anchors = (reached.get(_point(text, block)) for text in event.anchors)
