@@ -83,7 +83,7 @@ class Recognizer:
             case ActionBegan() | ActionEnded() | ActorFound() | ActorLost() if (
                 observation.actor != self.session.robot
             ):
-                derived = self._attend(lambda attention: attention.believe(observation, at), at)
+                derived = self._attend(lambda attention: attention.take_report(observation, at), at)
                 for when, told in self._interrupted.feed(observation, at):
                     self._wait(told, when)
             case _:

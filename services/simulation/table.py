@@ -55,7 +55,7 @@ class PieceRested(Struct, frozen=True):
 
 
 class Table:
-    """The pieces and a person's hands. Each hand makes one movement at a time."""
+    """The pieces and a person's hands. Each hand makes one movement at a time; the next begins when it has ended."""
 
     def __init__(self, layout: TangramTable, *, hand_speed: float, shortest_movement: Seconds) -> None:
         self.layout = layout

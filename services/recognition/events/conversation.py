@@ -32,11 +32,11 @@ class Conversation:
 
     @property
     def deadlines(self) -> tuple[Seconds | None, ...]:
-        """Times of the `dues`."""
+        """Times of the `timed_steps`."""
         return self.own_backchannel.deadline, self.robot_backchannel.deadline, self._pair_deadline
 
     @property
-    def dues(self) -> Iterator[tuple[Seconds | None, Callable[[Seconds], None]]]:
+    def timed_steps(self) -> Iterator[tuple[Seconds | None, Callable[[Seconds], None]]]:
         """Steps that are due by themselves, with their times."""
         yield self.own_backchannel.deadline, self._takes_floor
         yield self.robot_backchannel.deadline, self._robot_takes_floor

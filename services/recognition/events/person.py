@@ -69,13 +69,13 @@ class Person:
         return min([at for at in times if at is not None], default=None)
 
     @property
-    def _dues(self) -> Iterator[tuple[Seconds | None, Callable[[Seconds], None]]]:
+    def _timed_steps(self) -> Iterator[tuple[Seconds | None, Callable[[Seconds], None]]]:
         """Steps with their times, in the order in which they happen if the times are equal."""
         yield self.gaze.deadline, self._gaze_expires
         yield self.presence.deadline, self.leave
         yield from ((one.deadline, partial(self._expire_directed, one)) for one in self.directed)
         yield self.facial.deadline, self.facial.expire
-        yield from self.conversation.dues
+        yield from self.conversation.timed_steps
         yield self._look_directs_at, self._look_directs
         yield from (
             (one.since + self._longest(action), self._goes_on_too_long) for action, one in self._doing.items()
@@ -83,7 +83,7 @@ class Person:
 
     def pass_time(self, at: Seconds) -> None:
         """Take the first step that is due at `at`, the deadline."""
-        next(step for due, step in self._dues if due == at)(at)
+        next(step for due, step in self._timed_steps if due == at)(at)
 
     @property
     def _look_directs_at(self) -> Seconds | None:
@@ -96,7 +96,7 @@ class Person:
         return None if silent_since is None else max(self.gaze.since, silent_since) + self._config.direct_by_look
 
     def leave(self, at: Seconds) -> None:
-        """Let the person go, and close all open events."""
+        """Count the person as gone, and close all its open events."""
         until = self.presence.leave()
         for one in self.directed:
             one.person_gone(at, until)

@@ -44,7 +44,7 @@ class Presence:
             self._lost_at = at
 
     def leave(self) -> Seconds:
-        """Let the person go. Returns the time at which it was last there."""
+        """Count the person as gone. Returns the time at which it was last there."""
         assert self._lost_at is not None
         self.here, self.reported, self.left_at, self._lost_at = False, False, self._lost_at, None
         return self.left_at

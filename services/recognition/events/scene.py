@@ -126,7 +126,7 @@ class SessionScene:
         return max((at for at, other in self._fell_silent if other != actor), default=float("-inf"))
 
     def knows(self, entity: str) -> bool:
-        """True if the entity has ever been seen, or if no world has come yet."""
+        """True if the entity has ever been seen, or if no object has been seen yet."""
         return not self._objects or entity in self._objects or self._is_no_object(entity)
 
     def _is_no_object(self, entity: str) -> bool:

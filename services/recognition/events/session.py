@@ -37,7 +37,7 @@ Observation = (
 TURNS_KEPT = 64
 """Number of ended turns that are remembered, for a pair announced after the end of its turn; aborted ones too."""
 SILENCE: Seconds = 3.0
-"""Time for which a body shows that it does not speak before its speech counts as over without a reported end."""
+"""Time after a body last showed that it speaks from which on its speech is over, even without a report."""
 ACTIONS_KEPT = 256
 """Number of actions of the robot for which it is remembered when they last began and ended."""
 
@@ -60,7 +60,7 @@ class Session:
         self._people = People(self.scene, config, self._writer, strict=strict)
         self._ended_turns: Latest[str, Seconds] = Latest(TURNS_KEPT)
         self._aborted_turns: Latest[str, Seconds] = Latest(TURNS_KEPT)
-        self._robot_does: dict[tuple[str, Action], ActionBegan] = {}
+        self._robot_actions: dict[tuple[str, Action], ActionBegan] = {}
         """Present speech and gestures of the robot, by behavior."""
         self._heard_at: Seconds | None = None
         """Time when the robot's body last showed that it speaks."""
@@ -174,25 +174,25 @@ class Session:
                 if self.scene.gaze.begin(began.targets, at):
                     self._robot_gaze_changed(at)
             case "speak":
-                self._robot_does[began.behavior, "speak"] = began
+                self._robot_actions[began.behavior, "speak"] = began
                 self._heard_at = None
                 if self.scene.robot_speaks_since is None:
                     self.scene.robot_speaks_since = at
                     self.scene.speaks(self.robot)
                     self._people.apply_to_all(at, lambda person: person.conversation.robot_speaks(at))
             case "nod" | "shake" | "point":
-                self._robot_does[began.behavior, began.action] = began
+                self._robot_actions[began.behavior, began.action] = began
                 self._people.apply_to_all(at, lambda person: person.conversation.robot_gestures(began.action, at))
 
     def _robot_ends(self, ended: ActionEnded, at: Seconds) -> None:
         if not self._history.is_new(ended, at):
             return
-        self._robot_does.pop((ended.behavior, ended.action), None)
+        self._robot_actions.pop((ended.behavior, ended.action), None)
         match ended.action:
             case "look":
                 self.scene.gaze.end(ended.targets, at)
             case "speak":
-                speaks = any(action == "speak" for _, action in self._robot_does)
+                speaks = any(action == "speak" for _, action in self._robot_actions)
                 if self.scene.robot_speaks_since is not None and not speaks:
                     self.scene.robot_speaks_since = None
                     self.scene.falls_silent(self.robot, at)
@@ -213,7 +213,7 @@ class Session:
 
         behaviors: only those with this prefix of the id. actions: only these.
         """
-        for began in list(self._robot_does.values()):
+        for began in list(self._robot_actions.values()):
             if began.behavior.startswith(behaviors) and began.action in actions:
                 ended = ActionEnded(
                     actor=self.robot, action=began.action, at=began.at, targets=began.targets, behavior=began.behavior

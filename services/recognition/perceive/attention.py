@@ -127,7 +127,7 @@ class Attention:
                 self._gaze_targets.see_face(self._robot, observation.gaze.origin)
         return actions
 
-    def believe(self, report: Symbolic, at: Seconds) -> list[Symbolic]:
+    def take_report(self, report: Symbolic, at: Seconds) -> list[Symbolic]:
         """Take a symbolic report: raw perception of the same is ignored from now on. Returns no actions itself."""
         self._forget(at)
         actor = self._actor(report.actor, at)
