@@ -13,7 +13,7 @@ from engage_hri.schemas.presence import PeerAlive, PeerGone
 from engage_hri.schemas.recognition import ENDINGS, ConnectionEvent, OpenEvents
 from engage_hri.schemas.units import Stamp
 from engage_hri.services.client.event_stream import EventStream
-from engage_hri.services.recognition.events.open_events import OpenBook
+from engage_hri.services.recognition.events.open_events import OpenEventTracker
 from tests.test_examples import example
 
 plain = example("plain_zenoh_events")
@@ -38,7 +38,7 @@ class Link:
         """Another life of recognition, which knows nothing of the former, on a machine whose clock is behind."""
         self.life = f"life{next(self.lives)}"
         self.stamps = count(1)
-        self.book = OpenBook("robot", self.life)
+        self.book = OpenEventTracker("robot", self.life)
         self.published: list[tuple[float, int, ConnectionEvent | OpenEvents]] = []
         self.missed: list[ConnectionEvent | OpenEvents] = []
         self.open.clear()

@@ -1,4 +1,4 @@
-"""What can be set in recognition: time limits, resolution, windows. Defaults: design page and Table 2.1."""
+"""Settings of recognition: time limits, resolution, windows. Defaults: design page and Table 2.1."""
 
 from typing import Literal
 
@@ -12,41 +12,41 @@ GazeResolution = Literal["object", "table"]
 
 
 class Sensing(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """How raw perception becomes looks, speech and manipulations. Raises ValueError for what is out of range."""
+    """Settings for making looks, speech and manipulations of raw perception. Raises ValueError if out of range."""
 
     gaze_half_angle: Degrees = 5.0
-    """Of the gaze cone: what is farther off the head's direction is not looked at. Right for eye trackers; where only
-    the nose is seen take 10, and `gaze_resolution` `table`."""
+    """Half angle of the gaze cone: what is farther off the head's direction is not looked at. Right for eye trackers;
+    where only the nose is seen take 10, and `gaze_resolution` `table`."""
     gaze_margin: Degrees = 1.0
-    """How much nearer to the direction another target must be than the present one before it takes over."""
+    """Angle by which another target must be nearer to the direction than the present one before it takes over."""
     dwell: Seconds = 0.15
-    """How long the gaze stays on a target before that is a look, and off it before the look is over."""
+    """Time for which the gaze stays on a target before that is a look, and off it before the look is over."""
     face_radius: Meters = 0.12
-    """Of people and of the robot, around the point between the eyes."""
+    """Radius of the faces of people and of the robot, around the point between the eyes."""
     robot_face: Vector = (0.05, 0.0, 1.17)
-    """Where the robot's eyes are as long as its `RobotState` does not say it."""
+    """Place of the robot's eyes as long as its `RobotState` does not say it."""
     memory: Seconds = 10.0
-    """In which the confidence in the place of a covered thing halves."""
+    """Time in which the confidence in the place of a covered thing halves."""
     voice_onset: Seconds = 0.1
-    """Shorter sounds are no speech."""
+    """Shortest sound that counts as speech."""
     voice_pause: Seconds = 0.25
-    """A shorter silence does not end speech."""
+    """Shortest silence that ends speech."""
     voice_lost: Seconds = 0.5
-    """Without news of the voice for this long, speech has ended with the last."""
+    """Time without a voice level after which speech has ended, at the time of the last level."""
     hand_reach: Meters = 0.1
-    """How near the center of a hand comes to that of a piece that it moves."""
+    """Greatest distance from the center of a hand to that of a piece that it moves."""
     moved: Meters = 0.025
-    """How far a piece has gone from its place, with a hand, before it is manipulated."""
+    """Distance that a piece goes from its place, with a hand, before it counts as manipulated."""
     tremor: Meters = 0.01
-    """Within this of its place a piece rests: the noise of vision."""
+    """Distance from its place within which a piece rests: the noise of vision."""
     smoothing: Seconds = 0.15
-    """Over which places of pieces are averaged."""
+    """Time over which places of pieces are averaged."""
     rest: Seconds = 0.3
-    """How long a piece rests before its manipulation is over."""
+    """Time for which a piece rests before its manipulation is over."""
     oldest: Seconds = 0.5
-    """A head pose or a voice level that arrives later than this after its stamp is ignored."""
+    """Greatest age at which a head pose or a voice level that arrives still counts."""
     settling: Seconds = 0.35
-    """How long events wait, at most, for raw perception that has not made up its mind. Shorter than the realizer's
+    """Longest time for which events wait for raw perception that is undecided. Shorter than the realizer's
     `event_grace`."""
 
     def __post_init__(self) -> None:
@@ -62,58 +62,59 @@ class Sensing(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
 
 
 class RecognitionConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """Raises ValueError for a limit that is not positive or thresholds out of order."""
+    """Settings of recognition. Raises ValueError for a limit that is not positive or thresholds out of order."""
 
     gaze_resolution: GazeResolution = "object"
-    """`table`: a person's look at the table or anything on it counts as a look at any object there (poor vision)."""
+    """Resolution of looks. `table`: one at the table or anything on it counts for any object there (poor vision)."""
     directed_gaze_limit: Seconds = 2.5
-    """From the latest of the event's start, gaze on target, point stroke and phrase start."""
+    """Time limit, from the latest of the event's start, gaze on target, point stroke and phrase start."""
     mutual_facial_gaze_limit: Seconds = 1.9
-    """Longest failed one in Table 2.1 is 1.8 s."""
+    """Time limit; the longest failed one in Table 2.1 is 1.8 s."""
     adjacency_pair_limit: Seconds = 1.5
-    """From the end of the turn, for an answer in words or gestures."""
+    """Time limit from the end of the turn, for an answer in words or gestures."""
     manipulation_limit: Seconds = 8.0
-    """From the end of the turn, when the manipulation of an object is accepted as the answer."""
+    """Time limit from the end of the turn, when the manipulation of an object is accepted as the answer."""
     accept: tuple[Action, ...] = ("speak", "nod", "shake", "point")
-    """What answers a robot's adjacency pair whose request does not say."""
+    """Actions that answer an adjacency pair of the robot, unless its request names others."""
     turn_patience: Seconds = 12.0
-    """How long after the robot's last word its unfinished turn is believed in; longer than generation's 10 s.
-    After the limit, an anchor that does not come is waited for as long."""
+    """Time after the robot's last word for which its unfinished turn still counts; longer than generation's 10 s.
+    Also the time, after the limit, for which an anchor that does not come is waited for."""
     backchannel_limit: Seconds = 0.8
     """Longest speech that is still a backchannel."""
     direct_by_look: Seconds = 0.6
-    """How long a person looks at an object before that directs the robot's gaze."""
+    """Time for which a person looks at an object before that directs the robot's gaze."""
     after_robot_directed: Seconds = 2.0
-    """A look that follows a robot's directed gaze to the same object so closely is no direction of its own."""
+    """Time after a robot's directed gaze in which a look at the same object is no direction of its own."""
     least_confidence: Probability = 0.4
-    """What is observed to begin with less is ignored, and a thing in the world with less counts as covered. Ours."""
+    """Least confidence of an observation: a beginning below is ignored, a thing below counts as covered. Ours."""
     sensing: Sensing = Sensing()
-    """For raw perception."""
+    """Settings for raw perception."""
     lost_face_grace: Seconds = 0.5
-    """A face lost for less has not gone."""
+    """Time for which a face may be lost before the person has gone."""
     look_break: Seconds = 0.15
-    """A look that is said to end and follows again within this has gone on. What happens meanwhile waits for it."""
+    """Longest pause in a look: one that is reported to end and to begin again within it has gone on. What happens
+    meanwhile waits for the decision."""
     forgotten_after: Seconds = 600.0
-    """Who has been gone for this long, or not been told of by anybody, is forgotten: with the same id comes somebody
-    new. What they have done stays in the statistics of all together."""
+    """Time after which a person who has gone, or of whom no report comes, is forgotten: the same id then means a new
+    person. What the old one did stays in the statistics of all together."""
     longest_speech: Seconds = 60.0
-    """Speech whose end nobody has told of by then is over. The next beginning ends it, too."""
+    """Time after which speech is over if no report of its end has come. The next beginning ends it, too."""
     longest_gesture: Seconds = 10.0
-    """The same of a nod, a shake or a point."""
+    """The same for a nod, a shake or a point."""
     longest_manipulation: Seconds = 120.0
-    """The same of a manipulation."""
+    """The same for a manipulation."""
     window: Seconds = 30.0
-    """Of the recent statistics."""
+    """Length of the window of the recent statistics."""
     reference_mtbce: Seconds = 5.7
-    """Table 2.1; the pace to compare with until `enough_events` have been seen."""
+    """Pace to compare with until `enough_events` have been seen: mean time between connection events, Table 2.1."""
     enough_events: int = 5
-    """How many connection events make a mean of a person's own; at least 2. Ours."""
+    """Number of connection events from which a person's own mean counts; at least 2. Ours."""
     engaged_from: Probability = 0.5
-    """The estimate from which a person is engaged: all events good but half as fast as usual, say. Ours."""
+    """Estimate from which a person is engaged: for example all events good, but half as fast as usual. Ours."""
     disengaged_below: Probability = 0.25
-    """The estimate below which a person is disengaged; between the two, weakening. Ours."""
+    """Estimate below which a person is disengaged; between the two, weakening. Ours."""
     hysteresis: Probability = 0.05
-    """How far the estimate passes a threshold before the level changes."""
+    """Distance by which the estimate passes a threshold before the level changes."""
 
     def __post_init__(self) -> None:
         positive(self, (

@@ -1,13 +1,14 @@
 """All of recognition as one pure machine: symbolic and raw observations in; effects and derived actions out.
 
-Raw perception makes up its mind late about what has happened, so observations wait in the order of their times until
-nothing that came before them can still become known. With symbolic perception alone only the end of a look that no
-other look follows is waited for: it may be none.
+Raw perception decides late what has happened, so observations wait in the order of their times until nothing from
+before them can still become known. With symbolic perception alone they wait only when a look ends and no other look
+follows: the look may only be interrupted.
 """
 
 import heapq
 import math
 from collections.abc import Callable
+from functools import partial
 from itertools import count
 
 from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost
@@ -16,43 +17,42 @@ from engage_hri.schemas.perception import HeadPose, VoiceActivity
 from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.world import World
 from engage_hri.services.recognition.config import RecognitionConfig
-from engage_hri.services.recognition.events.breaks import Breaks
+from engage_hri.services.recognition.events.interrupted_looks import InterruptedLooks, Symbolic
 from engage_hri.services.recognition.events.machine import Effect, Forgotten, Mishap
 from engage_hri.services.recognition.events.scene import Covered
 from engage_hri.services.recognition.events.session import Observation, Session
-from engage_hri.services.recognition.perceive.attention import Attention, Symbolic
+from engage_hri.services.recognition.perceive.attention import Attention
 
 Perceived = Observation | HeadPose | VoiceActivity | RobotState
 Result = Effect | Symbolic
-"""Actions among them are what raw perception means; they have been taken already."""
+"""The actions among them were derived from raw perception; the session gets them without another call."""
 
 
 class Recognizer:
-    """robot, clock, name: as of `Session` and `Attention`. strict: as of `Session`; if not, nothing here raises."""
+    """Recognition of one robot. robot, clock, name, strict: as of `Session`; if not strict, nothing here raises."""
 
     def __init__(
         self, robot: str, config: RecognitionConfig, *, clock: str = "loop", name: str = "", strict: bool = True
     ) -> None:
         self.session = Session(robot, config, clock=clock, name=name, strict=strict)
         self._strict = strict
-        self._robot = robot
-        self._clock = clock
         self._config = config
-        self._attention = Attention(robot, config, clock)
-        self._breaks = Breaks(config.look_break)
+        self._new_attention = partial(Attention, robot, config, clock)
+        self._attention = self._new_attention()
+        self._interrupted = InterruptedLooks(config.look_break)
         self._waiting: list[tuple[Seconds, int, Observation | Covered]] = []
         self._numbers = count()
         self._mishaps: list[Mishap] = []
-        """That have not been told of."""
+        """Bugs that have shown and are not reported yet."""
         self._covered = Covered(frozenset())
         self._now: Seconds = -math.inf
 
     @property
     def deadline(self) -> Seconds | None:
-        """When `advance` has something to do, unless an observation comes first."""
+        """Time at which `advance` has something to do, unless an observation comes first."""
         settled, due = self._settled, self.session.deadline
-        more = settled + self._config.sensing.settling  # is settled then, at the latest
-        times = [self._attention.deadline, self._breaks.deadline]
+        more = settled + self._config.sensing.settling  # by then at the latest more is settled
+        times = [self._attention.deadline, self._interrupted.deadline]
         if self._waiting:
             times.append(more)
         if due is not None:
@@ -80,18 +80,20 @@ class Recognizer:
                     self._wait(covered, at)
             case ActionBegan(confidence=confidence) if confidence < self._config.least_confidence:
                 pass
-            case ActionBegan() | ActionEnded() | ActorFound() | ActorLost() if observation.actor != self._robot:
-                derived = self._attend(lambda attention: attention.believe(observation, at), at)
-                for when, told in self._breaks.feed(observation, at):
+            case ActionBegan() | ActionEnded() | ActorFound() | ActorLost() if (
+                observation.actor != self.session.robot
+            ):
+                derived = self._attend(lambda attention: attention.take_report(observation, at), at)
+                for when, told in self._interrupted.feed(observation, at):
                     self._wait(told, when)
             case _:
                 self._wait(observation, at)
         return self._take(derived)
 
     def advance(self, now: Seconds) -> list[Result]:
-        """What happens by itself up to and including `now`."""
+        """Take all steps that are due up to and including `now`."""
         self._now = now
-        for when, ended in self._breaks.advance(now):
+        for when, ended in self._interrupted.advance(now):
             self._wait(ended, when)
         results = self._take(self._attend(lambda attention: attention.advance(now), now))
         settled = self._settled
@@ -100,19 +102,19 @@ class Recognizer:
         return self._told([*results, *self.session.advance(until)])
 
     def lose_track(self, person: str, at: Seconds) -> list[Result]:
-        """After a failure with this person: see `Session.lose_track`."""
+        """Begin anew with this person after a failure: see `Session.lose_track`."""
         return self._told([*self.session.lose_track(person, at)])
 
-    def _attend(self, happen: Callable[[Attention], list[Symbolic]], at: Seconds) -> list[Symbolic]:
-        """What raw perception means. A bug there costs what it had found out; it begins anew."""
+    def _attend(self, derive: Callable[[Attention], list[Symbolic]], at: Seconds) -> list[Symbolic]:
+        """Derive actions from raw perception. If that fails, a new `Attention` begins with nothing."""
         try:
-            return happen(self._attention)
+            return derive(self._attention)
         except Exception as error:
             if self._strict:
                 raise
             self._mishaps.append(Mishap("", at, error))
             ends = self._attention.give_up(at)
-            self._attention = Attention(self._robot, self._config, self._clock)
+            self._attention = self._new_attention()
             return ends
 
     def _take(self, derived: list[Symbolic]) -> list[Result]:
@@ -133,7 +135,7 @@ class Recognizer:
     def _told(self, results: list[Result]) -> list[Result]:
         for result in results:
             if isinstance(result, Forgotten):
-                self._breaks.forget(result.actor)
+                self._interrupted.forget(result.actor)
         mishaps, self._mishaps = self._mishaps, []
         return [*results, *mishaps]
 
@@ -142,7 +144,7 @@ class Recognizer:
 
     @property
     def _settled(self) -> Seconds:
-        """Nothing from before this can still become known, but for what has taken longer than the time to settle."""
+        """Time before which nothing more can become known, except what takes longer than the time to settle."""
         longest = self._config.sensing.settling
-        undecided = (*self._attention.undecided, *self._breaks.undecided)
+        undecided = (*self._attention.undecided, *self._interrupted.undecided)
         return min((since for since in undecided if self._now < since + longest), default=math.inf)

@@ -1,4 +1,4 @@
-"""The recognition service: decodes, feeds the session, publishes what comes out. It decides nothing."""
+"""The recognition service: feeds the recognizer from the bus and publishes what comes out. It decides nothing."""
 
 from collections.abc import Iterable
 
@@ -22,17 +22,17 @@ from engage_hri.schemas.world import World
 from engage_hri.services.bus.interface import Bus, Received
 from engage_hri.services.recognition.config import RecognitionConfig
 from engage_hri.services.recognition.events.machine import Forgotten, Mishap
-from engage_hri.services.recognition.events.open_events import OpenBook
-from engage_hri.services.recognition.perceive.reporters import Witnesses
+from engage_hri.services.recognition.events.open_events import OpenEventTracker
+from engage_hri.services.recognition.perceive.reporters import Reporters
 from engage_hri.services.recognition.recognizer import Perceived, Recognizer, Result
 from engage_hri.services.recognition.statistics.published import PublishedStatistics
 from engage_hri.services.requests.ends import RequestDesk
 from engage_hri.services.runtime.service import Ready
 
 OLDEST: Seconds = 60.0
-"""How long ago anything may have happened of which we hear now. What is counted in windows would count for ever."""
+"""Age from which on a stamp is not believed: an older event would stay for ever in the windows of the statistics."""
 COMPLAINTS = 100
-"""How many bad ids are told of."""
+"""Number of bad ids that are reported as faults."""
 
 
 async def recognize(bus: Bus, ready: Ready, config: RecognitionConfig) -> None:
@@ -59,77 +59,78 @@ async def recognize(bus: Bus, ready: Ready, config: RecognitionConfig) -> None:
 
 
 class _Recognition:
+    """The parts of the service: request desk, recognizer, open events, statistics."""
+
     def __init__(self, bus: Bus, config: RecognitionConfig) -> None:
         self.desk = RequestDesk(bus, "recognition", self._cancel)
         self._bus = bus
-        self._nameless: set[str] = set()
-        self._witnesses = Witnesses()
+        self._bad_ids: set[str] = set()
+        self._reporters = Reporters()
         session = session_of(bus.run)
         self._recognizer = Recognizer(bus.robot, config, clock=bus.clock, name=f"{session}-", strict=False)
-        self._open = OpenBook(bus.robot, session)
-        self._published = PublishedStatistics(bus.robot, config, bus.clock)
+        self._open_events = OpenEventTracker(bus.robot, session)
+        self._statistics = PublishedStatistics(bus.robot, config, bus.clock)
 
     @property
     def deadline(self) -> Seconds | None:
-        times = (self._recognizer.deadline, self._published.deadline)
+        times = (self._recognizer.deadline, self._statistics.deadline)
         return min((at for at in times if at is not None), default=None)
 
     def begin(self) -> None:
-        """Who asks before anything has happened is told so."""
-        self._bus.publish(keys.statistics("all"), self._published.overall(self._bus.now()))
+        """Publish the statistics of all, so that those who ask before the first event get an answer."""
+        self._bus.publish(keys.statistics("all"), self._statistics.overall(self._bus.now()))
 
     def advance(self) -> None:
-        self._tell(self._recognizer.advance(self._bus.now()))
+        self._publish(self._recognizer.advance(self._bus.now()))
 
     def take(self, received: Received) -> None:
         request = self.desk.take(received)
         observation = request or received.message
-        if isinstance(observation, RequestEvent | SignalTurn | Cancel) and request is None:
-            return
-        if not self._is_credible(received):
+        is_unaccepted = request is None and isinstance(observation, RequestEvent | SignalTurn | Cancel)
+        if is_unaccepted or not self._is_credible(received):
             return
         if isinstance(observation, Perceived):
             fault = self._feed(observation, self._when(observation, received.at))
             if fault is not None and request is not None and self.desk.is_live(request.id):
                 self.desk.refuse(request.id, fault)
         if received.key == keys.PERCEIVED_ACTION or isinstance(received.message, PeerGone | PeerAlive):
-            for change in self._witnesses.feed(received.message, received.source, self._bus.stamp()):
+            for change in self._reporters.feed(received.message, received.source, self._bus.stamp()):
                 self._feed(change, self._bus.now())
 
     def _cancel(self, cancel: Cancel) -> None:
         self._feed(cancel, self._bus.now())
 
     def _feed(self, observation: Perceived, at: Seconds) -> Fault | None:
-        return self._tell(self._recognizer.feed(observation, at, self._bus.now()))
+        return self._publish(self._recognizer.feed(observation, at, self._bus.now()))
 
     def _is_credible(self, received: Received) -> bool:
-        """Only the robot's body says what the robot does, and only perception what others do."""
+        """True if the message came from its proper sender: the robot's body for the robot, perception for people."""
         match received.message:
             case ActionBegan(actor=actor) | ActionEnded(actor=actor):
                 by_robot = actor == self._bus.robot
-                return self._can_take_part(actor) and by_robot == (received.key == keys.ROBOT_ACTION)
+                return self._has_valid_id(actor) and by_robot == (received.key == keys.ROBOT_ACTION)
             case ActorFound(actor=actor) | ActorLost(actor=actor):
-                return self._can_take_part(actor) and actor != self._bus.robot
+                return self._has_valid_id(actor) and actor != self._bus.robot
             case HeadPose(actor=actor):
                 return actor != self._bus.robot and received.key == keys.head_pose(actor)
             case VoiceActivity(actor=actor):
                 return actor != self._bus.robot and received.key == keys.voice_activity(actor)
             case World(people=people):
-                return all(self._can_take_part(person.id) for person in people)
+                return all(self._has_valid_id(person.id) for person in people)
         return True
 
-    def _can_take_part(self, actor: str) -> bool:
-        """An id that can't be in a key has no events. Told once."""
+    def _has_valid_id(self, actor: str) -> bool:
+        """True if the id can be in a key; without that there are no events. A bad id is reported once."""
         if keys.is_chunk(actor):
             return True
-        if actor not in self._nameless and len(self._nameless) < COMPLAINTS:
-            self._nameless.add(actor)
+        if actor not in self._bad_ids and len(self._bad_ids) < COMPLAINTS:
+            self._bad_ids.add(actor)
             fault = Fault(reason=f"{actor!r} can't be in a key", advice=keys.CHUNK, service="recognition")
             self._bus.publish(keys.fault("recognition"), fault)
         return False
 
     def _when(self, observation: Perceived, arrived: Seconds) -> Seconds:
-        """Local time of what happened. A stamp from the future is not believed, nor one from long ago."""
+        """Local time of what happened, at most now and at least `OLDEST` ago, whatever the stamp says."""
         stamp: Stamp | None
         match observation:
             case HeadOwner(since=stamp) | World(at=stamp):
@@ -141,32 +142,32 @@ class _Recognition:
         now = self._bus.now()
         return arrived if stamp is None else max(min(self._bus.local(stamp), now), now - OLDEST)
 
-    def _tell(self, effects: Iterable[Result]) -> Fault | None:
-        """Publish what follows; the fault, if a bug has shown."""
+    def _publish(self, results: Iterable[Result]) -> Fault | None:
+        """Publish the results. Returns the fault if a bug has shown."""
         changes: list[ConnectionEvent | Forgotten] = []
         fault: Fault | None = None
-        for effect in effects:
-            match effect:
+        for result in results:
+            match result:
                 case ConnectionEvent():
-                    changes.append(effect)
-                    self._bus.publish(keys.connection_event(effect.person(self._bus.robot), effect.kind), effect)
+                    changes.append(result)
+                    self._bus.publish(keys.connection_event(result.person(self._bus.robot), result.kind), result)
                 case ActionBegan() | ActionEnded() | ActorFound() | ActorLost():
-                    self._bus.publish(keys.RECOGNIZED_ACTION, effect)
+                    self._bus.publish(keys.RECOGNIZED_ACTION, result)
                 case Accepted(id=id):
                     self.desk.accept(id)
                 case Refused(id=id, fault=fault):
                     self.desk.refuse(id, fault)
                 case EventOutcome() | TurnOutcome():
-                    self.desk.end(effect)
+                    self.desk.end(result)
                 case Forgotten(actor=actor):
-                    changes.append(effect)
-                    self._witnesses.forget(actor)
+                    changes.append(result)
+                    self._reporters.forget(actor)
                 case Mishap(actor=actor, error=error):
                     fault = self._bus.failed(error, f"what {actor or 'somebody'} does")
         events = [change for change in changes if isinstance(change, ConnectionEvent)]
-        for book in self._open.feed(events, self._bus.stamp()):
-            self._bus.publish(keys.open_events(book.actor), book)
-        for statistics in self._published.feed(changes, self._recognizer.session.busy, self._bus.now()):
-            if statistics.actor != "all":  # a person of that name would pass for everybody
+        for message in self._open_events.feed(events, self._bus.stamp()):
+            self._bus.publish(keys.open_events(message.actor), message)
+        for statistics in self._statistics.feed(changes, self._recognizer.session.busy, self._bus.now()):
+            if statistics.actor != "all":  # a person with this id would be taken for everybody
                 self._bus.publish(keys.statistics(statistics.actor or "all"), statistics)
         return fault

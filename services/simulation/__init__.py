@@ -1,1 +1,1 @@
-"""The simulated person and table: they look, speak and move pieces as the anchor study saw people do."""
+"""Simulation of a person at the tangram table, as the anchor study saw people, and of cameras and a microphone."""

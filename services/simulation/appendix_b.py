@@ -1,7 +1,9 @@
 """The person of thesis Appendix B, step by step, as rules. Steps 7-17 are missing in the source: those are ours.
 
-Delays are human reaction times, chosen so that every event of the scenario has at least 0.1 s to either side of it.
+Delays are human reaction times, chosen so that at least 0.1 s lies between any two events of the scenario.
 """
+
+from collections.abc import Mapping
 
 from msgspec import structs
 
@@ -24,25 +26,24 @@ from engage_hri.services.simulation.human import (
     Withdraw,
     Word,
 )
-from engage_hri.services.tangram.table import Side
 
 GLANCE = 0.2
-"""From a word to the gaze it causes."""
+"""Delay from a word to the gaze that it causes."""
 FOLLOW = 0.3
-"""From seeing where the robot points to looking there."""
+"""Delay from a point of the robot, seen, to the look there."""
 MOVE = 2.1
-"""From the end of a request to the hand's next motion. The robot holds its eyes on the person's until its facial gaze
-is answered or has failed, 1.9 s after it began; a hand that moved earlier would draw them away.
+"""Delay from the end of a request to the hand's next motion. The robot keeps looking at the person's eyes until its
+facial gaze is answered or has failed, 1.9 s after it began; a hand that moved earlier would draw its gaze away.
 """
 
 
 def rules() -> tuple[Rule, ...]:
-    """The whole script."""
+    """Rules of the whole script."""
     return (*GREETING, *FIRST_PIECE, *OURS, *LAST_PIECES, *GOODBYE, *FIXES)
 
 
 def misplacing_rules() -> tuple[Rule, ...]:
-    """The script, but in step 14 (one of ours) the piece is laid on the wrong side of its landmark."""
+    """Rules of the script, but in step 14 (one of ours) the piece is laid at a wrong place."""
     wrong = Lay("pink-square", "bottom left", "red-square")
     return tuple(
         structs.replace(rule, do=tuple(wrong if isinstance(act, Lay) else act for act in rule.do))
@@ -77,21 +78,40 @@ GREETING = (
 # -- moving pieces ----------------------------------------------------------------------------------------------
 
 
-def moves(step: str, piece: str, side: Side, landmark: str) -> tuple[Rule, ...]:
-    """The person follows an instruction as in steps 5 and 6."""
+PLACEMENTS: Mapping[str, Lay] = {
+    "step-5": Lay("blue-square", "top", "rectangle"),
+    "step-8-ours": Lay("trapezoid", "top", "blue-square"),
+    "step-10-ours": Lay("yellow-triangle", "bottom", "rectangle"),
+    "step-12-ours": Lay("red-square", "bottom left", "yellow-triangle"),
+    "step-14-ours": Lay("pink-square", "bottom right", "yellow-triangle"),
+    "step-16-ours": Lay("pink-triangle", "top left", "red-square"),
+    "step-17-ours": Lay("purple-square", "right", "blue-square"),
+    "step-18": Lay("purple-triangle", "top right", "pink-square"),
+    "step-21": Lay("green-square", "left", "blue-square"),
+}
+"""Placements as the robot asks for them, by step."""
+
+
+def moves(step: str, again: str = "") -> tuple[Rule, ...]:
+    """Rules of a person who does what the robot asks for in a step, as in steps 5 and 6.
+
+    again: suffix of the step where the robot asks once more.
+    """
+    lay, step = PLACEMENTS[step], step + again
+    piece, landmark = lay.piece, lay.landmark
     return (
         Rule(step, RobotDoes("point", piece), (LookAt(piece),), FOLLOW),
         Rule(step, Word("so"), (Grab(piece),), GLANCE),
         Rule(step, EventChanged("directed_gaze", "started", landmark), (LookAt(landmark),), 0.6),
-        Rule(step, Ended(), (Lay(piece, side, landmark), Withdraw(), Pause(0.2), LookAt(FACE)), MOVE),
+        Rule(step, Ended(), (lay, Withdraw(), Pause(0.2), LookAt(FACE)), MOVE),
     )
 
 
-FIRST_PIECE = moves("step-5", "blue-square", "top", "rectangle")
+FIRST_PIECE = moves("step-5")
 
 
 def approves(step: str) -> tuple[Rule, ...]:
-    """The person while the robot says "Ummmm, good", as in steps 20 and 23."""
+    """Rules of the person while the robot says "Ummmm, good", as in steps 20 and 23."""
     return (
         Rule(f"{step}-a", Word("ummmm"), (LookAt(TABLE),), GLANCE),
         Rule(f"{step}-b", Begun(), (LookAt(FACE),), 0.1),
@@ -101,28 +121,28 @@ def approves(step: str) -> tuple[Rule, ...]:
 
 OURS = (
     *approves("step-7-ours"),
-    *moves("step-8-ours", "trapezoid", "top", "blue-square"),
+    *moves("step-8-ours"),
     *approves("step-9-ours"),
-    *moves("step-10-ours", "yellow-triangle", "bottom", "rectangle"),
+    *moves("step-10-ours"),
     *approves("step-11-ours"),
-    *moves("step-12-ours", "red-square", "bottom left", "yellow-triangle"),
+    *moves("step-12-ours"),
     *approves("step-13-ours"),
-    *moves("step-14-ours", "pink-square", "bottom right", "yellow-triangle"),
+    *moves("step-14-ours"),
     *approves("step-15-ours"),
-    *moves("step-16-ours", "pink-triangle", "top left", "red-square"),
-    *moves("step-17-ours", "purple-square", "right", "blue-square"),
+    *moves("step-16-ours"),
+    *moves("step-17-ours"),
 )
 
 
 # -- steps 18 to 26 ---------------------------------------------------------------------------------------------
 
 LAST_PIECES = (
-    # Inattentive while the robot says which piece: its directed gaze fails.
+    # The person is inattentive while the robot says which piece: its directed gaze fails.
     Rule("step-18", Begun(), (LookAt(AWAY),), 0.05),
     Rule("step-18", Word("that"), (LookAt(FACE),), GLANCE),
-    # On the table in time for the landmark, but not while the first event still waits.
+    # The person looks at the table in time for the landmark, but not while the first event still waits.
     Rule("step-18", EventChanged("directed_gaze", "failed", "purple-triangle"), (LookAt(TABLE),), 0.05),
-    # Within 2 s after the event at the triangle failed: as its answer, not to direct the robot there.
+    # This look comes within 2 s after that event failed: it counts as the answer, not as a direction of its own.
     Rule("step-18", Word("pink"), (LookAt("purple-triangle"),), 0.05),
     Rule(
         "step-18",
@@ -165,22 +185,4 @@ GOODBYE = (
 
 # -- when the robot asks again ----------------------------------------------------------------------------------
 
-PLACES: tuple[tuple[str, str, Side, str], ...] = (
-    ("step-5", "blue-square", "top", "rectangle"),
-    ("step-8-ours", "trapezoid", "top", "blue-square"),
-    ("step-10-ours", "yellow-triangle", "bottom", "rectangle"),
-    ("step-12-ours", "red-square", "bottom left", "yellow-triangle"),
-    ("step-14-ours", "pink-square", "bottom right", "yellow-triangle"),
-    ("step-16-ours", "pink-triangle", "top left", "red-square"),
-    ("step-17-ours", "purple-square", "right", "blue-square"),
-    ("step-18", "purple-triangle", "top right", "pink-square"),
-    ("step-21", "green-square", "left", "blue-square"),
-)
-"""Step, piece, side, landmark: where pieces belong, as the robot said."""
-
-FIXES = tuple(
-    rule
-    for step, piece, side, landmark in PLACES
-    for again in ("fix", "again")
-    for rule in moves(f"{step}-{again}", piece, side, landmark)
-)
+FIXES = tuple(rule for step in PLACEMENTS for again in ("-fix", "-again") for rule in moves(step, again))

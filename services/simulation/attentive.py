@@ -1,6 +1,6 @@
-"""A person who is all attention: looks where the robot looks and points, meets its eyes, and nods when it has spoken.
+"""An attentive person: looks where the robot looks and points, meets its eyes, and nods when it has spoken.
 
-Pure. For first meetings: they know no task but the placements of the tangram, and need no table for the rest.
+Pure. This person is for first meetings: the only task it knows is to place tangram pieces; the rest needs no table.
 """
 
 from collections.abc import Callable
@@ -15,7 +15,7 @@ from engage_hri.services.tangram.table import TangramTable
 
 
 class AttentiveHuman(ListeningHuman):
-    """person: who they are. sees: what there is to look at. Delays: the means of Table 2.1 of the thesis."""
+    """The attentive person. person: its id. sees: ids it can look at. Delays: the means of Table 2.1."""
 
     ANSWERS: Seconds = 0.4
     FOLLOWS: Seconds = 0.3

@@ -1,7 +1,7 @@
-"""Simulated cameras and a microphone: what they report of a scene, faults included.
+"""Simulated cameras and a microphone: their reports of a person at the table, faults included.
 
-Pure. The scene says exactly what happens; raw perception comes at every frame while somebody sits there, and so
-does the world where it is not seen steadily.
+Pure. `PersonAtTable` says exactly what happens. Raw perception comes at every frame while the person sits there, and
+so does the world if a fault makes it unsteady.
 """
 
 from collections.abc import Iterator
@@ -14,18 +14,18 @@ from engage_hri.schemas.world import Entity, World
 from engage_hri.services.simulation.config import SimulationConfig
 from engage_hri.services.simulation.faults import Chances, FaceLoss, TableVision
 from engage_hri.services.simulation.head import Sightlines
-from engage_hri.services.simulation.perception import PersonAtTable, Stamper
-from engage_hri.services.simulation.reports import Actions, Reports, Signals
+from engage_hri.services.simulation.person_at_table import PersonAtTable, Stamper
+from engage_hri.services.simulation.reports import RawReports, Reports, SymbolicReports
 
 
 class Cameras:
-    """See `scene` as `config` says; to be used in its stead."""
+    """Reports of `exact`, with the perception and the faults of `config`. The interface is the same."""
 
     def __init__(
-        self, scene: PersonAtTable, sightlines: Sightlines, config: SimulationConfig, stamp: Stamper, chances: Chances
+        self, exact: PersonAtTable, sightlines: Sightlines, config: SimulationConfig, stamp: Stamper, chances: Chances
     ) -> None:
         faults = config.faults
-        self._scene = scene
+        self._exact = exact
         self._sightlines = sightlines
         self._stamp = stamp
         self._frame = config.frame
@@ -33,37 +33,37 @@ class Cameras:
         self._dropped = faults.dropped_frames
         self._chance = chances("frames")
         self._person: Reports = (
-            Signals(sightlines, faults, chances, head_turn=config.head_turn)
+            RawReports(sightlines, faults, chances, head_turn=config.head_turn)
             if config.perception == "raw"
-            else Actions(sightlines, faults, chances)
+            else SymbolicReports(sightlines, faults, chances)
         )
         self._face = FaceLoss(faults, chances("faces"))
         self._vision = TableVision(faults, chances("table"))
         self._entities: tuple[Entity, ...] = ()
         self._next_frame: Seconds | None = None
-        """None: no frames, changes alone are reported."""
+        """Time of the next frame; None while only changes are reported."""
 
     @property
     def deadline(self) -> Seconds | None:
-        times = (self._scene.deadline, self._next_frame)
+        times = (self._exact.deadline, self._next_frame)
         return min((time for time in times if time is not None), default=None)
 
     def enter(self, now: Seconds) -> None:
-        self._scene.enter(now)
+        self._exact.enter(now)
 
     def feed(self, message: Message, now: Seconds) -> None:
         if isinstance(message, RobotState):
             self._sightlines.robot_eyes = message.gaze.origin
         else:
-            self._scene.feed(message, now)
+            self._exact.feed(message, now)
 
     def world(self, now: Seconds) -> World:
-        """The table as it is seen now."""
-        return self._seen(self._scene.world(now))
+        """The table as the cameras see it now."""
+        return self._seen(self._exact.world(now))
 
     def advance(self, now: Seconds) -> Iterator[Message]:
-        """What is to be reported now."""
-        for message in self._scene.advance(now):
+        """Yield the reports that are due by now."""
+        for message in self._exact.advance(now):
             match message:
                 case World():
                     if self._next_frame is None:
@@ -84,7 +84,7 @@ class Cameras:
         lost, before = self._face.lost(now), self._entities
         if not self._drops():
             yield from self._person.seen(lost, at, now)
-            world = self._seen(self._scene.world(now))
+            world = self._seen(self._exact.world(now))
             if world.entities != before:
                 yield world
         if not self._drops():

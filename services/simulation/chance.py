@@ -1,4 +1,4 @@
-"""Chance as pure code sees it, and delays drawn by it as Table 2.1 of the thesis has them."""
+"""Source of chance for pure code, and delays drawn from it, with the statistics of Table 2.1 of the thesis."""
 
 from collections.abc import MutableSequence, Sequence
 from typing import Any, Protocol, TypeVar
@@ -9,11 +9,11 @@ from engage_hri.schemas.units import Seconds
 
 T = TypeVar("T")
 CONCENTRATION = 3.0
-"""Sum of the two parameters of each Beta. The table tells only least, mean and most; with 3 the tails are broad."""
+"""Sum of the two parameters of each Beta distribution. The table has least, mean and most only; 3: broad tails."""
 
 
 class Chance(Protocol):
-    """What is used of `random.Random`; the service makes one from the seed."""
+    """The part of `random.Random` that is used here; the service makes one from the seed."""
 
     def random(self) -> float: ...
     def uniform(self, a: float, b: float) -> float: ...

@@ -1,6 +1,6 @@
-"""What goes wrong between the table as it is and the table as it is seen (thesis 5.4.2).
+"""Faults between the table as it is and the table as it is seen (thesis 5.4.2).
 
-Pure. Chance comes from outside, a source of its own for each fault: turning one on does not change the others.
+Pure. Each fault has its own source of chance, given from outside: turning one on does not change the others.
 """
 
 import math
@@ -15,15 +15,13 @@ from engage_hri.services.simulation.config import PerceptionFaults
 from engage_hri.services.simulation.head import unit
 
 FAINT = 0.3
-"""Confidence in a thing that is where it was seen last, covered now."""
-
-
+"""Confidence in a covered thing, reported where it was seen last."""
 Chances = Callable[[str], Chance]
-"""A source of chance for each name."""
+"""Function from a name to a source of chance of its own."""
 
 
 class FaceLoss:
-    """When the tracker has lost the face. Ask with times that do not go backward."""
+    """Losses of the face by the tracker. Times must not go backward."""
 
     def __init__(self, faults: PerceptionFaults, chance: Chance) -> None:
         self._faults = faults
@@ -32,7 +30,7 @@ class FaceLoss:
         self._until: Seconds = -math.inf
 
     def begin(self, now: Seconds) -> None:
-        """A face is there from now on."""
+        """Begin with a face that is there from now on."""
         self._plan(now)
 
     def lost(self, now: Seconds) -> bool:
@@ -47,7 +45,7 @@ class FaceLoss:
 
 
 class TableVision:
-    """The things on the table as a camera sees them. It keeps in mind where it has seen them."""
+    """View of the things on the table by a camera, which remembers where it has last seen each."""
 
     def __init__(self, faults: PerceptionFaults, chance: Chance) -> None:
         self._faults = faults
@@ -55,7 +53,7 @@ class TableVision:
         self._seen: dict[str, Entity] = {}
 
     def see(self, entities: Iterable[Entity]) -> tuple[Entity, ...]:
-        """What the camera makes of them in one frame."""
+        """The entities as the camera reports them in one frame."""
         things = tuple(entities)
         hands = [thing.position for thing in things if thing.kind == "hand"]
         return tuple(seen for thing in things if (seen := self._piece(thing, hands)) is not None)
@@ -66,10 +64,10 @@ class TableVision:
         if any(math.dist(hand[:2], thing.position[:2]) < self._faults.occlusion for hand in hands):
             last = self._seen.get(thing.id)
             return replace(last, confidence=FAINT) if last and self._faults.covered == "faint" else None
-        seen = self._seen[thing.id] = self._misjudged(thing)
+        seen = self._seen[thing.id] = self._mismeasured(thing)
         return seen
 
-    def _misjudged(self, piece: Entity) -> Entity:
+    def _mismeasured(self, piece: Entity) -> Entity:
         if not self._faults.position and not self._faults.yaw:
             return piece
         x, y, z = piece.position
@@ -79,8 +77,8 @@ class TableVision:
         return replace(piece, position=(x, y, z), yaw=math.remainder(piece.yaw + turned, math.tau))
 
 
-def off_by(direction: Vector, deviation: float, chance: Chance) -> Vector:
-    """A unit vector near `direction`. deviation: radians, standard, about each axis across it."""
+def deviated(direction: Vector, deviation: float, chance: Chance) -> Vector:
+    """A unit vector near `direction`. deviation: standard deviation about each axis across it, in radians."""
     if not deviation:
         return direction
     x, y, z = (part + chance.gauss(0.0, deviation) for part in direction)

@@ -1,4 +1,4 @@
-"""Where a person's head is turned: toward what they look at, and on the way there past what lies between.
+"""Head of a simulated person: turned toward the target of its look, or on the way there.
 
 Pure; directions are unit vectors in the robot's frame.
 """
@@ -9,13 +9,13 @@ from engage_hri.schemas.units import Seconds, Vector
 from engage_hri.services.simulation.table import Table, minimum_jerk
 
 ASIDE: Vector = (-0.3, 0.95, 0.1)
-"""Toward nothing: past the robot's shoulder."""
+"""Direction of a look at nothing: past the robot's shoulder."""
 
 
 class Sightlines:
-    """From the eyes of the person at the table to what there is.
+    """Directions from the eyes of the person at the table to the robot, the table and the pieces.
 
-    robot: its actor id. robot_eyes: where the person looks who looks at it; above its origin until that is known.
+    robot: its actor id. robot_eyes: place of its eyes; above its origin until the place is known.
     """
 
     def __init__(self, table: Table, robot: str) -> None:
@@ -26,12 +26,12 @@ class Sightlines:
         self.robot_eyes: Vector = (0.0, 0.0, self.eyes[2])
 
     def to(self, target: str, now: Seconds) -> Vector:
-        """Direction of an entity; aside for what there is not. Who looks at the table looks where nothing lies."""
+        """Direction of an entity; `ASIDE` if it is unknown. That of the table is a spot where nothing lies."""
         place = self._places(now).get(target)
         return _toward(place, self.eyes) if place is not None else unit(ASIDE)
 
     def beside(self, target: str, now: Seconds) -> str:
-        """What else is nearest to that, seen from here; what a look at it is taken for."""
+        """Id of the entity that appears nearest to `target`, and so may be taken for it."""
         goal = self.to(target, now)
         others = {id: _toward(place, self.eyes) for id, place in self._places(now).items() if id != target}
         return min(others, key=lambda id: angle(others[id], goal))
@@ -43,7 +43,7 @@ class Sightlines:
 
 
 class SimulatedHead:
-    """turning: how long it takes to face something else, however far it is."""
+    """A head that turns. turning: time that it takes to face another target, however far that is."""
 
     def __init__(self, turning: Seconds) -> None:
         self._turning = turning
@@ -55,14 +55,14 @@ class SimulatedHead:
         self._from, self._since = facing, now
 
     def facing(self, goal: Vector, now: Seconds) -> Vector:
-        """Where it points on its way to `goal`, which may move."""
+        """Direction of the head on its way to `goal`, which may move."""
         if now >= self._since + self._turning:
             return goal
         return _between(self._from, goal, minimum_jerk((now - self._since) / self._turning))
 
 
 def unit(vector: Vector) -> Vector:
-    """Raises ZeroDivisionError for one without length."""
+    """The unit vector in the same direction. Raises ZeroDivisionError if the length is 0."""
     length = math.hypot(*vector)
     return (vector[0] / length, vector[1] / length, vector[2] / length)
 
@@ -77,7 +77,7 @@ def _toward(place: Vector, eyes: Vector) -> Vector:
 
 
 def _between(one: Vector, other: Vector, part: float) -> Vector:
-    """On the great circle from `one` to `other`."""
+    """Direction on the great circle from `one` to `other`, after `part` of the way."""
     whole = angle(one, other)
     if math.sin(whole) < 1e-6:  # no way to go, or no way that is the shortest
         return other

@@ -1,7 +1,7 @@
-"""What a person makes of the robot's words: which piece it wants where.
+"""Understanding of the robot's words: the piece that it wants, and where.
 
-Pure. They know the pieces by color and shape, the eight directions, and that "this" is what the robot points at. The
-words must be those of the tangram's requests.
+Pure. Known are the pieces by color and shape, the eight directions, and that "this" is the piece at which the robot
+points. The words must be those of the tangram's requests.
 """
 
 import re
@@ -13,18 +13,18 @@ from engage_hri.schemas.body import WordSpoken
 from engage_hri.schemas.feedback import BlockProgress
 from engage_hri.schemas.messages import Message
 from engage_hri.services.simulation.human import Lay
-from engage_hri.services.tangram.table import SIDES, Side, TangramTable
+from engage_hri.services.tangram.table import SIDES, TangramTable
 
 REQUEST = re.compile(
     r"(?:move|fix|put) (?P<piece>.+?) so that it is touching the (?P<side>[a-z ]+?) of (?P<landmark>.+)"
 )
 POINTED = ("this", "that")
 THINKING = "ummmm"
-"""Said by a robot that will go on: nothing to answer."""
+"""Words of a robot that will go on speaking: they need no answer."""
 
 
 class HeardSpeech(Struct, frozen=True):
-    """The words of a block of the robot, in lower case without punctuation, and what it pointed at meanwhile."""
+    """Words of a block of the robot, lower case without punctuation, and the piece at which it pointed meanwhile."""
 
     words: str
     pointed: str = ""
@@ -35,7 +35,7 @@ class HeardSpeech(Struct, frozen=True):
 
 
 class Hearing:
-    """Puts words together until their block has ended."""
+    """Collector of the robot's words until their block has ended."""
 
     def __init__(self, robot: str) -> None:
         self._robot = robot
@@ -44,7 +44,7 @@ class Hearing:
         self._pointing_at = ""
 
     def feed(self, message: Message) -> HeardSpeech | None:
-        """Perceive the robot. The utterance that is over now, if one is."""
+        """Take a message about the robot. Returns the utterance that is over now, if one is."""
         match message:
             case WordSpoken(block=block, word=word):
                 self._words.setdefault(block, []).append(word)
@@ -60,23 +60,19 @@ class Hearing:
         return None
 
 
-def wanted(utterance: HeardSpeech, table: TangramTable) -> Lay | None:
-    """The placement that is asked for; None if none is, or the words and the pointing don't tell which."""
+def requested_placement(utterance: HeardSpeech, table: TangramTable) -> Lay | None:
+    """The placement for which the robot asks; None if it asks for none, or if words and pointing leave it open."""
     request = REQUEST.search(utterance.words)
     if request is None:
         return None
-    piece = utterance.pointed if request["piece"] in POINTED else _meant(request["piece"], table)
-    landmark, side = _meant(request["landmark"], table), _side(request["side"])
+    piece = utterance.pointed if request["piece"] in POINTED else _piece_called(request["piece"], table)
+    landmark = _piece_called(request["landmark"], table)
+    side = next((side for side in SIDES if side == request["side"].removesuffix(" side")), None)
     return Lay(piece, side, landmark) if piece and landmark and side else None
 
 
-def _meant(phrase: str, table: TangramTable) -> str:
-    """The one piece whose color and shape agree with the phrase; empty if none or several do."""
+def _piece_called(phrase: str, table: TangramTable) -> str:
+    """Id of the only piece with the color and shape of the phrase; empty if none or several have them."""
     words = set(phrase.split()) - {"the", "a", "piece"}
     meant = [piece.id for piece in table.pieces if words <= {piece.color, piece.shape}]
     return meant[0] if words and len(meant) == 1 else ""
-
-
-def _side(words: str) -> Side | None:
-    name = words.removesuffix(" side")
-    return next((side for side in SIDES if side == name), None)

@@ -1,14 +1,15 @@
-"""A scripted person: rules say on which of the robot's words and motions they look, reach and move pieces.
+"""A scripted person: rules say on which words and motions of the robot the person looks, reaches and moves pieces.
 
-Pure state machine: `feed` what the bus says of the robot, `due` gives what the person does by now, `deadline` says
-when to ask next. Rules belong to steps, steps are known from the ids of the robot's fragments (`step-3`,
-`step-20-a`, `step-5-fix`). Triggers are things a person could hear or see; where the robot is concerned the words,
-looks and points come as they are realised, so that the order of events is the same on a slow machine.
+Pure state machine: `feed` takes messages about the robot, `due` returns the acts that are due by now, `deadline` says
+when to ask next. Rules belong to steps, which are known from the ids of the robot's fragments (`step-3`, `step-20-a`,
+`step-5-fix`). Triggers are things that a person could hear or see: words, looks and points come as they are realised,
+so that the order of events is the same on a slow machine.
 """
 
 import re
 from collections.abc import Callable, Iterable
 from heapq import heappop, heappush
+from itertools import count
 
 from msgspec import Struct
 
@@ -22,30 +23,30 @@ from engage_hri.schemas.units import Seconds
 from engage_hri.services.tangram.table import Side
 
 FACE = "@robot"
-"""Stands for the robot's face, whose id the script does not know."""
+"""Placeholder for the robot's face, because the script does not know its id."""
 AWAY = ""
 TABLE = "table"
 
 
-# -- what the person does ---------------------------------------------------------------------------------------
+# -- acts of the person ---------------------------------------------------------------------------------------
 
 
 class LookAt(Struct, frozen=True):
-    """target: an entity, `FACE`, or `AWAY`."""
+    """Look at `target`: an entity, `FACE`, or `AWAY`."""
 
     target: str
 
 
 class Sit(Struct, frozen=True):
-    """Come to the table: perception finds them."""
+    """Come to the table: perception finds the person."""
 
 
 class Leave(Struct, frozen=True):
-    """Go: perception loses them."""
+    """Go: perception loses the person."""
 
 
 class Grab(Struct, frozen=True):
-    """Reach for a piece. Takes as long as the hand needs."""
+    """Reach for a piece, for as long as the hand needs."""
 
     piece: str
 
@@ -59,10 +60,12 @@ class Lay(Struct, frozen=True):
 
 
 class Withdraw(Struct, frozen=True):
-    """Hands back to the lap, while the script goes on."""
+    """Take the hands back to the lap, while the script goes on."""
 
 
 class Pause(Struct, frozen=True):
+    """Wait before the next act."""
+
     seconds: Seconds
 
 
@@ -74,7 +77,7 @@ class Start(Struct, frozen=True):
 
 
 class Stop(Struct, frozen=True):
-    """End what the same `Start` began."""
+    """End the action that the same `Start` began."""
 
     action: Action
     target: str = ""
@@ -83,7 +86,7 @@ class Stop(Struct, frozen=True):
 Act = LookAt | Sit | Leave | Grab | Lay | Withdraw | Pause | Start | Stop
 
 
-# -- when they do it --------------------------------------------------------------------------------------------
+# -- triggers of acts --------------------------------------------------------------------------------------------
 
 
 class Entrance(Struct, frozen=True):
@@ -95,7 +98,7 @@ class Begun(Struct, frozen=True):
 
 
 class Ended(Struct, frozen=True):
-    """It has ended."""
+    """The robot's fragment of this step has ended."""
 
 
 class Word(Struct, frozen=True):
@@ -124,7 +127,7 @@ Trigger = Entrance | Begun | Ended | Word | RobotDoes | EventChanged
 
 
 class Rule(Struct, frozen=True):
-    """In fragment `step`, `delay` seconds after `when`: do these one after the other. Once."""
+    """A rule: in fragment `step`, `delay` seconds after `when`, do the acts one after the other. It fires once."""
 
     step: str
     when: Trigger
@@ -133,13 +136,15 @@ class Rule(Struct, frozen=True):
 
 
 class _Due(Struct, order=True):
+    """Acts to do, one after the other, from `at` on."""
+
     at: Seconds
     number: int
     acts: tuple[Act, ...]
 
 
 class Human:
-    """The person. vary: what to add to the next reaction time, so that no two are alike."""
+    """The person. vary: returns a number to add to the next reaction time, so that no two are alike."""
 
     def __init__(
         self, rules: Iterable[Rule], robot: str = "robot", vary: Callable[[], Seconds] = lambda: 0.0
@@ -151,19 +156,19 @@ class Human:
         self._heard: dict[tuple[str, str], int] = {}
         self._fired: set[int] = set()
         self._due: list[_Due] = []
-        self._number = 0
+        self._numbers = count()
 
     @property
     def deadline(self) -> Seconds | None:
         return self._due[0].at if self._due else None
 
     def enter(self, now: Seconds) -> None:
-        """The person comes in: step 1 begins."""
+        """Let the person come in: step 1 begins."""
         self._step = "step-1"
         self._observe("step-1", Entrance(), now)
 
     def feed(self, message: Message, now: Seconds) -> None:
-        """Perceive the robot through a message of the bus; anything else is ignored."""
+        """Take a message of the bus; those that say nothing of the robot are ignored."""
         match message:
             case BlockProgress(block=str(block), progress="start") if block.startswith("step-"):
                 self._step = block
@@ -183,19 +188,18 @@ class Human:
         for index, rule in enumerate(self._rules):
             if index not in self._fired and rule.when == seen and rule.step == step:
                 self._fired.add(index)
-                self.go_on(rule.do, max(now, now + rule.delay + self._vary()))
+                self.schedule(rule.do, max(now, now + rule.delay + self._vary()))
 
     def due(self, now: Seconds) -> tuple[Act, ...]:
-        """The next acts whose time has come: the first to be done now, the others after it. Empty: nothing is due."""
+        """Return the next due acts: the first is to be done now, the others after it. Empty if nothing is due."""
         if self._due and self._due[0].at <= now:
             return heappop(self._due).acts
         return ()
 
-    def go_on(self, acts: tuple[Act, ...], at: Seconds) -> None:
-        """Do these from `at` on."""
+    def schedule(self, acts: tuple[Act, ...], at: Seconds) -> None:
+        """Plan to do the acts from `at` on."""
         if acts:
-            self._number += 1
-            heappush(self._due, _Due(at, self._number, acts))
+            heappush(self._due, _Due(at, next(self._numbers), acts))
 
 
 def _words(text: str) -> list[str]:

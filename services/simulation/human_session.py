@@ -1,14 +1,14 @@
-"""Two people at a table, drawn from Table 2.1: what recognition would observe, and which events that should make.
+"""Sessions of two people, drawn from Table 2.1: observations for recognition, and the events they should make.
 
     plan = draw(random.Random(seed))
     for observation, at in observations(plan): ...
 
-Pure. One person sits in the robot's place: their events are asked for with requests, which can say how long is
-waited; the other's are only seen. Who explains sits in the robot's place, so backchannels are the other's,
-and so are failures to look or to answer, whose delay only a request can set.
+Pure. The explainer sits in the robot's place and begins events by requests, which can set a time limit; the events of
+the listener are only seen. So backchannels are the listener's, and so are failures to look or to answer, for only a
+request can set their delay.
 
 A Poisson stream with the table's mean almost never pauses for 70 s. So there are two regimes: engaged, and busy,
-when the other person follows a request by a detailed task and hardly answers anything else (thesis 2.3).
+while the listener carries out a detailed task after a request and hardly answers anything else (thesis 2.3).
 """
 
 from collections.abc import Iterable, Iterator, Sequence
@@ -28,39 +28,41 @@ Observation = World | ActorFound | ActionBegan | ActionEnded | RequestEvent | Si
 
 EXPLAINER, LISTENER = "robot", "human"
 OBJECTS = ("cracker", "knife", "cheese", "olives", "peppers", "plate", "salmon")
-"""Directed to in turn, so that none is meant again while the last time still counts."""
+"""Objects of directed gazes, used in turn, so that none comes again while its last time still counts."""
 SHARED: Seconds = 0.5
-"""How long a gaze is shared once both look there."""
+"""Length of the shared phase of a gaze, once both look there."""
 TURN: tuple[Seconds, Seconds] = (0.6, 1.8)
-"""Of the first turn of an adjacency pair, uniform. One that fails so early that it can't be so long takes half."""
+"""Range of the length of a pair's first turn, uniform; but at most half the delay of a pair that fails."""
 ANSWER: Seconds = 0.6
-"""How long the second turn of an adjacency pair lasts."""
+"""Length of the second turn of an adjacency pair."""
 LEAD: Seconds = 0.5
-"""How long the explainer has been speaking when a backchannel comes."""
+"""Time for which the explainer has been speaking when a backchannel comes."""
 THIRD_TURN: Seconds = 1.6
-"""After the answer the asker's next words could still be the third turn of the same pair (1.5 s)."""
+"""Time after the answer until the asker's next words can no longer be the third turn of that pair (1.5 s)."""
 BETWEEN: Seconds = 0.6
 """Least time from the end of an event to the start of the next; longer than `LEAD`."""
 
 
 class Pace(Struct, frozen=True, kw_only=True):
-    """When events come. The defaults give a mean of 5.7 s and a longest gap of about 70 s in nine minutes."""
+    """Pace of the events. The defaults give a mean of 5.7 s and a longest gap of about 70 s in nine minutes."""
 
     pause: Seconds = 2.15
-    """Engaged: mean (exponential) from the end of an event to the next, beyond the least time."""
+    """Engaged: mean time from the end of an event to the next (exponential), beyond the least time."""
     detailed: Probability = 0.13
     """Share of the explainer's answered adjacency pairs that are answered by a detailed task: the busy regime."""
     busy: tuple[Seconds, Seconds] = (25.0, 85.0)
-    """Busy: between two starts, uniform."""
+    """Busy: range of the time between two starts, uniform."""
     busy_lasts: Probability = 0.3
-    """That the task is still not done when the next event begins."""
+    """Probability that the task is not yet done when the next event begins."""
     busy_answers: Probability = 0.25
-    """Busy: how much of the table's success rates is left."""
+    """Busy: factor on the table's success rates."""
 
 
 class Planned(Struct, frozen=True, kw_only=True):
-    """An event to come. delay: of a failed one from its start, of an answered pair from the end of its first turn,
-    which is `turn` long; None for backchannels. task_until: when the manipulation that answers this pair is done.
+    """A planned event.
+
+    delay: of a failed event from its start, of an answered pair from the end of its first turn (`turn` seconds long);
+    None for backchannels. task_until: end of the manipulation that answers this pair.
     """
 
     kind: EventKind
@@ -78,12 +80,12 @@ class Planned(Struct, frozen=True, kw_only=True):
 
     @property
     def decided(self) -> Seconds:
-        """When the responder begins, or fails to."""
+        """Time at which the responder begins, or fails to."""
         return self.start + (self.turn if self.succeeds else 0.0) + (self.delay or 0.0)
 
     @property
     def over(self) -> Seconds:
-        """When the next event may begin to be prepared."""
+        """Time from which on the next event may be prepared."""
         if self.kind != "adjacency_pair":
             return self.decided + SHARED
         answered = self.decided + ANSWER if self.succeeds else self.decided
@@ -97,7 +99,7 @@ USUAL = Pace()
 
 
 def draw(chance: Chance, pace: Pace = USUAL) -> tuple[Planned, ...]:
-    """A session of as many events of each kind as the table has, in random order."""
+    """Draw a session with as many events of each kind as the table has, in random order."""
     kinds = [kind for kind, row in TABLE.items() for _ in range(row.count)]
     chance.shuffle(kinds)
     plan: list[Planned] = []
@@ -122,13 +124,13 @@ def draw(chance: Chance, pace: Pace = USUAL) -> tuple[Planned, ...]:
 
 
 def _next_kind(kinds: list[EventKind], *, busy: bool) -> EventKind:
-    """The first; somebody busy gives no backchannels as long as there is anything else."""
+    """Take the first kind; for a busy listener the first that is no backchannel, if there is one."""
     index = next((index for index, kind in enumerate(kinds) if not (busy and kind == "backchannel")), 0)
     return kinds.pop(index)
 
 
 def _event(kind: EventKind, number: int, start: Seconds, chance: Chance, answers: Probability | None) -> Planned:
-    """answers: of a busy listener, who begins nothing either; None: they are engaged."""
+    """Draw an event. answers: share of answers of a busy listener, who begins no event either; None if engaged."""
     row = TABLE[kind]
     succeeds = kind == "backchannel" or chance.random() < row.success * (1.0 if answers is None else answers)
     only_explainer = answers is not None or kind == "backchannel" or (not succeeds and kind != "mutual_facial_gaze")
@@ -136,29 +138,20 @@ def _event(kind: EventKind, number: int, start: Seconds, chance: Chance, answers
     delay = None if kind == "backchannel" else (row.delays if succeeds else row.failed_delays).draw(chance)
     turn = chance.uniform(*TURN) if kind == "adjacency_pair" else 0.0
     return Planned(
-        kind=kind,
-        initiator=EXPLAINER if by_explainer else LISTENER,
-        start=start,
-        succeeds=succeeds,
-        delay=delay,
-        turn=_turn(turn, succeeds, delay),
+        kind=kind, initiator=EXPLAINER if by_explainer else LISTENER, start=start, succeeds=succeeds, delay=delay,
+        turn=turn if succeeds or delay is None else min(turn, delay / 2),  # it ends before the pair fails
         object=OBJECTS[number % len(OBJECTS)] if kind == "directed_gaze" else "",
-    )
+    )  # fmt: skip
 
 
-def _turn(drawn: Seconds, succeeds: bool, delay: Seconds | None) -> Seconds:
-    """Length of a pair's first turn, which ends before the pair fails."""
-    return drawn if succeeds or delay is None else min(drawn, delay / 2)
-
-
-# -- what is observed of it -------------------------------------------------------------------------------------
+# -- its observations -------------------------------------------------------------------------------------------
 
 
 def observations(plan: Sequence[Planned], clock: str = "loop") -> list[tuple[Observation, Seconds]]:
-    """What happens in the session, in order, each with its time. clock: of the stamps."""
+    """Observations of the session, in order, each with its time. clock: of the stamps."""
     seen = [*_arrival(clock)]
     for number, event in enumerate(plan, start=1):
-        seen += _Acting(event, number, clock).observations()
+        seen += _PlannedObservations(event, number, clock).all()
     return sorted(seen, key=lambda observation: observation[1])
 
 
@@ -170,15 +163,15 @@ def _arrival(clock: str) -> Iterator[tuple[Observation, Seconds]]:
     yield ActorFound(actor=LISTENER, at=Stamp(clock, 0.0)), 0.0
 
 
-class _Acting:
-    """How one planned event looks to recognition. Gazes come from and go back to nowhere."""
+class _PlannedObservations:
+    """Observations of one planned event. Gazes come from and go back to nowhere."""
 
     def __init__(self, event: Planned, number: int, clock: str) -> None:
         self._event = event
         self._number = number
         self._clock = clock
 
-    def observations(self) -> Iterable[tuple[Observation, Seconds]]:
+    def all(self) -> Iterable[tuple[Observation, Seconds]]:
         match self._event.kind:
             case "directed_gaze":
                 return self._gaze(self._event.object, self._event.object)
@@ -195,7 +188,7 @@ class _Acting:
         initiator, responder = event.initiator, self._other(event.initiator)
         if event.by_explainer:
             yield self._request()
-        # Who is not answered looks away: a person when they give up, the explainer when the request has failed.
+        # Without an answer the initiator looks away: the listener at once, the explainer once its request has failed.
         gives_up = event.decided + (SHARED if event.succeeds or event.by_explainer else 0.0)
         yield from self._does(initiator, "look", event.start, gives_up, target)
         if event.kind == "directed_gaze" and not event.by_explainer:

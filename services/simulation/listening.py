@@ -1,6 +1,6 @@
-"""A person who does what the robot's words say: hears which piece goes where, and moves it there.
+"""A listening person: understands from the robot's words which piece goes where, and moves it there.
 
-Pure. For managers whose plan nobody knows beforehand.
+Pure. Meant for managers without a plan that is known beforehand.
 """
 
 from collections.abc import Callable
@@ -8,7 +8,7 @@ from collections.abc import Callable
 from engage_hri.schemas.actions import ActionBegan
 from engage_hri.schemas.messages import Message
 from engage_hri.schemas.units import Seconds
-from engage_hri.services.simulation.hearing import HeardSpeech, Hearing, wanted
+from engage_hri.services.simulation.hearing import HeardSpeech, Hearing, requested_placement
 from engage_hri.services.simulation.human import (
     FACE,
     TABLE,
@@ -29,21 +29,22 @@ GOES: tuple[Act, ...] = (LookAt(TABLE), Pause(1.0), LookAt(FACE), Pause(1.0), Le
 
 
 def moves(lay: Lay) -> tuple[Act, ...]:
-    """Take a piece and lay it where it belongs."""
+    """Acts that take a piece and lay it at its place."""
     return (LookAt(lay.piece), Pause(0.3), Grab(lay.piece), LookAt(lay.landmark), lay, Withdraw())
 
 
 class ListeningHuman(Human):
-    """Looks where the robot points and at its face in between; answers each request by a placement. Leaves after
-    "goodbye". table: whose pieces they move; None: none.
+    """The listening person: looks where the robot points, at its face in between, and leaves after "goodbye".
+
+    Each request is answered by a placement. table: with the pieces to move; None: none.
     """
 
     ANSWERS: Seconds = 0.5
-    """From the end of the robot's words to what they do about them."""
+    """Delay from the end of the robot's words to the answer."""
     FOLLOWS: Seconds = 0.3
-    """From its point, or look, to theirs."""
+    """Delay from the robot's point, or look, to the person's look."""
     ACKNOWLEDGES: tuple[Act, ...] = (LookAt(FACE),)
-    """What they do about words that ask for nothing."""
+    """Answer to words that ask for nothing."""
 
     def __init__(
         self, table: TangramTable | None, robot: str = "robot", vary: Callable[[], Seconds] = lambda: 0.0
@@ -53,7 +54,7 @@ class ListeningHuman(Human):
         self._hearing = Hearing(robot)
 
     def enter(self, now: Seconds) -> None:
-        self.go_on(COMES, now)
+        self.schedule(COMES, now)
 
     def feed(self, message: Message, now: Seconds) -> None:
         match message:
@@ -67,11 +68,11 @@ class ListeningHuman(Human):
             self._react(acts, self.ANSWERS, now)
 
     def _react(self, acts: tuple[Act, ...], delay: Seconds, now: Seconds) -> None:
-        self.go_on(acts, max(now, now + delay + self._vary()))
+        self.schedule(acts, max(now, now + delay + self._vary()))
 
     def _answer(self, utterance: HeardSpeech) -> tuple[Act, ...]:
-        """What the words of a whole block make the person do."""
+        """Acts that answer the words of a whole block."""
         if "goodbye" in utterance.words:
             return GOES
-        lay = None if self._table is None else wanted(utterance, self._table)
+        lay = None if self._table is None else requested_placement(utterance, self._table)
         return self.ACKNOWLEDGES if lay is None else (*moves(lay), Pause(0.2), LookAt(FACE))

@@ -1,6 +1,6 @@
-"""What perception tells of a person: what they do, or only their head and voice.
+"""Reports of perception about a person: actions, or only head and voice.
 
-Pure. Both are fed with what really happens, as exact messages, and with frames of camera and microphone.
+Pure. Both kinds take exact messages of what really happens, and frames of camera and microphone.
 """
 
 import math
@@ -14,25 +14,25 @@ from engage_hri.schemas.messages import Message
 from engage_hri.schemas.perception import HeadPose, VoiceActivity
 from engage_hri.schemas.units import Seconds, Stamp
 from engage_hri.services.simulation.config import PerceptionFaults
-from engage_hri.services.simulation.faults import Chances, off_by
+from engage_hri.services.simulation.faults import Chances, deviated
 from engage_hri.services.simulation.head import Sightlines, SimulatedHead
 
 
 class Reports(Protocol):
-    """One person, as perceived."""
+    """Perception of one person."""
 
     def happened(self, message: Message, now: Seconds) -> Iterator[Message]:
-        """The person did something."""
+        """Take an exact message of what the person did."""
 
     def seen(self, lost: bool, at: Stamp, now: Seconds) -> Iterator[Message]:
-        """A frame of the camera. lost: it does not find the face."""
+        """Take a frame of the camera. lost: it does not find the face."""
 
     def heard(self, at: Stamp, now: Seconds) -> Iterator[Message]:
-        """A frame of the microphone."""
+        """Take a frame of the microphone."""
 
 
 class Ear:
-    """Which utterances are heard. heard: one is, now."""
+    """Hearing of utterances, some of which are missed. heard: True while one is heard."""
 
     def __init__(self, faults: PerceptionFaults, chances: Chances) -> None:
         self._dropped = faults.dropped_speech
@@ -40,7 +40,7 @@ class Ear:
         self.heard = False
 
     def hear(self, message: ActionBegan | ActionEnded) -> bool:
-        """An utterance begins or ends. Is it heard?"""
+        """Take the beginning or end of an utterance. True if that is heard."""
         if isinstance(message, ActionBegan):
             self.heard = self._chance.random() >= self._dropped
             return self.heard
@@ -48,8 +48,8 @@ class Ear:
         return was
 
 
-class Actions:
-    """`symbolic`: looks, speech and manipulations are told as such. Looks may go wrong or unnoticed."""
+class SymbolicReports:
+    """Reports for `symbolic`: looks, speech and manipulations as such. Looks may be wrong or missed."""
 
     def __init__(self, sightlines: Sightlines, faults: PerceptionFaults, chances: Chances) -> None:
         self._sightlines = sightlines
@@ -57,8 +57,9 @@ class Actions:
         self._chance = chances("looks")
         self._ear = Ear(faults, chances)
         self._look: ActionBegan | None = None
-        """As it seems to go. None: nobody has noticed one."""
-        self._told: ActionBegan | None = None
+        """Present look as perceived; None if there is none, or it is missed."""
+        self._reported: ActionBegan | None = None
+        """Look that was reported last and not ended."""
         self._lost = False
 
     def happened(self, message: Message, now: Seconds) -> Iterator[Message]:
@@ -66,15 +67,15 @@ class Actions:
             case ActionBegan(action="look"):
                 self._look = self._noticed(message, now)
                 if self._look is not None and not self._lost:
-                    self._told = self._look
-                    yield self._told
+                    self._reported = self._look
+                    yield self._reported
             case ActionEnded(action="look"):
                 self._look = None
-                if self._told is not None and not self._lost:
-                    yield replace(message, targets=self._told.targets)
-                    self._told = None
+                if self._reported is not None and not self._lost:
+                    yield replace(message, targets=self._reported.targets)
+                    self._reported = None
             case ActorLost() if self._lost:
-                self._lost, self._told = False, None  # said already
+                self._lost, self._reported = False, None  # this was reported when the face was lost
             case (ActionBegan(action="speak") | ActionEnded(action="speak")) as speech:
                 if self._ear.hear(speech):
                     yield speech
@@ -90,13 +91,13 @@ class Actions:
             yield ActorLost(actor=actor, at=at)
             return
         yield ActorFound(actor=actor, at=at)
-        if self._told is self._look:
+        if self._reported is self._look:
             return
-        if self._told is not None:
-            yield ActionEnded(actor=actor, action="look", targets=self._told.targets, at=at)
+        if self._reported is not None:
+            yield ActionEnded(actor=actor, action="look", targets=self._reported.targets, at=at)
         if self._look is not None:
             yield replace(self._look, at=at)
-        self._told = self._look
+        self._reported = self._look
 
     def heard(self, at: Stamp, now: Seconds) -> Iterator[Message]:
         yield from ()
@@ -111,8 +112,8 @@ class Actions:
         return look
 
 
-class Signals:
-    """`raw`: the head's pose and the voice. Manipulations show in the world; nods and points are told as such."""
+class RawReports:
+    """Reports for `raw`: the head's pose and the voice. Manipulations show in the world; nods and points as such."""
 
     def __init__(
         self, sightlines: Sightlines, faults: PerceptionFaults, chances: Chances, *, head_turn: Seconds
@@ -136,7 +137,7 @@ class Signals:
 
     def seen(self, lost: bool, at: Stamp, now: Seconds) -> Iterator[Message]:
         if not lost:
-            facing = off_by(self._facing(now), self._deviation, self._chance)
+            facing = deviated(self._facing(now), self._deviation, self._chance)
             yield HeadPose(actor=self._sightlines.person, position=self._sightlines.eyes, direction=facing, at=at)
 
     def heard(self, at: Stamp, now: Seconds) -> Iterator[Message]:

@@ -18,18 +18,18 @@ from engage_hri.services.simulation.config import SimulationConfig
 from engage_hri.services.simulation.head import Sightlines
 from engage_hri.services.simulation.human import Human
 from engage_hri.services.simulation.listening import ListeningHuman
-from engage_hri.services.simulation.perception import PersonAtTable
+from engage_hri.services.simulation.person_at_table import PersonAtTable
 from engage_hri.services.simulation.stochastic import StochasticHuman
 from engage_hri.services.simulation.table import Table
 from engage_hri.services.tangram.table import tangram_table
 
 
 async def simulate(bus: Bus, ready: Ready, config: SimulationConfig) -> None:
-    """Serve until cancelled. The person comes when everybody the configuration names is on the bus."""
+    """Serve until cancelled. The person comes when all participants that the configuration names are on the bus."""
     table = Table(tangram_table(), hand_speed=config.hand_speed, shortest_movement=config.shortest_movement)
     human = _human(config, bus.robot, random.Random(config.seed))
-    scene = PersonAtTable(human, table, robot=bus.robot, frame=config.frame, stamp=bus.stamp)
-    cameras = Cameras(scene, Sightlines(table, bus.robot), config, bus.stamp, partial(_chance, config.seed))
+    person = PersonAtTable(human, table, robot=bus.robot, frame=config.frame, stamp=bus.stamp)
+    cameras = Cameras(person, Sightlines(table, bus.robot), config, bus.stamp, partial(_chance, config.seed))
     with bus.subscribe(
         keys.ANY_ALIVE, keys.FEEDBACK, keys.SYNC_POINT, keys.ROBOT_ACTION, keys.ANY_CONNECTION_EVENT,
         *([keys.ROBOT_STATE] if config.perception == "raw" else []),
@@ -61,7 +61,7 @@ def _key(message: Message) -> str:
 
 
 def _chance(seed: int, name: str) -> random.Random:
-    """A source of its own for each thing that may go wrong."""
+    """A source of chance of its own for each fault."""
     return random.Random(f"{seed} {name}")
 
 
@@ -91,6 +91,5 @@ async def _wait_for(participants: set[str], inbox: Subscription) -> None:
         received = await inbox.next()
         if received is None:
             return
-        match received.message:
-            case PeerAlive(participant=participant):
-                participants.discard(participant)
+        if isinstance(received.message, PeerAlive):
+            participants.discard(received.message.participant)

@@ -1,4 +1,4 @@
-"""A world in which nothing moves: from a file, or the tangram table. Whoever is in it sits there, or attends."""
+"""A world in which nothing moves: from a file, or the tangram table. Its people sit there, and one may attend."""
 
 import asyncio
 from collections.abc import Iterator
@@ -27,7 +27,7 @@ ADVICE = f"for example {EXAMPLE}; places are in metres, at most {FARTHEST:.0e}"
 
 
 class _File(Struct, frozen=True, forbid_unknown_fields=True):
-    """As a `World` on the bus, so that one from there can be kept in a file."""
+    """Content of a world file: the fields of a `World` on the bus, so that one from there can be kept in a file."""
 
     entities: tuple[Entity, ...]
     type: Literal["world"] = "world"
@@ -35,9 +35,9 @@ class _File(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 async def show_world(bus: Bus, ready: Ready, world: World, *, is_attentive: bool = False) -> None:
-    """Be perception in a world in which nothing moves, until cancelled. Its people are found at once.
+    """Publish a world in which nothing moves, as perception would, until cancelled. Its people are found at once.
 
-    is_attentive: the first of them follows the robot's gaze and answers it; else they sit there.
+    is_attentive: the first person follows the robot's gaze and answers it; else all just sit there.
     """
     with bus.subscribe(keys.ROBOT_ACTION, keys.SYNC_POINT, keys.FEEDBACK) as inbox:
         ready()
@@ -49,7 +49,7 @@ async def show_world(bus: Bus, ready: Ready, world: World, *, is_attentive: bool
         sees = frozenset(entity.id for entity in world.objects)
         human = AttentiveHuman(world.people[0].id, sees, bus.robot)
         body = Bystander(world.people[0].id, bus.robot)
-        human.go_on((LookAt(FACE),), bus.now())
+        human.schedule((LookAt(FACE),), bus.now())
         while not inbox.is_over:
             received = await inbox.next(human.deadline)
             if received is not None:
@@ -57,11 +57,11 @@ async def show_world(bus: Bus, ready: Ready, world: World, *, is_attentive: bool
             while acts := human.due(bus.now()):
                 for message in body.does(acts[0], bus.stamp()):
                     bus.publish(keys.PERCEIVED_ACTION, message)
-                human.go_on(acts[1:], bus.now() + (acts[0].seconds if isinstance(acts[0], Pause) else 0.0))
+                human.schedule(acts[1:], bus.now() + (acts[0].seconds if isinstance(acts[0], Pause) else 0.0))
 
 
 class Bystander:
-    """What others see of a person who looks, gestures and speaks, and moves nothing. Pure."""
+    """Actions of a person who looks, gestures and speaks, and moves nothing. Pure."""
 
     def __init__(self, person: str, robot: str) -> None:
         self._person = person
@@ -78,14 +78,13 @@ class Bystander:
                     yield ActionEnded(actor=self._person, action="look", targets=self._look, at=at)
                 self._look = look
                 yield ActionBegan(actor=self._person, action="look", targets=look, at=at)
-            case Start(action=action, target=target):
-                yield ActionBegan(actor=self._person, action=action, targets=(target,) if target else (), at=at)
-            case Stop(action=action, target=target):
-                yield ActionEnded(actor=self._person, action=action, targets=(target,) if target else (), at=at)
+            case Start(action=action, target=target) | Stop(action=action, target=target):
+                kind = ActionBegan if isinstance(act, Start) else ActionEnded
+                yield kind(actor=self._person, action=action, targets=(target,) if target else (), at=at)
 
 
 def tangram_world() -> World:
-    """The tangram table as it is at the start, with the person before it."""
+    """The tangram table as it is at the start, with the person sitting at it."""
     defaults = SimulationConfig()
     table = Table(tangram_table(), hand_speed=defaults.hand_speed, shortest_movement=defaults.shortest_movement)
     table.seated = True

@@ -1,11 +1,12 @@
-"""A person as Table 2.1 of the thesis has them: looks, answers and errs by chance, and is sometimes busy.
+"""A person with the statistics of Table 2.1 of the thesis: looks, answers and errs by chance, and is sometimes busy.
 
-Pure; chance comes from outside. What they know of the robot is what can be heard and seen: its words, where it looks
-and points, as realised. What they do and don't do is in `Habits`, each number with its source.
+Pure; chance comes from outside. The person knows only what can be heard and seen of the robot: its words, looks and
+points, as realised. `Habits` has the numbers, each with its source.
 """
 
 from collections.abc import Callable
 from heapq import heappop, heappush
+from itertools import count
 
 from msgspec import Struct
 
@@ -16,7 +17,7 @@ from engage_hri.schemas.messages import Message
 from engage_hri.schemas.units import Probability, Seconds
 from engage_hri.services.simulation.chance import Chance, Delays
 from engage_hri.services.simulation.config import Habits
-from engage_hri.services.simulation.hearing import THINKING, HeardSpeech, Hearing, wanted
+from engage_hri.services.simulation.hearing import THINKING, HeardSpeech, Hearing, requested_placement
 from engage_hri.services.simulation.human import (
     FACE,
     TABLE,
@@ -36,15 +37,15 @@ from engage_hri.services.tangram.table import SIDES, TangramTable, poses_touchin
 
 NOD: Seconds = 0.5
 WORD: Seconds = 0.5
-"""Of a spoken backchannel or answer; shorter than 0.8 s, with which speech would be a change of floor."""
+"""Length of a spoken backchannel or answer: shorter than 0.8 s, from which on speech is a change of floor."""
 QUESTION: Seconds = 1.0
-""" "Which one?" """
+"""Length of the question "Which one?"."""
 GLANCE_UP: Seconds = 0.2
-"""From laying a piece down to looking up."""
+"""Delay from laying a piece down to looking up."""
 
 
 class _Thought(Struct, order=True):
-    """Something to decide at `at`."""
+    """A decision to make at `at`."""
 
     at: Seconds
     number: int
@@ -52,7 +53,7 @@ class _Thought(Struct, order=True):
 
 
 class StochasticHuman(Human):
-    """Does what the robot asks for, in their own time and not without mistakes."""
+    """The stochastic person: does what the robot asks for, at a varying pace and with some mistakes."""
 
     def __init__(self, table: TangramTable, habits: Habits, chance: Chance, robot: str = "robot") -> None:
         super().__init__((), robot)
@@ -62,24 +63,25 @@ class StochasticHuman(Human):
         self._pieces = frozenset(piece.id for piece in table.pieces)
         self._hearing = Hearing(robot)
         self._thoughts: list[_Thought] = []
-        self._thought = 0
+        self._thought_numbers = count()
         self._seated = False
         self._gaze = ""
         self._looks = 0
-        """How many looks there were: who finds another number has been overtaken."""
+        """Number of looks so far: a plan made at another number is outdated."""
         self._robot_gaze = ""
         self._robot_speech: set[str] = set()
-        """What it is saying now, by behavior."""
+        """Ids of the robot's present speech behaviors."""
         self._shown: set[str] = set()
-        """Pieces that they saw the robot look or point at during its present turn."""
+        """Pieces that the person saw the robot look or point at during its present turn."""
         self._task: Lay | None = None
-        """What they are at, or about to be: the busy regime."""
+        """Present or next task: with one the person is in the busy regime."""
         self._next_task: Lay | None = None
+        """Task that the robot asked for meanwhile."""
         self._gesture_until: Seconds = 0.0
         self._awaits_eyes = False
-        """They look at the robot's face, and it has not looked back yet."""
+        """True while the person looks at the robot's face and it has not looked back yet."""
         self.propensity = 1.0
-        """For looks at the robot's face, 0..2."""
+        """Propensity for looks at the robot's face, 0..2."""
 
     # -- time ---------------------------------------------------------------------------------------------------
 
@@ -93,15 +95,14 @@ class StochasticHuman(Human):
             heappop(self._thoughts).decide(now)
         acts = super().due(now)
         if acts:
-            self._notice(acts[0], now)
+            self._update(acts[0], now)
         return acts
 
     def _later(self, at: Seconds, decide: Callable[[Seconds], None]) -> None:
-        self._thought += 1
-        heappush(self._thoughts, _Thought(at, self._thought, decide))
+        heappush(self._thoughts, _Thought(at, next(self._thought_numbers), decide))
 
-    def _notice(self, act: Act, now: Seconds) -> None:
-        """What doing this changes for them."""
+    def _update(self, act: Act, now: Seconds) -> None:
+        """Update the person's state for an act that is done now."""
         match act:
             case LookAt(target=target):
                 self._look_changes(target)
@@ -116,10 +117,10 @@ class StochasticHuman(Human):
             case Withdraw():
                 self._finish(now)
 
-    # -- what they perceive -------------------------------------------------------------------------------------
+    # -- perception ----------------------------------------------------------------------------------------------
 
     def enter(self, now: Seconds) -> None:
-        self.go_on((*COMES, Pause(self._habits.glance), LookAt(TABLE)), now)
+        self.schedule((*COMES, Pause(self._habits.glance), LookAt(TABLE)), now)
 
     def feed(self, message: Message, now: Seconds) -> None:
         if not self._seated:
@@ -130,7 +131,7 @@ class StochasticHuman(Human):
                 if self._robot_gaze == self._table.person.id:
                     self._robot_looks_at_them(now)
                 elif self._robot_gaze in self._pieces:
-                    self._is_directed(self._robot_gaze, self._habits.follows_look, now)
+                    self._follow(self._robot_gaze, self._habits.follows_look, now)
             case ActionEnded(actor=self._robot, action="look", targets=(self._robot_gaze,)):
                 self._robot_gaze = ""
             case ActionBegan(actor=self._robot, action="speak", behavior=behavior):
@@ -138,7 +139,7 @@ class StochasticHuman(Human):
             case ActionEnded(actor=self._robot, action="speak", behavior=behavior):
                 self._robot_speech.discard(behavior)
             case ActionBegan(actor=self._robot, action="point", targets=(target,)) if target in self._pieces:
-                self._is_directed(target, self._habits.follows_point, now)
+                self._follow(target, self._habits.follows_point, now)
             case WordSpoken() if self._happens(self._habits.backchannels) and not self._task:
                 self._utter(now + 0.2)
         utterance = self._hearing.feed(message)
@@ -158,23 +159,23 @@ class StochasticHuman(Human):
     # -- gaze ---------------------------------------------------------------------------------------------------
 
     def _glances(self, target: str, at: Seconds) -> None:
-        """Look there, and after a while back at the table, unless something else has drawn the eyes away."""
+        """Plan to look at the target, and after a while back at the table, unless the next look has come before."""
         self._later(at, lambda now: self._glance(target, now))
 
     def _glance(self, target: str, now: Seconds) -> None:
         if self._gaze != target:
-            self.go_on((LookAt(target),), now)
+            self.schedule((LookAt(target),), now)
             self._look_back(self._looks + 1, now)
 
     def _look_back(self, look: int, now: Seconds) -> None:
         def back(now: Seconds) -> None:
             if self._looks == look:
-                self.go_on((LookAt(TABLE),), now)
+                self.schedule((LookAt(TABLE),), now)
 
         self._later(now + self._habits.glance, back)
 
-    def _is_directed(self, piece: str, follows: Probability, now: Seconds) -> None:
-        """The robot looks or points at a piece. Once they have noticed, a point after the look changes nothing."""
+    def _follow(self, piece: str, follows: Probability, now: Seconds) -> None:
+        """Look, perhaps, at a piece that the robot shows by look or point; a shown one is not looked at again."""
         if piece not in self._shown and self._answers(follows):
             self._shown.add(piece)
             self._glances(piece, now + self._drawn(self._habits.follow_delay))
@@ -188,7 +189,7 @@ class StochasticHuman(Human):
             self._glances(FACE, now + self._drawn(self._habits.look_delay))
 
     def _look_changes(self, target: str) -> None:
-        """Whether the robot looks back tells how soon they will look at its face again."""
+        """Note a look of the person, and learn from the one before whether the robot looked back."""
         if self._awaits_eyes:
             self._learn(answered=False)
         self._gaze = target
@@ -205,10 +206,10 @@ class StochasticHuman(Human):
         self._awaits_eyes = False
         self.propensity += self._habits.reciprocity * ((2.0 if answered else 0.0) - self.propensity)
 
-    # -- of their own accord ------------------------------------------------------------------------------------
+    # -- unasked acts --------------------------------------------------------------------------------------------
 
     def _plan_look_up(self, now: Seconds) -> None:
-        """Now and then look at the robot's face, the more seldom the less it looks back."""
+        """Plan the next unasked look at the robot's face: the less the robot looks back, the fewer there are."""
 
         def look_up(now: Seconds) -> None:
             if self._answers(self.propensity / 2):
@@ -219,7 +220,7 @@ class StochasticHuman(Human):
         self._later(now + self._chance.expovariate(2 / self._habits.looks_up_every), look_up)
 
     def _plan_direction(self, now: Seconds) -> None:
-        """Now and then look or point at some piece, but not while the robot speaks."""
+        """Plan the next unasked look or point at some piece; there is none while the robot speaks."""
 
         def direct(now: Seconds) -> None:
             if not self._robot_speech and self._answers(1.0):
@@ -234,25 +235,25 @@ class StochasticHuman(Human):
     # -- turns --------------------------------------------------------------------------------------------------
 
     def _respond(self, utterance: HeardSpeech, now: Seconds) -> None:
-        """The robot has said something."""
+        """Answer an utterance of the robot."""
         habits = self._habits
         if utterance.words == THINKING or not self._happens(habits.hears):
             return
         at = now + self._drawn(habits.answer_delay)
         if "goodbye" in utterance.words:
-            self.go_on(GOES, at)
+            self.schedule(GOES, at)
         elif utterance.is_request:
             self._take_up(self._understood(utterance), at)
         elif self._answers(habits.answers_turn):
             self._utter(at)
 
     def _understood(self, utterance: HeardSpeech) -> Lay | None:
-        """What they are to do as they understand it, which may be wrong; None if they cannot tell."""
+        """Task as the person understands it, which may be wrong; None if that is left open."""
         habits = self._habits
         if utterance.pointed not in self._shown:
             guess = self._chance.choice(sorted(self._pieces)) if self._happens(habits.guesses) else ""
             utterance = HeardSpeech(utterance.words, guess)
-        asked = wanted(utterance, self._table)
+        asked = requested_placement(utterance, self._table)
         if asked is None:
             return None
         if self._happens(habits.confuses_shown if asked.piece in self._shown else habits.confuses):
@@ -265,7 +266,7 @@ class StochasticHuman(Human):
         return self._chance.choice(mistakes) if mistakes else asked
 
     def _other_pieces(self, asked: Lay) -> list[Lay]:
-        """The same with a piece of the same color or shape, where that fits."""
+        """The same task with another piece of the same color or shape, where that fits."""
         right = self._table.piece(asked.piece)
         others = (
             Lay(piece.id, asked.side, asked.landmark)
@@ -275,17 +276,18 @@ class StochasticHuman(Human):
         return [lay for lay in others if lay.piece != asked.landmark and self._fits(lay)]
 
     def _other_sides(self, asked: Lay) -> list[Lay]:
+        """The same task on another side of the landmark, where that fits."""
         others = (Lay(asked.piece, side, asked.landmark) for side in SIDES if side != asked.side)
         return [lay for lay in others if self._fits(lay)]
 
     def _fits(self, lay: Lay) -> bool:
-        """Has the landmark such an edge there? As it lies in the figure."""
+        """True if the landmark, as it lies in the figure, has a fitting edge on that side."""
         piece, landmark = self._table.piece(lay.piece), self._table.piece(lay.landmark)
         there = self._table.lying(landmark, landmark.goal)
         return any(True for _ in poses_touching(self._table.lying(piece, piece.start), there, lay.side))
 
     def _take_up(self, task: Lay | None, at: Seconds) -> None:
-        """Do it, once they have found the piece, and perhaps not before they have studied all of them."""
+        """Begin the task after finding the piece, and perhaps after studying all pieces. None: ask which is meant."""
         if task is None:
             self._glances(FACE, at)
             self._gestures("speak", QUESTION, at)
@@ -303,30 +305,30 @@ class StochasticHuman(Human):
 
     def _begin(self, task: Lay, at: Seconds) -> None:
         self._task = task
-        self.go_on(moves(task), at)
+        self.schedule(moves(task), at)
 
     def _finish(self, now: Seconds) -> None:
-        """The piece lies there: go on with what they were asked meanwhile, or look up."""
+        """End the task, now that the piece lies there: begin the next one, or look up."""
         self._task, following = None, self._next_task
         self._next_task = None
         if following is not None:
             self._begin(following, now)
             return
-        self.go_on((LookAt(TABLE),), now)
+        self.schedule((LookAt(TABLE),), now)
         if self._answers(min(1.0, self._habits.reports * self.propensity)):
             self._glances(FACE, now + GLANCE_UP)
 
     # -- voice and gestures -------------------------------------------------------------------------------------
 
     def _utter(self, at: Seconds) -> None:
-        """A brief word or a nod: an answer, or while the robot speaks a backchannel."""
+        """Say a brief word or nod: an answer, or a backchannel while the robot speaks."""
         if self._happens(self._habits.speaks):
             self._gestures("speak", WORD, at)
         else:
             self._gestures("nod", NOD, at)
 
     def _gestures(self, action: Action, seconds: Seconds, at: Seconds, target: str = "") -> None:
-        """Speak, nod or point; one at a time."""
+        """Speak, nod or point, unless another gesture is still going on."""
         if at >= self._gesture_until:
             self._gesture_until = at + seconds
-            self.go_on((Start(action, target), Pause(seconds), Stop(action, target)), at)
+            self.schedule((Start(action, target), Pause(seconds), Stop(action, target)), at)

@@ -1,4 +1,4 @@
-"""What lies on the table and how hands move it: smooth movements as functions of time.
+"""Pieces on the table, and hands that move them: smooth movements as functions of time.
 
 Pure: `now` is an argument, and time must not go backward. A movement never jumps: position and velocity are
 continuous, as the hands of people are (minimum jerk).
@@ -16,13 +16,12 @@ from engage_hri.services.tangram.table import PiecePose, TangramTable
 
 HandSide = Literal["left", "right"]
 LIFT: Meters = 0.03
-"""How high above the table's top the hand is that holds a piece."""
+"""Height above the table's top of a hand that holds a piece."""
 
 
 class Movement(Struct, frozen=True, kw_only=True):
-    """A hand goes from one point to another, perhaps with a piece, which turns on the way."""
+    """Movement of a hand from one point to another, perhaps with a piece, which turns on the way."""
 
-    hand: HandSide
     start: Vector
     end: Vector
     since: Seconds
@@ -32,7 +31,7 @@ class Movement(Struct, frozen=True, kw_only=True):
     yaw_end: float = 0.0
 
     def progress(self, now: Seconds) -> float:
-        """0..1."""
+        """Share of the way that is done, 0..1."""
         return minimum_jerk((now - self.since) / (self.until - self.since))
 
     def position(self, now: Seconds) -> Vector:
@@ -48,16 +47,15 @@ class Movement(Struct, frozen=True, kw_only=True):
         return tuple(rate * (end - start) for start, end in zip(self.start, self.end, strict=True))  # type: ignore[return-value]
 
 
-class PieceMoved(Struct, frozen=True):
-    """A piece began to move, or came to rest, at `at`."""
+class PieceRested(Struct, frozen=True):
+    """A piece came to rest at `at`."""
 
     piece: str
-    began: bool
     at: Seconds
 
 
 class Table:
-    """The pieces and a person's hands. One movement at a time per hand; another begins when it has ended."""
+    """The pieces and a person's hands. Each hand makes one movement at a time; the next begins when it has ended."""
 
     def __init__(self, layout: TangramTable, *, hand_speed: float, shortest_movement: Seconds) -> None:
         self.layout = layout
@@ -69,38 +67,37 @@ class Table:
         self._hands: dict[HandSide, Vector] = dict(self._rest)
         self._moving: dict[HandSide, Movement] = {}
 
-    # -- what hands do ------------------------------------------------------------------------------------------
+    # -- movements ----------------------------------------------------------------------------------------------
 
     def reach(self, piece: str, now: Seconds) -> Seconds:
-        """The nearer hand goes to the piece. Returns when it is there."""
+        """Move the nearer hand to the piece. Returns the time at which it is there."""
         x, y, _ = self.piece(piece, now).position
-        return self._move(self._hand_for(piece, now), (x, y, self._holding_height), now).until
+        return self._move(self._hand_for(piece, now), (x, y, self._holding_height), now)
 
     def carry(self, piece: str, pose: PiecePose, now: Seconds) -> Seconds:
-        """The hand at the piece (or the nearer one) takes it to `pose`. Returns when it lies there."""
+        """Take the piece to `pose`, with the nearer hand. Returns the time at which it lies there."""
         entity = self.piece(piece, now)
         x, y, _ = entity.position
         hand = self._hand_for(piece, now)
         self._hands[hand] = (x, y, self._holding_height)
         turn = math.remainder(math.radians(pose.yaw) - entity.yaw, math.tau)
         end = (pose.x, pose.y, self._holding_height)
-        return self._move(hand, end, now, piece=piece, yaw=entity.yaw, turn=turn).until
+        return self._move(hand, end, now, piece=piece, yaw=entity.yaw, turn=turn)
 
     def withdraw(self, now: Seconds) -> Seconds:
-        """Both hands go back to the lap. Returns when they are there."""
-        return max(self._move(hand, rest, now).until for hand, rest in self._rest.items())
+        """Take both hands back to the lap. Returns the time at which they are there."""
+        return max(self._move(hand, rest, now) for hand, rest in self._rest.items())
 
     def _move(
         self, hand: HandSide, end: Vector, now: Seconds, *, piece: str = "", yaw: float = 0.0, turn: float = 0.0
-    ) -> Movement:
+    ) -> Seconds:
+        """Begin a movement. Returns the time at which it ends."""
         start = self.hand(hand, now)
-        duration = max(self._shortest, math.dist(start, end) / self._hand_speed)
-        movement = Movement(
-            hand=hand, start=start, end=end, since=now, until=now + duration,
-            piece=piece, yaw_start=yaw, yaw_end=yaw + turn,
-        )  # fmt: skip
-        self._moving[hand] = movement
-        return movement
+        until = now + max(self._shortest, math.dist(start, end) / self._hand_speed)
+        self._moving[hand] = Movement(
+            start=start, end=end, since=now, until=until, piece=piece, yaw_start=yaw, yaw_end=yaw + turn
+        )
+        return until
 
     @property
     def _holding_height(self) -> Meters:
@@ -111,7 +108,7 @@ class Table:
         hands: tuple[HandSide, HandSide] = ("right", "left")
         return min(hands, key=lambda hand: math.dist(self.hand(hand, now), (x, y, z)))
 
-    # -- what happens -------------------------------------------------------------------------------------------
+    # -- time ---------------------------------------------------------------------------------------------------
 
     @property
     def moving(self) -> bool:
@@ -119,16 +116,16 @@ class Table:
 
     @property
     def carrying(self) -> bool:
-        """Is a piece on its way?"""
+        """True while a piece is on its way."""
         return any(movement.piece for movement in self._moving.values())
 
     @property
     def deadline(self) -> Seconds | None:
-        """When the next movement ends."""
+        """Time at which the next movement ends."""
         return min((movement.until for movement in self._moving.values()), default=None)
 
-    def settle(self, now: Seconds) -> list[PieceMoved]:
-        """End the movements that are over by `now`; returns the pieces that came to rest."""
+    def settle(self, now: Seconds) -> list[PieceRested]:
+        """End the movements that are over by `now`. Returns the pieces that came to rest."""
         rested = []
         for hand, movement in list(self._moving.items()):
             if movement.until <= now:
@@ -138,10 +135,10 @@ class Table:
                     x, y, _ = movement.end
                     yaw = math.degrees(math.remainder(movement.yaw_end, math.tau))
                     self._poses[movement.piece] = PiecePose(x, y, yaw)
-                    rested.append(PieceMoved(movement.piece, False, movement.until))
+                    rested.append(PieceRested(movement.piece, movement.until))
         return rested
 
-    # -- what there is ------------------------------------------------------------------------------------------
+    # -- positions ----------------------------------------------------------------------------------------------
 
     def hand(self, hand: HandSide, now: Seconds) -> Vector:
         movement = self._moving.get(hand)
@@ -162,7 +159,7 @@ class Table:
         return tuple(self.piece(piece.id, now) for piece in self.layout.pieces)
 
     def entities(self, now: Seconds) -> tuple[Entity, ...]:
-        """Everything there is to see: table and pieces, and the person while they sit there."""
+        """All entities to be seen: table and pieces, and the person while sitting there."""
         surface, person = self.layout.surface, self.layout.person
         top = Entity(id=surface.id, kind="surface", position=surface.center, footprint=surface.footprint)
         seen = (top, *self.pieces(now))
@@ -182,7 +179,7 @@ class Table:
 
 
 def minimum_jerk(part: float) -> float:
-    """How much of the way is done, 0..1, after `part` of the time: the way people move."""
+    """Share of the way that is done, 0..1, after `part` of the time: people move like this."""
     part = min(1.0, max(0.0, part))
     return part**3 * (10.0 - 15.0 * part + 6.0 * part**2)
 

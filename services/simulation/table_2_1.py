@@ -10,9 +10,9 @@ from engage_hri.services.simulation.chance import Delays
 
 
 class Row(Struct, frozen=True, kw_only=True):
-    """One kind of connection event. delays: of the succeeded; failed_delays: from the start of one to its failure.
+    """One kind of connection event. delays: of successes; failed_delays: from start to failure.
 
-    A backchannel has neither: it cannot fail.
+    Backchannels have neither: they have no delay and cannot fail.
     """
 
     succeeded: int
@@ -26,7 +26,7 @@ class Row(Struct, frozen=True, kw_only=True):
 
     @property
     def success(self) -> float:
-        """Share of the events that succeeded."""
+        """Share of the events that succeed."""
         return self.succeeded / self.count
 
 

@@ -11,8 +11,8 @@ from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.world import Entity, World
 from engage_hri.services.recognition.config import RecognitionConfig
 from engage_hri.services.recognition.events.machine import Forgotten
-from engage_hri.services.recognition.events.open_events import OpenBook
-from engage_hri.services.recognition.perceive.reporters import Witnesses
+from engage_hri.services.recognition.events.open_events import OpenEventTracker
+from engage_hri.services.recognition.perceive.reporters import Reporters
 from engage_hri.services.recognition.recognizer import Perceived, Recognizer, Result
 from engage_hri.services.recognition.statistics.published import PublishedStatistics
 from tests.recognition.observations import PIECES, ROBOT, stamp, world
@@ -30,20 +30,20 @@ class Lobby(Struct):
     keeps_events: bool = False
     recognizer: Recognizer = field(default=None)  # type: ignore[arg-type]
     published: PublishedStatistics = field(default=None)  # type: ignore[arg-type]
-    book: OpenBook = field(default=None)  # type: ignore[arg-type]
-    witnesses: Witnesses = field(default_factory=Witnesses)
+    book: OpenEventTracker = field(default=None)  # type: ignore[arg-type]
+    reporters: Reporters = field(default_factory=Reporters)
 
     def __post_init__(self) -> None:
         self.recognizer = Recognizer(ROBOT, self.config)
         self.published = PublishedStatistics(ROBOT, self.config)
-        self.book = OpenBook(ROBOT, "session")
+        self.book = OpenEventTracker(ROBOT, "session")
         self.feed(world("host"), 0.0)
 
     def feed(self, observation: Perceived, at: Seconds) -> None:
         while (due := self._deadline) is not None and due < at:
             self._tell(self.recognizer.advance(due), due)
         self._tell(self.recognizer.feed(observation, at, at), at)
-        self.witnesses.feed(observation, "cameras", stamp(at))  # type: ignore[arg-type]
+        self.reporters.feed(observation, "cameras", stamp(at))  # type: ignore[arg-type]
 
     @property
     def _deadline(self) -> Seconds | None:
@@ -55,14 +55,14 @@ class Lobby(Struct):
         events = [change for change in changes if isinstance(change, ConnectionEvent)]
         for change in changes:
             if isinstance(change, Forgotten):
-                self.witnesses.forget(change.actor)
+                self.reporters.forget(change.actor)
         self.book.feed(events, stamp(now))
         self.published.feed(changes, self.recognizer.session.busy, now)
         if self.keeps_events:
             self.events += events
 
     def kept(self) -> tuple[object, ...]:
-        return self.recognizer, self.published, self.book, self.witnesses
+        return self.recognizer, self.published, self.book, self.reporters
 
 
 def visit(number: int, *, raw: bool) -> Iterator[tuple[Seconds, Perceived]]:

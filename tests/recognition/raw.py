@@ -8,7 +8,8 @@ from engage_hri.schemas.perception import HeadPose, VoiceActivity
 from engage_hri.schemas.units import Vector
 from engage_hri.schemas.world import Entity, World
 from engage_hri.services.recognition.config import RecognitionConfig, Sensing
-from engage_hri.services.recognition.perceive.attention import Attention, Symbolic
+from engage_hri.services.recognition.events.interrupted_looks import Symbolic
+from engage_hri.services.recognition.perceive.attention import Attention
 from tests.recognition.observations import HUMAN, ROBOT, stamp
 
 EYES: Vector = (1.3, 0.0, 1.2)

@@ -275,7 +275,7 @@ def test_a_covered_piece_is_looked_at_where_it_was_with_less_and_less_confidence
 def test_symbolic_looks_are_believed_and_the_head_is_no_longer_asked():
     watch = Watch()
     watch.looks("blue", *ticks(1.0, 1.5))
-    watch.attention.believe(ActionBegan(actor=HUMAN, action="look", at=stamp(1.5), targets=("red",)), 1.5)
+    watch.attention.take_report(ActionBegan(actor=HUMAN, action="look", at=stamp(1.5), targets=("red",)), 1.5)
     watch.looks("green", *ticks(1.55, 3.0))
     watch.hears(True, *ticks(1.55, 3.0))
 
@@ -285,7 +285,7 @@ def test_symbolic_looks_are_believed_and_the_head_is_no_longer_asked():
 
 def test_who_is_told_to_come_and_go_is_not_lost_with_the_face():
     watch = Watch()
-    watch.attention.believe(ActorFound(actor=HUMAN, at=stamp(0.5)), 0.5)
+    watch.attention.take_report(ActorFound(actor=HUMAN, at=stamp(0.5)), 0.5)
     watch.looks("blue", *ticks(1.0, 2.05))
     watch.until(9.0)
 
@@ -295,7 +295,7 @@ def test_who_is_told_to_come_and_go_is_not_lost_with_the_face():
 def test_who_is_told_to_have_gone_and_is_seen_again_looks_anew():
     watch = Watch()
     watch.looks("blue", *ticks(1.0, 2.0))
-    watch.attention.believe(ActorLost(actor=HUMAN, at=stamp(2.0)), 2.0)
+    watch.attention.take_report(ActorLost(actor=HUMAN, at=stamp(2.0)), 2.0)
     watch.looks("blue", *ticks(2.5, 3.0))
 
     assert watch.told[2:] == [("look", "blue", 2.5)]

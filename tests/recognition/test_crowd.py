@@ -13,7 +13,7 @@ from engage_hri.schemas.recognition import ConnectionEvent, EventOutcome, Statis
 from engage_hri.schemas.requests import Accepted, Refused
 from engage_hri.services.recognition.config import RecognitionConfig
 from engage_hri.services.recognition.events.machine import Forgotten
-from engage_hri.services.recognition.events.open_events import OpenBook
+from engage_hri.services.recognition.events.open_events import OpenEventTracker
 from engage_hri.services.recognition.events.person import Person
 from engage_hri.services.recognition.events.session import Session
 from engage_hri.services.recognition.statistics.published import PublishedStatistics
@@ -125,7 +125,7 @@ def test_who_comes_back_later_is_somebody_new_and_the_totals_stay():
 
 
 def test_the_book_of_open_events_keeps_nobody_without_one():
-    book = OpenBook(ROBOT, "s")
+    book = OpenEventTracker(ROBOT, "s")
     log = met_and_lost()
     log.until(10.0)
     told = book.feed(log.events, stamp(10.0))

@@ -18,7 +18,7 @@ from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.client.event_stream import EventStream
 from engage_hri.services.client.feeds import EventFeed
 from engage_hri.services.client.robot import Robot, connect
-from engage_hri.services.recognition.events.open_events import OpenBook
+from engage_hri.services.recognition.events.open_events import OpenEventTracker
 from engage_hri.services.requests.ends import Requester
 from engage_hri.services.runtime.service import running
 from tests.recognition.observations import ROBOT, world
@@ -258,7 +258,7 @@ def test_whenever_one_comes_nothing_is_missed_repeated_or_stale(
     history: list[ConnectionEvent], joins: int, remembered: int
 ):
     joins = min(joins, len(history))
-    book, reader, states = OpenBook(ROBOT, "life"), stream(began=float(joins)), {}
+    book, reader, states = OpenEventTracker(ROBOT, "life"), stream(began=float(joins)), {}
     for before in history[:joins]:
         states |= {state.actor: state for state in book.feed([before], before.at)}
     open_then = [event for state in states.values() for event in state.events]
@@ -316,7 +316,7 @@ def test_a_state_heals_what_never_came():
 
 @pytest.mark.parametrize("opening", [True, False])
 def test_what_comes_twice_is_told_once(opening: bool):
-    reader, book = EventStream(0.0, partial(Stamp, "loop"), opening=opening), OpenBook(ROBOT, "life")
+    reader, book = EventStream(0.0, partial(Stamp, "loop"), opening=opening), OpenEventTracker(ROBOT, "life")
     life = [change(1, "ann", state, 0.0) for state in ("started", "failed")]
     told = []
     for each in life:

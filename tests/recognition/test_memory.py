@@ -10,7 +10,7 @@ from engage_hri.schemas.actions import ActionBegan
 from engage_hri.schemas.recognition import ConnectionEvent
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.recognition.config import RecognitionConfig
-from engage_hri.services.recognition.events.news import Latest
+from engage_hri.services.recognition.events.history import Latest
 from engage_hri.services.recognition.events.session import Observation, Session
 from engage_hri.services.recognition.statistics.published import PublishedStatistics
 from tests.recognition.kept import kinds

@@ -161,7 +161,7 @@ def test_an_undefined_transition_is_such_a_bug():
     session = meeting()
     session.feed(looks("bob", 1.0, ROBOT), 1.0)
     session.persons["bob"].facial.state = "somewhere"
-    session._company.let("bob", 1.5, lambda person: person.facial.step("limit", 1.5))
+    session._people.apply("bob", 1.5, lambda person: person.facial.step("limit", 1.5))
     (mishap, lost) = session.advance(1.5)
 
     assert isinstance(mishap, Mishap)

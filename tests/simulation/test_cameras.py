@@ -38,7 +38,7 @@ from engage_hri.services.simulation.human import (
     Stop,
     Withdraw,
 )
-from engage_hri.services.simulation.perception import PersonAtTable
+from engage_hri.services.simulation.person_at_table import PersonAtTable
 from engage_hri.services.simulation.table import Table
 from engage_hri.services.tangram.table import tangram_table
 

@@ -81,7 +81,7 @@ def test_acts_that_follow_wait_until_they_are_handed_back() -> None:
     human.feed(ends("step-3"), 1.0)
 
     first, *then = human.due(1.0)
-    human.go_on(tuple(then), 2.0)
+    human.schedule(tuple(then), 2.0)
 
     assert first == Pause(1.0)
     assert human.due(1.9) == ()

@@ -15,7 +15,7 @@ from engage_hri.schemas.messages import Message
 from engage_hri.schemas.units import Stamp
 from engage_hri.schemas.world import World
 from engage_hri.services.simulation.config import Habits
-from engage_hri.services.simulation.perception import PersonAtTable
+from engage_hri.services.simulation.person_at_table import PersonAtTable
 from engage_hri.services.simulation.stochastic import StochasticHuman
 from engage_hri.services.simulation.table import Table
 from engage_hri.services.tangram.table import tangram_table

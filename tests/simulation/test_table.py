@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from engage_hri.services.simulation.table import PieceMoved, Table
+from engage_hri.services.simulation.table import PieceRested, Table
 from engage_hri.services.tangram.table import PiecePose, tangram_table
 
 
@@ -21,7 +21,7 @@ def test_a_piece_lies_where_it_was_laid() -> None:
     rested = scene.settle(end)
 
     lies = scene.piece("blue-square", end + 1.0)
-    assert rested == [PieceMoved("blue-square", False, end)]
+    assert rested == [PieceRested("blue-square", end)]
     assert lies.position == pytest.approx((0.48, 0.0, 0.72))
     assert math.degrees(lies.yaw) == pytest.approx(90.0)
     assert lies.velocity == (0.0, 0.0, 0.0)

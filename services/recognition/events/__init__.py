@@ -1,1 +1,1 @@
-"""From actions to connection events: one state machine for each kind, one set of them for each person."""
+"""Connection events from actions: one state machine for each kind, one set of them for each person."""

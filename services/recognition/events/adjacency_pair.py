@@ -7,7 +7,7 @@ that comes while the turn still goes on is known at once, but decided only when 
 from engage_hri.schemas.behaviors import Action
 from engage_hri.schemas.units import Probability, Seconds
 from engage_hri.services.recognition.events.limits import in_time
-from engage_hri.services.recognition.events.machine import IDLE, EventWriter, Machine, Row, UnderWay, table
+from engage_hri.services.recognition.events.machine import IDLE, EventWriter, Machine, OngoingEvent, Row, table
 
 ROBOT_WAITING, HUMAN_WAITING = "robot_waiting", "human_waiting"
 INTERRUPTED, RESPONDING = "interrupted", "responding"
@@ -42,7 +42,7 @@ TABLE = table(
 class AdjacencyPair(Machine):
     """The adjacency pair between one person and the robot: at most one at a time, a new first turn replaces it.
 
-    limit: of a person's pair. patience: how long an unfinished turn of the robot is believed in.
+    limit: time limit of a person's pair. patience: seconds for which an unfinished turn of the robot still counts.
     """
 
     TABLE = TABLE
@@ -62,7 +62,7 @@ class AdjacencyPair(Machine):
 
     @property
     def robot_holds_turn(self) -> bool:
-        """The robot's first turn has begun and not ended: pauses in its speech belong to it."""
+        """True from the beginning of the robot's first turn to its end, pauses in its speech included."""
         return self._by_robot and self._turn_end is None and self.state in (ROBOT_WAITING, INTERRUPTED)
 
     @property
@@ -76,7 +76,7 @@ class AdjacencyPair(Machine):
         return None
 
     def expire(self, at: Seconds) -> None:
-        """No answer within the limit; or a turn of the robot that nobody ended."""
+        """Decide the pair at its deadline: no answer within the limit, or a turn of the robot without an end."""
         if self.state == INTERRUPTED:
             self.turn_ends(at)
         elif self._turn_end is None:
@@ -86,15 +86,15 @@ class AdjacencyPair(Machine):
 
     # -- first turn ---------------------------------------------------------------------------------------------
 
-    def robot_asks(self, event: UnderWay) -> None:
-        """The robot's first turn begins. A pair still pending is superseded; see `make_way`."""
+    def robot_asks(self, event: OngoingEvent) -> None:
+        """Begin a pair with the robot's first turn. A pair still pending is superseded; see `make_way`."""
         self.make_way(event.started)
         self._open(event, by_robot=True)
         self._last_heard = event.started
         self.step("robot_asks", event.started)
 
     def make_way(self, at: Seconds) -> None:
-        """End what is pending because the robot speaks. A person who has finished gets this as the answer."""
+        """End a pending pair because the robot speaks. To a person who has finished the speech is the answer."""
         if self.state == HUMAN_WAITING and self._turn_end is not None:
             self._answer("robot_answers", "speak", at)
         if self.state == INTERRUPTED:
@@ -104,23 +104,23 @@ class AdjacencyPair(Machine):
         elif self.state != IDLE:
             self.step("supersede", at)
 
-    def human_asks(self, event: UnderWay, action: Action) -> None:
-        """A person's first turn begins with `action` (speech, or the manipulation of an object)."""
+    def human_asks(self, event: OngoingEvent, action: Action) -> None:
+        """Begin a pair with a person's first turn: `action` is speech, or the manipulation of an object."""
         self._open(event, by_robot=False)
         self._asked_with = action
         self.step("human_asks", event.started)
 
-    def _open(self, event: UnderWay, *, by_robot: bool) -> None:
+    def _open(self, event: OngoingEvent, *, by_robot: bool) -> None:
         self.event = event
         self._by_robot = by_robot
         self._turn_end = self._last_heard = self._response_until = None
 
     def is_turn(self, turn: str) -> bool:
-        """Is `turn` (empty: whichever) the robot's turn that this pair began with?"""
+        """True if `turn` (empty: any) is the robot's turn with which this pair began."""
         return self.event is not None and self._by_robot and turn in ("", self.event.turn)
 
     def is_third_turn(self, person: str, at: Seconds) -> bool:
-        """Does this speech of the initiator follow the answer so closely that it closes that pair?"""
+        """True if speech of `person` at `at` closes the last pair: its initiator's, soon after the answer."""
         return self.state == IDLE and person == self._third_turn_of and in_time(at, self._third_turn_until)
 
     def third_turn(self, at: Seconds) -> None:
@@ -128,7 +128,7 @@ class AdjacencyPair(Machine):
         self.step("third_turn", at)
 
     def turn_ends(self, at: Seconds) -> None:
-        """The first turn is over: the response clock starts, and an interruption gets its negative delay."""
+        """End the first turn: the response clock starts, and an interruption gets its negative delay."""
         if self.event is None or self._turn_end is not None:
             return
         if self.state == INTERRUPTED:
@@ -142,12 +142,12 @@ class AdjacencyPair(Machine):
             self.step("turn_ends", at)
 
     def robot_heard(self, at: Seconds | None) -> None:
-        """at: when the robot last fell silent, None while it speaks."""
+        """Note when the robot last fell silent; None while it speaks."""
         if self.robot_holds_turn:
             self._last_heard = at
 
     def abort(self, at: Seconds) -> None:
-        """The robot's turn was cut off. Who interrupted it has answered; otherwise the question is taken back."""
+        """End a turn of the robot that was cut off: an interruption is the answer, else the pair is withdrawn."""
         if self.state == INTERRUPTED and self._by_robot:
             self.turn_ends(at)
         elif self.state == ROBOT_WAITING:
@@ -156,31 +156,29 @@ class AdjacencyPair(Machine):
     # -- second turn --------------------------------------------------------------------------------------------
 
     def may_be_answered_with(self, action: Action) -> bool:
-        """Does the robot wait for an answer of the person, and would `action` be one?"""
+        """True if the robot waits for an answer of the person, and `action` is one."""
         return self.event is not None and self.state == ROBOT_WAITING and action in self.event.accept
 
     def human_begins(self, action: Action, at: Seconds, confidence: Probability = 1.0) -> bool:
-        """A person's action as the answer to the robot's turn; False if it is none."""
-        if self.event is None:
+        """Take a person's action as the answer to the robot's turn. False if it is none."""
+        is_first = self.may_be_answered_with(action)
+        if self.event is None or not (is_first or self._is_earlier_answer(action, at)):
             return False
-        if self._is_earlier_answer(action, at):
-            self.event.rests_on(confidence)
-            self.event.response, self._response_since, self._response_until = action, at, None
-            return True
-        if self.may_be_answered_with(action):
-            self.event.rests_on(confidence)
+        self.event.rests_on(confidence)
+        if is_first:
             self._answer("human_answers", action, at)
-            return True
-        return False
+        else:
+            self.event.response, self._response_since, self._response_until = action, at, None
+        return True
 
     def _is_earlier_answer(self, action: Action, at: Seconds) -> bool:
-        """Did it begin before what has been taken for the answer, and only becomes known now, while that is open?"""
-        assert self.event is not None
-        undecided = self.state == INTERRUPTED and self._by_robot
-        return undecided and at < self._response_since and action in self.event.accept
+        """True if the action, known only now, began before the one that has been taken for the answer so far."""
+        if self.event is None or self.state != INTERRUPTED or not self._by_robot:
+            return False
+        return at < self._response_since and action in self.event.accept
 
     def human_goes_on(self, action: Action, at: Seconds) -> bool:
-        """The asking person speaks or manipulates again: the turn is not over yet. False if nobody waits."""
+        """Continue a person's first turn that had ended with another `action`. False if none waits for an answer."""
         if self.state != HUMAN_WAITING:
             return False
         self._asked_with = action
@@ -189,7 +187,7 @@ class AdjacencyPair(Machine):
         return True
 
     def robot_begins(self, action: Action, at: Seconds) -> None:
-        """The robot speaks or gestures: that answers a waiting person."""
+        """Take speech or a gesture of the robot, which answers a waiting person."""
         if self.state == HUMAN_WAITING:
             self._answer("robot_answers", action, at)
 
@@ -204,7 +202,7 @@ class AdjacencyPair(Machine):
             self.step(given, max(at, self._turn_end))
 
     def ends(self, action: Action, at: Seconds, *, by_robot: bool) -> None:
-        """Somebody's action has ended: the person's turn, or the response."""
+        """End an action of person or robot: it may be the person's first turn, or the response."""
         if self.event is None:
             return
         if by_robot == self._by_robot:
@@ -224,7 +222,7 @@ class AdjacencyPair(Machine):
         self.step(given, at)
 
     def repaired(self, at: Seconds) -> None:
-        """The robot's third turn closes its pair, whether or not the second was seen."""
+        """Close the robot's pair by its third turn, whether or not the second was seen."""
         if not self._by_robot:
             return
         if self.state == INTERRUPTED:
@@ -235,7 +233,7 @@ class AdjacencyPair(Machine):
             self.step("repaired", at)
 
     def block_ended(self, block: str, at: Seconds, *, aborted: bool) -> None:
-        """For pairs whose turn nobody names: their turn is the block."""
+        """End the turn of a pair without a named turn: there the turn is the block."""
         if self.event is not None and self.event.block == block and not self.event.turn:
             if aborted:
                 self.abort(at)
@@ -243,7 +241,7 @@ class AdjacencyPair(Machine):
                 self.turn_ends(at)
 
     def answered_block_ended(self, at: Seconds) -> None:
-        """The fragment that answered the person is over, and with it an answer without words."""
+        """End an answer of the robot without words, for the fragment that gave it is over."""
         if self.state == RESPONDING and not self._by_robot:
             self._end_response("response_ends", at)
 

@@ -5,7 +5,7 @@ whether it was one; longer speech is a change of floor, and so is speech that ou
 """
 
 from engage_hri.schemas.units import Seconds
-from engage_hri.services.recognition.events.machine import IDLE, EventWriter, Machine, Row, UnderWay, table
+from engage_hri.services.recognition.events.machine import IDLE, EventWriter, Machine, OngoingEvent, Row, table
 
 UNDECIDED, BRIEF = "undecided", "brief"
 
@@ -32,7 +32,7 @@ class Backchannel(Machine):
         super().__init__(writer)
         self._limit = limit
         self.last: tuple[Seconds, str] | None = None
-        """Start and id of the last one that was published."""
+        """Start and id of the last backchannel that was published."""
 
     @property
     def undecided_since(self) -> Seconds | None:
@@ -43,14 +43,14 @@ class Backchannel(Machine):
     def deadline(self) -> Seconds | None:
         return None if self.undecided_since is None else self.undecided_since + self._limit
 
-    def speaks(self, event: UnderWay) -> None:
+    def speaks(self, event: OngoingEvent) -> None:
         self._begin(event, "speaks")
 
-    def gestures(self, event: UnderWay) -> None:
+    def gestures(self, event: OngoingEvent) -> None:
         self._begin(event, "gestures")
 
-    def announced(self, event: UnderWay) -> None:
-        """The robot says that what it does now is a backchannel; its speech may have been noticed already."""
+    def announced(self, event: OngoingEvent) -> None:
+        """Begin a backchannel that the robot announces. Its speech may have been noticed already."""
         if self.state == BRIEF:
             self.ends(event.started)
         if self.state == UNDECIDED and self.event is not None:
@@ -59,7 +59,7 @@ class Backchannel(Machine):
         self.step("announced", event.started)
         self.last = (event.started, event.id)
 
-    def _begin(self, event: UnderWay, given: str) -> None:
+    def _begin(self, event: OngoingEvent, given: str) -> None:
         if self.state == BRIEF:
             self.ends(event.started)
         if self.state == UNDECIDED:
@@ -70,7 +70,7 @@ class Backchannel(Machine):
             self.last = (event.started, event.id)
 
     def ends(self, at: Seconds) -> None:
-        """The speech or gesture has ended."""
+        """End the speech or gesture."""
         event = self.event
         if event is None:
             return
@@ -79,7 +79,7 @@ class Backchannel(Machine):
         self.last = (event.started, event.id)
 
     def takes_floor(self, given: str, at: Seconds) -> Seconds:
-        """It was none: `limit` passed, or it `outlasts_turn` of the speaker. When the speech began."""
+        """Drop speech that turns out to be a turn (given: `limit` or `outlasts_turn`). Returns its start."""
         assert self.event is not None
         started = self.event.started
         self.step(given, at)

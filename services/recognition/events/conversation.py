@@ -1,6 +1,6 @@
-"""What a person and the robot say and do to one another: speech, gestures and manipulations, turn by turn.
+"""Conversation of a person and the robot: speech, gestures and manipulations, turn by turn.
 
-Input of the adjacency pair and of the two backchannels, the person's own and the robot's.
+They are input of the adjacency pair and of the two backchannels, the person's own and the robot's.
 """
 
 from collections.abc import Callable, Iterator
@@ -11,12 +11,12 @@ from engage_hri.services.recognition.config import RecognitionConfig
 from engage_hri.services.recognition.events.adjacency_pair import AdjacencyPair
 from engage_hri.services.recognition.events.backchannel import BRIEF, UNDECIDED, Backchannel
 from engage_hri.services.recognition.events.limits import in_time
-from engage_hri.services.recognition.events.machine import IDLE, EventWriter, UnderWay
+from engage_hri.services.recognition.events.machine import IDLE, EventWriter, OngoingEvent
 from engage_hri.services.recognition.events.scene import SessionScene
 
 
 class Conversation:
-    """Of one person with the robot."""
+    """Conversation of one person with the robot."""
 
     def __init__(self, id: str, scene: SessionScene, config: RecognitionConfig, writer: EventWriter) -> None:
         self.id = id
@@ -32,19 +32,19 @@ class Conversation:
 
     @property
     def deadlines(self) -> tuple[Seconds | None, ...]:
-        """The times of the `dues`."""
+        """Times of the `timed_steps`."""
         return self.own_backchannel.deadline, self.robot_backchannel.deadline, self._pair_deadline
 
     @property
-    def dues(self) -> Iterator[tuple[Seconds | None, Callable[[Seconds], None]]]:
-        """What will happen by itself, and when."""
+    def timed_steps(self) -> Iterator[tuple[Seconds | None, Callable[[Seconds], None]]]:
+        """Steps that are due by themselves, with their times."""
         yield self.own_backchannel.deadline, self._takes_floor
         yield self.robot_backchannel.deadline, self._robot_takes_floor
         yield self._pair_deadline, self.pair.expire
 
     @property
     def _pair_deadline(self) -> Seconds | None:
-        """Speech that began in time and may yet turn out to be the answer is waited for."""
+        """Deadline of the pair; None while speech that began in time may yet turn out to be the answer."""
         at, since = self.pair.deadline, self.own_backchannel.undecided_since
         if at is not None and since is not None and in_time(since, at) and self.pair.may_be_answered_with("speak"):
             return None
@@ -88,7 +88,7 @@ class Conversation:
         self.pair.ends("speak", at, by_robot=False)
 
     def gestures(self, action: Action, at: Seconds, confidence: Probability = 1.0) -> None:
-        """A nod or a shake."""
+        """Take a nod or a shake of the person."""
         if self.robot_holds_floor and self.own_backchannel.state != UNDECIDED:
             self.own_backchannel.gestures(self._backchannel(self._scene.robot, self.id, at, confidence))
         else:
@@ -112,14 +112,14 @@ class Conversation:
         self.pair.ends("act", at, by_robot=False)
 
     def _human_turn(self, at: Seconds, action: Action, confidence: Probability) -> None:
-        """Speech that is no backchannel, or a manipulation: an answer, more of the same turn, or a first turn."""
+        """Take speech that is no backchannel, or a manipulation: an answer, more of a turn, or a first turn."""
         pair = self.pair
         if pair.human_begins(action, at, confidence) or pair.human_goes_on(action, at):
             pass
         elif action == "speak" and pair.is_third_turn(self.id, at):
             pair.third_turn(at)
         elif pair.state == IDLE:
-            event = UnderWay(
+            event = OngoingEvent(
                 kind="adjacency_pair", initiator=self.id, responder=self._scene.robot, started=at,
                 limit=self._config.adjacency_pair_limit, confidence=confidence,
             )  # fmt: skip
@@ -144,7 +144,7 @@ class Conversation:
         self._floor_is_free(at)
 
     def robot_gestures(self, action: Action, at: Seconds) -> None:
-        """A nod, a shake, or pointing: the robot's."""
+        """Take a nod, a shake or a point of the robot."""
         if not self.holds_floor or action == "point":
             self.pair.robot_begins(action, at)
         elif self.robot_backchannel.state == IDLE:
@@ -165,7 +165,7 @@ class Conversation:
             backchannel.ends(at)
 
     def _floor_is_free(self, at: Seconds) -> None:
-        """Speech that outlasts the turn in which it began is a turn of its own."""
+        """Turn undecided speech that outlasts the other's turn into a turn of its own."""
         if self.own_backchannel.state == UNDECIDED and not self.robot_holds_floor:
             self._takes_floor(at, "outlasts_turn")
         if self.robot_backchannel.state == UNDECIDED and not self.holds_floor:
@@ -175,7 +175,7 @@ class Conversation:
         self.pair.robot_begins("speak", self.robot_backchannel.takes_floor(given, at))
 
     def _takes_floor(self, at: Seconds, given: str = "limit") -> None:
-        """The person's speech is no backchannel after all, but a turn since it began."""
+        """Turn the person's undecided speech into a turn since the speech began."""
         self._human_turn(self.own_backchannel.takes_floor(given, at), "speak", self._speech_confidence)
 
     def turn_ended(self, turn: str, at: Seconds) -> None:
@@ -183,13 +183,13 @@ class Conversation:
             self.turn_ends(at)
 
     def is_answered(self, at: Seconds, *, repairs: bool) -> None:
-        """The robot's second turn, or its third one, that repairs. Either answers a person who waits."""
+        """Take the robot's second turn, or a third one that repairs. Either answers a waiting person."""
         if repairs:
             self.pair.repaired(at)
         self.pair.robot_begins("speak", at)
 
     def abort(self, at: Seconds, *, turn: str) -> None:
-        """The robot's turn was cut off: what it asked for is taken back."""
+        """Withdraw the pair of a robot's turn that was cut off."""
         if self.pair.is_turn(turn):
             self.pair.abort(at)
             self._floor_is_free(at)
@@ -201,15 +201,15 @@ class Conversation:
             self.robot_backchannel.ends(at)
         self._floor_is_free(at)
 
-    def robot_asks(self, event: UnderWay) -> None:
+    def robot_asks(self, event: OngoingEvent) -> None:
         if self.robot_backchannel.state == UNDECIDED:
             self.robot_backchannel.takes_floor("outlasts_turn", event.started)
         self.pair.robot_asks(event)
         if self._scene.robot_speaks_since is not None:
             self.pair.robot_heard(None)
 
-    def _backchannel(self, speaker: str, listener: str, at: Seconds, confidence: Probability = 1.0) -> UnderWay:
+    def _backchannel(self, speaker: str, listener: str, at: Seconds, confidence: Probability = 1.0) -> OngoingEvent:
         cause: Cause = "human" if listener == self.id else "turn"
-        return UnderWay(
+        return OngoingEvent(
             kind="backchannel", initiator=speaker, responder=listener, started=at, cause=cause, confidence=confidence
         )

@@ -1,8 +1,8 @@
 """Directed gaze: one looks or points at objects, so that the other looks there too. Thesis 2.2.1.
 
 The initiator may look away before the responder arrives, most of all when pointing; so the robot's own gaze
-matters only for how long the gaze was shared. When the human is there first the robot's head is still on its
-way: the sharing begins with its arrival.
+matters only for the length of the shared phase. If the person looks there first, while the robot's head is still on
+its way, the shared phase begins when the head arrives.
 """
 
 from engage_hri.services.recognition.events.machine import IDLE, EventWriter, Row, table

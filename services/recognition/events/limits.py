@@ -1,4 +1,4 @@
-"""When a time limit starts to run: sync points of blocks as realised, and the clock that waits for its anchors."""
+"""Time limits of events: a clock that waits for its anchors, and the sync points of blocks that are such anchors."""
 
 import math
 from collections.abc import Iterable
@@ -6,23 +6,23 @@ from collections.abc import Iterable
 from engage_hri.schemas.behavior_types import canonical_sync
 from engage_hri.schemas.syncref import BLOCK_ITSELF, SyncRef
 from engage_hri.schemas.units import Seconds
-from engage_hri.services.recognition.events.news import Latest
+from engage_hri.services.recognition.events.history import Latest
 
 ROUNDING: Seconds = 1e-6
-"""Sums of times are off by less than this, on clocks that have run for decades, too."""
+"""Upper limit of the rounding error in sums of times, even on clocks that have run for decades."""
 BLOCKS_KEPT = 64
-"""Blocks whose realised points are remembered, for a request that arrives after them."""
+"""Number of blocks with realised points that are remembered, for a request that arrives after them."""
 
 
 def in_time(at: Seconds, limit: Seconds) -> bool:
-    """Is `at` no later than `limit`? What happens at the very limit still counts, whatever the rounding."""
+    """True if `at` is not later than `limit`, give or take rounding: exactly at the limit is in time."""
     return at <= limit + ROUNDING
 
 
 def anchor(reference: str) -> tuple[str, Seconds] | None:
-    """The point a sync reference means, and the offset: `g:strokeStart+0.5` -> `g:stroke_start`, 0.5.
+    """Sync point that a reference means, and its offset: `g:strokeStart+0.5` -> `g:stroke_start`, 0.5.
 
-    None for what is no point of a behavior: a bad reference, a number of seconds, the block itself.
+    None if the reference is bad or means no point of a behavior, but a number of seconds or the block itself.
     """
     try:
         point = SyncRef.parse(reference)
@@ -38,34 +38,26 @@ def _name(behavior: str, sync: str) -> str:
 
 
 class Blocks:
-    """What is known of the blocks that run or ran recently: realised points by `anchor`, and when they ended."""
+    """Blocks that run or ran recently: times of their realised points, and of their ends (`ended`)."""
 
     def __init__(self) -> None:
+        self.ended: Latest[str, Seconds] = Latest(BLOCKS_KEPT)
         self._points: Latest[str, dict[str, Seconds]] = Latest(BLOCKS_KEPT)
-        self._ended: Latest[str, Seconds] = Latest(BLOCKS_KEPT)
 
     def realised(self, block: str, behavior: str, sync: str, at: Seconds) -> str:
-        """Remember a point; its anchor."""
+        """Remember a point. Returns its name, `behavior:sync`."""
         name = _name(behavior, sync)
-        points = self._points.get(block, {})
-        points[name] = at
-        self._points[block] = points
+        self._points[block] = {**self._points.get(block, {}), name: at}
         return name
-
-    def end(self, block: str, at: Seconds) -> None:
-        self._ended[block] = at
-
-    def ended(self, block: str) -> Seconds | None:
-        return self._ended.get(block)
 
     def point(self, block: str, name: str) -> Seconds | None:
         return self._points.get(block, {}).get(name)
 
 
 class LimitClock:
-    """`limit` seconds from the latest of `start` and the anchors.
+    """Clock of a time limit: `limit` seconds from the latest of `start` and the anchors.
 
-    patience: how much longer to wait for an anchor that does not come, though nobody says that the block has ended.
+    patience: seconds after the limit for which an anchor is waited for, as long as its block has not ended.
     """
 
     def __init__(
@@ -83,7 +75,7 @@ class LimitClock:
 
     @property
     def deadline(self) -> Seconds:
-        """When the limit passes, or the patience, as long as there is somebody `waiting`."""
+        """Time at which the limit passes; while anchors are `waiting`, at which the patience ends, too."""
         if self._waiting:
             return self._from + self.limit + self._patience
         return max(self._from + self.limit, self._not_before)
@@ -93,7 +85,7 @@ class LimitClock:
             self._from = max(self._from, at + self._waiting.pop(name))
 
     def stop_waiting(self, at: Seconds) -> None:
-        """The block has ended: anchors that have not come never will."""
+        """Give up the anchors that have not come, for the block ended at `at`."""
         if self._waiting:
             self._waiting.clear()
             self._not_before = max(self._not_before, at)

@@ -1,10 +1,10 @@
-"""What the four recognizers share: a transition table as data, the event that is under way, and where it is told.
+"""The base of the four recognizers: a transition table as data, the ongoing event, and the writer of its changes.
 
-A row says which state an input leads to and which changes of the connection event are published on the way.
-Guards are part of the input's name (`robot_directs_shared`), so that table and diagram tell everything.
+A row says to which state an input leads, and which changes of the connection event are published on the way.
+Guards are part of the input's name (`robot_directs_shared`), so that table and diagram are complete.
 """
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from typing import ClassVar, NamedTuple
 
 from msgspec import Struct
@@ -16,15 +16,15 @@ from engage_hri.schemas.units import Probability, Seconds, Stamp
 
 
 class Forgotten(NamedTuple):
-    """A person who has been gone for long. Who comes with this id from now on is somebody new."""
+    """A person has been gone for long and is forgotten. The same id then means a new person."""
 
     actor: str
 
 
 class Mishap(NamedTuple):
-    """A bug has shown while something happened; `actor` is whom it concerned, empty: nobody in particular.
+    """A bug has shown in a step. actor: the person concerned; empty if none in particular.
 
-    The person's open events have ended as lost; nothing else has.
+    Only the open events of that person have ended, as lost.
     """
 
     actor: str
@@ -36,17 +36,19 @@ Effect = ConnectionEvent | EventOutcome | TurnOutcome | Accepted | Refused | For
 IDLE = "idle"
 DECISIONS: frozenset[EventState] = frozenset({"succeeded", "failed", "preempted", "withdrawn", "superseded"})
 DECIDED: frozenset[EventState] = DECISIONS | {"lost"}
-"""What answers a request."""
+"""States that answer a request."""
 PREFIX: Mapping[EventKind, str] = {
     "directed_gaze": "dg", "mutual_facial_gaze": "mfg", "adjacency_pair": "ap", "backchannel": "bc",
 }  # fmt: skip
 
 
 class UndefinedTransition(Exception):
-    """The table has no row for this input in this state. Nothing has changed."""
+    """An input for which the table has no row in the present state. Nothing has changed."""
 
 
 class Row(NamedTuple):
+    """A transition: in `state`, the input `given` leads to state `next`."""
+
     state: str
     given: str
     next: str
@@ -64,17 +66,8 @@ def table(*rows: Row) -> Table:
     return by_input
 
 
-def diagram(rows: Iterable[Row]) -> str:
-    """The table as a Mermaid state diagram."""
-    lines = ["stateDiagram-v2", f"    [*] --> {IDLE}"]
-    for row in rows:
-        told = f" / {', '.join(row.publishes)}" if row.publishes else ""
-        lines.append(f"    {row.state} --> {row.next} : {row.given}{told}")
-    return "\n".join(lines) + "\n"
-
-
-class UnderWay(Struct, kw_only=True):
-    """A connection event between its start and its end; what `ConnectionEvent` will say about it."""
+class OngoingEvent(Struct, kw_only=True):
+    """A connection event between its start and its end, with all that its `ConnectionEvent` messages say."""
 
     kind: EventKind
     initiator: str
@@ -95,16 +88,16 @@ class UnderWay(Struct, kw_only=True):
     duration: Seconds | None = None
     response: Action | None = None
     confidence: Probability = 1.0
-    """The least of the observations it rests on."""
+    """Least confidence of the observations on which the event rests."""
     changed: Seconds | None = None
 
     def rests_on(self, confidence: Probability) -> None:
-        """One more observation has contributed."""
+        """Count one more observation, of this confidence."""
         self.confidence = min(self.confidence, confidence)
 
 
 class EventWriter:
-    """Numbers the events and turns their changes into messages, in `effects`.
+    """Writer of messages: numbers the events and turns their changes into `effects`.
 
     clock: of the stamps. session: prefix of the ids, so that a restarted service never reuses one.
     """
@@ -114,19 +107,19 @@ class EventWriter:
         self._clock = clock
         self._session = session
         self._count: dict[EventKind, int] = dict.fromkeys(PREFIX, 0)
-        self._open: dict[str, UnderWay] = {}
-        """What has been told of and not ended, by id."""
+        self._open: dict[str, OngoingEvent] = {}
+        """Published events that have not ended, by id."""
 
     def take(self) -> list[Effect]:
-        """What happened since the last call."""
+        """Return the effects since the last call."""
         taken, self.effects = self.effects, []
         return taken
 
     def stamp(self, at: Seconds) -> Stamp:
         return Stamp(self._clock, at)
 
-    def publish(self, event: UnderWay, state: EventState, at: Seconds) -> None:
-        """Tell a change, and answer the event's request if this decides it. An event's times never run backwards."""
+    def publish(self, event: OngoingEvent, state: EventState, at: Seconds) -> None:
+        """Write a change, and answer the event's request if this decides it. An event's times never run backwards."""
         if not event.id:
             self._count[event.kind] += 1
             event.id = f"{self._session}{PREFIX[event.kind]}-{self._count[event.kind]}"
@@ -158,7 +151,7 @@ class EventWriter:
             event.request = ""
 
     def lose(self, person: str, at: Seconds) -> None:
-        """Nobody will know what became of the open events with `person`."""
+        """End the open events with `person` as lost."""
         for event in [event for event in self._open.values() if person in (event.initiator, event.responder)]:
             self.publish(event, "lost", at)
 
@@ -168,27 +161,19 @@ class EventWriter:
 
 
 class Machine:
-    """One recognizer: its state, the event under way, and when it must be woken (`deadline`, then `expire`)."""
+    """One recognizer: its state and its ongoing event."""
 
     TABLE: ClassVar[Table]
 
     def __init__(self, writer: EventWriter) -> None:
         self.state = IDLE
-        self.event: UnderWay | None = None
+        self.event: OngoingEvent | None = None
         self._writer = writer
-
-    @property
-    def deadline(self) -> Seconds | None:
-        """When something happens by itself, unless an input comes first."""
-        return None
-
-    def expire(self, at: Seconds) -> None:
-        """`deadline` has passed; at: that instant."""
 
     def step(self, given: str, at: Seconds) -> None:
         """Take one transition and publish what its row says.
 
-        An undefined one changes nothing and raises UndefinedTransition.
+        Raises UndefinedTransition, and changes nothing, if there is no row.
         """
         row = self.TABLE.get((self.state, given))
         if row is None:

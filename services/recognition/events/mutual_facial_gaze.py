@@ -1,7 +1,7 @@
 """Mutual facial gaze: each looks at the other's face. Thesis 2.2.2.
 
-The robot asks for it when its head begins to move. Its turning away counts only once its gaze has been on the
-face since the request; before that it has not yet come.
+The robot asks for it when its head begins to move. That the robot turns away counts only after its gaze has been on
+the face since the request; before that its gaze is still on the way.
 """
 
 from engage_hri.schemas.units import Seconds
@@ -44,7 +44,7 @@ class MutualFacialGaze(SharedGaze):
     ROBOT_JOINS, HUMAN_JOINS = "robot_answers", "human_answers"
 
     def directed_gaze_begins(self, at: Seconds, *, by_robot: bool) -> None:
-        """Eyes go elsewhere: a mutual gaze is over, and the robot takes its own request back."""
+        """End the mutual gaze because a directed gaze takes the eyes elsewhere; the robot withdraws its request."""
         if self.state == MUTUAL:
             self._part("directed_gaze_begins", at)
         elif self.state == ROBOT_WAITING and by_robot:

@@ -1,4 +1,4 @@
-"""Which events are open, for those who come late: one message per person, made anew at each change."""
+"""Open events for subscribers that come late: one message per person, made anew at each change."""
 
 from collections.abc import Iterable
 
@@ -6,8 +6,8 @@ from engage_hri.schemas.recognition import ENDINGS, ConnectionEvent, OpenEvents
 from engage_hri.schemas.units import Stamp
 
 
-class OpenBook:
-    """robot: whoever else takes part in an event is the person it counts for. session: as in the ids."""
+class OpenEventTracker:
+    """The open events of each person with `robot`. session: prefix of the event ids."""
 
     def __init__(self, robot: str, session: str) -> None:
         self._robot = robot
@@ -15,7 +15,7 @@ class OpenBook:
         self._open: dict[str, dict[str, ConnectionEvent]] = {}
 
     def feed(self, changes: Iterable[ConnectionEvent], at: Stamp) -> list[OpenEvents]:
-        """Enter what happened; the messages of the persons it happened with. at: now."""
+        """Take changes of events. Returns the messages of the persons concerned. at: now."""
         touched: dict[str, tuple[ConnectionEvent, ...]] = {}
         for change in changes:
             person = change.person(self._robot)

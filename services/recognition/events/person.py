@@ -1,4 +1,4 @@
-"""One person and the robot: what each does becomes input of the four recognizers between them."""
+"""One person and the robot: the actions of each become input of the four recognizers between them."""
 
 from collections.abc import Callable, Iterator
 from functools import partial
@@ -10,16 +10,16 @@ from engage_hri.schemas.units import Probability, Seconds
 from engage_hri.services.recognition.config import RecognitionConfig
 from engage_hri.services.recognition.events.conversation import Conversation
 from engage_hri.services.recognition.events.directed_gaze import HUMAN_DIRECTING, DirectedGaze
+from engage_hri.services.recognition.events.history import ActionHistory
 from engage_hri.services.recognition.events.limits import LimitClock, in_time
-from engage_hri.services.recognition.events.machine import IDLE, EventWriter, UnderWay
+from engage_hri.services.recognition.events.machine import IDLE, EventWriter, OngoingEvent
 from engage_hri.services.recognition.events.mutual_facial_gaze import HUMAN_WAITING, MutualFacialGaze
-from engage_hri.services.recognition.events.news import News
 from engage_hri.services.recognition.events.presence import Presence
 from engage_hri.services.recognition.events.scene import GazeState, SessionScene
 from engage_hri.services.recognition.events.shared_gaze import SharedGaze
 
 ACTIONS_KEPT = 64
-"""Of each person; of those it is known when they last began and ended."""
+"""Number of actions of each person for which it is remembered when they last began and ended."""
 
 
 class _Directed(NamedTuple):
@@ -30,14 +30,14 @@ class _Directed(NamedTuple):
 
 
 class _Doing(NamedTuple):
-    """What a person does, and since when. targets: with what."""
+    """An action that a person performs: its targets and its start."""
 
     targets: tuple[str, ...]
     since: Seconds
 
 
 class Person:
-    """The recognizers of one actor. number: in the order of acquaintance."""
+    """The recognizers of one person. number: position in the order of acquaintance."""
 
     def __init__(
         self, id: str, number: int, scene: SessionScene, config: RecognitionConfig, writer: EventWriter
@@ -49,9 +49,9 @@ class Person:
         self.directed: list[DirectedGaze] = []
         self.facial = MutualFacialGaze(writer)
         self.conversation = Conversation(id, scene, config, writer)
-        self.news = News(ACTIONS_KEPT)
+        self.history = ActionHistory(ACTIONS_KEPT)
         self._doing: dict[Action, _Doing] = {}
-        """Other than looking."""
+        """Present actions other than looking."""
         self._scene = scene
         self._config = config
         self._writer = writer
@@ -61,7 +61,7 @@ class Person:
 
     @property
     def deadline(self) -> Seconds | None:
-        """When something happens by itself, unless something comes in between; then `pass_time`."""
+        """Time of the next step that is due by itself, unless an input comes before; then call `pass_time`."""
         times = [self.gaze.deadline, self.presence.deadline, self.facial.deadline, self._look_directs_at]
         times += self.conversation.deadlines
         times += [one.deadline for one in self.directed]
@@ -69,25 +69,25 @@ class Person:
         return min([at for at in times if at is not None], default=None)
 
     @property
-    def _dues(self) -> Iterator[tuple[Seconds | None, Callable[[Seconds], None]]]:
-        """All that has a time, in the order in which it happens if the times are equal."""
+    def _timed_steps(self) -> Iterator[tuple[Seconds | None, Callable[[Seconds], None]]]:
+        """Steps with their times, in the order in which they happen if the times are equal."""
         yield self.gaze.deadline, self._gaze_expires
         yield self.presence.deadline, self.leave
         yield from ((one.deadline, partial(self._expire_directed, one)) for one in self.directed)
         yield self.facial.deadline, self.facial.expire
-        yield from self.conversation.dues
+        yield from self.conversation.timed_steps
         yield self._look_directs_at, self._look_directs
         yield from (
             (one.since + self._longest(action), self._goes_on_too_long) for action, one in self._doing.items()
         )
 
     def pass_time(self, at: Seconds) -> None:
-        """What is due at `at`, the deadline, happens: the first of it."""
-        next(happen for due, happen in self._dues if due == at)(at)
+        """Take the first step that is due at `at`, the deadline."""
+        next(step for due, step in self._timed_steps if due == at)(at)
 
     @property
     def _look_directs_at(self) -> Seconds | None:
-        """When this look will have lasted long enough to direct the robot's, if nothing changes."""
+        """Time at which the person's look has lasted long enough to direct the robot's; None if it does not."""
         if self.gaze.spent or self.gaze.ended is not None or self.conversation.acts_since is not None:
             return None
         if not any(map(self._scene.is_object, self.gaze.targets)):
@@ -96,7 +96,7 @@ class Person:
         return None if silent_since is None else max(self.gaze.since, silent_since) + self._config.direct_by_look
 
     def leave(self, at: Seconds) -> None:
-        """The person has gone: close whatever is open."""
+        """Count the person as gone, and close all its open events."""
         until = self.presence.leave()
         for one in self.directed:
             one.person_gone(at, until)
@@ -110,7 +110,7 @@ class Person:
     # -- what the person does -----------------------------------------------------------------------------------
 
     def begins(self, began: ActionBegan, at: Seconds) -> None:
-        if not self.news.is_news(began, at) or not self.presence.seen(at):
+        if not self.history.is_new(began, at) or not self.presence.seen(at):
             return
         action, targets, confidence = began.action, began.targets, began.confidence
         if action == "look":
@@ -133,7 +133,7 @@ class Person:
                 self.conversation.manipulates(at, confidence)
 
     def ends(self, ended: ActionEnded, at: Seconds) -> None:
-        if not self.news.is_news(ended, at):
+        if not self.history.is_new(ended, at):
             return
         if ended.action == "look":
             self.gaze.end(ended.targets, at)
@@ -162,7 +162,7 @@ class Person:
         return self._config.longest_manipulation if action == "act" else self._config.longest_gesture
 
     def _goes_on_too_long(self, at: Seconds) -> None:
-        """An end has been lost, and no other beginning has followed."""
+        """End actions with a lost end and no later beginning."""
         for action in [action for action, one in self._doing.items() if one.since + self._longest(action) <= at]:
             self._stops(action, at)
 
@@ -184,7 +184,7 @@ class Person:
         self.gaze_changed(self.gaze.expire())
 
     def gaze_changed(self, at: Seconds) -> None:
-        """The person's or the robot's gaze is elsewhere now."""
+        """Pass a change of the person's or the robot's gaze on to the recognizers."""
         confidence = self.gaze.confidence
         robot_on = self._scene.robot_looks_at((self.id,))
         self.facial.gazes(robot_on=robot_on, human_on=self.on_robots_face, at=at, confidence=confidence)
@@ -203,11 +203,11 @@ class Person:
         self.hands_changed()
 
     def hands_changed(self) -> None:
-        """What the person's hands hide may be on the move: a look that goes with it directs nothing."""
+        """Mark a look that goes with the person's own hand, which may move a hidden piece: it directs nothing."""
         self.gaze.spent = self.gaze.spent or self._scene.goes_with_hand(self.id, self.gaze.targets)
 
     def head_owner_changed(self, at: Seconds) -> None:
-        """What the robot can no longer answer, because its fragment looks elsewhere, is preempted."""
+        """Preempt events that the robot can no longer answer, because its fragment looks elsewhere."""
         if self.facial.state == HUMAN_WAITING and self._scene.fragment_looks_elsewhere((self.id,)):
             self.facial.step("fragment_takes_head", at)
         for one in self.directed:
@@ -222,14 +222,8 @@ class Person:
     def _human_looks_at_face(self, at: Seconds) -> None:
         limit = self._config.mutual_facial_gaze_limit
         event = self._by_human("mutual_facial_gaze", at, limit, self.gaze.confidence)
-        self.facial.human_begins(
-            event,
-            LimitClock(at, limit),
-            robot_since=self._scene.robot_since((self.id,)),
-            human_on=True,
-            in_vain=self._scene.fragment_looks_elsewhere((self.id,)),
-            at=at,
-        )
+        in_vain, robot_since = self._scene.fragment_looks_elsewhere((self.id,)), self._scene.robot_since((self.id,))
+        self.facial.human_begins(event, limit, robot_since=robot_since, human_on=True, in_vain=in_vain, at=at)
 
     # -- directed gaze ------------------------------------------------------------------------------------------
 
@@ -245,7 +239,7 @@ class Person:
         self._human_directs(objects, at - self._config.direct_by_look, at, self.gaze.confidence)
 
     def _human_directs(self, objects: tuple[str, ...], since: Seconds, at: Seconds, confidence: Probability) -> None:
-        """since: start of the pointing, or of the look that has become a direction at `at`."""
+        """Begin a directed gaze. since: start of the pointing, or of the look that has become a direction at `at`."""
         if any(set(one.objects) & set(objects) for one in self.directed):
             return
         limit = self._config.directed_gaze_limit
@@ -257,12 +251,11 @@ class Person:
         human_on = self._scene.person_looks_at(self.gaze, objects)
         one = DirectedGaze(self._writer, objects)
         self.directed.append(one)
-        clock = LimitClock(since, limit)
-        one.human_begins(event, clock, robot_since=robot_since, human_on=human_on, in_vain=in_vain, at=at)
+        one.human_begins(event, limit, robot_since=robot_since, human_on=human_on, in_vain=in_vain, at=at)
         self.gaze.spent = self.gaze.spent or human_on
         self.forget_idle(at)
 
-    def robot_directs(self, event: UnderWay, clock: LimitClock) -> DirectedGaze:
+    def robot_directs(self, event: OngoingEvent, clock: LimitClock) -> None:
         for one in self.directed:
             if set(one.objects) == set(event.objects):
                 one.supersede(event.started)
@@ -275,14 +268,13 @@ class Person:
         robot_on = self._scene.robot_looks_at(event.objects)
         one.robot_begins(event, clock, robot_on=robot_on, look=self.gaze if there else None)
         self.forget_idle(event.started)
-        return one
 
     def _expire_directed(self, one: DirectedGaze, at: Seconds) -> None:
         one.expire(at)
         self.forget_idle(at)
 
     def forget_idle(self, at: Seconds) -> None:
-        """Drop finished directed gazes; the robot's are remembered for a while."""
+        """Drop finished directed gazes, and remember those of the robot for a while."""
         self._robot_directed = [past for past in self._robot_directed if self._is_recent(past, at)]
         for one in self.directed:
             if one.state == IDLE and one.by_robot:
@@ -290,13 +282,13 @@ class Person:
         self.directed = [one for one in self.directed if one.state != IDLE]
 
     def point_realised(self, block: str, name: str, at: Seconds) -> None:
-        """A point of a block of the robot has come: time limits may run from there."""
+        """Take a realised sync point of a block of the robot: time limits may run from there."""
         for machine in self.gaze_machines():
             if machine.clock is not None and machine.event is not None and machine.event.block == block:
                 machine.clock.realised(name, at)
 
     def abort(self, at: Seconds, *, turn: str) -> None:
-        """The robot's turn was cut off: what it asked for is taken back."""
+        """Withdraw the events that the robot began in a turn that was cut off."""
         self.conversation.abort(at, turn=turn)
         for machine in self.gaze_machines():
             if machine.event is not None and turn and machine.event.turn == turn:
@@ -310,8 +302,8 @@ class Person:
         self.forget_idle(at)
         self.conversation.block_ended(block, at, aborted=aborted)
 
-    def withdraw(self, event: UnderWay, at: Seconds) -> None:
-        """The robot takes back what it has asked for."""
+    def withdraw(self, event: OngoingEvent, at: Seconds) -> None:
+        """Withdraw an event of the robot."""
         if self.conversation.pair.event is event:
             self.conversation.pair.abort(at)
             return
@@ -325,7 +317,7 @@ class Person:
 
     # -- mutual facial gaze -------------------------------------------------------------------------------------
 
-    def robot_looks_at_face(self, event: UnderWay, clock: LimitClock) -> None:
+    def robot_looks_at_face(self, event: OngoingEvent, clock: LimitClock) -> None:
         self.facial.supersede(event.started)
         robot_on = self._scene.robot_looks_at((self.id,))
         self.facial.robot_begins(event, clock, robot_on=robot_on, look=self.gaze if self.on_robots_face else None)
@@ -334,8 +326,8 @@ class Person:
 
     def _by_human(
         self, kind: EventKind, at: Seconds, limit: Seconds, confidence: Probability, objects: tuple[str, ...] = ()
-    ) -> UnderWay:
-        return UnderWay(
+    ) -> OngoingEvent:
+        return OngoingEvent(
             kind=kind, initiator=self.id, responder=self._scene.robot, started=at, limit=limit, objects=objects,
             confidence=confidence,
         )  # fmt: skip

@@ -1,4 +1,4 @@
-"""Is a person there? Faces get lost and found again, and reports of it may come late or twice."""
+"""Presence of a person: faces get lost and found again, and reports of it may come late or twice."""
 
 from engage_hri.schemas.units import Seconds
 
@@ -6,23 +6,23 @@ NEVER: Seconds = float("-inf")
 
 
 class Presence:
-    """Of one person. grace: a face that is lost for less has not gone."""
+    """Presence of one person. grace: time for which a face may be lost before the person has gone."""
 
     def __init__(self, grace: Seconds) -> None:
         self.here = True
-        self.told = False
-        """Perception has said that the person is there, and will say when that is over."""
+        self.reported = False
+        """True if perception has reported that the person is there, and so will report when that is over."""
         self._grace = grace
         self._lost_at: Seconds | None = None
         self._found_last = self._seen_last = self._lost_last = self.left_at = NEVER
 
     @property
     def deadline(self) -> Seconds | None:
-        """When the person will have gone, unless it is seen again; then `leave`."""
+        """Time at which the person has gone, unless it is seen again before; then call `leave`."""
         return None if self._lost_at is None else self._lost_at + self._grace
 
     def seen(self, at: Seconds) -> bool:
-        """There is an observation of the person, so it is there; False if that is from before it left."""
+        """Take an observation at `at` that shows the person is there. False if it is from before the person left."""
         if at < self.left_at:
             return False
         self._seen_last = max(self._seen_last, at)
@@ -33,10 +33,10 @@ class Presence:
     def found(self, at: Seconds) -> None:
         if at > self._found_last:
             self._found_last = at
-            self.told = self.seen(at) or self.told
+            self.reported = self.seen(at) or self.reported
 
     def lost(self, at: Seconds) -> None:
-        """The face is lost. Nothing new if that was known, or if the person has been seen since."""
+        """Take a loss of the face. It changes nothing if it was known, or if the person has been seen since."""
         if at < self._seen_last or at <= self._lost_last:
             return
         self._lost_last = at
@@ -44,11 +44,11 @@ class Presence:
             self._lost_at = at
 
     def leave(self) -> Seconds:
-        """The person has gone; when it was last there."""
+        """Count the person as gone. Returns the time at which it was last there."""
         assert self._lost_at is not None
-        self.here, self.told, self.left_at, self._lost_at = False, False, self._lost_at, None
+        self.here, self.reported, self.left_at, self._lost_at = False, False, self._lost_at, None
         return self.left_at
 
     def vanish(self, at: Seconds) -> None:
-        """Nobody has told of the person since `at`: it has gone then, and is to `leave`."""
+        """Count the person as lost since `at`, the last report of it; call `leave` next."""
         self._lost_at = at

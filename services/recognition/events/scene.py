@@ -1,4 +1,4 @@
-"""What recognition knows besides the events: where everybody looks, who speaks, what is on the table."""
+"""State of robot, people and world besides the events: gazes, speakers, things on the table."""
 
 from typing import NamedTuple
 
@@ -10,11 +10,11 @@ from engage_hri.schemas.world import World
 from engage_hri.services.recognition.config import GazeResolution
 
 SAME_INSTANT: Seconds = 0.001
-"""A look that ends and begins again at the same target within this has not been interrupted."""
+"""Longest gap between two looks at the same target that count as one."""
 
 
 class Covering(NamedTuple):
-    """A person's hand hides a piece, and may be moving it. left: it has gone on, maybe with the piece."""
+    """A person's hand hides a piece, and may be moving it. left: the hand has gone on, maybe with the piece."""
 
     actor: str
     piece: str
@@ -22,23 +22,23 @@ class Covering(NamedTuple):
 
 
 class Covered(Struct, frozen=True):
-    """All pieces under hands: an observation, from raw perception alone."""
+    """Observation of all pieces under hands, from raw perception alone."""
 
     by: frozenset[Covering]
 
 
 class GazeState(Struct):
-    """Where an actor looks, and since when. ended: it has looked away at that instant, unless it is still there."""
+    """Look of an actor, and its start. ended: time at which it ended, unless the same look begins again at once."""
 
     targets: tuple[str, ...] = ()
     since: Seconds = 0.0
     ended: Seconds | None = None
     confidence: Probability = 1.0
     spent: bool = False
-    """This look answers the robot, or has directed it already: it directs nothing (any more)."""
+    """True if this look answers the robot, or has directed it already: it does not direct it (again)."""
 
     def begin(self, targets: tuple[str, ...], at: Seconds, confidence: Probability = 1.0) -> bool:
-        """A look at `targets`; True if that is a change. What is older than the present look is ignored."""
+        """Begin a look at `targets`. True if that is a change; a look older than the present one is ignored."""
         if at < self.since:
             return False
         if targets == self.targets and (self.ended is None or at - self.ended <= SAME_INSTANT):
@@ -49,7 +49,7 @@ class GazeState(Struct):
         return True
 
     def end(self, targets: tuple[str, ...], at: Seconds) -> None:
-        """The end of the look at `targets`: takes effect only if it does not begin again at once."""
+        """End the look at `targets`; effective only if the same look does not begin again at once."""
         if self.targets and targets in ((), self.targets) and at >= self.since:
             self.ended = at
 
@@ -58,7 +58,7 @@ class GazeState(Struct):
         return None if self.ended is None else self.ended + SAME_INSTANT
 
     def expire(self) -> Seconds:
-        """The look is over; when it was."""
+        """Let the ended look be over. Returns the time of its end."""
         assert self.ended is not None
         at = self.ended
         self.targets, self.since, self.ended, self.spent = (), at, None, False
@@ -66,7 +66,7 @@ class GazeState(Struct):
 
 
 class SessionScene:
-    """The robot and the world, shared by all persons of a session."""
+    """State of the robot and the world, shared by all persons of a session."""
 
     def __init__(self, robot: str, resolution: GazeResolution) -> None:
         self.robot = robot
@@ -77,19 +77,19 @@ class SessionScene:
         self.people_in_world: frozenset[str] = frozenset()
         self.covered = Covered(frozenset())
         self.acting: set[str] = set()
-        """People with a manipulation in hand."""
+        """People who are manipulating something."""
         self._objects: set[str] = set()
         self._surfaces: set[str] = {"table"}
         self._others: dict[str, Seconds] = {}
-        """People and hands that have been seen, and when last; the longest ago first."""
+        """People and hands with the time when they were last seen; the longest ago first."""
         self._speakers: set[str] = set()
         self.speech = 0
-        """Counts how often somebody has begun or ended to speak."""
+        """Number of times that speech of any actor has begun or ended."""
         self._fell_silent: list[tuple[Seconds, str]] = []
-        """The two people who fell silent last, for whoever asks is one of them at most."""
+        """The two actors that fell silent last. Two are enough: the actor that asks is at most one of them."""
 
     def see(self, world: World, at: Seconds) -> None:
-        """Objects once seen stay known: a covered piece has not gone (thesis 5.4.2)."""
+        """Take a view of the world. Objects once seen stay known: a covered piece has not gone (thesis 5.4.2)."""
         self._objects.update(entity.id for entity in world.objects)
         self._surfaces.update(entity.id for entity in world.entities if entity.kind == "surface")
         for entity in world.entities:
@@ -99,7 +99,7 @@ class SessionScene:
         self.people_in_world = frozenset(person.id for person in world.people) - {self.robot}
 
     def forget_others(self, before: Seconds) -> None:
-        """Forget the people and hands that nobody has seen since."""
+        """Forget the people and hands that have not been seen since `before`."""
         while self._others and (oldest := next(iter(self._others))) and self._others[oldest] < before:
             del self._others[oldest]
 
@@ -115,18 +115,18 @@ class SessionScene:
             self.speech += 1
 
     def stops(self, actor: str, at: Seconds) -> None:
-        """A person has gone, or is not followed any longer."""
+        """End what the actor says and manipulates, because it has gone or is not followed any longer."""
         self.acting.discard(actor)
         self.falls_silent(actor, at)
 
     def others_silent_since(self, actor: str) -> Seconds | None:
-        """Since when nobody but `actor` speaks; None while somebody does."""
+        """Time since when all but `actor` are silent; None while another speaks."""
         if self._speakers - {actor}:
             return None
         return max((at for at, other in self._fell_silent if other != actor), default=float("-inf"))
 
     def knows(self, entity: str) -> bool:
-        """Has it ever been seen? Without any world nobody can tell, so yes."""
+        """True if the entity has ever been seen, or if no object has been seen yet."""
         return not self._objects or entity in self._objects or self._is_no_object(entity)
 
     def _is_no_object(self, entity: str) -> bool:
@@ -138,7 +138,7 @@ class SessionScene:
         return not self._objects and entity != self.robot and not self._is_no_object(entity)
 
     def person_looks_at(self, gaze: GazeState, objects: tuple[str, ...]) -> bool:
-        """Does a person's look count as one at `objects`? At resolution `table` anything on the table will do."""
+        """True if a person's look counts as one at `objects`: at resolution `table` a look at anything there does."""
         if any(target in objects for target in gaze.targets):
             return True
         if self.resolution == "object":
@@ -147,16 +147,16 @@ class SessionScene:
         return on_table and any(map(self.is_object, objects))
 
     def goes_with_hand(self, actor: str, targets: tuple[str, ...]) -> bool:
-        """Does a look at these accompany the person's own hand, that may be moving what it hides?"""
+        """True if a look at `targets` goes with the person's own hand, which may move the piece that it hides."""
         return any(one.actor == actor and (one.left or one.piece in targets) for one in self.covered.by)
 
     def robot_looks_at(self, entities: tuple[str, ...]) -> bool:
         return any(target in entities for target in self.gaze.targets)
 
     def robot_since(self, entities: tuple[str, ...]) -> Seconds | None:
-        """Since when the robot looks at one of these; None if it does not."""
+        """Start of the robot's look at one of the entities; None if it looks elsewhere."""
         return self.gaze.since if self.robot_looks_at(entities) else None
 
     def fragment_looks_elsewhere(self, entities: tuple[str, ...]) -> bool:
-        """A fragment's own gaze holds the head, and not for one of these."""
+        """True if a fragment's own gaze holds the robot's head for another target."""
         return self.head_owner.kind == "fragment" and self.head_owner.target not in entities

@@ -1,11 +1,11 @@
-"""The whole of recognition as one pure machine: observations in, effects out, and when it must be woken.
+"""Connection events of the robot with all people, as one pure machine: observations in, effects and a deadline out.
 
     session = Session(robot="robot", config=RecognitionConfig())
-    effects = session.feed(observation, at)         # at: when it happened, on the session's clock
+    effects = session.feed(observation, at)         # at: time of the event itself, on the session's clock
     effects = session.advance(now)                  # whenever `session.deadline` has been reached
 
-Everything is decided by the times of the observations, not of their arrival: what was due before an observation
-happens before it, at its own time. An answer at the very limit still counts.
+The times of the observations decide, not those of their arrival: a step that was due before an observation happens
+before it, at its own time. An answer exactly at the limit still counts.
 """
 
 from collections.abc import Callable, Container, Set
@@ -23,10 +23,10 @@ from engage_hri.schemas.requests import Accepted, Cancel, Refused
 from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.world import World
 from engage_hri.services.recognition.config import RecognitionConfig
-from engage_hri.services.recognition.events.company import Company
+from engage_hri.services.recognition.events.history import ActionHistory, Latest
 from engage_hri.services.recognition.events.limits import BLOCKS_KEPT, ROUNDING, Blocks, LimitClock
-from engage_hri.services.recognition.events.machine import Effect, EventWriter, UnderWay
-from engage_hri.services.recognition.events.news import Latest, News
+from engage_hri.services.recognition.events.machine import Effect, EventWriter, OngoingEvent
+from engage_hri.services.recognition.events.people import People
 from engage_hri.services.recognition.events.person import Person
 from engage_hri.services.recognition.events.scene import Covered, SessionScene
 
@@ -35,18 +35,18 @@ Observation = (
     | SyncPointProgress | BlockProgress | HeadOwner | World | PeerGone | RobotState
 )  # fmt: skip
 TURNS_KEPT = 64
-"""Ended turns that are remembered, for an adjacency pair that is announced after its turn's end; aborted ones too."""
+"""Number of ended turns that are remembered, for a pair announced after the end of its turn; aborted ones too."""
 SILENCE: Seconds = 3.0
-"""How long a body shows that it does not speak before a speech of its is over whose end was not told."""
+"""Time after a body last showed that it speaks from which on its speech is over, even without a report."""
 ACTIONS_KEPT = 256
-"""Of the robot; of those it is known when they last began and ended."""
+"""Number of actions of the robot for which it is remembered when they last began and ended."""
 
 
 class Session:
-    """All persons with one robot. clock: of the stamps in the effects. name: prefix of the events' ids.
+    """Recognition for one robot and all persons. clock: of the stamps in the effects. name: prefix of the event ids.
 
-    strict: a bug here, an undefined transition for instance, raises. Otherwise it costs the open events of the person
-    that it shows with, is told as a `Mishap`, and everything else goes on.
+    strict: a bug here, an undefined transition for instance, raises. Otherwise it ends the open events of the person
+    concerned, is reported as a `Mishap`, and everything else goes on.
     """
 
     def __init__(
@@ -57,63 +57,60 @@ class Session:
         self.scene = SessionScene(robot, config.gaze_resolution)
         self._config = config
         self._writer = EventWriter(clock, name)
-        self._company = Company(self.scene, config, self._writer, strict=strict)
+        self._people = People(self.scene, config, self._writer, strict=strict)
         self._ended_turns: Latest[str, Seconds] = Latest(TURNS_KEPT)
         self._aborted_turns: Latest[str, Seconds] = Latest(TURNS_KEPT)
-        self._robot_does: dict[tuple[str, Action], ActionBegan] = {}
-        """Its speech and gestures, by behavior."""
+        self._robot_actions: dict[tuple[str, Action], ActionBegan] = {}
+        """Present speech and gestures of the robot, by behavior."""
         self._heard_at: Seconds | None = None
-        """When its body last showed that it speaks."""
-        self._live: dict[str, UnderWay] = {}
+        """Time when the robot's body last showed that it speaks."""
+        self._live: dict[str, OngoingEvent] = {}
         """Undecided requests."""
         self._answering_blocks: Latest[str, str] = Latest(BLOCKS_KEPT)
-        """Whom they answer."""
-        self._news = News(ACTIONS_KEPT)
-        """Of the robot."""
+        """Blocks that answer a person, with the id of that person (empty: all)."""
+        self._history = ActionHistory(ACTIONS_KEPT)
+        """The robot's actions."""
 
     @property
     def persons(self) -> dict[str, Person]:
-        """Who is here, and who has not been gone for long."""
-        return self._company.persons
+        """Persons who are here, or have not been gone for long."""
+        return self._people.persons
 
     @property
     def busy(self) -> Set[str]:
-        """People with a task in hand."""
+        """Persons with a task in hand."""
         return self.scene.acting
 
     # -- time ---------------------------------------------------------------------------------------------------
 
     @property
     def deadline(self) -> Seconds | None:
-        """When `advance` has something to do, unless an observation comes first."""
-        gaze, company = self.scene.gaze.deadline, self._company.deadline
-        return company if gaze is None or (company is not None and company < gaze) else gaze
+        """Time at which `advance` has something to do, unless an observation comes first."""
+        gaze, people = self.scene.gaze.deadline, self._people.deadline
+        return people if gaze is None or (people is not None and people < gaze) else gaze
 
     def advance(self, now: Seconds) -> list[Effect]:
-        """What happens by itself up to and including `now`."""
+        """Take all steps that are due up to and including `now`."""
         while (due := self.deadline) is not None and due <= now:
-            self._happens(due)
-        self._company.forget(now)
+            self._take_step(due)
+        self._people.forget(now)
         return self._take()
 
     def _advance_before(self, at: Seconds) -> None:
         while (due := self.deadline) is not None and due < at - ROUNDING:
-            self._happens(due)
-        self._company.forget(at)
+            self._take_step(due)
+        self._people.forget(at)
 
-    def _happens(self, due: Seconds) -> None:
+    def _take_step(self, due: Seconds) -> None:
         if due == self.scene.gaze.deadline:
             self._robot_gaze_changed(self.scene.gaze.expire())
         else:
-            self._company.advance()
-
-    def _let_all(self, at: Seconds, happen: Callable[[Person], object]) -> None:
-        self._company.let_all(at, happen)
+            self._people.advance()
 
     # -- observations -------------------------------------------------------------------------------------------
 
     def feed(self, observation: Observation | Covered, at: Seconds) -> list[Effect]:
-        """Take what happened at `at`. Slightly late or repeated observations are put right or ignored."""
+        """Take an observation of what happened at `at`. Slightly late or repeated ones are put right or ignored."""
         self._advance_before(at)
         match observation:
             case ActionBegan(actor=self.robot):
@@ -121,13 +118,13 @@ class Session:
             case ActionEnded(actor=self.robot):
                 self._robot_ends(observation, at)
             case ActionBegan(actor=actor):
-                self._company.hear(actor, at, lambda person: person.begins(observation, at))
+                self._people.observe(actor, at, lambda person: person.begins(observation, at))
             case ActionEnded(actor=actor) if actor in self.persons:
-                self._company.hear(actor, at, lambda person: person.ends(observation, at))
+                self._people.observe(actor, at, lambda person: person.ends(observation, at))
             case ActorFound(actor=actor) if actor != self.robot:
-                self._company.hear(actor, at, lambda person: person.presence.found(at))
+                self._people.observe(actor, at, lambda person: person.presence.found(at))
             case ActorLost(actor=actor) if actor in self.persons:
-                self._company.hear(actor, at, lambda person: person.presence.lost(at))
+                self._people.observe(actor, at, lambda person: person.presence.lost(at))
             case RequestEvent():
                 self._request(observation, at)
             case SignalTurn():
@@ -136,7 +133,7 @@ class Session:
                 self._cancel(id, at)
             case SyncPointProgress(block=block):
                 name = self.blocks.realised(block, observation.behavior, observation.sync, at)
-                self._let_all(at, lambda person: person.point_realised(block, name, at))
+                self._people.apply_to_all(at, lambda person: person.point_realised(block, name, at))
             case BlockProgress(block=str() as block, progress="end"):
                 self._block_ended(block, at, aborted=observation.status in ("failed", "interrupted"))
             case RobotState(speaking=said):
@@ -146,18 +143,18 @@ class Session:
                 self.scene.gaze.end((), at)
             case HeadOwner(owner=owner):
                 self.scene.head_owner = owner
-                self._let_all(at, lambda person: person.head_owner_changed(at))
+                self._people.apply_to_all(at, lambda person: person.head_owner_changed(at))
             case World():
-                self._company.see(observation, at)
+                self._people.see(observation, at)
             case Covered():
                 self.scene.covered = observation
-                self._let_all(at, lambda person: person.hands_changed())
+                self._people.apply_to_all(at, lambda person: person.hands_changed())
         return self._take()
 
     def lose_track(self, person: str, at: Seconds) -> list[Effect]:
-        """After a failure with this person: its open events end as lost, and what it does is to be seen anew."""
+        """Begin anew with this person after a failure: its open events end as lost."""
         if person in self.persons:
-            self._company.lose_track(self.persons[person], at)
+            self._people.lose_track(self.persons[person], at)
         return self._take()
 
     def _take(self) -> list[Effect]:
@@ -170,41 +167,41 @@ class Session:
     # -- what the robot does ------------------------------------------------------------------------------------
 
     def _robot_begins(self, began: ActionBegan, at: Seconds) -> None:
-        if not self._news.is_news(began, at):
+        if not self._history.is_new(began, at):
             return
         match began.action:
             case "look":
                 if self.scene.gaze.begin(began.targets, at):
                     self._robot_gaze_changed(at)
             case "speak":
-                self._robot_does[began.behavior, "speak"] = began
+                self._robot_actions[began.behavior, "speak"] = began
                 self._heard_at = None
                 if self.scene.robot_speaks_since is None:
                     self.scene.robot_speaks_since = at
                     self.scene.speaks(self.robot)
-                    self._let_all(at, lambda person: person.conversation.robot_speaks(at))
+                    self._people.apply_to_all(at, lambda person: person.conversation.robot_speaks(at))
             case "nod" | "shake" | "point":
-                self._robot_does[began.behavior, began.action] = began
-                self._let_all(at, lambda person: person.conversation.robot_gestures(began.action, at))
+                self._robot_actions[began.behavior, began.action] = began
+                self._people.apply_to_all(at, lambda person: person.conversation.robot_gestures(began.action, at))
 
     def _robot_ends(self, ended: ActionEnded, at: Seconds) -> None:
-        if not self._news.is_news(ended, at):
+        if not self._history.is_new(ended, at):
             return
-        self._robot_does.pop((ended.behavior, ended.action), None)
+        self._robot_actions.pop((ended.behavior, ended.action), None)
         match ended.action:
             case "look":
                 self.scene.gaze.end(ended.targets, at)
             case "speak":
-                speaks = any(action == "speak" for _, action in self._robot_does)
+                speaks = any(action == "speak" for _, action in self._robot_actions)
                 if self.scene.robot_speaks_since is not None and not speaks:
                     self.scene.robot_speaks_since = None
                     self.scene.falls_silent(self.robot, at)
-                    self._let_all(at, lambda person: person.conversation.robot_falls_silent(at))
+                    self._people.apply_to_all(at, lambda person: person.conversation.robot_falls_silent(at))
             case "nod" | "shake" | "point":
-                self._let_all(at, lambda person: person.conversation.robot_gesture_ends(ended.action, at))
+                self._people.apply_to_all(at, lambda person: person.conversation.robot_gesture_ends(ended.action, at))
 
     def _robot_is_heard(self, is_speaking: bool, at: Seconds) -> None:
-        """A body that shows when it speaks is believed that it has stopped: the end itself may have been lost."""
+        """End speech with a lost end: the body showed that it speaks, and for `SILENCE` no longer does."""
         if is_speaking:
             self._heard_at = at
         elif self._heard_at is not None and at > self._heard_at + SILENCE:
@@ -212,11 +209,11 @@ class Session:
             self._robot_stops(at, actions=("speak",))
 
     def _robot_stops(self, at: Seconds, behaviors: str = "", actions: Container[Action] = get_args(Action)) -> None:
-        """Whatever ends have been lost: what the robot says and does with its hands and head is over.
+        """End speech and gestures of the robot, because reports of their ends may be lost.
 
-        behaviors: what their ids begin with. actions: of these only.
+        behaviors: only those with this prefix of the id. actions: only these.
         """
-        for began in list(self._robot_does.values()):
+        for began in list(self._robot_actions.values()):
             if began.behavior.startswith(behaviors) and began.action in actions:
                 ended = ActionEnded(
                     actor=self.robot, action=began.action, at=began.at, targets=began.targets, behavior=began.behavior
@@ -224,7 +221,7 @@ class Session:
                 self._robot_ends(ended, at)
 
     def _robot_gaze_changed(self, at: Seconds) -> None:
-        self._let_all(at, lambda person: person.gaze_changed(at))
+        self._people.apply_to_all(at, lambda person: person.gaze_changed(at))
 
     # -- requests -----------------------------------------------------------------------------------------------
 
@@ -238,19 +235,19 @@ class Session:
             return
         self._writer.effects.append(Accepted(id=request.id))
         wanted = request.event
-        event = UnderWay(
+        event = OngoingEvent(
             kind=wanted.kind, initiator=self.robot, responder=wanted.responder, started=at, objects=wanted.objects,
             cause=wanted.cause, optional=wanted.optional, block=request.block, behavior=wanted.id, turn=wanted.turn,
             request=request.id,
         )  # fmt: skip
         self._live[request.id] = event
-        self._company.let(wanted.responder, at, lambda person: self._begin(person, event, wanted))
-        if event.request and not event.id:  # a bug has shown before the event could be told
+        self._people.apply(wanted.responder, at, lambda person: self._begin(person, event, wanted))
+        if event.request and not event.id:  # a bug has shown before the event could be published
             self._writer.publish(event, "started", at)
             self._writer.publish(event, "lost", at)
 
-    def _begin(self, person: Person, event: UnderWay, wanted: Event) -> None:
-        """The robot's event with this person."""
+    def _begin(self, person: Person, event: OngoingEvent, wanted: Event) -> None:
+        """Begin the robot's event with this person."""
         match wanted.kind:
             case "directed_gaze":
                 person.robot_directs(event, self._clock(event, wanted, self._config.directed_gaze_limit))
@@ -260,7 +257,7 @@ class Session:
                 self._ask(person, event, wanted)
             case "backchannel":
                 self._announce_backchannel(person, event)
-                if (ended := self.blocks.ended(event.block)) is not None:
+                if (ended := self.blocks.ended.get(event.block)) is not None:
                     person.conversation.robot_backchannel.ends(max(event.started, ended))
 
     def _fault_in(self, request: RequestEvent) -> Fault | None:
@@ -282,30 +279,28 @@ class Session:
             return Fault(reason=f"limit must be greater than 0 s, not {event.limit}", where=where)
         return None
 
-    def _clock(self, event: UnderWay, wanted: Event, default: Seconds) -> LimitClock:
+    def _clock(self, event: OngoingEvent, wanted: Event, default: Seconds) -> LimitClock:
         event.limit = wanted.limit or default
         clock = LimitClock(event.started, event.limit, wanted.anchors, self._config.turn_patience)
         for name in clock.waiting:
-            realised = self.blocks.point(event.block, name)
-            if realised is not None:
+            if (realised := self.blocks.point(event.block, name)) is not None:
                 clock.realised(name, realised)
-        ended = self.blocks.ended(event.block)
-        if ended is not None:
+        if (ended := self.blocks.ended.get(event.block)) is not None:
             clock.stop_waiting(ended)
         return clock
 
-    def _ask(self, person: Person, event: UnderWay, wanted: Event) -> None:
+    def _ask(self, person: Person, event: OngoingEvent, wanted: Event) -> None:
         event.accept = wanted.accept or self._config.accept
         by_acting = "act" in event.accept
         default = self._config.manipulation_limit if by_acting else self._config.adjacency_pair_limit
         event.limit = wanted.limit or default
         person.conversation.robot_asks(event)
-        turn_end = self._ended_turns.get(event.turn) if event.turn else self.blocks.ended(event.block)
+        turn_end = self._ended_turns.get(event.turn) if event.turn else self.blocks.ended.get(event.block)
         if turn_end is not None:
             person.conversation.turn_ends(max(turn_end, event.started))
 
-    def _announce_backchannel(self, person: Person, event: UnderWay) -> None:
-        """The person holds the floor, so it is the initiator. What was noticed already gets no second event."""
+    def _announce_backchannel(self, person: Person, event: OngoingEvent) -> None:
+        """Begin the robot's backchannel, unless noticed already. The person holds the floor: it is the initiator."""
         event.initiator, event.responder = person.id, self.robot
         backchannel = person.conversation.robot_backchannel
         noticed = backchannel.last
@@ -318,40 +313,42 @@ class Session:
     def _cancel(self, id: str, at: Seconds) -> None:
         event = self._live.pop(id, None)
         if event is not None and event.request == id:
-            self._company.let(event.responder, at, lambda person: person.withdraw(event, at))
+            self._people.apply(event.responder, at, lambda person: person.withdraw(event, at))
 
     # -- turns and blocks ---------------------------------------------------------------------------------------
 
     def _signal(self, request: SignalTurn, at: Seconds) -> None:
-        """What became of a turn. Ends at once, whatever it says."""
+        """Take a signal about a turn, and answer the request at once."""
         signal = request.signal
         match signal.signal:
             case "ended":
                 self._ended_turns[signal.turn] = at
-                self._let_addressees(signal.actor, at, lambda person: person.conversation.turn_ended(signal.turn, at))
+                self._apply_to_addressees(
+                    signal.actor, at, lambda person: person.conversation.turn_ended(signal.turn, at)
+                )
             case "answered" | "repaired":
                 repairs = signal.signal == "repaired"
-                self._let_addressees(
+                self._apply_to_addressees(
                     signal.actor, at, lambda person: person.conversation.is_answered(at, repairs=repairs)
                 )
-                if request.block and self.blocks.ended(request.block) is None:
+                if request.block and request.block not in self.blocks.ended:
                     self._answering_blocks[request.block] = signal.actor
             case "aborted":
                 self._aborted_turns[signal.turn] = at
-                self._let_addressees(signal.actor, at, lambda person: person.abort(at, turn=signal.turn))
+                self._apply_to_addressees(signal.actor, at, lambda person: person.abort(at, turn=signal.turn))
         self._writer.effects.append(TurnOutcome(id=request.id, at=self._writer.stamp(at)))
 
-    def _let_addressees(self, actor: str, at: Seconds, happen: Callable[[Person], object]) -> None:
-        """actor: empty for all."""
+    def _apply_to_addressees(self, actor: str, at: Seconds, step: Callable[[Person], object]) -> None:
+        """Apply a step to a known person, or to all (actor: empty)."""
         if not actor:
-            self._let_all(at, happen)
+            self._people.apply_to_all(at, step)
         elif actor in self.persons:
-            self._company.let(actor, at, happen)
+            self._people.apply(actor, at, step)
 
     def _block_ended(self, block: str, at: Seconds, *, aborted: bool) -> None:
-        self.blocks.end(block, at)
+        self.blocks.ended[block] = at
         self._robot_stops(at, f"{block}:")
-        self._let_all(at, lambda person: person.block_ended(block, at, aborted=aborted))
+        self._people.apply_to_all(at, lambda person: person.block_ended(block, at, aborted=aborted))
         answered = self._answering_blocks.pop(block, None)
         if answered is not None:
-            self._let_addressees(answered, at, lambda person: person.conversation.pair.answered_block_ended(at))
+            self._apply_to_addressees(answered, at, lambda person: person.conversation.pair.answered_block_ended(at))

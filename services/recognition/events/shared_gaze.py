@@ -1,28 +1,28 @@
-"""What both gazes are: one begins, the other joins, and the shared phase lasts while both look there. Thesis 2.2.1-2.
+"""The base of both gaze events: one begins, the other joins, and the shared phase lasts while both look there.
 
-Which names the states and inputs have is data of the subclasses; what follows from each stands in their tables.
+Thesis 2.2.1-2. The names of states and inputs are data of the subclasses; their tables have the transitions.
 """
 
 from typing import ClassVar
 
 from engage_hri.schemas.units import Probability, Seconds
 from engage_hri.services.recognition.events.limits import LimitClock
-from engage_hri.services.recognition.events.machine import IDLE, EventWriter, Machine, UnderWay
+from engage_hri.services.recognition.events.machine import IDLE, EventWriter, Machine, OngoingEvent
 from engage_hri.services.recognition.events.scene import GazeState
 
 
 class SharedGaze(Machine):
-    """One event of one person and the robot that looking decides."""
+    """A gaze event of one person and the robot: directed gaze or mutual facial gaze."""
 
     ROBOT_WAITS: ClassVar[str]
-    """The state after the robot has begun, until the person joins."""
+    """State after the robot has begun, until the person joins."""
     HUMAN_WAITS: ClassVar[str]
     TOGETHER: ClassVar[str]
-    """The state of the shared phase."""
+    """State of the shared phase."""
     ROBOT_BEGINS: ClassVar[str]
-    """The robot's first input; `<input>_<TOGETHER>` if the person looks there already."""
+    """Input when the robot begins; `<input>_<TOGETHER>` if the person looks there already."""
     HUMAN_BEGINS: ClassVar[str]
-    """As the robot's; and `<input>_in_vain`."""
+    """Input when the person begins; `<input>_<TOGETHER>`, or `<input>_in_vain` if the robot cannot answer."""
     ROBOT_JOINS: ClassVar[str]
     HUMAN_JOINS: ClassVar[str]
 
@@ -40,12 +40,12 @@ class SharedGaze(Machine):
         return self.clock.deadline
 
     def expire(self, at: Seconds) -> None:
-        """Nobody came within the limit; or the robot has never shown what it meant."""
+        """Decide the event at its deadline: the limit has passed, or the robot has never shown its target."""
         never_shown = self.clock is not None and self.clock.waiting
         self.step("withdraw" if never_shown else "limit", at)
 
-    def robot_begins(self, event: UnderWay, clock: LimitClock, *, robot_on: bool, look: GazeState | None) -> None:
-        """The robot's request. look: the person's, if it is there already."""
+    def robot_begins(self, event: OngoingEvent, clock: LimitClock, *, robot_on: bool, look: GazeState | None) -> None:
+        """Begin the event by the robot's request. look: the person's, if it is on the target already."""
         self._begin(event, clock, by_robot=True, robot_on=robot_on, human_on=look is not None)
         if look is None:
             self.step(self.ROBOT_BEGINS, event.started)
@@ -55,32 +55,35 @@ class SharedGaze(Machine):
 
     def human_begins(
         self,
-        event: UnderWay,
-        clock: LimitClock,
+        event: OngoingEvent,
+        limit: Seconds,
         *,
         robot_since: Seconds | None,
         human_on: bool,
         in_vain: bool,
         at: Seconds,
     ) -> None:
-        """The person's gesture or look, recognized at `at`, which may be later than its start.
+        """Begin the event by the person's gesture or look, recognized at `at`, which may be later than its start.
 
-        robot_since: since when the robot looks there, None if elsewhere. in_vain: a fragment's own gaze holds
+        robot_since: start of the robot's look there, None if it looks elsewhere. in_vain: a fragment's own gaze holds
         the head elsewhere.
         """
+        clock = LimitClock(event.started, limit)
         self._begin(event, clock, by_robot=False, robot_on=robot_since is not None, human_on=human_on)
         if robot_since is not None:
             self._join(f"{self.HUMAN_BEGINS}_{self.TOGETHER}", at, came=robot_since)
         else:
             self.step(f"{self.HUMAN_BEGINS}_in_vain" if in_vain else self.HUMAN_BEGINS, at)
 
-    def _begin(self, event: UnderWay, clock: LimitClock, *, by_robot: bool, robot_on: bool, human_on: bool) -> None:
+    def _begin(
+        self, event: OngoingEvent, clock: LimitClock, *, by_robot: bool, robot_on: bool, human_on: bool
+    ) -> None:
         self.event, self.clock, self.by_robot = event, clock, by_robot
         self._robot_on = self._robot_came = robot_on
         self._human_on, self._shared_since = human_on, None
 
     def gazes(self, *, robot_on: bool, human_on: bool, at: Seconds, confidence: Probability = 1.0) -> None:
-        """Somebody's gaze has changed: who looks there now. confidence: of the person's look."""
+        """Take a change of gaze: True for each of the two that looks there now. confidence: of the person's look."""
         if self.event is None:
             return
         robot_left, human_left = self._robot_on and not robot_on, self._human_on and not human_on
@@ -98,7 +101,7 @@ class SharedGaze(Machine):
             self._share(at)
 
     def _join(self, given: str, at: Seconds, came: Seconds | None = None, confidence: Probability = 1.0) -> None:
-        """The responder is there; came: since when, if not `at`. confidence: of the look that says so."""
+        """Let the responder join. came: start of its look, if not `at`. confidence: of that look."""
         assert self.event is not None
         self.event.rests_on(confidence)
         together_since = max(at if came is None else came, self.event.started)
@@ -107,21 +110,21 @@ class SharedGaze(Machine):
         self._share(together_since)
 
     def _share(self, at: Seconds) -> None:
-        """The shared phase: begins when both are there, ends when one of them is not."""
+        """Update the shared phase: it begins when both look there, and ends when one does not."""
         if self._robot_on and self._human_on:
             self._shared_since = at if self._shared_since is None else self._shared_since
         elif self._shared_since is not None or not self._human_on or self._robot_came:
             self._part("part", at)
 
     def _part(self, given: str, at: Seconds, until: Seconds | None = None) -> None:
-        """End the shared phase; until: when it was last seen, if not `at`."""
+        """End the shared phase. until: time at which it was last seen, if not `at`."""
         assert self.event is not None
         since = self._shared_since
         self.event.duration = 0.0 if since is None else max(0.0, (at if until is None else until) - since)
         self.step(given, at)
 
     def block_ended(self, at: Seconds, *, aborted: bool) -> None:
-        """The robot is done: an aborted fragment takes its event back; a gaze that never came is over."""
+        """End the robot's part: an aborted fragment withdraws its event; a shared phase that lacks its gaze ends."""
         if self.clock is not None:
             self.clock.stop_waiting(at)
         if self.state == self.ROBOT_WAITS and aborted:
@@ -130,7 +133,7 @@ class SharedGaze(Machine):
             self._part("part", at)
 
     def supersede(self, at: Seconds) -> None:
-        """The robot begins anew: the shared phase completes, what is pending gives way."""
+        """End the event because the robot begins anew: a shared phase completes, a pending event is superseded."""
         self._close("supersede", at)
 
     def person_gone(self, at: Seconds, until: Seconds) -> None:

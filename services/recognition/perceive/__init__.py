@@ -1,1 +1,1 @@
-"""From raw perception to actions: looks, speech, hands."""
+"""Actions from raw perception: looks, speech, manipulations."""

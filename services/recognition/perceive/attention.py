@@ -1,15 +1,16 @@
-"""Who does what, from raw perception: looks from head poses, speech from voice levels, manipulations from the world.
+"""Actions of people from raw perception: looks from head poses, speech from voices, manipulations from the world.
 
     attention = Attention("robot", RecognitionConfig(), clock="loop")
-    actions = attention.feed(pose, at)              # at: its own time; late, double and impossible poses are dropped
+    actions = attention.feed(pose, at)              # at: of the pose; late, double and impossible ones are dropped
     actions = attention.advance(now)                # whenever `attention.deadline` has been reached
 
-Where perception says itself what a person does, it is believed: from the first symbolic observation of an action of
-somebody on, raw perception of the same is ignored, as long as this lives. Actions carry the times at which they
-began and ended, though they are known only later; until then `undecided` says from when on.
+A symbolic report of an action has precedence: from the first one on, raw perception of that action of that person is
+ignored, as long as the `Attention` lives. Actions carry the times at which they began and ended, though they are
+known only later; until then `undecided` says from when on.
 """
 
 from collections.abc import Iterable, Iterator
+from itertools import chain
 
 from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost
 from engage_hri.schemas.behaviors import Action
@@ -18,33 +19,33 @@ from engage_hri.schemas.perception import HeadPose, VoiceActivity
 from engage_hri.schemas.units import Seconds, Stamp
 from engage_hri.schemas.world import World
 from engage_hri.services.recognition.config import RecognitionConfig
+from engage_hri.services.recognition.events.interrupted_looks import Symbolic
 from engage_hri.services.recognition.events.presence import NEVER
 from engage_hri.services.recognition.events.scene import Covered
 from engage_hri.services.recognition.perceive.gaze_targets import GazeTargets, is_direction, is_place
 from engage_hri.services.recognition.perceive.looks import ROUNDING, Change, Looking
-from engage_hri.services.recognition.perceive.manipulation import Manipulation
+from engage_hri.services.recognition.perceive.manipulation import Manipulation, PersonChanges
 from engage_hri.services.recognition.perceive.speech import Voice
 
 Raw = HeadPose | VoiceActivity | World | RobotState
-Symbolic = ActionBegan | ActionEnded | ActorFound | ActorLost
 
 
 class _Actor:
-    """What is known of one person."""
+    """State of one person: gaze, voice, last signs of life, and what perception reports itself."""
 
     def __init__(self, id: str, number: int, config: RecognitionConfig) -> None:
         self.id = id
         self.number = number
-        """In the order in which they came."""
+        """Position in the order in which people came."""
         self.looking = Looking(config.sensing.dwell)
         self.voice = Voice(config.sensing)
         self.posed_at = self.heard_at = self.alive_at = NEVER
         """Times of the latest head pose and voice level, and of the latest sign of life."""
         self.seen = False
-        """The face has been found, and not been lost since."""
-        self.told: set[Action] = set()
+        """True while the face is found and not lost since."""
+        self.reported: set[Action] = set()
         """Actions that perception reports itself."""
-        self.presence_told = False
+        self.presence_reported = False
         self._grace = config.lost_face_grace
 
     @property
@@ -53,7 +54,7 @@ class _Actor:
 
     @property
     def lost_at(self) -> Seconds | None:
-        return self.alive_at + self._grace if self.seen and not self.presence_told else None
+        return self.alive_at + self._grace if self.seen and not self.presence_reported else None
 
     @property
     def deadlines(self) -> Iterator[Seconds]:
@@ -61,36 +62,36 @@ class _Actor:
 
     @property
     def is_attended(self) -> bool:
-        """Something may happen by itself, or is yet undecided."""
-        return any(True for _ in self.deadlines) or any(True for _ in self.undecided)
+        """True if a deadline or an undecided action is pending."""
+        return any(True for _ in chain(self.deadlines, self.undecided))
 
     @property
     def undecided(self) -> Iterator[Seconds]:
         for action, since in (("look", self.looking.undecided_since), ("speak", self.voice.undecided_since)):
-            if since is not None and action not in self.told:
+            if since is not None and action not in self.reported:
                 yield since
 
 
 class Attention:
-    """Everybody around `robot`. clock: of the stamps of the actions."""
+    """Actions of all people around `robot`, from what cameras and microphones report. clock: of the stamps."""
 
     def __init__(self, robot: str, config: RecognitionConfig, clock: str = "loop") -> None:
         self._robot = robot
         self._config = config
         self._clock = clock
-        self._sight = GazeTargets(robot, config)
+        self._gaze_targets = GazeTargets(robot, config)
         self._manipulation = Manipulation(robot, config)
         self._actors: dict[str, _Actor] = {}
         self._attended: dict[str, _Actor] = {}
-        """Of those, whom the passing of time concerns."""
-        self._told_of: dict[str, Seconds] = {}
-        """When somebody last told of each actor; the longest ago first."""
+        """The actors for whom a deadline or an undecided action is pending."""
+        self._mentioned_at: dict[str, Seconds] = {}
+        """Time of the last observation of each actor; the longest ago first."""
         self._came = 0
         self._world_at = NEVER
 
     @property
     def deadline(self) -> Seconds | None:
-        """When something ends, or somebody has gone, unless perception says otherwise before."""
+        """Time at which an action ends or a person has gone, unless perception says otherwise before."""
         times = [at for actor in self._attended.values() for at in actor.deadlines]
         if self._manipulation.deadline is not None:
             times.append(self._manipulation.deadline)
@@ -98,59 +99,54 @@ class Attention:
 
     @property
     def undecided(self) -> list[Seconds]:
-        """Since when gazes and voices do something that may be a look, or speech, or the end of one."""
+        """Start times of what may yet turn out to be a look, speech, or the end of one."""
         return [since for actor in self._attended.values() for since in actor.undecided]
 
     @property
     def covered(self) -> Covered:
-        """Which pieces are under hands of people of whom nobody says when they move some."""
-        of = self._manipulation.covering
-        return Covered(frozenset(one for one in of if not self._tells(one.actor, "act")))
+        """The pieces under hands of people whose manipulations perception does not report itself."""
+        coverings = self._manipulation.covering
+        return Covered(frozenset(one for one in coverings if not self._reports(one.actor, "act")))
 
     def feed(self, observation: Raw, at: Seconds) -> list[Symbolic]:
-        """What has begun and ended, in order. at: when the observation was made."""
+        """Take an observation made at `at`. Returns the actions that began and ended, in order."""
         self._forget(at)
         actions = self.advance(at)
         match observation:
             case HeadPose():
-                actions += self._faces(self._actor(observation.actor, at), observation, at)
+                actions += self._take_pose(self._actor(observation.actor, at), observation, at)
                 self._attend(observation.actor)
             case VoiceActivity():
-                actions += self._sounds(self._actor(observation.actor, at), observation, at)
+                actions += self._take_voice(self._actor(observation.actor, at), observation, at)
                 self._attend(observation.actor)
             case World() if at >= self._world_at and all(is_place(one.position) for one in observation.entities):
                 self._world_at = at
-                self._sight.see(observation, at)
-                for actor, changes in self._manipulation.feed(observation, at):
-                    actions += self._tell(self._actor(actor, at), changes)
-                    self._attend(actor)
+                self._gaze_targets.see(observation, at)
+                actions += self._manipulated(self._manipulation.feed(observation, at), at)
             case RobotState() if is_place(observation.gaze.origin):
-                self._sight.see_face(self._robot, observation.gaze.origin)
+                self._gaze_targets.see_face(self._robot, observation.gaze.origin)
         return actions
 
-    def believe(self, told: Symbolic, at: Seconds) -> list[Symbolic]:
-        """Perception itself says what somebody does: no need to find it out any more. Nothing follows from it."""
+    def take_report(self, report: Symbolic, at: Seconds) -> list[Symbolic]:
+        """Take a symbolic report: raw perception of the same is ignored from now on. Returns no actions itself."""
         self._forget(at)
-        actor = self._actor(told.actor, at)
-        match told:
+        actor = self._actor(report.actor, at)
+        match report:
             case ActionBegan() | ActionEnded():
-                actor.told.add(told.action)
+                actor.reported.add(report.action)
             case ActorFound():
-                actor.presence_told = True
+                actor.presence_reported = True
             case ActorLost():
-                actor.presence_told = True
+                actor.presence_reported = True
                 self._lose(actor, at)
         self._attend(actor.id)
         return []
 
     def advance(self, now: Seconds) -> list[Symbolic]:
-        actions: list[Symbolic] = []
-        for owner, changes in self._manipulation.advance(now):
-            actions += self._tell(self._actor(owner, now), changes)
-            self._attend(owner)
+        actions = self._manipulated(self._manipulation.advance(now), now)
         for actor in sorted(self._attended.values(), key=lambda actor: actor.number):
             actions += self._tell(actor, actor.voice.advance(now))
-            if self._manipulation.acts(actor.id):
+            if self._manipulation.is_acting(actor.id):
                 actor.alive_at = max(actor.alive_at, now)
             if actor.lost_at is not None and now >= actor.lost_at - ROUNDING:
                 at = actor.alive_at
@@ -162,32 +158,32 @@ class Attention:
         return actions
 
     def give_up(self, at: Seconds) -> list[Symbolic]:
-        """Whatever has been found out is over, for a successor to begin with nothing."""
+        """End all actions and presences found so far, so that a successor can begin with nothing."""
         ends: list[Symbolic] = []
         for actor in self._attended.values():
             stamp = self._stamp(max(at, actor.alive_at))
-            piece = self._manipulation.acting(actor.id)
-            if piece and "act" not in actor.told:
+            piece = self._manipulation.first_piece(actor.id)
+            if piece and "act" not in actor.reported:
                 ends.append(ActionEnded(actor=actor.id, action="act", at=stamp, targets=piece))
-            if actor.voice.speaks and "speak" not in actor.told:
+            if actor.voice.speaks and "speak" not in actor.reported:
                 ends.append(ActionEnded(actor=actor.id, action="speak", at=stamp))
-            if actor.seen and not actor.presence_told:
+            if actor.seen and not actor.presence_reported:
                 ends.append(ActorLost(actor=actor.id, at=stamp))
         return ends
 
-    # -- who there is -------------------------------------------------------------------------------------------
+    # -- people ------------------------------------------------------------------------------------------------
 
-    def _tells(self, actor: str, action: Action) -> bool:
-        """Does perception itself say when this person does that?"""
-        return actor in self._actors and action in self._actors[actor].told
+    def _reports(self, actor: str, action: Action) -> bool:
+        """True if perception itself reports this action of this person."""
+        return actor in self._actors and action in self._actors[actor].reported
 
     def _actor(self, id: str, at: Seconds) -> _Actor:
-        """at: when it is told of."""
+        """The actor with this id, made if it is new, and mentioned at `at`."""
         if id not in self._actors:
             self._came += 1
             self._actors[id] = _Actor(id, self._came, self._config)
-        self._told_of.pop(id, None)
-        self._told_of[id] = at
+        self._mentioned_at.pop(id, None)
+        self._mentioned_at[id] = at
         return self._actors[id]
 
     def _attend(self, id: str) -> None:
@@ -197,34 +193,34 @@ class Attention:
             self._attended.pop(id, None)
 
     def _forget(self, now: Seconds) -> None:
-        """Whoever has not been told of for long, as the session does. Who is attended to has been."""
-        while self._told_of:
-            id, at = next(iter(self._told_of.items()))
+        """Forget actors without an observation for `forgotten_after`, as the session does."""
+        while self._mentioned_at:
+            id, at = next(iter(self._mentioned_at.items()))
             if at + self._config.forgotten_after > now:
                 return
-            del self._told_of[id], self._actors[id]
+            del self._mentioned_at[id], self._actors[id]
             self._attended.pop(id, None)
-            self._sight.forget_face(id)
+            self._gaze_targets.forget_face(id)
 
     # -- one person ---------------------------------------------------------------------------------------------
 
-    def _faces(self, actor: _Actor, pose: HeadPose, at: Seconds) -> list[Symbolic]:
+    def _take_pose(self, actor: _Actor, pose: HeadPose, at: Seconds) -> list[Symbolic]:
         credible = pose.confidence >= self._config.least_confidence
         if at <= actor.posed_at or not credible or not (is_place(pose.position) and is_direction(pose.direction)):
             return []
         actions: list[Symbolic] = []
-        if not actor.seen and not actor.presence_told:
+        if not actor.seen and not actor.presence_reported:
             actions.append(ActorFound(actor=actor.id, at=self._stamp(at)))
         actor.seen, actor.posed_at = True, at
         actor.alive_at = max(actor.alive_at, at)
-        self._sight.see_face(actor.id, pose.position, at)
-        if "look" in actor.told:
+        self._gaze_targets.see_face(actor.id, pose.position, at)
+        if "look" in actor.reported:
             return actions
         gaze, present = (pose.position, pose.direction), actor.looking.nearest
-        seen = self._sight.target(actor.id, gaze, present=present, at=at, sure=pose.confidence)
+        seen = self._gaze_targets.target(actor.id, gaze, present=present, at=at, sure=pose.confidence)
         return actions + self._tell(actor, actor.looking.feed(seen, at))
 
-    def _sounds(self, actor: _Actor, voice: VoiceActivity, at: Seconds) -> list[Symbolic]:
+    def _take_voice(self, actor: _Actor, voice: VoiceActivity, at: Seconds) -> list[Symbolic]:
         if at <= actor.heard_at or voice.confidence < self._config.least_confidence:
             return []
         actor.heard_at = at
@@ -234,11 +230,18 @@ class Attention:
         return self._tell(actor, changes)
 
     def _lose(self, actor: _Actor, at: Seconds) -> None:
-        """The person has gone: all they did ends with that."""
+        """End all that the person did, for the person has gone."""
         actor.seen = False
         actor.looking.lose(at)
         actor.voice.lose(at)
         self._manipulation.lose(actor.id)
+
+    def _manipulated(self, found: Iterable[PersonChanges], at: Seconds) -> list[Symbolic]:
+        actions: list[Symbolic] = []
+        for actor, changes in found:
+            actions += self._tell(self._actor(actor, at), changes)
+            self._attend(actor)
+        return actions
 
     def _tell(self, actor: _Actor, changes: Iterable[Change]) -> list[Symbolic]:
         actions: list[Symbolic] = []
@@ -246,7 +249,7 @@ class Attention:
             kind = ActionBegan if began else ActionEnded
             if action != "look":
                 actor.alive_at = max(actor.alive_at, at)
-            if action not in actor.told:
+            if action not in actor.reported:
                 stamp = self._stamp(at)
                 actions.append(kind(actor=actor.id, action=action, at=stamp, targets=targets, confidence=confidence))
         return actions

@@ -1,7 +1,7 @@
-"""What lies in the direction of a head, and the angle from the gaze to each thing, face and surface.
+"""Gaze targets: things, faces and surfaces in the direction of a head, chosen by their angle from the gaze.
 
 An angle is measured to the thing's extent: 0 when the gaze goes through its footprint, or the sphere of its radius.
-What is covered stays where it was last seen, with a confidence that decays (thesis 5.4.2).
+A covered thing stays where it was last seen, with a confidence that decays (thesis 5.4.2).
 """
 
 import math
@@ -15,35 +15,38 @@ from engage_hri.services.recognition.config import RecognitionConfig
 Targets = tuple[str, ...]
 AWAY: Targets = ()
 SURFACE = "table"
-"""What a thing lies on when no surface is seen under it."""
+"""Id of the surface that a thing lies on when none is seen under it."""
 SAME_ANGLE: Radians = 1e-6
-"""Closer angles are the same; then the nearer thing is in front."""
+"""Resolution of angles: where they are equal, the nearer thing is in front."""
 ROUNDING: Meters = 1e-9
 
 
 class Seen(NamedTuple):
-    """What a gaze is on, and how sure it is that it is there."""
+    """Targets of a gaze, and the confidence that it is on them."""
 
     targets: Targets
     confidence: Probability
 
 
 class _Thing:
-    """radius: of a sphere, 0 for what has an outline. bound: of a sphere around all of it."""
+    """An entity that a gaze can be on. radius: of its sphere, 0 for an outline. bound: of a sphere around it."""
 
     def __init__(self, entity: Entity, face_radius: Meters) -> None:
         self.entity = entity
         self.radius = 0.0 if entity.footprint else entity.radius or (face_radius if entity.kind == "person" else 0.0)
         self.bound = _extent(entity.footprint) if entity.footprint else self.radius
         self.hidden_since: Seconds | None = None
-        """When it was covered; None while it is in view."""
+        """Time at which the thing was covered; None while it is in view."""
 
     @cached_property
     def outline(self) -> tuple[Vector, ...]:
-        """The corners of its footprint where it is. Made when a gaze comes near: most things are never looked at."""
+        """Corners of the footprint in the world. Computed when a gaze comes near: most things are never looked at."""
         x, y, z = self.entity.position
         cos, sin = math.cos(self.entity.yaw), math.sin(self.entity.yaw)
         return tuple((x + cos * u - sin * v, y + sin * u + cos * v, z) for u, v in self.entity.footprint)
+
+    def is_under(self, x: Meters, y: Meters) -> bool:
+        return _is_inside([(corner[0] - x, corner[1] - y) for corner in self.outline])
 
 
 @lru_cache(maxsize=256)
@@ -52,7 +55,7 @@ def _extent(footprint: tuple[tuple[float, float], ...]) -> Meters:
 
 
 class _Candidate(NamedTuple):
-    """How far from the gaze, to its extent, and how near to the eye; then what it is."""
+    """A thing in the cone, ordered by angle from the gaze to its extent, then by distance from the eye."""
 
     angle: Radians
     distance: Meters
@@ -69,22 +72,22 @@ class _Gaze:
         length = math.hypot(*scaled)
         self.eye = eye
         self.axis = x, y, z = scaled[0] / length, scaled[1] / length, scaled[2] / length
-        # Any two axes across the gaze: from the one of the world's that is the least along it.
+        # Two axes across the gaze, made from the axis of the world that is least along it.
         side = (0.0, -z, y) if abs(x) <= min(abs(y), abs(z)) else (z, 0.0, -x) if abs(y) <= abs(z) else (-y, x, 0.0)
         length = math.hypot(*side)
         self._right = a, b, c = side[0] / length, side[1] / length, side[2] / length
         self._up = (y * c - z * b, z * a - x * c, x * b - y * a)
 
     def across(self, place: Vector) -> tuple[float, float] | None:
-        """Where a place appears: its distance from (0, 0) is the tangent of its angle. None: it is not in front."""
-        from_eye = (place[0] - self.eye[0], place[1] - self.eye[1], place[2] - self.eye[2])
+        """Coordinates of a place across the ray: distance from (0, 0) is the tangent of its angle. None if behind."""
+        from_eye = _minus(place, self.eye)
         depth = _dot(from_eye, self.axis)
         if depth <= 1e-9:
             return None
         return _dot(from_eye, self._right) / depth, _dot(from_eye, self._up) / depth
 
     def angle_to(self, thing: _Thing) -> Radians:
-        """To the nearest point of the thing."""
+        """Angle from the ray to the nearest point of the thing."""
         corners = [self.across(corner) for corner in thing.outline]
         if corners and None not in corners:
             return _to_polygon([corner for corner in corners if corner is not None])
@@ -92,22 +95,21 @@ class _Gaze:
         distance = math.dist(center, self.eye)
         if distance <= thing.radius:
             return 0.0
-        along = sum((one - eye) * axis for one, eye, axis in zip(center, self.eye, self.axis, strict=True))
+        along = _dot(_minus(center, self.eye), self.axis)
         angle = math.acos(max(-1.0, min(1.0, along / max(distance, 1e-9))))
         return max(0.0, angle - math.asin(thing.radius / max(distance, 1e-9)))
 
     def meets(self, surface: _Thing) -> bool:
-        """Does it go through the surface's footprint?"""
+        """True if the ray goes through the surface's footprint."""
         height = surface.entity.position[2] - self.eye[2]
         if height * self.axis[2] <= 0.0:
             return False
         far = height / self.axis[2]
-        x, y = self.eye[0] + far * self.axis[0], self.eye[1] + far * self.axis[1]
-        return _is_inside([(corner[0] - x, corner[1] - y) for corner in surface.outline])
+        return surface.is_under(self.eye[0] + far * self.axis[0], self.eye[1] + far * self.axis[1])
 
 
 class GazeTargets:
-    """The things around, for gazes to be on. robot: its face is known without being seen."""
+    """Things, faces and surfaces that gazes can be on. robot: its face is known without being seen."""
 
     def __init__(self, robot: str, config: RecognitionConfig) -> None:
         self._robot = robot
@@ -119,11 +121,11 @@ class GazeTargets:
         self._known: dict[str, _Thing] = {}
         self._surfaces: list[_Thing] = []
         self._spheres: dict[str, tuple[float, float, float, Meters, _Thing]] | None = None
-        """Around each thing that is no surface: center and radius; None: to be made anew."""
+        """Center and radius of a sphere around each thing but surfaces, by id; None if outdated."""
         self.see_face(robot, config.sensing.robot_face)
 
     def see(self, world: World, at: Seconds) -> None:
-        """What is missing, or there with too little confidence, is covered."""
+        """Take a view of the world. Things that are missing, or seen with too little confidence, are covered."""
         self._spheres = None
         self._forget_faded(at)
         seen = {one.id: one for one in world.entities if one.kind != "hand" and one.confidence >= self._least}
@@ -138,7 +140,7 @@ class GazeTargets:
                 before.hidden_since = None
 
     def see_face(self, actor: str, position: Vector, at: Seconds | None = None) -> None:
-        """at: when; the place is the less certain the longer ago. None: it stays certain."""
+        """Take the place of a face. at: time of the observation, from which the confidence decays; None: never."""
         if actor not in self._known and at is not None:
             self._forget_faded(at)
         thing = self._thing(Entity(id=actor, kind="person", position=position))
@@ -154,7 +156,7 @@ class GazeTargets:
             self._spheres = None
 
     def _forget_faded(self, at: Seconds) -> None:
-        """What has been covered for so long that no gaze can be on it. Things may still lie on a covered surface."""
+        """Drop things covered for so long that no gaze can be on them. Surfaces stay, for things may lie on them."""
         faded = [
             id
             for id, thing in self._known.items()
@@ -171,10 +173,10 @@ class GazeTargets:
     def target(
         self, looker: str, gaze: tuple[Vector, Vector], *, present: Targets | None, at: Seconds, sure: Probability
     ) -> Seen:
-        """What `looker`'s gaze is on: the nearest by angle in the cone, else the surface it meets, else `AWAY`.
+        """Target of `looker`'s gaze: the nearest by angle in the cone, else the surface it meets, else `AWAY`.
 
-        gaze: from where and in which direction. present: what it was on before; that stays, unless something else is
-        nearer by the margin. sure: of the pose.
+        gaze: place of the eyes and direction. present: target before, which stays unless another thing is nearer by
+        the margin. sure: confidence of the pose.
         """
         ray = _Gaze(*gaze)
         found: list[_Candidate] = []
@@ -202,7 +204,7 @@ class GazeTargets:
         return Seen(AWAY, sure)
 
     def _around(self, gaze: _Gaze) -> list[tuple[Radians, int, _Thing]]:
-        """All that may be in the cone, each with the least that its angle may be: the nearest first."""
+        """Things that may be in the cone, as (least possible angle, number, thing), in order."""
         if self._spheres is None:
             self._surfaces = [thing for thing in self._known.values() if thing.entity.kind == "surface"]
             others = [thing for thing in self._known.values() if thing.entity.kind != "surface"]
@@ -227,22 +229,23 @@ class GazeTargets:
         return thing.entity.confidence * math.exp2(-age / self._sensing.memory)
 
     def _reported(self, entity: Entity) -> str:
-        """At resolution `table` a thing cannot be told from what it lies on."""
+        """Id to report for the entity: at resolution `table` that of the surface on which an object lies."""
         if entity.kind != "object" or not self._by_table:
             return entity.id
         x, y, _ = entity.position
-        for surface in self._surfaces:
-            if _is_inside([(corner[0] - x, corner[1] - y) for corner in surface.outline]):
-                return surface.entity.id
-        return SURFACE
+        return next((surface.entity.id for surface in self._surfaces if surface.is_under(x, y)), SURFACE)
 
 
 def _dot(a: Vector, b: Vector) -> float:
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
+def _minus(a: Vector, b: Vector) -> Vector:
+    return a[0] - b[0], a[1] - b[1], a[2] - b[2]
+
+
 def _is_inside(corners: list[tuple[float, float]]) -> bool:
-    """Is (0, 0) inside the polygon?"""
+    """True if (0, 0) is inside the polygon."""
     inside = False
     for (x, y), (u, v) in zip(corners, corners[1:] + corners[:1], strict=True):
         if (y > 0.0) != (v > 0.0) and x - y * (u - x) / (v - y) > 0.0:

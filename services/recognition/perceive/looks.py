@@ -1,6 +1,6 @@
-"""From where a gaze is, pose by pose, to looks: on something for a dwell time, and over when off it for as long.
+"""Looks from gaze targets, pose by pose: a look begins after a dwell time on a target and ends after one off it.
 
-Decided by the poses' own times. A beginning needs evidence: a pose after the dwell that agrees with the first.
+The poses' own times decide. A beginning needs evidence: a pose after the dwell that agrees with the first.
 """
 
 from typing import NamedTuple
@@ -13,7 +13,7 @@ ROUNDING: Seconds = 1e-9
 
 
 class Change(NamedTuple):
-    """An action has begun or ended, at `at`."""
+    """Beginning or end of an action, at `at`."""
 
     began: bool
     action: Action
@@ -23,32 +23,34 @@ class Change(NamedTuple):
 
 
 class _Candidate(NamedTuple):
+    """A look that may have begun."""
+
     seen: Seen
     since: Seconds
 
 
 class Looking:
-    """One person's looks. `nearest`: what the gaze was on at the latest pose, a look or not."""
+    """Looks of one person. `nearest`: targets of the gaze at the latest pose, a look or not."""
 
     def __init__(self, dwell: Seconds) -> None:
         self.target: Targets | None = None
-        """Of the present look; None: there is none."""
+        """Targets of the present look; None if there is none."""
         self.nearest: Targets | None = None
         self._dwell = dwell - ROUNDING
         self._confidence: Probability = 1.0
         self._left: Seconds | None = None
-        """When the gaze left the target of the look that may be over."""
+        """Time at which the gaze left the target of a look that may be over."""
         self._candidate: _Candidate | None = None
 
     @property
     def undecided_since(self) -> Seconds | None:
-        """What happened from then on is still open."""
+        """Start of a look, or of the end of one, that is not yet certain."""
         if self._left is not None:
             return self._left
         return None if self._candidate is None else self._candidate.since
 
     def feed(self, seen: Seen, at: Seconds) -> list[Change]:
-        """The gaze is on this at `at`, later than before."""
+        """Take the gaze target at `at`, later than the last. Returns the looks that began and ended."""
         self.nearest = seen.targets
         if seen.targets == self.target:
             self._left = self._candidate = None
@@ -71,7 +73,7 @@ class Looking:
         return changes
 
     def end(self, at: Seconds) -> list[Change]:
-        """The look is over, since `at` if the gaze had not left before."""
+        """End the look: when the gaze left its target, or else at `at`."""
         if self.target is None:
             return []
         ended = Change(False, "look", at if self._left is None else self._left, self.target, self._confidence)
@@ -79,7 +81,7 @@ class Looking:
         return [ended]
 
     def lose(self, at: Seconds) -> list[Change]:
-        """The face is out of sight since `at`: nothing of it is known any more."""
+        """End the look and forget the gaze, because the face is out of sight since `at`."""
         ended = self.end(at)
         self._candidate = self.nearest = None
         return ended

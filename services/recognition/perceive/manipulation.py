@@ -1,8 +1,8 @@
-"""From where hands and pieces are to manipulations: a piece that leaves its place together with a hand.
+"""Manipulations from the places of hands and pieces: a piece leaves its place together with a hand.
 
-Vision trembles, so places are averaged, and what stays within the tremor of its place rests. A piece that is covered
-neither begins nor ends anything: while it is being moved it goes where the hand goes, and one that comes to light
-elsewhere was moved by the hand that had been at it.
+Vision trembles, so places are averaged, and a piece within the tremor of its place rests. A covered piece begins and
+ends nothing: while it is being moved it goes where the hand goes, and if it reappears elsewhere, the hand that had
+been at its place has moved it.
 """
 
 import math
@@ -20,49 +20,52 @@ from engage_hri.services.recognition.perceive.looks import ROUNDING, Change
 ALONG = 0.5
 """Share of the piece's way that a hand must have gone meanwhile, to have moved it."""
 FOLLOW = 0.1
-"""How quickly the place of a resting piece follows what is seen of it: share of the difference at each sight."""
+"""Share of the difference by which the place of a resting piece follows each sight of it."""
 
 HANDS_KEPT = 16
-"""So many hands may have taken what they hid: the last ones."""
+"""Number of hands, the latest, that are kept as possible movers of a hidden piece."""
 
 
 class _Piece(Struct):
+    """State of one piece."""
+
     place: Vector
-    """Where it rests, or has rested last."""
+    """Place where the piece rests, or has rested last."""
     still_at: Seconds
-    """When it was last seen there."""
+    """Time when it was last seen there."""
     hands_then: dict[str, Entity]
+    """The hands at that time."""
     pause: Vector
-    """Where it may be coming to rest, from `moved_at` until `paused_at` at least."""
+    """Place where it may be coming to rest, from `moved_at` until `paused_at` at least."""
     moved_at: Seconds
     paused_at: Seconds
     holder: str = ""
-    """The hand that moves it."""
+    """Hand that moves the piece; empty while it rests."""
     grip: Vector = (0.0, 0.0, 0.0)
-    """From that hand to the piece."""
+    """Vector from that hand to the piece."""
     hidden: bool = False
     touched: dict[str, Seconds] = field(default_factory=dict)
-    """Hands that have been at its place since it was hidden, and until when: before they first left it."""
+    """Hands that have been at its place since it was hidden, each with the end of its first stay so far."""
     sights: deque[tuple[Seconds, Vector]] = field(default_factory=deque)
 
 
 class _Act(Struct):
-    """One person's manipulation. first: the piece it began with."""
+    """Manipulation by one person, of one or more pieces. first: the piece with which it began."""
 
     first: str
     confidence: Probability
     pieces: set[str]
 
 
-class Acts(NamedTuple):
-    """Changes of one person."""
+class PersonChanges(NamedTuple):
+    """Beginnings and ends of one person's manipulations."""
 
     actor: str
     changes: list[Change]
 
 
 class Manipulation:
-    """All hands and pieces. Hands without an owner, and the robot's, move pieces in nobody's name."""
+    """Manipulations of all pieces by all hands. A robot's hand, or one without an owner, causes no action."""
 
     def __init__(self, robot: str, config: RecognitionConfig) -> None:
         self._robot = robot
@@ -72,14 +75,14 @@ class Manipulation:
         self._hands: dict[str, Entity] = {}
         self._acts: dict[str, _Act] = {}
         self._before: Seconds = float("-inf")
-        """When the world was last seen."""
+        """Time when the world was last seen."""
 
-    def acts(self, actor: str) -> bool:
+    def is_acting(self, actor: str) -> bool:
         return actor in self._acts
 
     @property
     def covering(self) -> frozenset[Covering]:
-        """Whose hands may have taken what they hide, as long as that is believed in."""
+        """Pieces that hands hide and may have taken, as long as that is credible (`memory`)."""
         return frozenset(
             Covering(self._hands[hand].owner, id, until < self._before)
             for id, piece in self._pieces.items()
@@ -90,16 +93,16 @@ class Manipulation:
 
     @property
     def deadline(self) -> Seconds | None:
-        """When a piece will have come to rest, if nothing is seen to change."""
+        """Time at which a piece has come to rest, if nothing is seen to change."""
         return min((self._rests_at(piece) for piece in self._pieces.values() if piece.holder), default=None)
 
     def _rests_at(self, piece: _Piece) -> Seconds:
-        """What goes on out of sight, hand and all, is not over so soon."""
+        """Time at which the moving piece rests. It is later if piece and hand are both out of sight."""
         lost = piece.hidden and piece.holder not in self._hands
         return piece.moved_at + (self._sensing.memory if lost else self._sensing.rest)
 
-    def feed(self, world: World, at: Seconds) -> list[Acts]:
-        """The world at `at`, later than before."""
+    def feed(self, world: World, at: Seconds) -> list[PersonChanges]:
+        """Take the world at `at`, later than the last. Returns the manipulations that began and ended."""
         found = self.advance(at)
         seen = {one.id: one for one in world.entities if one.confidence >= self._least}
         self._hands = {
@@ -114,26 +117,26 @@ class Manipulation:
         self._before = at
         return found
 
-    def advance(self, now: Seconds) -> list[Acts]:
+    def advance(self, now: Seconds) -> list[PersonChanges]:
         found = []
         for id, piece in self._pieces.items():
             if piece.holder and now >= self._rests_at(piece) - ROUNDING:
                 found += self._end(id, piece)
         return found
 
-    def acting(self, actor: str) -> tuple[str, ...]:
-        """The piece with which the person's manipulation began; empty if there is none."""
+    def first_piece(self, actor: str) -> tuple[str, ...]:
+        """Piece with which the person's manipulation began; empty if there is none."""
         return (self._acts[actor].first,) if actor in self._acts else ()
 
     def lose(self, actor: str) -> None:
-        """The person has gone, and whatever they did is over."""
+        """End the person's manipulation, for the person has gone."""
         act = self._acts.pop(actor, None)
         for id in act.pieces if act else ():
             self._rest(self._pieces[id])
 
     # -- one piece ----------------------------------------------------------------------------------------------
 
-    def _see(self, id: str, entity: Entity, at: Seconds) -> list[Acts]:
+    def _see(self, id: str, entity: Entity, at: Seconds) -> list[PersonChanges]:
         piece = self._pieces.get(id)
         if piece is None:
             place = entity.position
@@ -192,11 +195,11 @@ class Manipulation:
             piece.grip = (place[0] - x, place[1] - y, place[2] - z)
 
     def _rest(self, piece: _Piece) -> None:
-        """It lies where it is."""
+        """Let the piece rest where it is."""
         piece.holder, piece.place = "", piece.pause
         piece.still_at, piece.hands_then = piece.paused_at, self._hands
 
-    def _reappears(self, id: str, piece: _Piece, entity: Entity, at: Seconds) -> list[Acts]:
+    def _reappears(self, id: str, piece: _Piece, entity: Entity, at: Seconds) -> list[PersonChanges]:
         if math.dist(entity.position, piece.place) < self._sensing.moved:
             return []
         hands = [hand for hand in piece.touched if hand in self._hands]
@@ -213,7 +216,7 @@ class Manipulation:
         return math.dist(hand.position, place) <= self._sensing.hand_reach
 
     def _moving_along(self, piece: _Piece, place: Vector) -> str:
-        """The hand at `place` that has come a like way; empty if there is none."""
+        """Id of the nearest hand at `place` that has moved `ALONG` with the piece; empty if there is none."""
         way = ALONG * math.dist(place, piece.place)
         hands = [
             hand
@@ -226,7 +229,7 @@ class Manipulation:
 
     # -- one person ---------------------------------------------------------------------------------------------
 
-    def _begin(self, id: str, piece: _Piece, entity: Entity, hand: str, at: Seconds) -> list[Acts]:
+    def _begin(self, id: str, piece: _Piece, entity: Entity, hand: str, at: Seconds) -> list[PersonChanges]:
         piece.holder = hand
         self._grip(piece, entity.position)
         owner = self._hands[hand].owner
@@ -235,10 +238,10 @@ class Manipulation:
             return []
         confidence = min(entity.confidence, self._hands[hand].confidence)
         self._acts[owner] = _Act(id, confidence, {id})
-        return [Acts(owner, [Change(True, "act", at, (id,), confidence)])]
+        return [PersonChanges(owner, [Change(True, "act", at, (id,), confidence)])]
 
-    def _end(self, id: str, piece: _Piece) -> list[Acts]:
-        """The piece rests; the person's manipulation is over when all their pieces do."""
+    def _end(self, id: str, piece: _Piece) -> list[PersonChanges]:
+        """Let the piece rest; the person's manipulation ends when all its pieces rest."""
         at = piece.moved_at
         self._rest(piece)
         owner, act = next((owner, act) for owner, act in self._acts.items() if id in act.pieces)
@@ -246,7 +249,7 @@ class Manipulation:
         if act.pieces:
             return []
         del self._acts[owner]
-        return [Acts(owner, [Change(False, "act", at, (act.first,), act.confidence)])]
+        return [PersonChanges(owner, [Change(False, "act", at, (act.first,), act.confidence)])]
 
 
 def _between(a: Vector, b: Vector, share: float) -> Vector:

@@ -1,4 +1,4 @@
-"""Who says what people do: when such a perception vanishes from the bus nobody will report their ends."""
+"""Participants that report what people do: when one vanishes from the bus, its people are lost with it."""
 
 from engage_hri.schemas.actions import ActionBegan, ActorFound, ActorLost
 from engage_hri.schemas.messages import Message
@@ -6,15 +6,15 @@ from engage_hri.schemas.presence import PeerAlive, PeerGone
 from engage_hri.schemas.units import Stamp
 
 
-class Witnesses:
-    """Those whom a perception reports are lost with it, and found again if the same life of it comes back."""
+class Reporters:
+    """The people that each participant reports. They are lost with it, and found again if its life comes back."""
 
     def __init__(self) -> None:
         self._reported: dict[str, set[str]] = {}
         self._runs: dict[str, str] = {}
 
     def feed(self, message: Message, source: str, at: Stamp) -> list[ActorLost | ActorFound]:
-        """What follows from a message of, or about, a perception. at: now."""
+        """Derive what a message from a reporter, or about its presence, says of its people. at: now."""
         match message:
             case ActionBegan(actor=actor) | ActorFound(actor=actor):
                 self._reported.setdefault(source, set()).add(actor)
@@ -33,7 +33,7 @@ class Witnesses:
         return []
 
     def forget(self, actor: str) -> None:
-        """The person has been gone for long: nobody will be asked for it again."""
+        """Drop a person who has been gone for long from all reporters."""
         for source in list(self._reported):
             self._discard(actor, source)
 

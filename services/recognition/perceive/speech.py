@@ -1,6 +1,6 @@
-"""From voice levels to speech: short sounds are none, short silences do not end it.
+"""Speech from voice levels: short sounds do not count, short silences do not end it.
 
-Levels, not edges: any of them may be lost. A beginning needs evidence, for an end its absence is enough.
+The input is levels, not edges, so any of them may be lost. A beginning needs evidence; for an end silence is enough.
 """
 
 from engage_hri.schemas.units import Probability, Seconds
@@ -9,13 +9,13 @@ from engage_hri.services.recognition.perceive.looks import ROUNDING, Change
 
 
 class Voice:
-    """One person's speech."""
+    """Speech of one person."""
 
     def __init__(self, sensing: Sensing) -> None:
         self.speaks = False
         self._sensing = sensing
         self._heard: Seconds = float("-inf")
-        """The latest level's time."""
+        """Time of the latest level."""
         self._since: Seconds | None = None
         """Start of the sound that is, or may become, speech."""
         self._silent_since: Seconds | None = None
@@ -28,13 +28,13 @@ class Voice:
 
     @property
     def deadline(self) -> Seconds | None:
-        """When speech, or a sound, will be over if nothing more is heard."""
+        """Time at which speech, or a sound, is over if nothing more is heard."""
         if self._silent_since is not None:
             return self._silent_since + self._sensing.voice_pause
         return None if self._since is None else self._heard + self._sensing.voice_lost
 
     def feed(self, active: bool, at: Seconds, confidence: Probability) -> list[Change]:
-        """The level at `at`, later than before."""
+        """Take the level at `at`, later than the last. Returns beginning and end of speech."""
         changes = self.advance(at)
         self._heard = at
         if active:
@@ -62,7 +62,7 @@ class Voice:
         return self.lose(self._heard)
 
     def lose(self, at: Seconds) -> list[Change]:
-        """Nothing is heard since `at`, or since the silence began."""
+        """End the speech at the start of the silence, or else at `at`."""
         ended = Change(False, "speak", at if self._silent_since is None else self._silent_since, (), self._confidence)
         spoke, self.speaks = self.speaks, False
         self._since = self._silent_since = None

@@ -1,1 +1,1 @@
-"""What connection events say in numbers."""
+"""Statistics of connection events: counts, delays, pace and engagement."""

@@ -1,7 +1,7 @@
-"""How engaged somebody seems: pace times quality, with reasons, and levels that do not flutter. Thesis 2.3.
+"""Estimate of engagement: pace times quality, with reasons, and a level that does not flutter. Thesis 2.3.
 
 Pace compares the usual time between connection events with the recent one, or with the interval that is still
-open if that is longer. Quality is the share of recent events that did not fail. While somebody is busy with a
+open if that is longer. Quality is the share of recent events that did not fail. While the person is busy with a
 task nothing is concluded from silence: that explains the 70 s gap of the canapé study.
 """
 
@@ -14,7 +14,7 @@ from engage_hri.services.recognition.statistics.tally import Tally
 Level = Literal["engaged", "weakening", "disengaged", "unknown"]
 
 JUST_AFTER: Seconds = 0.001
-"""The estimate must have passed the threshold, not be on it."""
+"""Delay after the instant at which the estimate is on a threshold; then it has passed it."""
 
 
 class EngagementEstimate(NamedTuple):
@@ -27,18 +27,18 @@ UNKNOWN = EngagementEstimate(None, "unknown", ("no connection event yet",))
 
 
 def pace(usual: Seconds, recent: Seconds | None, open: Seconds) -> Probability:
-    """1 while events come at least as fast as usual, falling towards 0 as they stay away."""
+    """Pace: 1 while events come at least as fast as usual, falling towards 0 as they stay away."""
     longest = max(recent or 0.0, open)
     return 1.0 if longest <= usual else usual / longest
 
 
-def share_of_good(failed: int, judged: int) -> Probability:
-    """Quality: 1 while nothing has been decided."""
+def quality(failed: int, judged: int) -> Probability:
+    """Share of the decided events that did not fail; 1 while nothing has been decided."""
     return 1.0 - failed / judged if judged else 1.0
 
 
 def next_level(level: Level, value: Probability, config: RecognitionConfig) -> Level:
-    """The level of `value`; it changes only when the value has passed a threshold by the hysteresis."""
+    """Level of `value`; it changes only when the value has passed a threshold by the hysteresis."""
     margin = config.hysteresis
     engaged_from = config.engaged_from + {"engaged": -margin, "unknown": 0.0}.get(level, margin)
     disengaged_below = config.disengaged_below + {"disengaged": margin, "unknown": 0.0}.get(level, -margin)
@@ -48,7 +48,7 @@ def next_level(level: Level, value: Probability, config: RecognitionConfig) -> L
 
 
 class Engagement:
-    """The estimate for one actor (or all), from its tally."""
+    """Estimate for one actor (or all), from its tally."""
 
     def __init__(self, config: RecognitionConfig, tally: Tally) -> None:
         self.estimate = UNKNOWN
@@ -58,7 +58,7 @@ class Engagement:
         self._busy_until: Seconds = float("-inf")
 
     def update(self, now: Seconds, *, busy: bool) -> EngagementEstimate:
-        """The estimate now. busy: with a task, so that it stays as it was when that began."""
+        """Update the estimate, and return it. busy: True freezes it as it was when the task began."""
         if self.busy and not busy:
             self._busy_until = now
         if not (self.busy and busy) and self._tally.starts.last is not None:
@@ -71,23 +71,23 @@ class Engagement:
 
     @property
     def _silent_since(self) -> Seconds:
-        """The last start, or the end of the last task, whichever was later."""
+        """Time of the last start or of the end of the last task, whichever was later."""
         last = self._tally.starts.last
         return self._busy_until if last is None else max(last, self._busy_until)
 
     def _estimate(self, now: Seconds, open: Seconds) -> EngagementEstimate:
-        usual, recent = self._usual, self._recent(now)
+        usual = self._usual
+        recent = self._tally.recent_mean(now) if now >= self._recent_from else None
         failed, judged = self._tally.judged(now)
-        quality = share_of_good(failed, judged)
-        speed = pace(usual, recent, open)
-        value = speed * quality
+        speed, good = pace(usual, recent, open), quality(failed, judged)
+        value = speed * good
         between = f"{recent:.1f} s between recent events" if recent is not None else "no recent pace"
         return EngagementEstimate(
             value,
             next_level(self.estimate.level, value, self._config),
             (
                 f"pace {speed:.2f}: {between}, {open:.1f} s since the last, usually {usual:.1f} s",
-                f"quality {quality:.2f}: {failed} of {judged} recent events failed",
+                f"quality {good:.2f}: {failed} of {judged} recent events failed",
             ),
         )
 
@@ -100,16 +100,13 @@ class Engagement:
 
     @property
     def _recent_from(self) -> Seconds:
-        """From when on the recent window holds no time in which the actor was busy."""
+        """Time from which on the recent window holds no time in which the actor was busy."""
         return self._busy_until + self._config.window
 
-    def _recent(self, now: Seconds) -> Seconds | None:
-        return self._tally.recent_mean(now) if now >= self._recent_from else None
-
     def next_change(self, now: Seconds) -> Seconds | None:
-        """When the estimate changes otherwise than by getting less, or its level falls, if nothing happens any more.
+        """Time of the next change by silence alone that matters: the level falls, or recent pace counts again.
 
-        None if neither will, or if it is frozen. The tally's own `next_change` may come first.
+        None if there is none, or if the estimate is frozen. The tally's own `next_change` may come first.
         """
         if self.busy or self._tally.starts.last is None:
             return None
@@ -117,13 +114,13 @@ class Engagement:
         return min((at for at in changes if at is not None and at > now), default=None)
 
     def _level_falls(self, now: Seconds) -> Seconds | None:
-        """When silence alone will have passed the next threshold."""
+        """Time at which silence alone has passed the next threshold; None if it never does."""
         level = self.estimate.level
         if level not in ("engaged", "weakening"):
             return None
         threshold = self._config.engaged_from if level == "engaged" else self._config.disengaged_below
         threshold -= self._config.hysteresis
-        quality = share_of_good(*self._tally.judged(now))
-        if threshold <= 0.0 or quality <= threshold:
+        good = quality(*self._tally.judged(now))
+        if threshold <= 0.0 or good <= threshold:
             return None
-        return self._silent_since + self._usual * quality / threshold + JUST_AFTER
+        return self._silent_since + self._usual * good / threshold + JUST_AFTER

@@ -1,6 +1,8 @@
-"""The statistics message of each person and of all together: made anew whenever something in it changes."""
+"""Statistics messages of each person and of all together: made anew whenever something in them changes."""
 
+from collections import defaultdict
 from collections.abc import Iterable, Set
+from functools import partial
 
 from engage_hri.schemas.recognition import ConnectionEvent, Statistics
 from engage_hri.schemas.units import Seconds, Stamp
@@ -13,39 +15,40 @@ from engage_hri.services.requests.deadlines import Deadlines
 EVERYBODY = ""
 
 
-class _OfOne:
+class _ActorStatistics:
+    """Counts and estimate of one person, or of all."""
+
     def __init__(self, config: RecognitionConfig, clock: str) -> None:
         self.tally = Tally(config.window, clock)
         self.engagement = Engagement(config, self.tally)
 
 
 class PublishedStatistics:
-    """robot: whoever else takes part in an event is the person it counts for. clock: of the stamps."""
+    """Statistics of all persons. robot: each event counts for the other one of its two. clock: of the stamps."""
 
     def __init__(self, robot: str, config: RecognitionConfig, clock: str = "loop") -> None:
         self._robot = robot
-        self._config = config
         self._clock = clock
-        self._published: dict[str, _OfOne] = {EVERYBODY: _OfOne(config, clock)}
+        self._actors = defaultdict[str, _ActorStatistics](partial(_ActorStatistics, config, clock))
         self._agenda: Deadlines[str] = Deadlines(str)
         self._busy: frozenset[str] = frozenset()
 
     @property
     def deadline(self) -> Seconds | None:
-        """When somebody's statistics change by the passing of time."""
+        """Time at which statistics of an actor next change by the passing of time."""
         return self._agenda.earliest
 
     def feed(self, changes: Iterable[ConnectionEvent | Forgotten], busy: Set[str], now: Seconds) -> list[Statistics]:
-        """Count what happened, in its order; the statistics that are new. busy: persons with a task in hand."""
+        """Count changes, in their order. Returns the statistics that are new. busy: persons with a task in hand."""
         touched = set(iter(lambda: self._agenda.due(now), None))
         for change in changes:
             if isinstance(change, Forgotten):
-                self._published.pop(change.actor, None)
+                self._actors.pop(change.actor, None)
                 self._agenda.clear(change.actor)
                 touched.discard(change.actor)
                 continue
             for name in (change.person(self._robot), EVERYBODY):
-                self._statistics_of(name).tally.feed(change)
+                self._actors[name].tally.feed(change)
                 touched.add(name)
         if busy != self._busy:
             touched |= {EVERYBODY, *(busy ^ self._busy)}
@@ -53,16 +56,11 @@ class PublishedStatistics:
         return [self._statistics(actor, now) for actor in sorted(touched)]
 
     def overall(self, now: Seconds) -> Statistics:
-        """Of all together, as they are."""
+        """Statistics of all together, as they are."""
         return self._statistics(EVERYBODY, now)
 
-    def _statistics_of(self, actor: str) -> _OfOne:
-        if actor not in self._published:
-            self._published[actor] = _OfOne(self._config, self._clock)
-        return self._published[actor]
-
     def _statistics(self, actor: str, now: Seconds) -> Statistics:
-        one = self._statistics_of(actor)
+        one = self._actors[actor]
         busy = bool(self._busy) if actor == EVERYBODY else actor in self._busy
         estimate = one.engagement.update(now, busy=busy)
         statistics = Statistics(

@@ -1,8 +1,8 @@
-"""Counts, delays and times between connection events, kept up with each change: Table 2.1 of the thesis.
+"""Counts, delays and times between connection events, updated with each change: Table 2.1 of the thesis.
 
 The time between events is the difference of successive *starts*, of all kinds and both initiators, failures
 included. Starts may become known late (a backchannel shows only at its end), so recent ones are kept sorted and
-gaps are final only after `SETTLED`. What is kept is bounded by what happens in that time and in the recent window.
+gaps are final only after `SETTLED`. Memory is bounded by the events of that time and of the recent window.
 """
 
 from bisect import bisect_left, bisect_right, insort
@@ -10,31 +10,45 @@ from collections.abc import Iterable, Sequence
 from operator import sub
 from typing import get_args
 
-from msgspec import Struct
+from msgspec import Struct, field
 
 from engage_hri.schemas.behaviors import EventKind
 from engage_hri.schemas.recognition import ENDINGS, ConnectionEvent, KindStatistics, WindowStatistics
 from engage_hri.schemas.units import Seconds, Stamp
 
 SETTLED: Seconds = 120.0
-"""No start becomes known later than this: one that does is counted, but splits no gap."""
+"""Longest time until a start becomes known: a later one is counted, but splits no gap."""
 KINDS: tuple[EventKind, ...] = get_args(EventKind)
 
 
+class Spread(Struct):
+    """Number, sum, least and greatest of some delays."""
+
+    number: int = 0
+    sum: Seconds = 0.0
+    least: Seconds | None = None
+    greatest: Seconds | None = None
+
+    def add(self, delay: Seconds) -> None:
+        self.number += 1
+        self.sum += delay
+        self.least = delay if self.least is None else min(self.least, delay)
+        self.greatest = delay if self.greatest is None else max(self.greatest, delay)
+
+    @property
+    def mean(self) -> Seconds | None:
+        return self.sum / self.number if self.number else None
+
+
 class Count(Struct):
-    """One kind of event. failed: without the optional ones. judged: successes and failures without those."""
+    """Count of one kind of event. failed: without the optional ones. judged: successes and failures without those."""
 
     count: int = 0
     succeeded: int = 0
     failed: int = 0
     judged: int = 0
-    delays: int = 0
-    delay_sum: Seconds = 0.0
-    delay_min: Seconds = float("inf")
-    delay_max: Seconds = float("-inf")
-    failed_delay_sum: Seconds = 0.0
-    failed_delay_min: Seconds = float("inf")
-    failed_delay_max: Seconds = float("-inf")
+    delays: Spread = field(default_factory=Spread)
+    failed_delays: Spread = field(default_factory=Spread)
 
     def decide(self, event: ConnectionEvent) -> None:
         """Count a success or a failure; nothing else changes the rates."""
@@ -42,29 +56,20 @@ class Count(Struct):
             self.succeeded += 1
             self.judged += not event.optional
             if event.delay is not None:
-                self.delays += 1
-                self.delay_sum += event.delay
-                self.delay_min = min(self.delay_min, event.delay)
-                self.delay_max = max(self.delay_max, event.delay)
+                self.delays.add(event.delay)
         elif event.state == "failed" and not event.optional:
             self.failed += 1
             self.judged += 1
-            delay = event.delay or 0.0
-            self.failed_delay_sum += delay
-            self.failed_delay_min = min(self.failed_delay_min, delay)
-            self.failed_delay_max = max(self.failed_delay_max, delay)
+            self.failed_delays.add(event.delay or 0.0)
 
     def statistics(self, kind: EventKind) -> KindStatistics:
-        decided, failed = self.succeeded + self.failed, self.failed
+        delays, failed_delays, decided = self.delays, self.failed_delays, self.succeeded + self.failed
         return KindStatistics(
-            kind=kind, count=self.count, succeeded=self.succeeded, failed=failed,
-            delay_min=self.delay_min if self.delays else None,
-            delay_mean=self.delay_sum / self.delays if self.delays else None,
-            delay_max=self.delay_max if self.delays else None,
-            failure_rate=failed / decided if decided else None,
-            failed_delay_min=self.failed_delay_min if failed else None,
-            failed_delay_mean=self.failed_delay_sum / failed if failed else None,
-            failed_delay_max=self.failed_delay_max if failed else None,
+            kind=kind, count=self.count, succeeded=self.succeeded, failed=self.failed,
+            delay_min=delays.least, delay_mean=delays.mean, delay_max=delays.greatest,
+            failure_rate=self.failed / decided if decided else None,
+            failed_delay_min=failed_delays.least, failed_delay_mean=failed_delays.mean,
+            failed_delay_max=failed_delays.greatest,
         )  # fmt: skip
 
 
@@ -77,20 +82,20 @@ def _counted(events: Iterable[ConnectionEvent]) -> Count:
 
 
 class Starts:
-    """The starts of connection events, in order: their number, mean and largest difference.
+    """Starts of connection events, in order: their number, mean and largest difference.
 
-    A session settles the old ones, the recent window forgets them.
+    A session settles old starts, the recent window forgets them.
     """
 
     def __init__(self) -> None:
         self._kept: list[Seconds] = []
         self._settled = 0
-        """How many are counted and no longer kept."""
+        """Number of starts that are counted and no longer kept."""
         self._first: Seconds = float("inf")
-        """Of the settled."""
+        """Earliest of the settled starts."""
         self._largest_settled: Seconds = float("-inf")
         self._largest: Seconds | None = None
-        """None: to be found anew."""
+        """Largest difference; None if outdated."""
 
     def add(self, start: Seconds) -> None:
         kept = self._kept
@@ -105,7 +110,7 @@ class Starts:
         insort(kept, start)
 
     def settle(self, horizon: Seconds) -> None:
-        """Of what came before `horizon` keep only what can be said of it; and the last, for the next difference."""
+        """Summarize the starts before `horizon`. The last of them is kept, for the next difference."""
         settled = bisect_left(self._kept, horizon) - 1
         if settled > 0:
             self._first = min(self._first, self._kept[0])
@@ -114,7 +119,7 @@ class Starts:
             del self._kept[:settled]
 
     def forget(self, number: int) -> None:
-        """Drop the oldest."""
+        """Drop the oldest `number` starts."""
         if number:
             del self._kept[:number]
             self._largest = None
@@ -147,13 +152,13 @@ def _differences(starts: Sequence[Seconds]) -> list[Seconds]:
 
 
 class _Window:
-    """What is counted of the session, or of the recent part of it."""
+    """Counts and starts of the session, or of the recent window."""
 
     def __init__(self) -> None:
         self.counts = {kind: Count() for kind in KINDS}
         self.starts = Starts()
         self.own_starts = Starts()
-        """Without the glances that the maintenance policy caused."""
+        """Starts without the glances that the maintenance policy caused."""
 
     def begin(self, event: ConnectionEvent) -> None:
         self.counts[event.kind].count += 1
@@ -192,7 +197,7 @@ class Tally:
         self._session = _Window()
         self._recent = _Window()
         self._recent_events: dict[EventKind, list[ConnectionEvent]] = {kind: [] for kind in KINDS}
-        """In the order of their starts: started, or decided."""
+        """Events of the recent window, in the order of their starts: each as started, or as decided."""
         self._open: set[str] = set()
         self._decided: set[str] = set()
 
@@ -225,12 +230,12 @@ class Tally:
 
     @property
     def starts(self) -> Starts:
-        """Of the session."""
+        """Starts of the session."""
         return self._session.starts
 
     @property
     def next_change(self) -> Seconds | None:
-        """When the oldest event leaves the recent window."""
+        """Time at which the oldest event leaves the recent window."""
         return min((self._leaves(events[0]) for events in self._recent_events.values() if events), default=None)
 
     def _leaves(self, event: ConnectionEvent) -> Seconds:
@@ -259,9 +264,9 @@ class Tally:
         return self._recent.starts.mean_difference
 
     def judged(self, now: Seconds) -> tuple[int, int]:
-        """Recent failures, and recent decisions that tell of engagement.
+        """Number of recent failures, and of recent decisions that count for engagement.
 
-        Those are neither optional ones nor what was preempted, withdrawn or superseded.
+        Optional events do not count, nor those preempted, withdrawn or superseded.
         """
         self.forget(now)
         counts = self._recent.counts.values()

@@ -1,7 +1,7 @@
-"""Ends of looks that are none: the tracker has lost the eyes for a moment, and finds them where they were.
+"""Filter for reported looks that are only interrupted, because the tracker loses the eyes for a moment.
 
-Where perception reports looks itself, an end that goes with a loss of the face, or that the same look follows within
-a short pause, is left out. Until the pause is over it is undecided whether there was an end.
+Where perception reports looks itself, the end of a look is left out if it goes with a loss of the face, or if the
+same look follows within a short pause. Until the pause is over the end is undecided.
 """
 
 from msgspec import Struct
@@ -10,65 +10,65 @@ from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound, Act
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.recognition.events.limits import in_time
 
-Told = ActionBegan | ActionEnded | ActorFound | ActorLost
-Passed = tuple[Seconds, Told]
+Symbolic = ActionBegan | ActionEnded | ActorFound | ActorLost
+Timed = tuple[Seconds, Symbolic]
 
 
 class _Break(Struct):
-    """since: when the look ended, or when the face that was lost then was found again."""
+    """Possible end of a look. since: time of that end, or at which the face that was lost then was found again."""
 
     ended: ActionEnded
     since: Seconds
     lost: bool
 
 
-class Breaks:
-    """Of all people. pause: how soon the same look has to follow."""
+class InterruptedLooks:
+    """The filter for all people. pause: time within which the same look has to follow to go on."""
 
     def __init__(self, pause: Seconds) -> None:
         self._pause = pause
         self._breaks: dict[str, _Break] = {}
         self._lost: set[str] = set()
-        """Whose face is out of sight."""
+        """People with their face out of sight."""
 
     @property
     def undecided(self) -> list[Seconds]:
-        """Since when looks may be over. While the face is lost they are taken to go on."""
+        """Times since which looks may be over. While the face is lost a look is taken to go on."""
         return [one.since for one in self._breaks.values() if not one.lost]
 
     @property
     def deadline(self) -> Seconds | None:
-        """When one of them is over, unless it goes on before."""
+        """Time at which the earliest undecided end becomes certain, unless the look goes on before."""
         return min((since + self._pause for since in self.undecided), default=None)
 
-    def feed(self, told: Told, at: Seconds) -> list[Passed]:
-        """What perception says; what of it holds, with its times."""
-        match told:
+    def feed(self, report: Symbolic, at: Seconds) -> list[Timed]:
+        """Take a report of perception. Returns the reports that hold now, each with its time."""
+        match report:
             case ActionEnded(action="look", actor=actor):
                 before = self._end(actor)
-                self._breaks[actor] = _Break(told, at, actor in self._lost)
+                self._breaks[actor] = _Break(report, at, actor in self._lost)
                 return before
             case ActionBegan(action="look", actor=actor):
-                return [*self._begin(told, at), (at, told)]
+                return [*self._begin(report, at), (at, report)]
             case ActionBegan(actor=actor) | ActorFound(actor=actor):
                 self._find(actor, at)
             case ActorLost(actor=actor):
                 self._lost.add(actor)
                 if actor in self._breaks:
                     self._breaks[actor].lost = True
-        return [(at, told)]
+        return [(at, report)]
 
-    def advance(self, now: Seconds) -> list[Passed]:
-        """The ends that have turned out to be some."""
+    def advance(self, now: Seconds) -> list[Timed]:
+        """Return the ends of looks that have become certain by `now`."""
         over = [actor for actor, one in self._breaks.items() if not one.lost and now >= one.since + self._pause]
-        return [passed for actor in over for passed in self._end(actor)]
+        return [ended for actor in over for ended in self._end(actor)]
 
     def forget(self, actor: str) -> None:
         self._breaks.pop(actor, None)
         self._lost.discard(actor)
 
-    def _begin(self, began: ActionBegan, at: Seconds) -> list[Passed]:
-        """A look: the one that was interrupted, or another one, that ends it."""
+    def _begin(self, began: ActionBegan, at: Seconds) -> list[Timed]:
+        """Take the beginning of a look: it goes on with the interrupted one, or makes the end of that certain."""
         self._find(began.actor, at)
         one = self._breaks.get(began.actor)
         goes_on = one is not None and one.ended.targets == began.targets
@@ -82,6 +82,6 @@ class Breaks:
         if one is not None and one.lost:
             one.since, one.lost = max(at, one.since), False
 
-    def _end(self, actor: str) -> list[Passed]:
+    def _end(self, actor: str) -> list[Timed]:
         one = self._breaks.pop(actor, None)
         return [] if one is None else [(one.since, one.ended)]

@@ -1,7 +1,7 @@
-"""Everybody with the robot: who is here, whose turn it is when time passes, and who has been gone for long enough.
+"""People with the robot: those who are here, the times at which they are due, and those to be forgotten.
 
-A step touches those whom it concerns: one person, or all who are here. Those who have gone have nothing open; they
-are remembered for a while, in case they come back.
+A step concerns one person, or all who are here. People who have gone have no open events; they are remembered for a
+while, in case they come back.
 """
 
 from collections.abc import Callable
@@ -15,29 +15,28 @@ from engage_hri.services.recognition.events.scene import SessionScene
 from engage_hri.services.requests.deadlines import Deadlines
 
 
-class Company:
-    """strict: a bug with one person raises; otherwise it costs that person's events (see `Session`)."""
+class People:
+    """The persons of a session. strict: a bug with one raises; else it ends that person's events (see `Session`)."""
 
     def __init__(self, scene: SessionScene, config: RecognitionConfig, writer: EventWriter, *, strict: bool) -> None:
         self.persons: dict[str, Person] = {}
         self._here: dict[str, Person] = {}
-        """In the order of acquaintance."""
+        """Persons who are here, in the order of acquaintance."""
         self._agenda: Deadlines[str] = Deadlines(lambda id: self.persons[id].number)
         self._unseen: dict[str, Seconds] = {}
-        """Since when nobody has told of those who have gone, or of whom nobody says that they are there. The longest
-        ago first."""
+        """Time of the last sign of each person who has gone or is not reported as present. The longest ago first."""
         self._met = 0
         self._speech = 0
-        """As of the scene, when the times of all were last arranged."""
+        """`scene.speech` when the deadlines of all were last updated."""
         self._scene = scene
         self._config = config
         self._writer = writer
         self._strict = strict
 
-    # -- who there is -------------------------------------------------------------------------------------------
+    # -- acquaintances ------------------------------------------------------------------------------------------
 
     def person(self, id: str) -> Person:
-        """An acquaintance, old or new."""
+        """The person with this id, made if it is new."""
         if id not in self.persons:
             self._met += 1
             person = Person(id, self._met, self._scene, self._config, self._writer)
@@ -45,7 +44,7 @@ class Company:
         return self.persons[id]
 
     def see(self, world: World, at: Seconds) -> None:
-        """Who is in the world is there; who is in it no longer may have gone."""
+        """Take a view of the world: people in it are here, those that are missing now may have gone."""
         before = self._scene.people_in_world
         self._scene.see(world, at)
         self._scene.forget_others(at - self._config.forgotten_after)
@@ -53,17 +52,17 @@ class Company:
             self.person(id)
         for id in sorted(before ^ self._scene.people_in_world):
             self._note(self.persons[id], at)
-        self.let_all(at, lambda person: None)  # what is an object may have changed
+        self.apply_to_all(at, lambda person: None)  # an entity may have become known as an object
 
     def _note(self, person: Person, at: Seconds) -> None:
-        """Somebody has told of the person, or it has left."""
+        """Note a sign of the person, or its leaving, at `at`."""
         self._unseen.pop(person.id, None)
-        told = person.presence.here and person.presence.told
-        if not told and person.id not in self._scene.people_in_world:
+        reported = person.presence.here and person.presence.reported
+        if not reported and person.id not in self._scene.people_in_world:
             self._unseen[person.id] = at
 
     def forget(self, now: Seconds) -> None:
-        """Drop those of whom nobody has told for long. Nothing waits for that, so it is done on occasion."""
+        """Drop persons without a sign for long. No deadline wakes for that: it happens at the next step."""
         while self._unseen:
             id, since = next(iter(self._unseen.items()))
             if since + self._config.forgotten_after > now:
@@ -71,7 +70,7 @@ class Company:
             person = self.persons[id]
             if person.presence.here:
                 person.presence.vanish(since)
-                self._let(person, now, lambda person: person.leave(now))
+                self._apply(person, now, lambda person: person.leave(now))
             self._agenda.clear(id)
             self._here.pop(id, None)
             del self.persons[id], self._unseen[id]
@@ -79,69 +78,68 @@ class Company:
             self._follow_speech(now)
 
     def lose_track(self, person: Person, at: Seconds) -> None:
-        """Begin anew with somebody: open events end as lost, and what the person does has to be seen again."""
+        """Begin anew with a person: its open events end as lost, and its actions have to be observed again."""
         fresh = Person(person.id, person.number, self._scene, self._config, self._writer)
-        fresh.presence, fresh.news = person.presence, person.news
+        fresh.presence, fresh.history = person.presence, person.history
         self.persons[person.id] = fresh
         if person.id in self._here:
             self._here[person.id] = fresh
         self._writer.lose(person.id, at)
         self._scene.stops(person.id, at)
-        self._arrange(fresh)
+        self._update(fresh)
         self._follow_speech(at)
 
-    # -- what happens to them -----------------------------------------------------------------------------------
+    # -- steps ---------------------------------------------------------------------------------------------
 
     @property
     def deadline(self) -> Seconds | None:
-        """When something happens by itself."""
+        """Time at which the first person is due."""
         return self._agenda.earliest
 
     def advance(self) -> None:
-        """Let happen what is due first."""
+        """Take the step that is due first."""
         id, at = self._agenda.first, self._agenda.earliest
         assert id is not None
         assert at is not None
-        self._let(self.persons[id], at, lambda person: person.pass_time(at))
-        self._follow_speech(at)
+        self.apply(id, at, lambda person: person.pass_time(at))
 
-    def hear(self, id: str, at: Seconds, happen: Callable[[Person], object]) -> None:
-        """Let happen what is told of one person, who may be new."""
+    def observe(self, id: str, at: Seconds, step: Callable[[Person], object]) -> None:
+        """Apply a step that an observation of one person asks for; the person may be new."""
         person = self.person(id)
-        self.let(id, at, happen)
+        self.apply(id, at, step)
         if person.presence.here or id not in self._unseen:
             self._note(person, at)
 
-    def let(self, id: str, at: Seconds, happen: Callable[[Person], object]) -> None:
-        """Let it happen to one person."""
-        self._let(self.persons[id], at, happen)
+    def apply(self, id: str, at: Seconds, step: Callable[[Person], object]) -> None:
+        """Apply a step to one person."""
+        self._apply(self.persons[id], at, step)
         self._follow_speech(at)
 
-    def let_all(self, at: Seconds, happen: Callable[[Person], object]) -> None:
-        """Let it happen to all who are here."""
+    def apply_to_all(self, at: Seconds, step: Callable[[Person], object]) -> None:
+        """Apply a step to all who are here."""
         self._speech = self._scene.speech
         for person in list(self._here.values()):
-            self._let(person, at, happen)
+            self._apply(person, at, step)
         self._follow_speech(at)
 
     def _follow_speech(self, at: Seconds) -> None:
-        """While somebody speaks the looks of the others direct nobody: their times change."""
+        """Update all deadlines if speech has begun or ended: while one speaks, looks of the others direct nothing."""
         if self._speech != self._scene.speech:
-            self.let_all(at, lambda person: None)
+            self.apply_to_all(at, lambda person: None)
 
-    def _let(self, person: Person, at: Seconds, happen: Callable[[Person], object]) -> None:
-        """A bug that shows with one person costs the others nothing."""
+    def _apply(self, person: Person, at: Seconds, step: Callable[[Person], object]) -> None:
+        """Apply a step to one person; a bug that shows in it does not affect the others."""
         try:
-            happen(person)
-            self._arrange(person)
+            step(person)
+            self._update(person)
         except Exception as error:
             if self._strict:
                 raise
             self._writer.effects.append(Mishap(person.id, at, error))
             self.lose_track(person, at)
 
-    def _arrange(self, person: Person) -> None:
-        """Know when the person is due, and whether it is here."""
+    def _update(self, person: Person) -> None:
+        """Note when the person is due, and whether it is here."""
         self._agenda.set(person.id, person.deadline)
         here, was_here = person.presence.here, person.id in self._here
         if was_here and not here:

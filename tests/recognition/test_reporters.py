@@ -2,7 +2,7 @@
 
 from engage_hri.schemas.actions import ActionBegan, ActorFound, ActorLost
 from engage_hri.schemas.presence import PeerAlive, PeerGone
-from engage_hri.services.recognition.perceive.reporters import Witnesses
+from engage_hri.services.recognition.perceive.reporters import Reporters
 from tests.recognition.observations import stamp
 
 ALIVE, GONE = PeerAlive(participant="cameras", run="one"), PeerGone(participant="cameras")
@@ -10,13 +10,13 @@ ALIVE, GONE = PeerAlive(participant="cameras", run="one"), PeerGone(participant=
 
 def watching(*messages: object) -> list[ActorLost | ActorFound]:
     """What follows, after "cameras" have told of ann and bob and others of eve."""
-    witnesses = Witnesses()
-    changes = witnesses.feed(ALIVE, "", stamp(0.0))
-    changes += witnesses.feed(ActorFound(actor="bob", at=stamp(1.0)), "cameras", stamp(1.0))
-    changes += witnesses.feed(ActionBegan(actor="ann", action="speak", at=stamp(1.0)), "cameras", stamp(1.0))
-    changes += witnesses.feed(ActionBegan(actor="eve", action="speak", at=stamp(1.0)), "others", stamp(1.0))
+    reporters = Reporters()
+    changes = reporters.feed(ALIVE, "", stamp(0.0))
+    changes += reporters.feed(ActorFound(actor="bob", at=stamp(1.0)), "cameras", stamp(1.0))
+    changes += reporters.feed(ActionBegan(actor="ann", action="speak", at=stamp(1.0)), "cameras", stamp(1.0))
+    changes += reporters.feed(ActionBegan(actor="eve", action="speak", at=stamp(1.0)), "others", stamp(1.0))
     for at, message in enumerate(messages, 2):
-        changes += witnesses.feed(message, "", stamp(at))  # type: ignore[arg-type]
+        changes += reporters.feed(message, "", stamp(at))  # type: ignore[arg-type]
     return changes
 
 
@@ -31,14 +31,14 @@ def test_they_are_found_when_it_was_only_out_of_reach():
 
 
 def test_who_had_left_before_is_not_found_again():
-    witnesses = Witnesses()
-    witnesses.feed(ALIVE, "", stamp(0.0))
+    reporters = Reporters()
+    reporters.feed(ALIVE, "", stamp(0.0))
     for found in (ActorFound(actor="ann", at=stamp(1.0)), ActorFound(actor="bob", at=stamp(1.0))):
-        witnesses.feed(found, "cameras", stamp(1.0))
-    witnesses.feed(ActorLost(actor="ann", at=stamp(2.0)), "cameras", stamp(2.0))
+        reporters.feed(found, "cameras", stamp(1.0))
+    reporters.feed(ActorLost(actor="ann", at=stamp(2.0)), "cameras", stamp(2.0))
 
-    assert witnesses.feed(GONE, "", stamp(3.0)) == [ActorLost(actor="bob", at=stamp(3.0))]
-    assert witnesses.feed(ALIVE, "", stamp(4.0)) == [ActorFound(actor="bob", at=stamp(4.0))]
+    assert reporters.feed(GONE, "", stamp(3.0)) == [ActorLost(actor="bob", at=stamp(3.0))]
+    assert reporters.feed(ALIVE, "", stamp(4.0)) == [ActorFound(actor="bob", at=stamp(4.0))]
 
 
 def test_another_life_of_it_has_yet_to_see_them():

@@ -128,7 +128,7 @@ def test_breaks_of_people_long_gone_are_forgotten():
             recognizer.feed(observation, observation.at.seconds, observation.at.seconds)
         recognizer.advance(at + 50.0)
 
-    assert len(recognizer._breaks._breaks) + len(recognizer._breaks._lost) <= 2
+    assert len(recognizer._interrupted._breaks) + len(recognizer._interrupted._lost) <= 2
 
 
 def test_a_pause_may_not_outlast_what_is_waited_for():

@@ -1,4 +1,4 @@
-"""What is remembered of what was observed, but not for ever: enough to know what is news."""
+"""Bounded memory of observations, enough to tell new ones from repeated and late ones."""
 
 from typing import TypeVar
 
@@ -12,7 +12,7 @@ Value = TypeVar("Value")
 
 
 class Latest(dict[Key, Value]):
-    """Only the `size` entries that were set last are kept."""
+    """A dict that keeps only the `size` entries that were set last."""
 
     def __init__(self, size: int) -> None:
         super().__init__()
@@ -25,21 +25,17 @@ class Latest(dict[Key, Value]):
             del self[next(iter(self))]
 
 
-class News:
-    """When the actions of one actor last began and ended, for the `kept` latest of them."""
+class ActionHistory:
+    """Times at which the actions of one actor last began and ended, for the `kept` latest of them."""
 
     def __init__(self, kept: int) -> None:
         self._performed: Latest[tuple[Action, str, tuple[str, ...]], tuple[Seconds, Seconds]] = Latest(kept)
 
-    def is_news(self, action: ActionBegan | ActionEnded, at: Seconds) -> bool:
-        """Did it neither come twice nor too late, after something newer of the same kind?"""
+    def is_new(self, action: ActionBegan | ActionEnded, at: Seconds) -> bool:
+        """True unless the report repeats an earlier one, or comes after a newer report of the same action."""
         key = (action.action, action.behavior, action.targets)
         began, ended = self._performed.get(key, (NEVER, NEVER))
-        if isinstance(action, ActionBegan):
-            news = at > began and at >= ended
-            began = at if news else began
-        else:
-            news = at > ended and at >= began
-            ended = at if news else ended
-        self._performed[key] = (began, ended)
-        return news
+        begins = isinstance(action, ActionBegan)
+        is_new = at > began and at >= ended if begins else at > ended and at >= began
+        self._performed[key] = (began, ended) if not is_new else (at, ended) if begins else (began, at)
+        return is_new

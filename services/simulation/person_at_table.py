@@ -1,7 +1,7 @@
-"""What happens at the table: the person and the pieces put together, as exact messages.
+"""A person at the table, with the pieces: exact messages of all that happens.
 
-Pure. A look is told of while the person sits at the table; `act` while a piece really moves. What perception makes of
-it is in `cameras.py`.
+Pure. A look is reported while the person sits at the table, `act` while a piece really moves. `cameras.py` turns them
+into messages of perception.
 """
 
 from collections.abc import Callable, Iterator
@@ -32,7 +32,7 @@ Stamper = Callable[[Seconds], Stamp]
 
 
 class PersonAtTable:
-    """A person at the table. `feed` it with what the robot does; `advance` gives what has happened by `now`.
+    """A person at the table. `feed` takes messages about the robot; `advance` yields what has happened by `now`.
 
     frame: seconds between two reports of the world while something moves.
     """
@@ -49,7 +49,7 @@ class PersonAtTable:
 
     @property
     def deadline(self) -> Seconds | None:
-        """When `advance` has something to do again; None: not before the robot does something."""
+        """Time at which `advance` has something to do; None: not before the robot does something."""
         times = [self._human.deadline, self._table.deadline]
         if self._table.moving and self._last_world is not None:
             times.append(self._last_world + self._frame)
@@ -66,11 +66,11 @@ class PersonAtTable:
         return World(entities=self._table.entities(now), at=self._stamp(now))
 
     def advance(self, now: Seconds) -> Iterator[Message]:
-        """What is to be reported now: first what people did, then the world if it has changed."""
+        """Yield the reports that are due: first the person's actions, then the world if it has changed."""
         changed = self._table.moving and self._last_world is not None and now >= self._last_world + self._frame
-        for moved in self._table.settle(now):
+        for rested in self._table.settle(now):
             changed = True
-            yield self._does(ActionEnded, "act", moved.piece, moved.at)
+            yield self._does(ActionEnded, "act", rested.piece, rested.at)
         while acts := self._human.due(now):
             changed = changed or not isinstance(acts[0], LookAt | Pause | Start | Stop)
             yield from self._do(acts[0], acts[1:], now)
@@ -93,8 +93,8 @@ class PersonAtTable:
                 self._table.seated, self._look = False, None
                 yield ActorLost(actor=self._actor, at=self._stamp(now))
             case Grab() | Lay() if self._table.carrying:
-                # Hands are busy with another piece: this comes after it.
-                self._human.go_on((act, *then), self._table.deadline or now)
+                # The hands are busy with another piece: this act comes after it.
+                self._human.schedule((act, *then), self._table.deadline or now)
                 return
             case Grab(piece=piece):
                 following = self._table.reach(piece, now)
@@ -110,7 +110,7 @@ class PersonAtTable:
                 yield self._does(ActionBegan, action, target, now)
             case Stop(action=action, target=target):
                 yield self._does(ActionEnded, action, target, now)
-        self._human.go_on(then, following)
+        self._human.schedule(then, following)
 
     def _looks_at(self, target: str, now: Seconds) -> Iterator[Message]:
         if target == self._look:
@@ -125,7 +125,7 @@ class PersonAtTable:
         return kind(actor=self._actor, action=action, targets=(target,) if target else (), at=self._stamp(at))
 
     def _place_for(self, lay: Lay, now: Seconds) -> PiecePose | None:
-        """The first place with room, or the first if there is none; None if no edges fit."""
+        """First pose with room, or simply the first if none has room; None if no edges fit."""
         piece = self._table.piece(lay.piece, now)
         others = [other for other in self._table.pieces(now) if other.id != lay.piece]
         places = sorted(
