@@ -44,14 +44,14 @@ from engage_hri.services.client.given import FragmentSource, checked, fragment_i
 from engage_hri.services.requests.ends import Pending, Requester, RequestRefused
 
 ANSWER_PATIENCE = 20.0
-"""Seconds after a fragment's end: longer than any answer of a person is waited for."""
+"""Seconds after a fragment's end for which `await_answer` waits: longer than recognition waits for an answer."""
 
 
 class Robot:
     """An engaged robot, as its collaboration manager sees it. Made by `connect` or, in a service, `Robot.on(bus)`.
 
-    Errors carry a `fault` that says where and why. Once the client hears nothing any more (it was left, or it broke),
-    all methods that ask or follow raise RunFailed. They are called on the event loop that made it.
+    Errors carry a `fault` that says where and why. Once the client has ended (its `async with` has, or it broke), all
+    methods that ask or follow raise RunFailed. They are called on the event loop that made it.
     """
 
     def __init__(self, bus: Bus, requests: Requester) -> None:
@@ -59,7 +59,7 @@ class Robot:
         self._requests = requests
         self._numbers = count(1)
         self._life = bus.new_life()
-        """In the names of fragments that have none: another client of this name, or its next life, has others."""
+        """Part of the ids of fragments without one, so that they differ from those of another client or life."""
 
     @classmethod
     @asynccontextmanager
@@ -77,7 +77,7 @@ class Robot:
         return self._bus.robot
 
     def now(self) -> Seconds:
-        """This process' clock: seconds, the time of the event loop."""
+        """Return the time on this process' clock: seconds, the time of the event loop."""
         return self._bus.now()
 
     def local(self, stamp: Stamp) -> Seconds:
@@ -222,7 +222,7 @@ class Robot:
             yield
         finally:
             self._requests.cancel(request.id, "released")
-        # Only on the good way: who is cancelled, or fails, is not to wait, nor to hear of a lease that was lost.
+        # Only after a body without an error: one that was cancelled, or failed, must not wait here.
         await asyncio.wait([pending.outcome], timeout=ttl)
 
     async def _ask(self, key: str, request: Request, timeout: Seconds | None) -> Outcome:
@@ -276,11 +276,11 @@ class Robot:
         return self._feed(Feedback.__args__, keys.ANY_FEEDBACK)
 
     def actions(self) -> Feed[ActionBegan | ActionEnded | ActorFound | ActorLost]:
-        """Follow what the robot and the people are seen to do, and who comes and goes."""
+        """Follow the actions of the robot and of people as they are seen, and the coming and going of people."""
         return self._feed((ActionBegan, ActionEnded, ActorFound, ActorLost), keys.ANY_ACTION)
 
     def faults(self) -> Feed[Fault]:
-        """Follow the faults that services tell of: bad messages, and what went wrong at their edge."""
+        """Follow the faults that services tell of: bad messages, and errors while one was taken."""
         return self._feed((Fault,), keys.ANY_FAULT)
 
     def worlds(self) -> Feed[World]:
@@ -288,7 +288,7 @@ class Robot:
         return self._feed((World,), keys.WORLD, keep=Keep.LATEST)
 
     def head_owners(self) -> Feed[HeadOwner]:
-        """Follow who owns the robot's head, and why: now, and at every change."""
+        """Follow the owner of the robot's head, with the reason: now, and at every change."""
         return self._feed((HeadOwner,), keys.HEAD_OWNER)
 
     async def world(self, timeout: Seconds | None = None) -> World:

@@ -1,4 +1,4 @@
-"""From a fragment to its block, in one pure step: phrases proposed, references chosen, then everything emitted."""
+"""Plan of a fragment, made in one pure step: phrases are proposed, references are chosen, the block is emitted."""
 
 from collections.abc import Sequence
 
@@ -23,7 +23,10 @@ from engage_hri.services.generation.turns.policy import TurnPlan, vain_delay
 
 
 class FragmentPlan(Struct, frozen=True, kw_only=True):
-    """continuation: for the turn's next fragment. mentions: when each object has been referred to."""
+    """The block of a fragment and what is known of it before it is sent.
+
+    continuation: for the turn's next fragment. mentions: when each object has been referred to.
+    """
 
     block: Block
     continuation: Continuation = NO_CONTINUATION
@@ -33,18 +36,18 @@ class FragmentPlan(Struct, frozen=True, kw_only=True):
 
 
 def references(fragment: TurnFragment) -> tuple[Reference, ...]:
-    """In the order in which they are made (decision B12)."""
+    """The fragment's references in the order in which they are made (decision B12)."""
     order = ordered(fragment.behaviors, fragment.constraints, fragment.id)
     return tuple(behavior for behavior in order if isinstance(behavior, Reference))
 
 
 def targets(fragment: TurnFragment) -> Sequence[str]:
-    """Of its references, in order: what the body is asked about."""
+    """Targets of the fragment's references, in order: the body is asked for motions to them."""
     return [reference.target for reference in references(fragment)]
 
 
 def glance(fragment: TurnFragment, turn: TurnPlan, config: GenerationConfig) -> str:
-    """Who is looked at after each of its points but the last; "": nobody."""
+    """The person looked at after each of the fragment's points but the last; "": nobody."""
     return turn.addressee if config.profile == "check-back" and len(references(fragment)) > 1 else ""
 
 
@@ -59,10 +62,10 @@ def plan(
     before: Continuation = NO_CONTINUATION,
     discourse: Discourse = NO_DISCOURSE,
 ) -> FragmentPlan:
-    """The block of a checked fragment. body, motions: needed for references only. before: the turn's other blocks'.
+    """Plan the block of a checked fragment. Raises RunFailed where a reference cannot be made at all.
 
-    discourse: what was referred to before it.
-    Raises RunFailed where a reference cannot be made at all.
+    body, motions: needed for references only. before: continuation of the turn's blocks under way. discourse: what
+    was referred to before this fragment.
     """
     chosen = Choices()
     made = proposed(references(fragment), world, config, discourse)

@@ -1,4 +1,4 @@
-"""Timers of the loop that are set again and again."""
+"""Timers on the event loop that are set again and again."""
 
 import asyncio
 from collections.abc import Callable
@@ -44,7 +44,7 @@ class Timer:
 
     @property
     def at(self) -> Seconds | None:
-        """When it is to ring."""
+        """Time when the timer is to ring; None: never."""
         return None if self._handle is None else self._at
 
     def set(self, at: Seconds | None) -> None:

@@ -1,4 +1,4 @@
-"""A fragment becomes a BML block: references replaced, the turn's events and gaze added. Two profiles of timing.
+"""Makes a BML block of a fragment: replaces references, adds the turn's events and gaze. Two profiles of timing.
 
 Events are behaviors of the block, so they begin exactly when the speech or gaze they belong to does. They carry
 their timing inline: the constraints that remain, but for the hold of a point until its event has ended, are
@@ -41,7 +41,7 @@ from engage_hri.services.generation.turns.policy import TurnPlan
 
 
 class Emission(Struct, frozen=True):
-    """The block of a fragment; what it leaves for the next one; what of the input was left out, and why."""
+    """The block of a fragment. continuation: for the turn's next fragment. warnings: what was left out, and why."""
 
     block: Block
     continuation: Continuation
@@ -58,15 +58,17 @@ def emit(
     hands: Mapping[str, Hand] | None = None,
     before: Continuation = NO_CONTINUATION,
 ) -> Emission:
-    """The block that performs `fragment`.
+    """Make the block that performs `fragment`.
 
-    choices: one for each reference. hands: the one to point with, by reference; where it is left to the body, two
-    points count as of the same arm. before: what the turn's earlier fragments still have to do.
+    choices: one for each reference. hands: the one to point with, by reference; where none is given, two points count
+    as made with the same arm. before: what the turn's earlier fragments still have to do.
     """
     return _Emitter(fragment, turn, choices, config, permits, hands or {}, before).emit()
 
 
 class _Emitter:
+    """One emission under way: the behaviors and constraints of the block so far."""
+
     def __init__(
         self,
         fragment: TurnFragment,
@@ -114,7 +116,7 @@ class _Emitter:
         )
         self.constraints: list[Constraint] = []
         self.last_gaze = self.last_glance = ""
-        """The one before the end-of-turn gaze, if it may be told when to relax; and the last glance."""
+        """Ids of the gaze before the end-of-turn gaze, if its timing leaves `relax` free, and of the last glance."""
         self.strokes: list[Stroke] = []
 
     def emit(self) -> Emission:
@@ -158,12 +160,13 @@ class _Emitter:
             return msgspec.structs.replace(behavior, timing=timing, mode=self.permits.only_hand)
         return msgspec.structs.replace(behavior, timing=timing) if timing != behavior.timing else behavior
 
-    # -- what the turn is still at ---------------------------------------------------------------------------------
+    # -- after the turn's earlier fragments -----------------------------------------------------------------------
 
     def _follow_the_turn(self) -> None:
-        """Nothing of the fragment begins before the words before it have ended, nor a stroke before its limb is free.
+        """Let everything begin after the turn's words so far, and each stroke only when its limb is free.
 
-        What nobody mentions follows the one before it of its type; naming it would let it go at once.
+        A behavior that the input does not name is left out, unless it is the first of its type: the realizer has it
+        follow the one before it of its type, but only as long as nothing names it.
         """
         operators: list[Operator] = []
         free: list[str] = []
@@ -235,7 +238,7 @@ class _Emitter:
         return same(f"{parts.gaze}:relax", f"{parts.glance}:start")
 
     def _is_said(self, operator: Operator, inherited: Sequence[Operator]) -> bool:
-        """Does the input, or the reference's own timing, ask for this order already?"""
+        """True if the input, or the reference's own timing, asks for this order already."""
         said = [*inherited, *(each for constraint in self.constraints for each in constraint.operators)]
         return isinstance(operator, After) and any(
             {operator.ref, *operator.syncs} <= {each.ref, *each.syncs}
@@ -244,8 +247,11 @@ class _Emitter:
         )
 
     def _keep_in_line(self, speech: Speech, preceding: str) -> None:
-        """Speeches whose start nobody times follow one another by document order. The realizer has them do so only
-        while nothing names them, but we do, and so does an author who ties something to a word."""
+        """Let a speech without a timed start begin after the words before it in the document.
+
+        The realizer does so only for speeches that nothing names. This block names them, and so does an author who
+        ties something to a word.
+        """
         if preceding and preceding != self.before.speech and (speech.id, "start") not in self.named:
             start = f"{speech.id}:start"
             is_free = speech.id not in self.named_behaviors
@@ -255,7 +261,7 @@ class _Emitter:
             self.constraints.append(Constraint(id=id, operators=(operator,), line=speech.line))
 
     def _last_reference(self) -> str:
-        """The reference whose gaze lasts until the end-of-turn gaze, if there is one."""
+        """Id of the reference with the gaze that lasts until the end-of-turn gaze; "": there is none."""
         if not self._ends_with_gaze or not self.parts:
             return ""
         return next(behavior.id for behavior in reversed(self.order) if isinstance(behavior, Reference))
@@ -267,7 +273,7 @@ class _Emitter:
         return self.turn.closes and self.permits.looks
 
     def _opening(self) -> list[BlockBehavior]:
-        """What begins with the first speech, or with the block if there is none."""
+        """The turn's event or signal that begins with the first speech, or with the block if there is none."""
         turn = self.turn
         timing = (Timing("start", f"{self.speeches[0]}:start"),) if self.speeches else ()
         if turn.announces_pair:
@@ -298,7 +304,7 @@ class _Emitter:
         return []
 
     def _closing(self) -> list[BlockBehavior]:
-        """End of the turn: facial gaze with an optional mutual facial gaze, and the clock of the pair."""
+        """Behaviors that end the turn: facial gaze, an optional mutual facial gaze, and the signal to recognition."""
         turn = self.turn
         if not turn.closes:
             return []
@@ -340,7 +346,7 @@ class _Emitter:
         return closing
 
     def _wordless_at_the_end(self) -> Sequence[str]:
-        """Ends of references made after the last words, by a gesture alone: the turn is not over before."""
+        """Last sync points of the references that follow all words, by a gesture alone: the turn ends after them."""
         ends: list[str] = []
         for behavior in reversed(self.order):
             if isinstance(behavior, Speech):
@@ -353,7 +359,7 @@ class _Emitter:
         return ends
 
     def _once_all_is_done(self, sync: str) -> list[Operator]:
-        """After the last words of the turn, and all that ends by itself; a gaze or a face lasts until that has."""
+        """Operators that put `sync` after the turn's last words and after all behaviors that end by themselves."""
         ends = [self.before.start] if self.before.start else []
         ends += [f"{behavior.id}:end" for behavior in self._in_document_order() if _ends_by_itself(behavior)]
         return [after(end, sync) for end in ends]
