@@ -14,14 +14,7 @@ from engage_hri.schemas.presence import PeerAlive, PeerGone
 from engage_hri.schemas.status import BusHealth
 from engage_hri.schemas.units import Seconds, Stamp
 from engage_hri.services.bus import journal
-from engage_hri.services.bus.interface import (
-    Answer,
-    Bus,
-    Hub,
-    Keep,
-    Received,
-    Subscription,
-)
+from engage_hri.services.bus.interface import Answer, Bus, Hub, Keep, Received, Subscription
 from engage_hri.services.bus.payloads import LOCAL, read_payload, unreadable
 
 
@@ -123,7 +116,7 @@ class MemoryHub(Hub):
         return (one in self._cut) != (other in self._cut)
 
     def replay(self, name: str, subscription: Subscription) -> int:
-        """Offer the participants that are there to a late subscriber, then the past in order; returns its last number."""
+        """Offer a late subscriber the participants, then the past in order; returns the number of the last message."""
         now = self._loop.time()
         for bus in self._buses.values():
             if bus.is_alive and subscription.wants(key := keys.alive(bus.name)):

@@ -27,12 +27,7 @@ class EventStream:
     """
 
     def __init__(
-        self,
-        began: Seconds,
-        stamp: Callable[[Seconds], Stamp],
-        *,
-        kinds: Collection[str] = (),
-        opening: bool = True,
+        self, began: Seconds, stamp: Callable[[Seconds], Stamp], *, kinds: Collection[str] = (), opening: bool = True
     ) -> None:
         self.open: dict[str, ConnectionEvent] = {}
         self.deadline: Seconds | None = None

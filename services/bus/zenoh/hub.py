@@ -41,11 +41,7 @@ QUIET: Seconds = 0.25
 
 
 async def open_hub(
-    robot: str,
-    *,
-    connect: Sequence[str] = (),
-    listen: Sequence[str] = (),
-    rendezvous: str | None = RENDEZVOUS,
+    robot: str, *, connect: Sequence[str] = (), listen: Sequence[str] = (), rendezvous: str | None = RENDEZVOUS
 ) -> "ZenohHub":
     """Join the bus of `robot`. Processes may start in any order: this waits for others for `OPENING` at most.
 

@@ -36,13 +36,7 @@ class Peers:
     number of times that a peer has come or gone.
     """
 
-    def __init__(
-        self,
-        session: zenoh.Session,
-        bridge: LoopBridge,
-        sent: SentLog,
-        clocks: Clocks,
-    ) -> None:
+    def __init__(self, session: zenoh.Session, bridge: LoopBridge, sent: SentLog, clocks: Clocks) -> None:
         self.processes: set[str] = set()
         self.names: dict[str, set[str]] = {}
         self.changes = 0

@@ -33,11 +33,7 @@ STREAM_CROWD = 1024
 
 CAUSAL = zenoh.Priority.DATA
 """Priority of all ordered messages: Zenoh does not keep the order of messages with different ones."""
-QOS: dict[str, Any] = {
-    "congestion_control": zenoh.CongestionControl.BLOCK,
-    "priority": CAUSAL,
-    "express": True,
-}
+QOS: dict[str, Any] = {"congestion_control": zenoh.CongestionControl.BLOCK, "priority": CAUSAL, "express": True}
 STREAM_QOS: dict[str, Any] = {
     "congestion_control": zenoh.CongestionControl.DROP,
     "priority": zenoh.Priority.DATA_LOW,

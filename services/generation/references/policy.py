@@ -277,10 +277,7 @@ def _candidates(
 
 
 def _cheapest_way(
-    references: Sequence[Reference],
-    tables: Sequence[tuple[Pair, ...]],
-    motions: Motions,
-    config: GenerationConfig,
+    references: Sequence[Reference], tables: Sequence[tuple[Pair, ...]], motions: Motions, config: GenerationConfig
 ) -> _Way:
     """The sequence of pairs with the least total cost, each from the posture before it (decision B11).
 
