@@ -180,24 +180,27 @@ class Bus(ABC):
     log: the log of what happens here (`services/bus/journal.py`).
     """
 
-    robot: str
-    name: str
-    role: str
-    clock: str
-    run: str
-    failures: int = 0
-    log: logging.Logger
-    _life_numbers: Iterator[int]
-    """Numbers that no former participant of this name in this run has used."""
+    def __init__(self, robot: str, name: str, role: str, clock: str, run: str, life_numbers: Iterator[int]) -> None:
+        """life_numbers: numbers that no former participant of this name in this run has used."""
+        self.robot = robot
+        self.name = name
+        self.role = role
+        self.clock = clock
+        self.run = run
+        self.failures = 0
+        self.log = journal.logger(name, role)
+        self._life_numbers = life_numbers
+        self._loop = asyncio.get_running_loop()
+        self._gone = False
 
     @property
     @abstractmethod
     def health(self) -> BusHealth:
         """Figures of the connection: peers, and messages passed, dropped and lost."""
 
-    @abstractmethod
     def now(self) -> Seconds:
         """Return the loop time."""
+        return self._loop.time()
 
     def stamp(self, at: Seconds | None = None) -> Stamp:
         """Make a stamp of `at`, or of now, on this clock."""

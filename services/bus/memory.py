@@ -116,7 +116,7 @@ class MemoryHub(Hub):
         return (one in self._cut) != (other in self._cut)
 
     def replay(self, name: str, subscription: Subscription) -> int:
-        """Offer a late subscriber the participants, then the past in order; returns the number of the last message."""
+        """Offer a late subscriber the participants, then the past in order; returns its last number."""
         now = self._loop.time()
         for bus in self._buses.values():
             if bus.is_alive and subscription.wants(key := keys.alive(bus.name)):
@@ -166,31 +166,22 @@ class MemoryHub(Hub):
 
 
 class MemoryBus(Bus):
-    clock = "loop"
+    """A participant's view of the bus in memory."""
 
     def __init__(self, hub: MemoryHub, name: str, role: str, run: str) -> None:
-        self.robot = hub.robot
-        self.name = name
-        self.role = role
-        self.log = journal.logger(name, role)
-        self.run = run
-        self._life_numbers = count(1)
+        super().__init__(hub.robot, name, role, "loop", run, count(1))
         self.is_alive = False
         self.answers: dict[str, Answer] = {}
         self._hub = hub
-        self._loop = asyncio.get_running_loop()
         self._subscriptions: dict[Subscription, int] = {}
+        """Subscriptions, and the number of the last message that was replayed to each."""
         self._overflowed = 0
-        self._gone = False
 
     @property
     def health(self) -> BusHealth:
         overflowed = self._overflowed + sum(subscription.overflowed for subscription in self._subscriptions)
-        health = BusHealth(peers=self._hub.alive, passed=self._hub.sent, overflowed=overflowed)
-        return msgspec.structs.replace(health, failures=self.failures)
-
-    def now(self) -> Seconds:
-        return self._loop.time()
+        peers, passed = self._hub.alive, self._hub.sent
+        return BusHealth(peers=peers, passed=passed, overflowed=overflowed, failures=self.failures)
 
     def local(self, stamp: Stamp) -> Seconds:
         return stamp.seconds

@@ -22,7 +22,7 @@ from engage_hri.services.generation.config import GenerationConfig
 from engage_hri.services.generation.fragment_check import check_world, checked
 from engage_hri.services.generation.head.arbiter import Arbiter
 from engage_hri.services.generation.head.inhibitions import Leases
-from engage_hri.services.generation.performance import FragmentPerformance, GazesOfFragments
+from engage_hri.services.generation.performance import Ended, FragmentPerformance, GazesOfFragments
 from engage_hri.services.generation.pipeline import glance, plan, targets
 from engage_hri.services.generation.references.discourse import NO_DISCOURSE, Discourse
 from engage_hri.services.generation.turns.continuation import NO_CONTINUATION, Continuation
@@ -315,7 +315,8 @@ class FragmentRunner:
             if performance.plan is not None:
                 self._requests.cancel(performance.block_id, reason)
             else:
-                performance.end(now, "interrupted", fault=Fault(reason=reason, where=performance.fragment.id))
+                fault = Fault(reason=reason, where=performance.fragment.id)
+                performance.end(Ended(now, "interrupted", fault=fault))
 
     def _abort(self, aborted: Aborted | None, now: Seconds) -> None:
         """End the fragments of a turn that has ended early, and tell recognition of it. None: no turn has."""

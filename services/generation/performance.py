@@ -22,8 +22,8 @@ from engage_hri.schemas.feedback import SyncPointProgress
 from engage_hri.schemas.fragments import FragmentOutcome, PerformFragment, ReferenceChoice, TurnFragment
 from engage_hri.schemas.speakable import has_words
 from engage_hri.schemas.units import Seconds
+from engage_hri.services.generation.block.emission import FragmentPlan
 from engage_hri.services.generation.permits import Permits
-from engage_hri.services.generation.pipeline import FragmentPlan
 from engage_hri.services.generation.references.policy import Unreferable
 from engage_hri.services.generation.turns.continuation import NO_CONTINUATION, Continuation
 from engage_hri.services.generation.turns.events import TurnEvents
@@ -154,30 +154,22 @@ class FragmentPerformance:
                 ids.append(behavior.id)
         return tuple(ids)
 
-    def end(
-        self,
-        at: Seconds,
-        status: str,
-        *,
-        spoken: tuple[SpokenText, ...] = (),
-        replaced_by: str = "",
-        fault: Fault | None = None,
-    ) -> None:
+    def end(self, ended: Ended) -> None:
         """Note that the block has ended, or that there will be none. Only the first call counts."""
         if self._ended is None:
-            self._ended = Ended(at, status, spoken, replaced_by, fault)
+            self._ended = ended
             self._running.clear()
 
     def fail(self, error: EngageError, at: Seconds) -> None:
         """Note that no block could be made or sent, or that it went wrong."""
         if isinstance(error, Unreferable):
             self._considered = error.choices
-        self.end(at, "failed", fault=error.fault)
+        self.end(Ended(at, "failed", fault=error.fault))
 
     def refuse(self, fault: Fault, at: Seconds) -> None:
         """Note that the realizer refused the block. A fragment that had been accepted already has failed."""
         self.refusal = None if self.accepted else fault
-        self.end(at, "failed", fault=fault)
+        self.end(Ended(at, "failed", fault=fault))
 
     def end_with(self, outcome: BlockOutcome, at: Seconds) -> None:
         """Take the outcome of the block. A fragment with words of which none was spoken has failed."""
@@ -188,7 +180,7 @@ class FragmentPerformance:
         status, fault = outcome.status, outcome.fault
         if status == "done" and (silence := self._silence(outcome, why)) is not None:
             status, fault = "failed", silence
-        self.end(at, status, spoken=outcome.spoken, replaced_by=outcome.replaced_by, fault=fault)
+        self.end(Ended(at, status, outcome.spoken, outcome.replaced_by, fault))
 
     def _silence(self, outcome: BlockOutcome, why: Mapping[str, str]) -> Fault | None:
         """Fault that names the dropped speeches of a fragment of which no word was spoken; None: there are none."""

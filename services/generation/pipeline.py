@@ -2,16 +2,14 @@
 
 from collections.abc import Sequence
 
-from msgspec import Struct
+from msgspec.structs import replace
 
 from engage_hri.schemas.behaviors import Reference
-from engage_hri.schemas.blocks import Block
 from engage_hri.schemas.body import Capabilities
-from engage_hri.schemas.fragments import ReferenceChoice, TurnFragment
+from engage_hri.schemas.fragments import TurnFragment
 from engage_hri.schemas.world import World
-from engage_hri.services.generation.block.emission import emit
+from engage_hri.services.generation.block.emission import Emission, FragmentPlan
 from engage_hri.services.generation.block.ordering import ordered
-from engage_hri.services.generation.block.parts import Mention
 from engage_hri.services.generation.config import GenerationConfig
 from engage_hri.services.generation.permits import Permits
 from engage_hri.services.generation.references.discourse import NO_DISCOURSE, Discourse
@@ -20,19 +18,6 @@ from engage_hri.services.generation.references.phrases import proposed
 from engage_hri.services.generation.references.policy import Choices, ReferenceScene, choose
 from engage_hri.services.generation.turns.continuation import NO_CONTINUATION, Continuation
 from engage_hri.services.generation.turns.policy import TurnPlan, vain_delay
-
-
-class FragmentPlan(Struct, frozen=True, kw_only=True):
-    """The block of a fragment and what is known of it before it is sent.
-
-    continuation: for the turn's next fragment. mentions: when each object has been referred to.
-    """
-
-    block: Block
-    continuation: Continuation = NO_CONTINUATION
-    mentions: tuple[Mention, ...] = ()
-    choices: tuple[ReferenceChoice, ...] = ()
-    warnings: tuple[str, ...] = ()
 
 
 def references(fragment: TurnFragment) -> tuple[Reference, ...]:
@@ -71,15 +56,8 @@ def plan(
     made = proposed(references(fragment), world, config, discourse)
     if made.references:
         chosen = choose(made.references, _scene(world, body, permits, config), motions, config)
-    emission = emit(fragment, turn, chosen.choices, config, permits, chosen.hands, before)
-    warnings = (*vain_delay(fragment), *made.warnings, *chosen.warnings, *emission.warnings)
-    return FragmentPlan(
-        block=emission.block,
-        continuation=emission.continuation,
-        mentions=emission.mentions,
-        choices=chosen.choices,
-        warnings=warnings,
-    )
+    emitted = Emission(fragment, turn, chosen.choices, config, permits, chosen.hands, before).plan()
+    return replace(emitted, warnings=(*vain_delay(fragment), *made.warnings, *chosen.warnings, *emitted.warnings))
 
 
 def _scene(world: World, body: Capabilities | None, permits: Permits, config: GenerationConfig) -> ReferenceScene:

@@ -19,7 +19,6 @@ from engage_hri.schemas.faults import EngageError, Fault, InputRefused, NoReply
 from engage_hri.schemas.messages import Message, decode, encode, encoding_of, published
 from engage_hri.schemas.status import BusHealth
 from engage_hri.schemas.units import Seconds, Stamp
-from engage_hri.services.bus import journal
 from engage_hri.services.bus.interface import LOG, Answer, Bus, Hub, Keep, Received, Subscription
 from engage_hri.services.bus.zenoh.clocks import Clocks
 from engage_hri.services.bus.zenoh.foreign_clients import ForeignClients, form_asked, in_form, refuse
@@ -57,6 +56,8 @@ async def open_hub(
 
 
 class ZenohHub(Hub):
+    """The hub of a process on a Zenoh session."""
+
     def __init__(self, robot: str, session: zenoh.Session) -> None:
         self.robot = robot
         self.run = str(session.zid())
@@ -165,21 +166,15 @@ class ZenohHub(Hub):
 
 
 class ZenohBus(Bus):
+    """A participant's view of the bus over Zenoh."""
+
     def __init__(self, hub: ZenohHub, name: str, role: str) -> None:
-        self.robot = hub.robot
-        self.name = name
-        self.role = role
-        self.log = journal.logger(name, role)
-        self._life_numbers = hub.life_numbers
-        self.clock = hub.clocks.own
-        self.run = hub.run
+        super().__init__(hub.robot, name, role, hub.clocks.own, hub.run, hub.life_numbers)
         self._hub = hub
-        self._loop = asyncio.get_running_loop()
         self._subscriptions: list[Subscription] = []
         self._answers: list[Any] = []
         self._overflowed = 0
         self._token: Any = None
-        self._gone = False
 
     @property
     def health(self) -> BusHealth:
@@ -188,9 +183,6 @@ class ZenohBus(Bus):
         return msgspec.structs.replace(
             self._hub.health, overflowed=overflowed, gaps=gaps, lost=lost, failures=self.failures
         )
-
-    def now(self) -> Seconds:
-        return self._loop.time()
 
     def local(self, stamp: Stamp) -> Seconds:
         return self._hub.clocks.local(stamp)

@@ -12,10 +12,12 @@ from msgspec import Struct
 
 from engage_hri.schemas.behavior_types import TYPES
 from engage_hri.schemas.behaviors import (
+    Action,
     After,
     BlockBehavior,
     Constraint,
     Event,
+    EventKind,
     Gaze,
     Hand,
     Head,
@@ -40,34 +42,25 @@ from engage_hri.services.generation.turns.continuation import NO_CONTINUATION, C
 from engage_hri.services.generation.turns.policy import TurnPlan
 
 
-class Emission(Struct, frozen=True):
-    """The block of a fragment. continuation: for the turn's next fragment. warnings: what was left out, and why."""
+class FragmentPlan(Struct, frozen=True, kw_only=True):
+    """The block of a fragment and what is known of it before it is sent.
+
+    continuation: for the turn's next fragment. mentions: when each object has been referred to.
+    """
 
     block: Block
-    continuation: Continuation
-    mentions: tuple[Mention, ...]
-    warnings: tuple[str, ...]
+    continuation: Continuation = NO_CONTINUATION
+    mentions: tuple[Mention, ...] = ()
+    choices: tuple[ReferenceChoice, ...] = ()
+    warnings: tuple[str, ...] = ()
 
 
-def emit(
-    fragment: TurnFragment,
-    turn: TurnPlan,
-    choices: Sequence[ReferenceChoice],
-    config: GenerationConfig,
-    permits: Permits,
-    hands: Mapping[str, Hand] | None = None,
-    before: Continuation = NO_CONTINUATION,
-) -> Emission:
-    """Make the block that performs `fragment`.
+class Emission:
+    """The making of the block that performs a fragment: its behaviors and constraints so far.
 
     choices: one for each reference. hands: the one to point with, by reference; where none is given, two points count
     as made with the same arm. before: what the turn's earlier fragments still have to do.
     """
-    return _Emitter(fragment, turn, choices, config, permits, hands or {}, before).emit()
-
-
-class _Emitter:
-    """One emission under way: the behaviors and constraints of the block so far."""
 
     def __init__(
         self,
@@ -77,10 +70,10 @@ class _Emitter:
         config: GenerationConfig,
         permits: Permits,
         hands: Mapping[str, Hand],
-        before: Continuation,
+        before: Continuation = NO_CONTINUATION,
     ) -> None:
         self.fragment, self.turn, self.config, self.permits, self.hands = fragment, turn, config, permits, hands
-        self.before = before
+        self.choices, self.before = choices, before
         self.names = FreshIds(fragment)
         self.figure = config.profile == "figure-3.3"
         self.dropped = [behavior for behavior in fragment.behaviors if not permits.allows(behavior)]
@@ -119,7 +112,8 @@ class _Emitter:
         """Ids of the gaze before the end-of-turn gaze, if its timing leaves `relax` free, and of the last glance."""
         self.strokes: list[Stroke] = []
 
-    def emit(self) -> Emission:
+    def plan(self) -> FragmentPlan:
+        """Make the block; called once."""
         for constraint in self.fragment.constraints:
             if (rewritten := self.rewriting.constraint(constraint)) is not None:
                 self.constraints.append(rewritten)
@@ -127,13 +121,20 @@ class _Emitter:
         self._time_speeches_and_references()
         opening, closing = self._opening(), self._closing()
         behaviors = (*opening, *self._in_document_order(), *closing)
-        block = Block(
-            id=self.fragment.id, behaviors=behaviors, constraints=tuple(self.constraints), unread=self.fragment.unread
+        return FragmentPlan(
+            block=Block(
+                id=self.fragment.id,
+                behaviors=behaviors,
+                constraints=tuple(self.constraints),
+                unread=self.fragment.unread,
+            ),
+            continuation=Continuation(
+                self.speeches[-1] if self.speeches else "", self.last_glance, tuple(self.strokes)
+            ),
+            mentions=tuple(parts.mention for parts in self.parts.values()),
+            choices=tuple(self.choices),
+            warnings=tuple(f"{behavior.id} is left out: inhibited" for behavior in self.dropped),
         )
-        continuation = Continuation(self.speeches[-1] if self.speeches else "", self.last_glance, tuple(self.strokes))
-        mentions = tuple(parts.mention for parts in self.parts.values())
-        left_out = tuple(f"{behavior.id} is left out: inhibited" for behavior in self.dropped)
-        return Emission(block, continuation, mentions, left_out)
 
     def _speeches(self) -> list[str]:
         """Ids of plain speeches and phrases, in order."""
@@ -272,35 +273,30 @@ class _Emitter:
     def _ends_with_gaze(self) -> bool:
         return self.turn.closes and self.permits.looks
 
+    def _event(
+        self, id: str, kind: EventKind, start: str, *, accept: tuple[Action, ...] = (), optional: bool = False
+    ) -> Event:
+        """An event of the turn. start: the sync point with which it begins; "": it begins with the block."""
+        return Event(
+            id=self.names.fresh(id), kind=kind, responder=self.turn.addressee, cause="turn", turn=self.turn.turn,
+            timing=(Timing("start", start),) if start else (), accept=accept, optional=optional,
+        )  # fmt: skip
+
     def _opening(self) -> list[BlockBehavior]:
         """The turn's event or signal that begins with the first speech, or with the block if there is none."""
         turn = self.turn
-        timing = (Timing("start", f"{self.speeches[0]}:start"),) if self.speeches else ()
+        start = f"{self.speeches[0]}:start" if self.speeches else ""
         if turn.announces_pair:
-            return [
-                Event(
-                    id=self.names.fresh("turn-pair"),
-                    kind="adjacency_pair",
-                    responder=turn.addressee,
-                    cause="turn",
-                    accept=turn.accept,
-                    turn=turn.turn,
-                    timing=timing,
-                )
-            ]
+            return [self._event("turn-pair", "adjacency_pair", start, accept=turn.accept)]
         if turn.reply:
             id = self.names.fresh(f"turn-{turn.reply}")
+            timing = (Timing("start", start),) if start else ()
             return [TurnSignal(id=id, turn=turn.turn, signal=turn.reply, actor=turn.addressee, timing=timing)]
         if turn.backchannel:
             nod = next((behavior.id for behavior in self.order if isinstance(behavior, Head)), "")
-            if not timing and nod and not self.permits.speech_only:
-                timing = (Timing("start", f"{nod}:start"),)
-            id = self.names.fresh("backchannel")
-            return [
-                Event(
-                    id=id, kind="backchannel", responder=turn.addressee, cause="turn", turn=turn.turn, timing=timing
-                )
-            ]
+            if not start and nod and not self.permits.speech_only:
+                start = f"{nod}:start"
+            return [self._event("backchannel", "backchannel", start)]
         return []
 
     def _closing(self) -> list[BlockBehavior]:
@@ -316,17 +312,7 @@ class _Emitter:
         if self._ends_with_gaze:
             gaze = self.names.fresh("turn-gaze")
             closing.append(Gaze(id=gaze, target=turn.addressee))
-            closing.append(
-                Event(
-                    id=self.names.fresh("turn-gaze-event"),
-                    kind="mutual_facial_gaze",
-                    responder=turn.addressee,
-                    cause="turn",
-                    optional=True,
-                    turn=turn.turn,
-                    timing=(Timing("start", f"{gaze}:start"),),
-                )
-            )
+            closing.append(self._event("turn-gaze-event", "mutual_facial_gaze", f"{gaze}:start", optional=True))
             if wordless:
                 operators += [after(end, f"{gaze}:start") for end in (f"{self.speeches[-1]}:end", *wordless)]
             elif self.speeches:
