@@ -16,7 +16,7 @@ from engage_hri.schemas.fragments import TurnFragment
 from engage_hri.schemas.messages import Message
 from engage_hri.schemas.presence import PeerGone
 from engage_hri.services.bus.memory import MemoryHub
-from engage_hri.services.client.ended import PerformFailed
+from engage_hri.services.client.results import PerformFailed
 from engage_hri.services.client.robot import Robot, connect
 from engage_hri.services.commandline import roster
 from engage_hri.services.commandline.config import load
@@ -39,7 +39,7 @@ def breaking(attribute: str) -> Callable[..., Any]:
 @pytest.mark.parametrize(
     ("place", "what"),
     [
-        ("engage_hri.services.generation.fragment_runner.Conductor.admit", "perform"),
+        ("engage_hri.services.generation.fragment_runner.FragmentRunner.admit", "perform"),
         ("engage_hri.services.generation.pipeline.plan", "perform"),
         ("engage_hri.services.generation.fragment_runner.plan", "perform"),
         ("engage_hri.services.realizer.service.plan_steps", "realize"),

@@ -37,13 +37,13 @@ def logger(name: str, role: str) -> logging.Logger:
 
 
 def entry(message: Message) -> Entry:
-    """The line for a message that is published."""
+    """Return the line for a message that is published."""
     tell = _TOLD.get(type(message))
     return tell(message) if tell else _any(message)
 
 
 def presence(message: PeerAlive | PeerGone) -> Entry:
-    """The line for a participant that has come or gone."""
+    """Return the line for a participant that has come or gone."""
     if isinstance(message, PeerGone):
         return INFO, f"peer {message.participant}: gone"
     return INFO, f"peer {message.participant}: here, life {message.run or 'unknown'}"

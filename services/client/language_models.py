@@ -23,7 +23,7 @@ from engage_hri.schemas.tool import Part, ToolInput
 from engage_hri.schemas.tool_call import fragment_of
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.client.chunking import Chunk, Chunker
-from engage_hri.services.client.ended import PerformFailed
+from engage_hri.services.client.results import PerformFailed
 from engage_hri.services.client.robot import Robot
 
 Piece = str | Part

@@ -37,10 +37,10 @@ from engage_hri.schemas.requests import Outcome, Request
 from engage_hri.schemas.units import Seconds, Stamp
 from engage_hri.schemas.world import Entity, World
 from engage_hri.services.bus.interface import Bus, Hub, Keep
-from engage_hri.services.client.ended import answered, unless_failed
 from engage_hri.services.client.event_stream import EventStream
 from engage_hri.services.client.feeds import EventFeed, Feed
-from engage_hri.services.client.given import FragmentSource, checked, fragment_in
+from engage_hri.services.client.inputs import FragmentSource, checked, fragment_in
+from engage_hri.services.client.results import in_time, successful
 from engage_hri.services.requests.ends import Pending, Requester, RequestRefused
 
 ANSWER_PATIENCE = 20.0
@@ -104,9 +104,9 @@ class Robot:
         """
         parsed = fragment_in(fragment, f"{self._bus.name}-{self._life}-{next(self._numbers)}")
         request = self._fragment_request(parsed)
-        answered = await_answer and parsed.turn_status in ("end", "full")
-        outcome = await (self._answered(request, timeout) if answered else self._performed(request, timeout))
-        return unless_failed(outcome, parsed.id)
+        awaits_answer = await_answer and parsed.turn_status in ("end", "full")
+        outcome = await (self._answered(request, timeout) if awaits_answer else self._performed(request, timeout))
+        return successful(outcome, parsed.id)
 
     def begin_to_perform(self, fragment: TurnFragment) -> None:
         """Send a fragment and do not wait for what becomes of it.
@@ -166,7 +166,7 @@ class Robot:
         request = PerformBlock(id=self._request_id(block.id), block=block)
         outcome = await self._ask(keys.BLOCK, request, timeout)
         assert isinstance(outcome, BlockOutcome)
-        return unless_failed(outcome, block.id)
+        return successful(outcome, block.id)
 
     async def interrupt(self, block: str, behavior: str, *, timeout: Seconds | None = None) -> BehaviorInterrupted:
         """End one behavior of a live block, which goes on without it; returns when it has ended, with what was said.
@@ -300,7 +300,7 @@ class Robot:
             NoReply: no world within `timeout`.
         """
         with self.worlds() as worlds:
-            return answered(await worlds.next(timeout), "world", timeout)
+            return in_time(await worlds.next(timeout), "world", timeout)
 
     async def person(self, timeout: Seconds | None = None) -> Entity:
         """Return the person who is there, or the first to come.
@@ -314,7 +314,7 @@ class Robot:
         with self.worlds() as worlds:
             while True:
                 left = None if deadline is None else max(0.0, deadline - self.now())
-                world = answered(await worlds.next(left), "person in the world", timeout)
+                world = in_time(await worlds.next(left), "person in the world", timeout)
                 if world.people:
                     return world.people[0]
 
@@ -339,7 +339,7 @@ class Robot:
             ValueError: a name that can be no person.
         """
         with self.statistics_updates(actor) as feed:
-            return answered(await feed.next(timeout), f"statistics of {actor}", timeout)
+            return in_time(await feed.next(timeout), f"statistics of {actor}", timeout)
 
     def _feed(self, kinds: tuple[type, ...], *patterns: str, keep: Keep = Keep.EVERY) -> Feed[Any]:
         self._requests.check()

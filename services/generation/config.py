@@ -27,27 +27,28 @@ class GenerationConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=
     channel: Channel = "sum"
     """Sum of gesture and phrase: r(j) + r(s) < 1 (thesis 3.3.2), or 1 - (1 - r(j))(1 - r(s)) (decision B1)."""
     phrase_reliability: Probability = 0.70
-    """rs, in (0, 1): of a spoken phrase. This and the next three: what gives the gestures of Appendix B."""
+    """Reliability rs of a spoken phrase, in (0, 1). This and the next three give the gestures of Appendix B."""
     gaze_reliability: Probability = 0.10
-    """rG, in (0, rDG): of a look."""
+    """Reliability rG of a look, in (0, rDG)."""
     directed_gaze_reliability: Probability = 0.20
-    """rDG, in (rG, rDGP): of a look that waits for the other's."""
+    """Reliability rDG of a look that waits for the other's, in (rG, rDGP)."""
     pointing_reliability: Probability = 0.28
-    """rDGP, in (rDG, 1): of a directed gaze with pointing."""
+    """Reliability rDGP of a directed gaze with pointing, in (rDG, 1)."""
     minimum_reliability: Probability = 0.85
-    """Rmin, in (0, 1): of references that come without one, as a language model's do. Appendix B's of landmarks."""
+    """Least reliability Rmin, in (0, 1), for references that come without one, as a language model's do. That of
+    landmarks in Appendix B."""
 
     # Cost, thesis 3.3.2, in seconds (decision B6).
     seconds_per_head_degree: float = 1 / 100
-    """kg, s/degree: 1 / head speed. Cost is in seconds: decision B6."""
+    """Cost kg of turning the head, in s/degree: 1 / head speed. Cost is in seconds: decision B6."""
     seconds_per_arm_degree: float = 1 / 60
-    """kp, s/degree: 1 / arm speed. Decision B6."""
+    """Cost kp of moving an arm, in s/degree: 1 / arm speed. Decision B6."""
     seconds_per_word: float = 0.35
-    """ks, s per unit of a phrase's cost: about one word. Decision B6."""
+    """Cost ks of speaking, in s per unit of a phrase's cost, which is about one word. Decision B6."""
     wait_weight: float = 1.0
-    """kw, s/s: what a second of waiting for shared gaze costs. Decision B7."""
+    """Cost kw of a second of waiting for shared gaze, in s/s. Decision B7."""
     expected_delay: Seconds = 0.3
-    """E[delay] of directed gaze: the mean of Table 2.1 (decision B7)."""
+    """Expected delay of directed gaze, E[delay]: the mean of Table 2.1 (decision B7)."""
 
     gaze_half_angle: Radians | None = None
     """Half the angle of the robot's gaze cone as people perceive it, < pi/2. None: the body's own. Thesis 3.3.2."""
@@ -83,7 +84,7 @@ class GenerationConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=
     dwell: Seconds = 0.3
     """Seconds that the head stays after its owner let go, before a lower claim gets it. Ours."""
     glance_factor: float = 1.0
-    """k, a factor: a glance is due after k times the mean time between connection events. Thesis 3.3.4 has 1."""
+    """Factor k: a glance is due after k times the mean time between connection events. Thesis 3.3.4 has 1."""
     mtbce_prior: Seconds = 5.7
     """The mean until `mtbce_events` connection events were seen. Table 2.1."""
     mtbce_low: Seconds = 3.0

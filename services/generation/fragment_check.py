@@ -56,7 +56,7 @@ def _checked(fragment: TurnFragment, world: World, robot: str, longest: int) -> 
     for index, behavior in enumerate(fragment.behaviors):
         if isinstance(behavior, Reference):
             _check_timing(fragment, index, behavior)
-    return replace(fragment, addressee=addressee(fragment, world), delay_target=_away(fragment, world))
+    return replace(fragment, addressee=addressee(fragment, world), delay_target=_delay_target(fragment, world))
 
 
 def _check_targets(fragment: TurnFragment, world: World, robot: str) -> None:
@@ -95,7 +95,7 @@ def addressee(fragment: TurnFragment, world: World) -> str:
     return people[0]
 
 
-def _away(fragment: TurnFragment, world: World) -> str:
+def _delay_target(fragment: TurnFragment, world: World) -> str:
     """The entity to look at while the fragment holds the turn: the one it names, else the first surface.
 
     Empty if it does not hold the turn, or the world has no surface.

@@ -182,7 +182,7 @@ class FragmentRunner:
                 self._outcomes.end(outcome, performance.turn, now)
                 self._desk.end(outcome)
         going = {each.turn.turn for each in self._live.values()} | {self._turns.open_turn}
-        for closed in self._outcomes.closed(going, now):
+        for closed in self._outcomes.close_due(going, now):
             self._bus.publish(keys.TURN_CLOSED, closed)
         self._events.forget({*going, *self._outcomes.turns})
         return refused
@@ -222,8 +222,8 @@ class FragmentRunner:
         permits = self._leases.permits
         try:
             while True:
-                company = [each for each in self._live.values() if each.goes_on_with(performance)]
-                moving = [behavior for each in company for behavior in each.moving]
+                followed = [each for each in self._live.values() if each.goes_on_with(performance)]
+                moving = [behavior for each in followed for behavior in each.moving]
                 glanced = glance(fragment, turn, self._config)
                 motions = await self._body.motions(targets(fragment), permits().only_hand, moving, glanced)
                 if performance.is_over:  # cancelled meanwhile
@@ -233,14 +233,14 @@ class FragmentRunner:
                 body = self._body.capabilities
                 if body is not None:
                     self._arbiter.gaze_perceived_within(body.gaze_half_angle)
-                before = reduce(Continuation.then, (each.continuation for each in company), NO_CONTINUATION)
+                before = reduce(Continuation.then, (each.continuation for each in followed), NO_CONTINUATION)
                 heard = self._heard_in(turn)
                 made = plan(fragment, turn, self._world, body, motions, permits(), self._config, before, heard)
                 performance.begin(made)
                 try:
-                    pending = await self._send_block(performance, company)
+                    pending = await self._send_block(performance, followed)
                 except RequestRefused:
-                    if not any(each.is_over for each in company):
+                    if not any(each.is_over for each in followed):
                         raise
                     # The block named others that ended while it was on its way: make it again without those.
                 else:
@@ -263,13 +263,13 @@ class FragmentRunner:
         """The discourse at the start of `turn`. A backchannel is said in the other's turn, and changes nothing."""
         return self._discourse if turn.backchannel else self._discourse.in_turn(turn.turn, turn.addressee)
 
-    async def _send_block(self, performance: FragmentPerformance, company: Iterable[FragmentPerformance]) -> Pending:
-        """Send the block and wait until it is accepted. company: fragments that it follows; if they fail, it does."""
+    async def _send_block(self, performance: FragmentPerformance, followed: Iterable[FragmentPerformance]) -> Pending:
+        """Send the block and wait until it is accepted. followed: fragments without which it fails, too."""
         assert performance.plan is not None
         request = PerformBlock(
             id=performance.block_id,
             block=performance.plan.block,
-            follows=tuple([each.fragment.id for each in company]),
+            follows=tuple([each.fragment.id for each in followed]),
         )
         self._turns.fragment_begins(performance.turn.turn)
         pending = self._requests.send(keys.BLOCK, request)

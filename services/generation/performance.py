@@ -220,14 +220,14 @@ class FragmentPerformance:
             status=status,  # type: ignore[arg-type]
             spoken=self._ended.spoken,
             replaced_by=self._ended.replaced_by,
-            events=events.of(self.turn.turn),
+            events=events.of_turn(self.turn.turn),
             choices=self.plan.choices if self.plan else self._considered,
             warnings=(*self._warnings, *(f"{id} was never decided" for id in undecided)),
             fault=self._ended.fault,
         )
 
     def _decided(self, behavior: str, events: TurnEvents) -> bool:
-        event = events.at(self.fragment.id, behavior)
+        event = events.last_begun_by(self.fragment.id, behavior)
         return behavior in self._closed if event is None else event.state != "started"
 
 

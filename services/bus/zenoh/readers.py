@@ -153,7 +153,7 @@ class Readers:
             reader.subscription.offer(received)
 
     def _decode(self, bus: Bus, written: Written) -> Message | None:
-        """The message, or what its server hears of a bad one, which is counted and complained about."""
+        """Decode a message. A bad one is counted, and told as a fault; returns the notice for its server, if any."""
         try:
             return read_payload(written.payload, written.encoding, written.key, written.envelope.source)
         except EngageError as error:

@@ -34,7 +34,7 @@ from engage_hri.schemas.references import type_name
 from engage_hri.services.generation.block.ordering import ordered
 from engage_hri.services.generation.block.parts import FreshIds, Mention, Parts
 from engage_hri.services.generation.block.profiles import after, as_in_the_figure, checking_back, same
-from engage_hri.services.generation.block.punctuation import joined
+from engage_hri.services.generation.block.punctuation import moved_punctuation
 from engage_hri.services.generation.block.rewriting import Operator, Rewriting, instants, points_named
 from engage_hri.services.generation.config import GenerationConfig
 from engage_hri.services.generation.permits import Permits
@@ -80,7 +80,7 @@ class Emission:
         kept = [behavior for behavior in fragment.behaviors if permits.allows(behavior)]
         order = ordered(kept, fragment.constraints, fragment.id)
         chosen = {choice.reference: choice for choice in choices}
-        punctuation = joined(order, [id for id, choice in chosen.items() if choice.phrase])
+        punctuation = moved_punctuation(order, [id for id, choice in chosen.items() if choice.phrase])
         self.kept = [each for old in kept if (each := punctuation.rest.get(old.id, old)) is not None]
         self.order = [each for old in order if (each := punctuation.rest.get(old.id, old)) is not None]
         self.parts = {

@@ -17,7 +17,7 @@ _IDEOGRAPHIC = "[、。，．；：！？…）］」』】》〉]+"
 _CLOSING = re.compile(rf"\s*({_ALPHABETIC}|{_IDEOGRAPHIC})\s*")
 
 
-class Joined(Struct, frozen=True):
+class MovedPunctuation(Struct, frozen=True):
     """Punctuation that was moved to phrases.
 
     closings: what a reference's phrase ends with, by reference. rest: what is left of a speech, by speech; None:
@@ -29,12 +29,12 @@ class Joined(Struct, frozen=True):
     follows: dict[str, str]
 
 
-def joined(order: Sequence[FragmentBehavior], phrased: Collection[str]) -> Joined:
+def moved_punctuation(order: Sequence[FragmentBehavior], phrased: Collection[str]) -> MovedPunctuation:
     """Find the punctuation to move. order: that of the voice. phrased: references that are made with a phrase.
 
     Speech with prosodic markup is left as it is: its words stand in the text and in the markup.
     """
-    result = Joined({}, {}, {})
+    result = MovedPunctuation({}, {}, {})
     before = ""
     for behavior in order:
         if isinstance(behavior, Reference):

@@ -118,7 +118,7 @@ class HandWatch:
 
 
 class FaceWatch:
-    """Claim 6: the face of the person spoken to last, else of whoever was nearest; lost for long, its direction."""
+    """Claim 6: the face of the person spoken to last, else the nearest one; if all are lost, the last direction."""
 
     def __init__(self, robot: str, config: GenerationConfig) -> None:
         self._robot = robot

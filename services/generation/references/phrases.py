@@ -135,27 +135,28 @@ class _Objects:
 
     def describes(self, id: str) -> bool:
         """True if the world has more of an object than its id: a name, a category or an attribute."""
-        return bool(_names(self._objects[id])) or any(self._said(self._objects[id], each) for each in SPOKEN)
+        return bool(_names(self._objects[id])) or any(self._words(self._objects[id], each) for each in SPOKEN)
 
     def properties(self, id: str, attribute: PhraseAttribute) -> tuple[Property, ...]:
         entity = self._objects[id]
         noun = _noun(entity)
-        return tuple(Property(attribute, word) for word in self._said(entity, attribute) if word != noun)
+        return tuple(Property(attribute, word) for word in self._words(entity, attribute) if word != noun)
 
     def may_be(self, known: Property) -> frozenset[str]:
         """Ids of the objects of which the word holds, or of which the world does not say whether it holds."""
         if known not in self._holders:
-            self._holders[known] = frozenset(id for id, entity in self._objects.items() if self._may(entity, known))
+            ids = (id for id, entity in self._objects.items() if self._may_hold(entity, known))
+            self._holders[known] = frozenset(ids)
         return self._holders[known]
 
-    def _may(self, entity: Entity, known: Property) -> bool:
+    def _may_hold(self, entity: Entity, known: Property) -> bool:
         if known.attribute is None:
             names = _names(entity) or {_noun_in(entity.id)} - {""}
             return not known.word or not names or known.word in names
-        said = self._said(entity, known.attribute)
+        said = self._words(entity, known.attribute)
         return known.word in said or (not said and known.attribute != "feature")
 
-    def _said(self, entity: Entity, attribute: PhraseAttribute) -> tuple[str, ...]:
+    def _words(self, entity: Entity, attribute: PhraseAttribute) -> tuple[str, ...]:
         match attribute:
             case "feature":
                 return entity.features

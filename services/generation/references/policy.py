@@ -142,7 +142,7 @@ def choose(
     """
     warnings: list[str] = []
     for reference in references:
-        warnings += _doubts(reference, scene)
+        warnings += _deictic_warnings(reference, scene)
     tables = [considered(reference, scene, motions, config) for reference in references]
     best = _cheapest_way(references, tables, motions, config)
     choices = tuple(
@@ -152,12 +152,12 @@ def choose(
     hands: dict[str, Hand] = {}
     for reference, table, pair, choice in zip(references, tables, best.pairs, choices, strict=True):
         if pair is None:
-            raise Unreferable(_no_way(reference, table), choices)
+            raise Unreferable(_unreferable(reference, table), choices)
         minimum = _minimum(reference, config)
         if _below(pair.reliability, minimum):
             warnings.append(
                 f"{reference.id}: nothing reaches the minimum reliability {minimum:g}; chose "
-                f"{_name(pair.gesture, pair.option.text)} with R {pair.reliability:.4g}"
+                f"{_pair_name(pair.gesture, pair.option.text)} with R {pair.reliability:.4g}"
             )
         if choice.gesture == "directed_gaze_with_pointing" and (
             hand := hand_of(motions.point(CURRENT_POSE, choice.target))
@@ -166,9 +166,9 @@ def choose(
     return Choices(choices, tuple(warnings), hands)
 
 
-def _no_way(reference: Reference, table: Sequence[Pair]) -> Fault:
+def _unreferable(reference: Reference, table: Sequence[Pair]) -> Fault:
     reasons = dict.fromkeys(
-        f"{_name(pair.gesture, pair.option.text)}: {pair.ruled_out or FROM_NOWHERE}" for pair in table
+        f"{_pair_name(pair.gesture, pair.option.text)}: {pair.ruled_out or FROM_NOWHERE}" for pair in table
     )
     return Fault(reason=f"no way to refer to {reference.target}: {'; '.join(reasons)}", where=reference.id)
 
@@ -369,7 +369,7 @@ def _explain(
     )
 
 
-def _doubts(reference: Reference, scene: ReferenceScene) -> list[str]:
+def _deictic_warnings(reference: Reference, scene: ReferenceScene) -> list[str]:
     """Warnings of deictic phrases with a list of distractors that are not all other objects (decision B8)."""
     universe = scene.universe - {reference.target}
     return [
@@ -388,6 +388,6 @@ def _below(value: Probability, minimum: Probability) -> bool:
     return round(value - minimum, ROUNDING) < 0
 
 
-def _name(gesture: GestureChoice, phrase: str) -> str:
+def _pair_name(gesture: GestureChoice, phrase: str) -> str:
     said = repr(phrase) if phrase else "no phrase"
     return f"{'no gesture' if gesture == 'none' else gesture.replace('_', ' ')} with {said}"

@@ -35,19 +35,19 @@ class TurnEvents:
             if event.state == "started" and event.session != session:
                 self._events[id] = replace(event, state="lost")
 
-    def of(self, turn: str) -> tuple[ConnectionEvent, ...]:
+    def of_turn(self, turn: str) -> tuple[ConnectionEvent, ...]:
         """The events of a turn, by their start."""
         events = [event for event in self._events.values() if self._turn_of[event.block] == turn]
         return tuple(sorted(events, key=lambda event: event.started.seconds))
 
-    def at(self, block: str, behavior: str) -> ConnectionEvent | None:
+    def last_begun_by(self, block: str, behavior: str) -> ConnectionEvent | None:
         """The last event that this behavior of the block has begun, if there is one."""
         mine = (event for event in reversed(self._events.values()) if event.block == block)
         return next((event for event in mine if event.behavior == behavior), None)
 
     def open_pair(self, turn: str) -> ConnectionEvent | None:
         """The adjacency pair of a turn, while it is undecided."""
-        pairs = (event for event in self.of(turn) if event.kind == "adjacency_pair")
+        pairs = (event for event in self.of_turn(turn) if event.kind == "adjacency_pair")
         return next((event for event in pairs if event.state == "started"), None)
 
     def forget(self, turns: Iterable[str]) -> None:
@@ -68,7 +68,7 @@ class _Record(Struct):
 
 
 class TurnOutcomes:
-    """Outcomes of the robot's turns; backchannels have none. `deadline`: when to ask `closed` again."""
+    """Outcomes of the robot's turns; backchannels have none. `deadline`: when to call `close_due` again."""
 
     def __init__(self, events: TurnEvents, patience: Seconds) -> None:
         self._events = events
@@ -112,13 +112,13 @@ class TurnOutcomes:
     def deadline(self) -> Seconds | None:
         return min(self._given_up.values(), default=None)
 
-    def closed(self, going: Collection[str], now: Seconds) -> tuple[TurnClosed, ...]:
+    def close_due(self, going: Collection[str], now: Seconds) -> tuple[TurnClosed, ...]:
         """Close the turns that are over by now. going: turns that are open, or have a fragment without an outcome."""
-        over = [turn for turn in self._records if turn not in going and now >= self._until(turn)]
-        self._given_up = {turn: self._until(turn) for turn in self._records if turn not in (*going, *over)}
+        over = [turn for turn in self._records if turn not in going and now >= self._due_at(turn)]
+        self._given_up = {turn: self._due_at(turn) for turn in self._records if turn not in (*going, *over)}
         return tuple(closed for turn in over if (closed := self._close(turn)).fragments)
 
-    def _until(self, turn: str) -> Seconds:
+    def _due_at(self, turn: str) -> Seconds:
         """Time when the outcome of a turn is due: its end or, with an open pair, some time after the pair's limit."""
         pair = self._events.open_pair(turn)
         ended = self._records[turn].ended
@@ -137,5 +137,5 @@ class TurnOutcomes:
                 for fragment, all_said in record.spoken.items()
                 for said in all_said
             ),
-            events=self._events.of(turn),
+            events=self._events.of_turn(turn),
         )

@@ -21,7 +21,7 @@ class PerformFailed(RunFailed):
 O = TypeVar("O", FragmentOutcome, BlockOutcome)  # noqa: E741
 
 
-def unless_failed(outcome: O, subject: str) -> O:
+def successful(outcome: O, subject: str) -> O:
     """Return the outcome, or raise PerformFailed if it says so. subject: id of the fragment or block."""
     if outcome.status == "failed":
         raise PerformFailed(outcome.fault or Fault(reason="it failed", where=subject), outcome)
@@ -31,7 +31,7 @@ def unless_failed(outcome: O, subject: str) -> O:
 S = TypeVar("S", bound=Struct)
 
 
-def answered(message: S | None, what: str, timeout: Seconds | None) -> S:
+def in_time(message: S | None, what: str, timeout: Seconds | None) -> S:
     """Return the message, or raise NoReply if none has come in time. what: its name, for the reader."""
     if message is None:
         raise NoReply(Fault(reason=f"no {what} within {timeout} s", advice="is its service running?"))
