@@ -4,6 +4,7 @@ They watch moving hands, the face of the person, and the time since the last con
 """
 
 import math
+from collections import Counter
 
 from msgspec import Struct
 
@@ -189,8 +190,9 @@ class GlanceWatch:
         self._statistics: dict[str, Statistics] = {}
         self._quiet_since: Seconds | None = None
         self._on_face = False
-        self._own = 0
-        """Number of the robot's glances among the events so far."""
+        self._session = ""
+        self._own: Counter[str] = Counter()
+        """Number of the robot's glances in this session of recognition, by person; "": at all together."""
         self._until: Seconds | None = None
         self._seen: Seconds = float("-inf")
         self.face = ""
@@ -200,9 +202,13 @@ class GlanceWatch:
         match message:
             case Statistics(actor=actor):
                 self._statistics[actor] = message
-            case ConnectionEvent(state="started", cause=cause):
+            case ConnectionEvent(state="started", cause=cause, responder=responder, session=session):
                 self._quiet_since = now
-                self._own += cause == "maintenance"
+                if session != self._session:  # another life of recognition counts from zero
+                    self._session = session
+                    self._own.clear()
+                if cause == "maintenance":
+                    self._own.update((responder, ""))
 
     def head_is_on_face(self, on_face: bool, now: Seconds) -> None:
         if self._on_face != on_face or self._quiet_since is None:
@@ -221,8 +227,9 @@ class GlanceWatch:
     @property
     def pace(self) -> Seconds:
         """Mean time between connection events, without the robot's glances, within its limits."""
-        seen = self._statistics.get(self.face) or self._statistics.get("")
-        if seen is None or seen.session.events - self._own < self._config.mtbce_events:
+        actor = self.face if self.face in self._statistics else ""
+        seen = self._statistics.get(actor)
+        if seen is None or seen.session.events - self._own[actor] < self._config.mtbce_events:
             return self._config.mtbce_prior
         recent = seen.recent.mtbce_without_maintenance
         if recent is None:
