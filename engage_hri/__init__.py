@@ -36,9 +36,9 @@ if TYPE_CHECKING:
     from engage_hri.schemas.tool import tool_definition as tool_definition
     from engage_hri.schemas.world import Entity as Entity
     from engage_hri.schemas.world import World as World
-    from engage_hri.services.client.ended import PerformFailed as PerformFailed
     from engage_hri.services.client.language_models import perform_call as perform_call
     from engage_hri.services.client.language_models import stream as stream
+    from engage_hri.services.client.results import PerformFailed as PerformFailed
     from engage_hri.services.client.robot import Robot as Robot
     from engage_hri.services.client.robot import connect as connect
     from engage_hri.services.control.body import Arrived as Arrived
@@ -56,7 +56,7 @@ _PLACES = {
     "engage_hri.schemas.summary": ("Summary", "summary"),
     "engage_hri.schemas.tool": ("tool_definition",),
     "engage_hri.schemas.world": ("Entity", "World"),
-    "engage_hri.services.client.ended": ("PerformFailed",),
+    "engage_hri.services.client.results": ("PerformFailed",),
     "engage_hri.services.client.robot": ("Robot", "connect"),
     "engage_hri.services.control.body": ("Arrived", "MovementAuthority", "BehaviorRefused", "Body", "Reached"),
     "engage_hri.services.client.language_models": ("perform_call", "stream"),

@@ -16,7 +16,7 @@ from engage_hri.schemas.fragments import TurnFragment
 from engage_hri.schemas.messages import Message
 from engage_hri.schemas.presence import PeerGone
 from engage_hri.services.bus.memory import MemoryHub
-from engage_hri.services.client.ended import PerformFailed
+from engage_hri.services.client.results import PerformFailed
 from engage_hri.services.client.robot import Robot, connect
 from engage_hri.services.commandline import roster
 from engage_hri.services.commandline.config import load

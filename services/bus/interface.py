@@ -1,7 +1,7 @@
 """The bus, as services see it: one interface, two implementations (`memory`, `zenoh`), one contract suite.
 
-A `Hub` is what a process opens once; each service joins it under its own name and gets a `Bus`. Delivery is by
-the class of the key (`schemas/keys.py`). Messages are frozen structs. Nothing here starts a thread.
+A process opens one `Hub`; each service joins it under its own name and gets a `Bus`. Delivery is by the class of
+the key (`schemas/keys.py`). Messages are frozen structs. Nothing here starts a thread.
 """
 
 import asyncio
@@ -23,22 +23,22 @@ from engage_hri.schemas.units import Seconds, Stamp
 from engage_hri.services.bus import journal
 
 LOG = logging.getLogger("engage")
-"""What is written here at level ERROR is a bug, and fails a test that did not expect it."""
+"""Log of all that is not one participant's. A line at level ERROR is a bug, and fails a test that expects none."""
 
 
 class Keep(Enum):
-    """What a subscription keeps while its reader is busy."""
+    """Messages that a subscription keeps while its reader is busy."""
 
     EVERY = auto()
     LATEST = auto()
-    """Only the newest of each key."""
+    """Keep only the newest message of each key."""
 
 
 class Received(Struct, frozen=True):
     """A message as it arrived. source: the participant that published it. at: local time of arrival.
 
-    life: of the process or connection that it came from, where that is known. past: from before the subscription,
-    given to a late subscriber as the class of its key says.
+    life: of the process or connection that it came from, where that is known. past: the message is from before the
+    subscription, given to a late subscriber as the class of its key says.
     """
 
     key: str
@@ -53,15 +53,15 @@ T = TypeVar("T")
 
 
 class Reading(ABC, Generic[T]):
-    """What comes one by one: `next`, or `async for` until that has no more; `with` closes it."""
+    """Items read one by one: with `next`, or with `async for` until there are no more; `with` closes the reading."""
 
     @abstractmethod
     async def next(self, until: Seconds | None = None, /) -> T | None:
-        """The next one; None if there is none by then, or none any more."""
+        """Wait for the next item; None if there is none by `until`, or after the end."""
 
     @abstractmethod
     def close(self) -> None:
-        """Nothing comes any more."""
+        """End the reading: no items come any more."""
 
     def __aiter__(self) -> Self:
         return self
@@ -80,7 +80,7 @@ class Reading(ABC, Generic[T]):
 
 
 KEYS_KEPT = 4096
-"""How many keys a subscription remembers: clients come and go, each with its own."""
+"""Number of keys for which a subscription remembers the pattern: clients come and go, each with its own keys."""
 
 
 class Subscription(Reading[Received]):
@@ -103,7 +103,8 @@ class Subscription(Reading[Received]):
         self._carriers: dict[str, str | None] = {}
 
     def wants(self, key: str) -> bool:
-        try:  # asked for every message and subscription
+        """True if a pattern includes the key."""
+        try:  # a shorter way, for this is asked for every message and subscription
             return self._carriers[key] is not None
         except KeyError:
             return self.carrier(key) is not None
@@ -117,7 +118,7 @@ class Subscription(Reading[Received]):
         return self._carriers[key]
 
     def offer(self, received: Received) -> None:
-        """For the bus: put a message in the queue."""
+        """Put a message in the queue; called by the bus."""
         if self._closed:
             return
         if self.keep is Keep.LATEST:
@@ -140,11 +141,11 @@ class Subscription(Reading[Received]):
 
     @property
     def is_over(self) -> bool:
-        """Closed, and read to its end: `next` has nothing more, and does not wait."""
+        """True if the subscription is closed and read to its end: `next` does not wait any more."""
         return self._closed and not self._queue
 
     async def next(self, deadline: Seconds | None = None) -> Received | None:
-        """The next message, or None once loop time has reached `deadline` with nothing waiting, or after `close`."""
+        """Wait for the next message; None if there is none by loop time `deadline`, or after `close`."""
         loop = asyncio.get_running_loop()
         while not self._queue and not self._closed:
             if deadline is not None and loop.time() >= deadline:
@@ -172,56 +173,59 @@ Answer = Callable[[Message], Message]
 class Bus(ABC):
     """One participant's view of the bus.
 
-    robot: the namespace. name: who this is; appears as `Received.source` and on its liveliness token.
-    role: what it may be to the others, one of `keys.ROLES`; stands in the keys of its commands.
+    robot: the namespace. name: the participant's; appears as `Received.source` and on its liveliness token.
+    role: its part among the others, one of `keys.ROLES`; stands in the keys of its commands.
     clock: the clock that `now` reads, the same for all processes that can compare their times directly.
-    run: which life of the participant this is. failures: how often something went wrong here that was contained.
-    log: where it tells what happens (`services/bus/journal.py`).
+    run: the participant's life. failures: number of errors here that were contained.
+    log: the log of what happens here (`services/bus/journal.py`).
     """
 
-    robot: str
-    name: str
-    role: str
-    clock: str
-    run: str
-    failures: int = 0
-    log: logging.Logger
-    _life_numbers: Iterator[int]
-    """What no former participant of this name in this run has used."""
+    def __init__(self, robot: str, name: str, role: str, clock: str, run: str, life_numbers: Iterator[int]) -> None:
+        """life_numbers: numbers that no former participant of this name in this run has used."""
+        self.robot = robot
+        self.name = name
+        self.role = role
+        self.clock = clock
+        self.run = run
+        self.failures = 0
+        self.log = journal.logger(name, role)
+        self._life_numbers = life_numbers
+        self._loop = asyncio.get_running_loop()
+        self._gone = False
 
     @property
     @abstractmethod
     def health(self) -> BusHealth:
-        """How the connection is doing."""
+        """Figures of the connection: peers, and messages passed, dropped and lost."""
 
-    @abstractmethod
     def now(self) -> Seconds:
-        """Loop time."""
+        """Return the loop time."""
+        return self._loop.time()
 
     def stamp(self, at: Seconds | None = None) -> Stamp:
-        """Now, or `at`, on this clock."""
+        """Make a stamp of `at`, or of now, on this clock."""
         return Stamp(self.clock, self.now() if at is None else at)
 
     @abstractmethod
     def local(self, stamp: Stamp) -> Seconds:
-        """The stamp as local loop time, through the estimated offset of its clock."""
+        """Convert a stamp to local loop time, through the estimated offset of its clock."""
 
     def new_life(self) -> str:
-        """A life of its own for each of the requesters on this bus, so that their ids need not differ."""
+        """Make the life of a requester on this bus: two requesters may use the same ids then."""
         return life_of(self.run, next(self._life_numbers))
 
     # -- what goes wrong ------------------------------------------------------------------------------------------
 
     def containing(self, what: object, then: Callable[[Fault], None] | None = None) -> "Containing":
-        """An exception in the body of `with` ends nothing else: it is logged, counted and told as a fault.
+        """Contain an exception in the body of `with`: it is logged, counted and told as a fault, and goes no further.
 
-        what: is being done, for the reader of the fault: text, or the message that is being taken. then: ends what
-        the exception makes impossible.
+        what: what is being done, for the reader of the fault: text, or the message that is being taken. then: called
+        with the fault, to end the request or block that can't go on.
         """
         return Containing(self, what, then)
 
     def failed(self, error: BaseException, what: object) -> Fault:
-        """Log, count and tell an exception that nobody has foreseen."""
+        """Log, count and tell an unforeseen exception. what: see `containing`."""
         reason = error.fault.reason if isinstance(error, EngageError) else _text(error)
         fault = Fault(
             reason=reason, where=_told(what), advice="this is a bug: the log has its traceback", service=self.name
@@ -232,7 +236,7 @@ class Bus(ABC):
         return fault
 
     def report(self, fault: Fault) -> None:
-        """Log, count and tell a mistake of this participant."""
+        """Log, count and tell a mistake of this participant that raised no exception."""
         self.failures += 1
         self.log.error("%s: %s", self.name, fault)
         self._complain(fault)
@@ -244,19 +248,19 @@ class Bus(ABC):
             self.log.exception("%s: the fault could not be told", self.name)
 
     def publish(self, key: str, message: Message) -> None:
-        """Send to all subscribers of `key`, this process' own included. Never raises for want of a listener."""
+        """Send to all subscribers of `key`, this process' own included. It is no error if there are none."""
         journal.note(self.log, key, message)
         self._send(key, message)
 
     @abstractmethod
     def _send(self, key: str, message: Message) -> None:
-        """Publish; nothing after the participant has left."""
+        """Publish the message; does nothing after the participant has left."""
 
     @abstractmethod
     def subscribe(self, *patterns: str, keep: Keep = Keep.EVERY, capacity: int = 4096) -> Subscription:
-        """Key expressions to one queue. Past messages come first as the class of each key says.
+        """Queue all messages of these key expressions. Past ones come first, as the class of each key says.
 
-        A pattern of class `alive` delivers `PeerAlive` for all who are there, then every change.
+        A pattern of class `alive` delivers `PeerAlive` for all participants that are there, then every change.
         """
 
     @abstractmethod
@@ -272,7 +276,7 @@ class Bus(ABC):
 
     @abstractmethod
     def declare_alive(self) -> None:
-        """Show this participant's liveliness token: to be called once its subscribers stand."""
+        """Show this participant's liveliness token; called once its subscriptions are made."""
 
     @abstractmethod
     async def leave(self) -> None:
@@ -280,7 +284,7 @@ class Bus(ABC):
 
 
 class Containing:
-    """See `Bus.containing`. A class, for it stands around each message."""
+    """Context manager of `Bus.containing`. A class, for a generator would be slower: it is used for each message."""
 
     __slots__ = ("_bus", "_then", "_what")
 
@@ -307,12 +311,12 @@ class Containing:
 def _text(error: BaseException) -> str:
     try:
         return f"{type(error).__name__}: {error}"
-    except Exception:  # it can't even say what it is
+    except Exception:  # the error's own __str__ raises
         return type(error).__name__
 
 
 def is_asked_to_stop() -> bool:
-    """Has somebody cancelled this task? Else a CancelledError in it is a mistake of what it awaits."""
+    """True if this task was cancelled. Else a CancelledError in it is a mistake of a future that it awaits."""
     task = asyncio.current_task()
     return task is not None and task.cancelling() > 0
 
@@ -333,13 +337,13 @@ class Hub(ABC):
 
     @abstractmethod
     def join(self, name: str, role: str = "manager") -> Bus:
-        """A participant's own view. Names are unique on a robot's bus; a client makes its own unique."""
+        """Add a participant; returns its view of the bus. Names are unique on a robot's bus."""
 
     @abstractmethod
     async def wait_until_free(self, *names: str) -> None:
-        """Wait until nobody else is there under these names, for one who has died may still seem to be.
+        """Wait until no other participant has these names: one that has died may seem alive for a while.
 
-        Raises InputRefused for those who stay.
+        Raises InputRefused for names that stay taken.
         """
 
     @abstractmethod

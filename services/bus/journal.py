@@ -1,8 +1,8 @@
-"""What the log tells of a message as it is published, and of who comes and goes: one line, without the words spoken.
+"""Log lines for messages as they are published, and for peers that come and go. The words spoken are not logged.
 
 A line for each block, fragment and turn that has ended, each connection event that is decided, each person and peer
 that comes or goes, each warning and refusal; at level DEBUG one for every message but the streams. Loggers are named
-`engage.<service>`, or `engage.<role>` for who is no service.
+`engage.<service>`, or `engage.<role>` for a participant that is no service.
 """
 
 import logging
@@ -26,24 +26,24 @@ Entry = tuple[int, str]
 
 
 NAMED = (*keys.SERVICES, "simulation", "collaboration")
-"""Services, each with a log of its own. The others, who come and go, share one by role."""
+"""Services, each with a log of its own. Other participants, which come and go, share one by role."""
 BUS = logging.getLogger("engage.bus")
-"""Of a process, before anybody has joined, and of the bus in memory, where all see the same."""
+"""Log of a process before a participant has joined, and of the bus in memory, where all see the same."""
 
 
 def logger(name: str, role: str) -> logging.Logger:
-    """Of a participant."""
+    """Return the log of a participant."""
     return logging.getLogger(f"engage.{name if name in NAMED else role}")
 
 
 def entry(message: Message) -> Entry:
-    """The line for a message that is published."""
+    """Return the line for a message that is published."""
     tell = _TOLD.get(type(message))
     return tell(message) if tell else _any(message)
 
 
 def presence(message: PeerAlive | PeerGone) -> Entry:
-    """The line for a participant that has come or gone."""
+    """Return the line for a participant that has come or gone."""
     if isinstance(message, PeerGone):
         return INFO, f"peer {message.participant}: gone"
     return INFO, f"peer {message.participant}: here, life {message.run or 'unknown'}"
@@ -91,7 +91,7 @@ def _refused(message: Refused) -> Entry:
 
 
 def _fault(message: Fault) -> Entry:
-    return DEBUG, "fault told"  # who tells of one has logged it, with its traceback
+    return DEBUG, "fault told"  # the participant that tells of a fault has logged it, with its traceback
 
 
 def _actor(message: ActorFound | ActorLost) -> Entry:
@@ -116,11 +116,11 @@ _TOLD: dict[type, Callable[[Any], Entry]] = {
 
 
 def note(log: logging.Logger, key: str, message: Message) -> None:
-    """Write the line of a message that is published under the key. What no log wants costs a look at its level."""
+    """Write the line of a message that is published under the key. It is not made if no log has its level."""
     if type(message) in _TOLD or (log.isEnabledFor(DEBUG) and keys.key_class(key) != "stream"):
         log.log(*entry(message))
 
 
 def note_presence(log: logging.Logger, message: PeerAlive | PeerGone) -> None:
-    """Write the line of a participant that has come or gone, as whoever writes this log sees it."""
+    """Write the line of a participant that has come or gone, as the owner of this log sees it."""
     log.log(*presence(message))

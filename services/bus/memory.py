@@ -14,26 +14,19 @@ from engage_hri.schemas.presence import PeerAlive, PeerGone
 from engage_hri.schemas.status import BusHealth
 from engage_hri.schemas.units import Seconds, Stamp
 from engage_hri.services.bus import journal
-from engage_hri.services.bus.interface import (
-    Answer,
-    Bus,
-    Hub,
-    Keep,
-    Received,
-    Subscription,
-)
+from engage_hri.services.bus.interface import Answer, Bus, Hub, Keep, Received, Subscription
 from engage_hri.services.bus.payloads import LOCAL, read_payload, unreadable
 
 
 class Past(NamedTuple):
-    """A message that late subscribers still get. number: of all that were sent, so states keep their place."""
+    """A message that late subscribers still get. number: its place among all messages, states included."""
 
     number: int
     received: Received
 
 
 class MemoryHub(Hub):
-    """Messages go through their encoding, so what works here works on a wire."""
+    """The hub of a bus in memory. Messages go through their encoding, so what works here works on a wire."""
 
     def __init__(self, robot: str = "robot") -> None:
         self.robot = robot
@@ -54,7 +47,7 @@ class MemoryHub(Hub):
         return bus
 
     async def wait_until_free(self, *names: str) -> None:
-        """Whoever has died is gone at once; `join` refuses a name that is taken."""
+        """Return at once: here a participant that has died is gone, and `join` refuses a name that is taken."""
 
     async def close(self) -> None:
         for bus in list(self._buses.values()):
@@ -69,7 +62,7 @@ class MemoryHub(Hub):
         self.wake_askers()
 
     def kill(self, name: str) -> None:
-        """End a participant as SIGKILL would: its token goes, nothing it sends or should get arrives any more."""
+        """End a participant as SIGKILL would: its token goes, and messages from it and to it are lost."""
         if bus := self._buses.get(name):
             bus.vanish()
 
@@ -81,14 +74,14 @@ class MemoryHub(Hub):
         payload, encoding = published(message)
         try:
             message = decode(payload, encoding)
-        except InputRefused as error:  # as on a wire: those who get it refuse it, not who has sent it
+        except InputRefused as error:  # as on a wire: the receivers refuse it, not the sender
             self._refuse(key, error, payload, encoding)
             return
         life = self._buses[sender].run
         self._pass_on(sender, Received(key, message, sender, self._loop.time(), life=life))
 
     def inject(self, key: str, payload: bytes, encoding: str) -> None:
-        """A payload from outside, as another program would send it. A bad one is answered with a Fault."""
+        """Send a payload from outside, as another program would. A bad one is answered with a Fault."""
         try:
             message = read_payload(payload, encoding, key, "")
         except InputRefused as error:
@@ -123,7 +116,7 @@ class MemoryHub(Hub):
         return (one in self._cut) != (other in self._cut)
 
     def replay(self, name: str, subscription: Subscription) -> int:
-        """What a late subscriber still gets: who is there, then the past in order. Returns its last number."""
+        """Offer a late subscriber the participants, then the past in order; returns its last number."""
         now = self._loop.time()
         for bus in self._buses.values():
             if bus.is_alive and subscription.wants(key := keys.alive(bus.name)):
@@ -145,7 +138,7 @@ class MemoryHub(Hub):
             bus.deliver(Received(keys.alive(name), message, name, self._loop.time()), self.sent + 1)
 
     async def answerer(self, key: str, asker: str, deadline: Seconds) -> "MemoryBus | None":
-        """Who serves the key, as soon as somebody does; None at the deadline."""
+        """Wait for a participant that serves the key; None at the deadline."""
         while self._loop.time() < deadline:
             for bus in self._buses.values():
                 if key in bus.answers and not self._is_cut(asker, bus.name):
@@ -160,44 +153,35 @@ class MemoryHub(Hub):
         return None
 
     def wake_askers(self) -> None:
-        """Somebody answers now, or may be heard again, or it is too late: look again."""
+        """Let all questions look for their server again: there is a new one, a cut has healed, or it is too late."""
         for asker in self._askers:
             if not asker.done():
                 asker.set_result(None)
         self._askers.clear()
 
     def forget(self, name: str) -> None:
-        """A process takes its states with it; the events of the last seconds are kept here."""
+        """Forget a participant and its states, as if its process had ended; recent events are kept."""
         self._buses.pop(name, None)
         self._state = {key: past for key, past in self._state.items() if past.received.source != name}
 
 
 class MemoryBus(Bus):
-    clock = "loop"
+    """A participant's view of the bus in memory."""
 
     def __init__(self, hub: MemoryHub, name: str, role: str, run: str) -> None:
-        self.robot = hub.robot
-        self.name = name
-        self.role = role
-        self.log = journal.logger(name, role)
-        self.run = run
-        self._life_numbers = count(1)
+        super().__init__(hub.robot, name, role, "loop", run, count(1))
         self.is_alive = False
         self.answers: dict[str, Answer] = {}
         self._hub = hub
-        self._loop = asyncio.get_running_loop()
         self._subscriptions: dict[Subscription, int] = {}
+        """Subscriptions, and the number of the last message that was replayed to each."""
         self._overflowed = 0
-        self._gone = False
 
     @property
     def health(self) -> BusHealth:
         overflowed = self._overflowed + sum(subscription.overflowed for subscription in self._subscriptions)
-        health = BusHealth(peers=self._hub.alive, passed=self._hub.sent, overflowed=overflowed)
-        return msgspec.structs.replace(health, failures=self.failures)
-
-    def now(self) -> Seconds:
-        return self._loop.time()
+        peers, passed = self._hub.alive, self._hub.sent
+        return BusHealth(peers=peers, passed=passed, overflowed=overflowed, failures=self.failures)
 
     def local(self, stamp: Stamp) -> Seconds:
         return stamp.seconds
@@ -212,7 +196,7 @@ class MemoryBus(Bus):
     def deliver(self, received: Received, number: int) -> None:
         key = received.key
         for subscription, replayed in self._subscriptions.items():
-            # What was still on its way when the subscription came has been replayed to it.
+            # A message that was on its way when the subscription was made has been replayed to it.
             if number > replayed and subscription.wants(key):
                 subscription.offer(received)
 

@@ -1,4 +1,4 @@
-"""What another program's payload says, in any encoding, and what its server hears of one that cannot be read."""
+"""Payloads of other programs: the message in any encoding, and the notice of one that cannot be read."""
 
 import msgspec
 from msgspec import Struct
@@ -13,13 +13,13 @@ from engage_hri.schemas.presence import PeerAlive, PeerGone
 from engage_hri.schemas.requests import Unreadable
 
 LOCAL = (PeerAlive, PeerGone, Unreadable)
-"""Messages that no payload may hold: who could send them could end what others have asked for."""
+"""Messages that no payload may hold: with them a program could end the requests of others."""
 
 
 def read_payload(payload: bytes, encoding: str, key: str, source: str) -> Message:
-    """The message that another program sent, in any encoding. Raises InputRefused.
+    """Decode the message that another program sent, in any encoding. Raises InputRefused.
 
-    XML holds a block or a fragment; the request for it goes by its id.
+    XML holds a block or a fragment; it becomes a request with the same id.
     """
     if encoding.partition(";")[0] not in ("application/xml", "text/xml"):
         message = decode(payload, encoding)
@@ -35,7 +35,7 @@ def read_payload(payload: bytes, encoding: str, key: str, source: str) -> Messag
 
 
 class _Head(Struct):
-    """As much of a request as its answer needs."""
+    """The fields of a request that its answer needs."""
 
     id: str = ""
     life: str = ""
@@ -43,7 +43,7 @@ class _Head(Struct):
 
 
 def unreadable(error: EngageError, key: str, payload: bytes = b"", encoding: str = "") -> Unreadable | None:
-    """What the server of `key` gets to hear of a bad payload: it owes an answer. None on keys that have no server."""
+    """Notice of a bad payload for the server of `key`, which owes an answer; None on keys that have no server."""
     if keys.key_class(key) != "cmd":
         return None
     codec = msgspec.json if encoding.startswith("application/json") else msgspec.msgpack

@@ -1,1 +1,1 @@
-"""What drives a robot and follows it, from any process."""
+"""The client library: drives a robot and follows it, from any process."""

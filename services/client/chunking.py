@@ -1,4 +1,4 @@
-"""Where speech that is still being written can be spoken already: words and references, cut at ends of clauses.
+"""Cuts text into chunks that can be spoken while the rest is still being written: at the ends of clauses.
 
     chunks = Chunker()
     for piece in pieces:                      # text as it comes, or whole parts
@@ -6,7 +6,7 @@
     chunks.rest()
 
 In the text `[blue-square]` refers to the object of that id, and `[blue-square!]` does so with high certainty. The
-words of a `Say` part are cut as text is, but brackets are words there. Where a part begins or ends a word ends. Pure.
+words of a `Say` part are cut as text is, but brackets are words there. A part begins and ends between words. Pure.
 """
 
 import re
@@ -22,7 +22,7 @@ Chunk = tuple[Part, ...]
 CLAUSE_WORDS = 4
 """A chunk of fewer words does not end at a comma: so short a fragment would be over before the next one comes."""
 WORDS_OF_REFERENCE = 2
-"""Which words are going to be chosen nobody knows yet: "the square"."""
+"""Words that a reference counts as, such as "the square": which ones will be chosen is not known yet."""
 _REFERENCE = r"\[(?P<id>[^\[\]\s!]+)(?P<certain>!?)\]"
 _ABBREVIATED = "".join(rf"(?<!\b{word})" for word in ("Mr", "Mrs", "Ms", "Dr", "Prof", "St", "vs", "[A-Z]"))
 _CLOSING = "\"'”’)\\]"
@@ -44,18 +44,18 @@ _CUT_OF_WORDS = re.compile(_END)
 
 
 class Chunker:
-    """clause_words: see `CLAUSE_WORDS`."""
+    """The text and parts of one turn that are not spoken yet. clause_words: see `CLAUSE_WORDS`."""
 
     def __init__(self, clause_words: int = CLAUSE_WORDS) -> None:
         self._clause_words = clause_words
         self._text = ""
-        """Of which it is not known yet whether it is words or a reference, or where it ends."""
+        """Text that may still become a reference, or the end of a clause, with what comes."""
         self._is_between_words = True
-        """Does what comes next begin with a word, whether or not there is a space before it?"""
+        """True if the next text begins a new word, even without a space before it."""
         self._parts: list[Part] = []
 
     def feed(self, piece: str | Part) -> Iterator[Chunk]:
-        """The chunks that are complete now. A part stands where it stands: the words before it are complete."""
+        """Take a piece; returns the chunks that are complete now. A part completes the words before it."""
         if isinstance(piece, str):
             self._text += piece
             yield from self._cut(_CUT)
@@ -68,7 +68,7 @@ class Chunker:
             self._parts.append(piece)
 
     def rest(self) -> Chunk:
-        """What is left when nothing more comes; may be empty."""
+        """Take out all that is left, when nothing more comes; may be empty."""
         self._say(self._text)
         self._text = ""
         return self._taken()
@@ -85,7 +85,7 @@ class Chunker:
                 yield self._taken()
 
     def _complete(self, pattern: re.Pattern[str]) -> Iterator[Chunk]:
-        """The text ends here, and so does its last word."""
+        """Cut the text to its end: the last word is complete, too."""
         self._text += " "
         yield from self._cut(pattern)
         self._say(self._text)
@@ -113,5 +113,5 @@ class Chunker:
 
 
 def _means_something(text: str) -> bool:
-    """Is there more than punctuation? An emoji is not spoken, but belongs to what has been said."""
+    """True if the text is more than punctuation. An emoji is not spoken, but belongs to what has been said."""
     return any(unicodedata.category(character)[0] in "LNS" for character in text)

@@ -1,8 +1,8 @@
 """Connection events as one stream for one reader: what is open, then each change exactly once, in order. Pure.
 
 Recognition tells each change (`keys.connection_event`), and right after it, as a state, which events of that person
-are open (`keys.open_events`). Who comes late gets that state, and what was told before it needs no repeating. Who
-is there when recognition dies is told that its events are `lost`.
+are open (`keys.open_events`). A reader that comes late gets that state, and needs nothing that was told before it. A
+reader that is there when recognition dies is told that the open events are `lost`.
 """
 
 from collections.abc import Callable, Collection
@@ -15,24 +15,19 @@ from engage_hri.schemas.recognition import ENDINGS, ConnectionEvent, OpenEvents,
 from engage_hri.schemas.units import Seconds, Stamp
 
 GRACE: Seconds = 2.0
-"""How long recognition may be gone before its events are lost: a router's restart looks like a death."""
+"""Time that recognition may be gone before its events are lost: a router's restart looks like a death."""
 
 
 class EventStream:
-    """What a reader gets to hear, fed with everything on the three keys: events, open events, liveliness.
+    """Connection events for one reader, made of everything on three keys: events, open events, liveliness.
 
-    began: when the reader came, local time. stamp: a local time as a stamp. kinds: only these; all if empty.
-    opening: tell also the events that were open already. open: those that have not ended, by id.
-    deadline: when to `expire`.
+    began: when the reader came, local time. stamp: makes a stamp of a local time. kinds: only these; all if empty.
+    opening: tell also the events that were open already. open: events that have not ended, by id.
+    deadline: when to call `expire`.
     """
 
     def __init__(
-        self,
-        began: Seconds,
-        stamp: Callable[[Seconds], Stamp],
-        *,
-        kinds: Collection[str] = (),
-        opening: bool = True,
+        self, began: Seconds, stamp: Callable[[Seconds], Stamp], *, kinds: Collection[str] = (), opening: bool = True
     ) -> None:
         self.open: dict[str, ConnectionEvent] = {}
         self.deadline: Seconds | None = None
@@ -45,43 +40,46 @@ class EventStream:
         self._ended: dict[str, ConnectionEvent] = {}
 
     def feed(self, message: Message, at: Seconds, now: Seconds, *, past: bool = False) -> list[ConnectionEvent]:
-        """What is new. at: the local instant that the message speaks of. past: it is from before the subscription."""
+        """Take a message; returns the changes to tell. at: the local instant that the message speaks of.
+
+        past: the message is from before the subscription.
+        """
         match message:
             case PeerAlive(participant="recognition", run=run):
                 self.deadline = None
                 return [*self._follow(session_of(run), now), *self._regain()]
             case PeerGone(participant="recognition"):
                 self.deadline = at + GRACE
-            case ConnectionEvent() if not past or at > self._began:  # of what is older, the state tells what is open
+            case ConnectionEvent() if not past or at > self._began:  # which older events are open, the state tells
                 return [*self._follow(message.session, now), *self._change(message)]
             case OpenEvents(session=session):
                 return [*self._follow(session, now), *self._compare(message, now)]
         return []
 
     def expire(self, now: Seconds) -> list[ConnectionEvent]:
-        """`deadline` has passed: recognition stays away."""
+        """Tell all open events as lost: `deadline` has passed, recognition stays away."""
         self.deadline = None
         self._lost = tuple(self.open.values())
         return self._lose(self._lost, now)
 
     def _follow(self, session: str, now: Seconds) -> list[ConnectionEvent]:
-        """Another life of recognition knows nothing of the events of the former."""
+        """Tell all open events as lost if this is another life of recognition: it does not know them."""
         if session in ("", self._session):
             return []
         self._session, self._lost = session, ()
         return self._lose(tuple(self.open.values()), now)
 
     def _regain(self) -> list[ConnectionEvent]:
-        """It was only cut off, for longer than the grace; what happened meanwhile comes after this."""
+        """Tell the lost events again: recognition was only cut off. The changes meanwhile come after this."""
         regained, self._lost = self._lost, ()
         return [told for event in regained for told in self._change(event)]
 
     def _compare(self, state: OpenEvents, now: Seconds) -> list[ConnectionEvent]:
-        """Usually nothing: the changes have come already."""
+        """Tell the differences from a person's open events. Usually there are none: the changes have come before."""
         still_open = {event.id for event in state.events}
         ended = [event for event in self.open.values() if _is_with(state.actor, event) and event.id not in still_open]
         told = self._lose(ended, now)
-        # Copies of a change come before the state that follows it.
+        # A repeated change comes before the state that follows it, so older endings need not be remembered.
         self._ended = {id: event for id, event in self._ended.items() if not _is_with(state.actor, event)}
         for event in state.events:
             if self._opening or event.id in self.open:
@@ -110,5 +108,5 @@ def _is_with(person: str, event: ConnectionEvent) -> bool:
 
 
 def _progress(event: ConnectionEvent) -> int:
-    """An event starts, is decided, is over."""
+    """Place of the event's state in its life: 0 started, 1 decided, 2 over."""
     return 0 if event.state == "started" else 1 if event.state == "succeeded" else 2

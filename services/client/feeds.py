@@ -1,4 +1,4 @@
-"""What a client gets to hear: messages of one kind as they come, with `async for` or one by one."""
+"""Feeds of a client: messages of one kind as they come, with `async for` or one by one."""
 
 from collections import deque
 from collections.abc import Callable, Iterable
@@ -13,9 +13,9 @@ M = TypeVar("M")
 
 
 class Feed(Reading[M]):
-    """Messages of one kind, from when it was made: `async for`, or `next` with a timeout. Ends with the client.
+    """Messages of one kind from now on: `async for`, or `next` with a timeout. Ends with the client.
 
-    Use it in a `with`, or close it: what nobody reads is kept until then.
+    Use it in a `with`, or close it: until then messages are kept even if nobody reads them.
     """
 
     def __init__(self, subscription: Subscription, kinds: tuple[type, ...], now: Callable[[], Seconds]) -> None:
@@ -35,12 +35,12 @@ class Feed(Reading[M]):
         return None
 
     def close(self) -> None:
-        """Hear nothing any more. What is waiting for `next` gets None."""
+        """End the feed: nothing more comes, and a task that waits in `next` gets None."""
         self._subscription.close()
 
 
 class EventFeed(Feed[ConnectionEvent]):
-    """Connection events: each change exactly once, in order. What is open when recognition dies ends as `lost`."""
+    """Connection events: each change exactly once, in order. Events open when recognition dies end as `lost`."""
 
     def __init__(self, bus: Bus, stream: EventStream, patterns: Iterable[str]) -> None:
         super().__init__(bus.subscribe(*patterns), (ConnectionEvent,), bus.now)
@@ -50,7 +50,7 @@ class EventFeed(Feed[ConnectionEvent]):
 
     @property
     def open(self) -> tuple[ConnectionEvent, ...]:
-        """The events that have not ended, of what `next` has returned or will return at once."""
+        """The events that have not ended, of those that `next` has returned or will return at once."""
         return tuple(self._stream.open.values())
 
     async def next(self, timeout: Seconds | None = None) -> ConnectionEvent | None:

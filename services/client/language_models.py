@@ -1,4 +1,4 @@
-"""For managers that are language models: tool calls, and speaking while the model still writes.
+"""Client for managers that are language models: tool calls, and speaking while the model still writes.
 
     async with connect() as robot:
         result = await perform_call(robot, call)                        # the input of the tool of `schemas/tool.py`
@@ -23,7 +23,7 @@ from engage_hri.schemas.tool import Part, ToolInput
 from engage_hri.schemas.tool_call import fragment_of
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.client.chunking import Chunk, Chunker
-from engage_hri.services.client.ended import PerformFailed
+from engage_hri.services.client.results import PerformFailed
 from engage_hri.services.client.robot import Robot
 
 Piece = str | Part
@@ -34,7 +34,7 @@ PLAIN_TURN = ToolInput(turn_status="full", parts=())
 async def perform_call(
     robot: Robot, call: dict[str, Any] | str | bytes, *, await_answer: bool = False, timeout: Seconds | None = None
 ) -> Summary:
-    """Perform a model's tool call; returns the tool's result, whatever becomes of it: nothing is raised.
+    """Perform a model's tool call; returns the tool's result, also where the call is refused or fails.
 
     robot: as `connect` gives it.
     call: the input of the tool, as its API gives it, decoded or as JSON.
@@ -48,7 +48,7 @@ async def perform_call(
 
 
 def summary_of(error: EngageError) -> Summary:
-    """What became of a fragment that `Robot.perform` raised for."""
+    """Summary of a fragment for which `Robot.perform` raised `error`."""
     if isinstance(error, PerformFailed) and isinstance(error.outcome, FragmentOutcome):
         return summary(error.outcome)
     return refusal(error.fault)
@@ -63,7 +63,7 @@ async def stream(
     chunker: Chunker | None = None,
     await_answer: bool = False,
 ) -> tuple[FragmentOutcome, ...]:
-    """Speak the pieces as they come, as one turn; returns what became of its fragments `<id>-1`, `<id>-2`...
+    """Speak the pieces as they come, as one turn; returns the outcomes of its fragments `<id>-1`, `<id>-2`...
 
     Where a fragment is refused, fails or is interrupted no more pieces are read, and the outcomes say so. Cancelling
     this interrupts the robot, and so does what `pieces` raises.
@@ -109,7 +109,7 @@ class _Speaking:
         self._performing: list[asyncio.Task[FragmentOutcome]] = []
         self._refused: set[str] = set()
         self._sent: set[str] = set()
-        """Fragments whose task has come to its first step before anything was cancelled."""
+        """Ids of the fragments with a task that has begun, and so has sent its request."""
         self._is_finished = False
         self._last = ""
 
@@ -125,18 +125,18 @@ class _Speaking:
         self._send(chunk, "middle" if self._performing else "beginning")
 
     def finish(self, chunk: Chunk) -> None:
-        """Nothing more comes. Where nothing came at all there is no turn."""
+        """Send the last chunk, with which the turn ends. Without any chunk there is no turn."""
         if self._performing or chunk:
             self._send(chunk, "end" if self._performing else "full")
 
     async def leave_no_turn_open(self) -> None:
-        """A refused fragment may have been the one to end the turn, or the last that was read."""
+        """End a turn of which a fragment was refused: that may have been the one to end it, or the last one read."""
         if self._refused and self._performing[0].get_name() not in self._refused:
             with suppress(EngageError):  # there was none
                 await self._robot.perform(self._fragment((), "end"))
 
     def break_off(self) -> None:
-        """Where the robot was just silent there was no fragment to interrupt, and the turn is still open."""
+        """End the turn after a break in which the robot was silent: no fragment was interrupted, so it is open."""
         sent = [task for task in self._performing if task.get_name() in self._sent]
         ended = [task.result() for task in sent if not task.cancelled() and task.exception() is None]
         is_silent = bool(sent) and [outcome.status for outcome in ended] == ["done"] * len(sent)

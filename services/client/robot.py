@@ -37,21 +37,21 @@ from engage_hri.schemas.requests import Outcome, Request
 from engage_hri.schemas.units import Seconds, Stamp
 from engage_hri.schemas.world import Entity, World
 from engage_hri.services.bus.interface import Bus, Hub, Keep
-from engage_hri.services.client.ended import answered, unless_failed
 from engage_hri.services.client.event_stream import EventStream
 from engage_hri.services.client.feeds import EventFeed, Feed
-from engage_hri.services.client.given import FragmentSource, checked, fragment_in
+from engage_hri.services.client.inputs import FragmentSource, checked, fragment_in
+from engage_hri.services.client.results import in_time, successful
 from engage_hri.services.requests.ends import Pending, Requester, RequestRefused
 
 ANSWER_PATIENCE = 20.0
-"""Seconds after a fragment's end: longer than any answer of a person is waited for."""
+"""Seconds after a fragment's end for which `await_answer` waits: longer than recognition waits for an answer."""
 
 
 class Robot:
     """An engaged robot, as its collaboration manager sees it. Made by `connect` or, in a service, `Robot.on(bus)`.
 
-    Errors carry a `fault` that says where and why. Once the client hears nothing any more (it was left, or it broke),
-    all methods that ask or follow raise RunFailed. They are called on the event loop that made it.
+    Errors carry a `fault` that says where and why. Once the client has ended (its `async with` has, or it broke), all
+    methods that ask or follow raise RunFailed. They are called on the event loop that made it.
     """
 
     def __init__(self, bus: Bus, requests: Requester) -> None:
@@ -59,7 +59,7 @@ class Robot:
         self._requests = requests
         self._numbers = count(1)
         self._life = bus.new_life()
-        """In the names of fragments that have none: another client of this name, or its next life, has others."""
+        """Part of the ids of fragments without one, so that they differ from those of another client or life."""
 
     @classmethod
     @asynccontextmanager
@@ -77,7 +77,7 @@ class Robot:
         return self._bus.robot
 
     def now(self) -> Seconds:
-        """This process' clock: seconds, the time of the event loop."""
+        """Return the time on this process' clock: seconds, the time of the event loop."""
         return self._bus.now()
 
     def local(self, stamp: Stamp) -> Seconds:
@@ -104,9 +104,9 @@ class Robot:
         """
         parsed = fragment_in(fragment, f"{self._bus.name}-{self._life}-{next(self._numbers)}")
         request = self._fragment_request(parsed)
-        answered = await_answer and parsed.turn_status in ("end", "full")
-        outcome = await (self._answered(request, timeout) if answered else self._performed(request, timeout))
-        return unless_failed(outcome, parsed.id)
+        awaits_answer = await_answer and parsed.turn_status in ("end", "full")
+        outcome = await (self._answered(request, timeout) if awaits_answer else self._performed(request, timeout))
+        return successful(outcome, parsed.id)
 
     def begin_to_perform(self, fragment: TurnFragment) -> None:
         """Send a fragment and do not wait for what becomes of it.
@@ -166,7 +166,7 @@ class Robot:
         request = PerformBlock(id=self._request_id(block.id), block=block)
         outcome = await self._ask(keys.BLOCK, request, timeout)
         assert isinstance(outcome, BlockOutcome)
-        return unless_failed(outcome, block.id)
+        return successful(outcome, block.id)
 
     async def interrupt(self, block: str, behavior: str, *, timeout: Seconds | None = None) -> BehaviorInterrupted:
         """End one behavior of a live block, which goes on without it; returns when it has ended, with what was said.
@@ -222,7 +222,7 @@ class Robot:
             yield
         finally:
             self._requests.cancel(request.id, "released")
-        # Only on the good way: who is cancelled, or fails, is not to wait, nor to hear of a lease that was lost.
+        # Only after a body without an error: one that was cancelled, or failed, must not wait here.
         await asyncio.wait([pending.outcome], timeout=ttl)
 
     async def _ask(self, key: str, request: Request, timeout: Seconds | None) -> Outcome:
@@ -276,11 +276,11 @@ class Robot:
         return self._feed(Feedback.__args__, keys.ANY_FEEDBACK)
 
     def actions(self) -> Feed[ActionBegan | ActionEnded | ActorFound | ActorLost]:
-        """Follow what the robot and the people are seen to do, and who comes and goes."""
+        """Follow the actions of the robot and of people as they are seen, and the coming and going of people."""
         return self._feed((ActionBegan, ActionEnded, ActorFound, ActorLost), keys.ANY_ACTION)
 
     def faults(self) -> Feed[Fault]:
-        """Follow the faults that services tell of: bad messages, and what went wrong at their edge."""
+        """Follow the faults that services tell of: bad messages, and errors while one was taken."""
         return self._feed((Fault,), keys.ANY_FAULT)
 
     def worlds(self) -> Feed[World]:
@@ -288,7 +288,7 @@ class Robot:
         return self._feed((World,), keys.WORLD, keep=Keep.LATEST)
 
     def head_owners(self) -> Feed[HeadOwner]:
-        """Follow who owns the robot's head, and why: now, and at every change."""
+        """Follow the owner of the robot's head, with the reason: now, and at every change."""
         return self._feed((HeadOwner,), keys.HEAD_OWNER)
 
     async def world(self, timeout: Seconds | None = None) -> World:
@@ -300,7 +300,7 @@ class Robot:
             NoReply: no world within `timeout`.
         """
         with self.worlds() as worlds:
-            return answered(await worlds.next(timeout), "world", timeout)
+            return in_time(await worlds.next(timeout), "world", timeout)
 
     async def person(self, timeout: Seconds | None = None) -> Entity:
         """Return the person who is there, or the first to come.
@@ -314,7 +314,7 @@ class Robot:
         with self.worlds() as worlds:
             while True:
                 left = None if deadline is None else max(0.0, deadline - self.now())
-                world = answered(await worlds.next(left), "person in the world", timeout)
+                world = in_time(await worlds.next(left), "person in the world", timeout)
                 if world.people:
                     return world.people[0]
 
@@ -339,7 +339,7 @@ class Robot:
             ValueError: a name that can be no person.
         """
         with self.statistics_updates(actor) as feed:
-            return answered(await feed.next(timeout), f"statistics of {actor}", timeout)
+            return in_time(await feed.next(timeout), f"statistics of {actor}", timeout)
 
     def _feed(self, kinds: tuple[type, ...], *patterns: str, keep: Keep = Keep.EVERY) -> Feed[Any]:
         self._requests.check()

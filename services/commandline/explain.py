@@ -20,7 +20,7 @@ from engage_hri.services.commandline.options import Configured, WorldFile
 from engage_hri.services.commandline.outputs import Terminal
 from engage_hri.services.commandline.process import DONE
 from engage_hri.services.commandline.sources import read_source, read_world
-from engage_hri.services.generation.pipeline import FragmentPlan
+from engage_hri.services.generation.block.emission import FragmentPlan
 
 GESTURES: dict[GestureChoice, str] = {
     "none": "none",

@@ -11,7 +11,7 @@ from engage_hri.schemas.fragments import ReferenceChoice, TurnFragment
 from engage_hri.schemas.world import World
 from engage_hri.services.commandline.config import Config
 from engage_hri.services.commandline.sources import Thing
-from engage_hri.services.generation.pipeline import FragmentPlan
+from engage_hri.services.generation.block.emission import FragmentPlan
 from engage_hri.services.runtime.virtual_time import run_virtual
 
 

@@ -1,1 +1,4 @@
-"""Engagement generation: turn fragments become blocks with connection events; who owns the head. Thesis 3."""
+"""Engagement generation: makes blocks with connection events of turn fragments, and decides where the head looks.
+
+Thesis, chapter 3.
+"""

@@ -1,4 +1,4 @@
-"""What generation asks the body: what it is, and what the motions of references would cost."""
+"""Questions of generation to the body: its capabilities, and the costs of the motions that references need."""
 
 from collections.abc import Sequence
 
@@ -21,7 +21,10 @@ from engage_hri.services.generation.references.motions import (
 
 
 class BodyLink:
-    """capabilities: what the body last said of itself. patience: how long one may take to come up."""
+    """Generation's connection to the body.
+
+    capabilities: what the body last said of itself; None: not asked yet. patience: how long it may take to come up.
+    """
 
     def __init__(self, bus: Bus, patience: Seconds) -> None:
         self.capabilities: Capabilities | None = None
@@ -29,7 +32,7 @@ class BodyLink:
         self._patience = patience
 
     def forget(self) -> None:
-        """It is gone; another may come."""
+        """Drop the capabilities of a body that is gone: another one may come."""
         self.capabilities = None
 
     async def motions(
@@ -37,8 +40,8 @@ class BodyLink:
     ) -> Motions:
         """Costs, rays and poses of all that references to the `sequence` of targets could need.
 
-        hand: the only one allowed, if so. moving: what goes on, in order; it will be on target before. glance: see
-        `Motions`. Raises NoReply without a body.
+        hand: the only one allowed; None: either. moving: gazes and points under way, in order; they will be on target
+        before the references begin. glance: see `Motions`. Raises NoReply without a body.
         """
         if not sequence:
             return Motions({}, {})
@@ -61,7 +64,7 @@ class BodyLink:
         return answer.items
 
     async def _ask(self, key: str, question: Message) -> Message:
-        """Once more and again, while a body may still come up."""
+        """The body's answer; the question is repeated while a body may still come up."""
         until = self._bus.now() + self._patience
         while True:
             try:

@@ -15,95 +15,96 @@ PhraseAttribute = Literal["size", "shape", "color", "feature"]
 
 
 class GenerationConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """Raises ValueError when a value is outside its range or the reliabilities leave (0, 1) (decision B1)."""
+    """Parameters of generation. Raises ValueError when one is out of range (for reliabilities see decision B1)."""
 
     condition: Condition = "operational"
-    """Of the study, thesis chapter 5. degraded-generation: the task's own speech, the head to the upper right.
-    degraded-recognition: nothing changes here; the other service is to be configured worse."""
+    """Condition of the study, thesis chapter 5. degraded-generation: the task's own speech, the head to the upper
+    right. degraded-recognition: nothing changes here; the other service is to be configured worse."""
     profile: Profile = "check-back"
-    """How a chosen gesture and phrase are synchronized: as in Appendix B, or as in Fig. 3.3."""
+    """Timing of a chosen gesture and phrase: as in Appendix B (`check-back`), or as in Fig. 3.3."""
 
     # Channel reliabilities, thesis 3.3.2. Defaults: those that give the gestures of Appendix B.
     channel: Channel = "sum"
-    """How gesture and phrase add up: r(j) + r(s) < 1 (thesis 3.3.2), or 1 - (1 - r(j))(1 - r(s)) (decision B1)."""
+    """Sum of gesture and phrase: r(j) + r(s) < 1 (thesis 3.3.2), or 1 - (1 - r(j))(1 - r(s)) (decision B1)."""
     phrase_reliability: Probability = 0.70
-    """rs, in (0, 1): of a spoken phrase. This and the next three: what gives the gestures of Appendix B."""
+    """Reliability rs of a spoken phrase, in (0, 1). This and the next three give the gestures of Appendix B."""
     gaze_reliability: Probability = 0.10
-    """rG, in (0, rDG): of a look."""
+    """Reliability rG of a look, in (0, rDG)."""
     directed_gaze_reliability: Probability = 0.20
-    """rDG, in (rG, rDGP): of a look that waits for the other's."""
+    """Reliability rDG of a look that waits for the other's, in (rG, rDGP)."""
     pointing_reliability: Probability = 0.28
-    """rDGP, in (rDG, 1): of a directed gaze with pointing."""
+    """Reliability rDGP of a directed gaze with pointing, in (rDG, 1)."""
     minimum_reliability: Probability = 0.85
-    """Rmin, in (0, 1): of references that come without one, as a language model's do. Appendix B's of landmarks."""
+    """Least reliability Rmin, in (0, 1), for references that come without one, as a language model's do. That of
+    landmarks in Appendix B."""
 
     # Cost, thesis 3.3.2, in seconds (decision B6).
     seconds_per_head_degree: float = 1 / 100
-    """kg, s/degree: 1 / head speed. Cost is in seconds: decision B6."""
+    """Cost kg of turning the head, in s/degree: 1 / head speed. Cost is in seconds: decision B6."""
     seconds_per_arm_degree: float = 1 / 60
-    """kp, s/degree: 1 / arm speed. Decision B6."""
+    """Cost kp of moving an arm, in s/degree: 1 / arm speed. Decision B6."""
     seconds_per_word: float = 0.35
-    """ks, s per unit of a phrase's cost: about one word. Decision B6."""
+    """Cost ks of speaking, in s per unit of a phrase's cost, which is about one word. Decision B6."""
     wait_weight: float = 1.0
-    """kw, s/s: what a second of waiting for shared gaze costs. Decision B7."""
+    """Cost kw of a second of waiting for shared gaze, in s/s. Decision B7."""
     expected_delay: Seconds = 0.3
-    """E[delay] of directed gaze: the mean of Table 2.1 (decision B7)."""
+    """Expected delay of directed gaze, E[delay]: the mean of Table 2.1 (decision B7)."""
 
     gaze_half_angle: Radians | None = None
-    """Of the robot's gaze cone as people perceive it, < pi/2. None: what the body says of itself. Thesis 3.3.2."""
+    """Half the angle of the robot's gaze cone as people perceive it, < pi/2. None: the body's own. Thesis 3.3.2."""
     pointing_radius: Meters | None = None
-    """Of the cylinder around a pointing forearm. None: what the body says of itself. Thesis 3.3.2."""
+    """Radius of the cylinder around a pointing forearm. None: the body's own. Thesis 3.3.2."""
     figure_lead: Seconds = 2.0
-    """From gaze on target to the stroke of the point in profile figure-3.3: the figure's own."""
+    """Seconds from gaze on target to the stroke of the point in profile figure-3.3: the figure's own."""
 
     # Phrases for references that come without any: services/generation/references/phrases.py.
     phrase_attributes: tuple[PhraseAttribute, ...] = ("color", "shape", "feature", "size")
-    """What proposed phrases may say beside the noun, the most preferred first: absolute before relative, as people
-    do (Dale and Reiter 1995, after Pechmann 1989). `shape` only where the noun is something else."""
+    """Attributes that proposed phrases may say beside the noun, the most preferred first: absolute before relative,
+    as people do (Dale and Reiter 1995, after Pechmann 1989). `shape` only where the noun is something else."""
     this_within: Meters = 0.65
-    """Proposed for what is so near to the robot: "this"; beyond: "that". Ours; both are said as in Appendix B."""
+    """Distance from the robot up to which "this" is proposed; beyond: "that". Ours; Appendix B says both."""
 
     turn_silence: Seconds = 10.0
-    """How long an open turn may lie still before it closes as aborted. Ours."""
+    """Silence after which an open turn closes as aborted. Ours."""
     barge_in: Seconds = 0.8
-    """How long the addressee speaks into the robot's speech before it gives up the turn; shorter is a backchannel,
-    as the longest of Table 2.1."""
+    """Seconds that the addressee speaks into the robot's speech before the robot gives up the turn; shorter is a
+    backchannel, as the longest of Table 2.1."""
     decision_patience: Seconds = 8.0
-    """After a block's end: how long its undecided connection events may delay the fragment's outcome. Ours."""
+    """Seconds after a block's end for which undecided connection events may delay the fragment's outcome. Ours."""
     world_patience: Seconds = 5.0
-    """How long a fragment waits for a first report of the world, or of a person to speak to. Ours."""
+    """Seconds that a fragment waits for a first report of the world, or for a person to speak to. Ours."""
     fragments: int = 200
-    """How many fragments may be waiting or performed at once; one more is refused. Ours."""
+    """Number of fragments that may be waiting or performed at once; one more is refused. Ours."""
     utterance: int = 5000
     """Characters of one speech, some five minutes; a longer one is refused. Ours."""
     body_patience: Seconds = 5.0
-    """How long a reference waits for a body to say what motions cost. Ours."""
+    """Seconds that a reference waits for a body to say what motions cost. Ours."""
 
     # The arbiter of the head: generation, maintenance policy.
     dwell: Seconds = 0.3
-    """How long the head stays after its owner let go, before a lower claim gets it. Ours."""
+    """Seconds that the head stays after its owner let go, before a lower claim gets it. Ours."""
     glance_factor: float = 1.0
-    """k, a factor: a glance is due after k times the mean time between connection events. Thesis 3.3.4 has 1."""
+    """Factor k: a glance is due after k times the mean time between connection events. Thesis 3.3.4 has 1."""
     mtbce_prior: Seconds = 5.7
     """The mean until `mtbce_events` connection events were seen. Table 2.1."""
     mtbce_low: Seconds = 3.0
-    """The recent mean counts as no shorter than this. Ours."""
+    """Least value that the recent mean counts as. Ours."""
     mtbce_high: Seconds = 15.0
-    """And as no longer than this. Ours."""
+    """Greatest value that the recent mean counts as. Ours."""
     mtbce_events: int = 5
-    """How many connection events, without glances of our own, make a mean worth believing. Ours."""
+    """Number of connection events, without the robot's glances, from which on the mean is believed. Ours."""
     glance_duration: Seconds = 0.9
-    """How long a glance at the face lasts before the head goes back. Ours."""
+    """Seconds that a glance at the face lasts before the head goes back. Ours."""
     response_hold: Seconds = 0.8
-    """How long shared gaze lasts before the response lets go. Thesis 3.3.3 names no time; ours."""
+    """Seconds that shared gaze lasts before the response lets go. Thesis 3.3.3 names no time; ours."""
     hand_speed: float = 0.05
-    """m/s: a hand is moving above this. Ours."""
+    """Speed in m/s above which a hand counts as moving. Ours."""
     hand_onset: Seconds = 0.2
-    """How long a hand moves before the head tracks it. Thesis 3.3.4 tracks hands; the number is ours."""
+    """Seconds that a hand moves before the head tracks it. Thesis 3.3.4 tracks hands; the number is ours."""
     hand_stillness: Seconds = 0.8
-    """How long it is still before the head leaves it. Ours."""
+    """Seconds that a hand is still before the head leaves it. Ours."""
     face_lost: Seconds = 2.0
-    """A face lost for longer is no longer tracked; the head holds its direction. Ours."""
+    """Seconds after which a lost face is no longer tracked; the head holds its direction. Ours."""
     retry: Seconds = 1.0
     """Pause before a gaze shift that failed is tried again. Ours."""
 
@@ -135,7 +136,7 @@ class GenerationConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=
 
     @property
     def speech_only(self) -> bool:
-        """Is the robot to say the task's words and to do nothing else?"""
+        """True if the robot is to say the task's words and to do nothing else."""
         return self.condition == "degraded-generation"
 
     def head_cost(self, degrees: Degrees) -> Seconds:

@@ -1,4 +1,7 @@
-"""Is a fragment sound, and does it speak of what the world knows? Refused whole, with its place, before all else."""
+"""Checks of a fragment before anything of it is performed: it is sound, and the world knows all that it names.
+
+A bad fragment is refused as a whole, and the fault says where it is wrong.
+"""
 
 import sys
 from collections.abc import Iterator, Mapping
@@ -19,22 +22,22 @@ from engage_hri.schemas.world import Entity, World
 def checked(fragment: TurnFragment, world: World, robot: str, longest: int = sys.maxsize) -> TurnFragment:
     """The fragment with addressee and delay target filled in, and marks that look like offsets made explicit.
 
-    robot: its actor id, which may be a target too. longest: characters of one speech. Raises InputRefused with JSON
-    path and XML line of the first thing that is wrong, by itself or with regard to the world.
+    robot: its actor id, which may be a target too. longest: the most characters that one speech may have. Raises
+    InputRefused with JSON path and XML line of the first thing that is wrong, by itself or with regard to the world.
     """
     with _places_as_written(fragment):
         return _checked(fragment, world, robot, longest)
 
 
 def check_world(fragment: TurnFragment, world: World, robot: str) -> None:
-    """Is all that a checked fragment names still there? Raises InputRefused, as `checked`."""
+    """Check again that the world has all that a checked fragment names. Raises InputRefused, as `checked`."""
     with _places_as_written(fragment):
         _check_targets(fragment, world, robot)
 
 
 @contextmanager
 def _places_as_written(fragment: TurnFragment) -> Iterator[None]:
-    """Faults name the parts of a tool call, where the fragment was made from one."""
+    """Make faults in the body of `with` name the parts of the tool call, if the fragment was made from one."""
     try:
         yield
     except InputRefused as error:
@@ -53,7 +56,7 @@ def _checked(fragment: TurnFragment, world: World, robot: str, longest: int) -> 
     for index, behavior in enumerate(fragment.behaviors):
         if isinstance(behavior, Reference):
             _check_timing(fragment, index, behavior)
-    return replace(fragment, addressee=addressee(fragment, world), delay_target=_away(fragment, world))
+    return replace(fragment, addressee=addressee(fragment, world), delay_target=_delay_target(fragment, world))
 
 
 def _check_targets(fragment: TurnFragment, world: World, robot: str) -> None:
@@ -67,14 +70,14 @@ def _check_targets(fragment: TurnFragment, world: World, robot: str) -> None:
 
 
 def lacks_people(fragment: TurnFragment, world: World) -> bool:
-    """Is it for whoever is there, and is nobody there?"""
+    """True if the fragment begins a turn without naming its addressee, and the world has no people."""
     return not (fragment.addressee or world.people) and fragment.turn_status not in ("middle", "end")
 
 
 def addressee(fragment: TurnFragment, world: World) -> str:
-    """Who is spoken to: the one named, else the only person there is. Raises InputRefused.
+    """Id of the person spoken to: the one that is named, else the only one there is. Raises InputRefused.
 
-    Empty for the rest of a turn that names nobody: whom the turn speaks to is said already.
+    Empty for a `middle` or `end` that names nobody: the fragment that began the turn has named the addressee.
     """
     people = [person.id for person in world.people]
     if fragment.addressee:
@@ -92,8 +95,11 @@ def addressee(fragment: TurnFragment, world: World) -> str:
     return people[0]
 
 
-def _away(fragment: TurnFragment, world: World) -> str:
-    """Where to look while it holds the turn: where it says, else at the first surface, away from the other's face."""
+def _delay_target(fragment: TurnFragment, world: World) -> str:
+    """The entity to look at while the fragment holds the turn: the one it names, else the first surface.
+
+    Empty if it does not hold the turn, or the world has no surface.
+    """
     if not fragment.delay or fragment.delay_target:
         return fragment.delay_target
     return next((entity.id for entity in world.entities if entity.kind == "surface"), "")

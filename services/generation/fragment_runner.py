@@ -1,4 +1,4 @@
-"""Fragments from their acceptance to their outcomes: what each sends, follows and waits for."""
+"""Runs fragments: takes them, sends their blocks in order, follows these, and answers with the outcomes."""
 
 import asyncio
 from collections.abc import Callable, Collection, Iterable
@@ -22,7 +22,7 @@ from engage_hri.services.generation.config import GenerationConfig
 from engage_hri.services.generation.fragment_check import check_world, checked
 from engage_hri.services.generation.head.arbiter import Arbiter
 from engage_hri.services.generation.head.inhibitions import Leases
-from engage_hri.services.generation.performance import FragmentPerformance, GazesOfFragments
+from engage_hri.services.generation.performance import Ended, FragmentPerformance, GazesOfFragments
 from engage_hri.services.generation.pipeline import glance, plan, targets
 from engage_hri.services.generation.references.discourse import NO_DISCOURSE, Discourse
 from engage_hri.services.generation.turns.continuation import NO_CONTINUATION, Continuation
@@ -33,7 +33,7 @@ from engage_hri.services.requests.serving import GRACE
 
 
 class FragmentRunner:
-    """Any number of fragments at once. `deadline`: when to `settle` at the latest."""
+    """All fragments that wait or are performed. `deadline`: when to call `settle` at the latest."""
 
     def __init__(
         self,
@@ -45,7 +45,7 @@ class FragmentRunner:
         leases: Leases,
         changed: Callable[[Seconds], None],
     ) -> None:
-        """changed: called when a fragment has come further by itself."""
+        """changed: called with the time when a fragment has made progress outside `feed` and `settle`."""
         self._bus = bus
         self._config = config
         self._desk = desk
@@ -61,19 +61,19 @@ class FragmentRunner:
         self._world: World | None = None
         self._discourse = NO_DISCOURSE
         self._live: dict[str, FragmentPerformance] = {}
-        """By request id: from acceptance to outcome."""
+        """Fragments by request id, from `admit` until their outcome is sent."""
         self._line: asyncio.Queue[FragmentPerformance] = asyncio.Queue()
         self._blocks: dict[asyncio.Task[None], str] = {}
-        """What waits for the end of a fragment's block, and of which turn that is."""
+        """Tasks that wait for the end of a fragment's block, and the turn of each."""
         self._session = f"{bus.name}@{bus.now():.6f}"
-        """Makes request ids of our own unique after a restart."""
+        """Part of each request id, so that the ids differ after a restart."""
         self._signals = 0
         self._recognition_lost_at: Seconds | None = None
 
     # -- what arrives ---------------------------------------------------------------------------------------------
 
     def admit(self, request: PerformFragment, world: World) -> None:
-        """Raises InputRefused, and changes nothing, where the fragment is illegal, or one too many."""
+        """Queue a fragment. Raises InputRefused, and changes nothing, where it is illegal, or one too many."""
         if len(self._live) >= self._config.fragments:
             reason = f"{len(self._live)} fragments are waiting or performed, which is the limit"
             advice = "wait until one has ended; `generation.fragments` is the limit"
@@ -86,7 +86,8 @@ class FragmentRunner:
         self._events.expect(fragment.id, turn.turn)
         if any(not each.is_over and each.turn.turn != turn.turn for each in self._live.values()):
             self._accept(performance)
-        # What need not wait is accepted with its block: what the realizer finds impossible is refused here, too.
+        # A fragment that need not wait for another turn is accepted when its block is: then, if the realizer finds
+        # the block impossible, the fragment is refused, too.
         self._live[request.id] = performance
         self._line.put_nowait(performance)
 
@@ -96,7 +97,7 @@ class FragmentRunner:
             self._desk.accept(performance.request.id)
 
     def cancel(self, id: str, reason: str, now: Seconds) -> None:
-        """A request, if it is one of these."""
+        """Cancel the fragment of request `id`, if it is here, and with it the rest of its turn."""
         if (performance := self._live.get(id)) is None:
             return
         aborted = self._turns.fragment_ended(performance.fragment.id, complete=False, now=now, reason=reason)
@@ -118,7 +119,7 @@ class FragmentRunner:
                 self._follow(message)
 
     def recognition_gone(self, now: Seconds) -> None:
-        """It may only be cut off."""
+        """Start the grace after which the open events are lost: recognition may only be cut off."""
         self._recognition_lost_at = now + GRACE
 
     def recognition_there(self, session: str) -> None:
@@ -126,15 +127,16 @@ class FragmentRunner:
         self._events.lose(session)
 
     def body_lost(self) -> None:
-        """Another may come."""
+        """Forget the body: another one may come."""
         self._body.forget()
 
     def _follow(self, progress: SyncPointProgress) -> None:
-        """The arbiter sees the gazes of fragments where they are realized."""
+        """Pass a sync point to its fragment, and tell the arbiter of its gazes when they really happen."""
         named = [each for each in self._live.values() if each.fragment.id == progress.block]
         if not named:
             return
-        performance = min(named, key=lambda each: each.is_over)  # an ended one may still hear of its events
+        # A fragment that has ended is second choice, but it still hears of its events.
+        performance = min(named, key=lambda each: each.is_over)
         performance.feed(progress)
         if performance.signalled_end:
             self._turns.turn_ended(performance.turn.turn)
@@ -144,7 +146,7 @@ class FragmentRunner:
         before = self._gazes.holder
         self._gazes.follow(performance)
         gaze = self._gazes.holder
-        if not self._gazes.rest:
+        if not self._gazes.goes_on:
             self._arbiter.fragment_lets_go()
         elif gaze is None and before is not None:
             self._arbiter.fragment_rests()
@@ -162,7 +164,7 @@ class FragmentRunner:
         return min((each for each in due if each is not None), default=None)
 
     def settle(self, now: Seconds) -> list[tuple[str, Fault]]:
-        """End what has come to its end by now. Requests that turned out to be impossible, and why."""
+        """End turns and fragments that are over by now. Returns the requests to refuse, each with the reason."""
         refused: list[tuple[str, Fault]] = []
         if self._recognition_lost_at is not None and now >= self._recognition_lost_at:
             self._recognition_lost_at = None
@@ -180,7 +182,7 @@ class FragmentRunner:
                 self._outcomes.end(outcome, performance.turn, now)
                 self._desk.end(outcome)
         going = {each.turn.turn for each in self._live.values()} | {self._turns.open_turn}
-        for closed in self._outcomes.closed(going, now):
+        for closed in self._outcomes.close_due(going, now):
             self._bus.publish(keys.TURN_CLOSED, closed)
         self._events.forget({*going, *self._outcomes.turns})
         return refused
@@ -195,7 +197,10 @@ class FragmentRunner:
     # -- fragments: those of a turn at once, turns one after the other --------------------------------------------
 
     async def perform_in_order(self) -> None:
-        """Send each fragment's block as soon as the turn before has ended: what it is to follow stands in it."""
+        """Send each fragment's block as soon as the blocks of other turns have ended.
+
+        The blocks of one turn are sent at once: each names the points of the others that it follows.
+        """
         async with asyncio.TaskGroup() as tasks:
             while True:
                 performance = await self._line.get()
@@ -210,15 +215,15 @@ class FragmentRunner:
                     self._changed(self._bus.now())
 
     async def _begin(self, performance: FragmentPerformance) -> Pending | None:
-        """The request for its block, accepted; None if nothing comes of it."""
+        """Plan and send the block of a fragment. Returns its accepted request; None if the fragment has ended."""
         fragment, turn = performance.fragment, performance.turn
         self._arbiter.stop_thinking()
         self._arbiter.speak_to(turn.addressee)
         permits = self._leases.permits
         try:
             while True:
-                company = [each for each in self._live.values() if each.goes_on_with(performance)]
-                moving = [behavior for each in company for behavior in each.moving]
+                followed = [each for each in self._live.values() if each.goes_on_with(performance)]
+                moving = [behavior for each in followed for behavior in each.moving]
                 glanced = glance(fragment, turn, self._config)
                 motions = await self._body.motions(targets(fragment), permits().only_hand, moving, glanced)
                 if performance.is_over:  # cancelled meanwhile
@@ -228,22 +233,22 @@ class FragmentRunner:
                 body = self._body.capabilities
                 if body is not None:
                     self._arbiter.gaze_perceived_within(body.gaze_half_angle)
-                before = reduce(Continuation.then, (each.continuation for each in company), NO_CONTINUATION)
+                before = reduce(Continuation.then, (each.continuation for each in followed), NO_CONTINUATION)
                 heard = self._heard_in(turn)
                 made = plan(fragment, turn, self._world, body, motions, permits(), self._config, before, heard)
                 performance.begin(made)
                 try:
-                    pending = await self._send_block(performance, company)
+                    pending = await self._send_block(performance, followed)
                 except RequestRefused:
-                    if not any(each.is_over for each in company):
+                    if not any(each.is_over for each in followed):
                         raise
-                    # It has named blocks that ended while it was on its way: once more, without them.
+                    # The block named others that ended while it was on its way: make it again without those.
                 else:
                     named = [mention.object for mention in made.mentions]
                     self._discourse = self._heard_in(turn).naming(fragment.id, named)
                     return pending
         except RequestRefused as error:
-            performance.refuse(error.fault, self._bus.now())  # the realizer did
+            performance.refuse(error.fault, self._bus.now())
         except EngageError as error:
             performance.fail(error, self._bus.now())
         except (Exception, asyncio.CancelledError) as error:
@@ -255,16 +260,16 @@ class FragmentRunner:
         return None
 
     def _heard_in(self, turn: TurnPlan) -> Discourse:
-        """What was referred to before, as `turn` finds it. A backchannel is said in the other's."""
+        """The discourse at the start of `turn`. A backchannel is said in the other's turn, and changes nothing."""
         return self._discourse if turn.backchannel else self._discourse.in_turn(turn.turn, turn.addressee)
 
-    async def _send_block(self, performance: FragmentPerformance, company: Iterable[FragmentPerformance]) -> Pending:
-        """company: what must not go wrong, or it is not performed, either."""
+    async def _send_block(self, performance: FragmentPerformance, followed: Iterable[FragmentPerformance]) -> Pending:
+        """Send the block and wait until it is accepted. followed: fragments without which it fails, too."""
         assert performance.plan is not None
         request = PerformBlock(
             id=performance.block_id,
             block=performance.plan.block,
-            follows=tuple([each.fragment.id for each in company]),
+            follows=tuple([each.fragment.id for each in followed]),
         )
         self._turns.fragment_begins(performance.turn.turn)
         pending = self._requests.send(keys.BLOCK, request)
@@ -289,7 +294,7 @@ class FragmentRunner:
             self._changed(self._bus.now())
 
     def _block_ended(self, performance: FragmentPerformance) -> None:
-        """Or there will be none."""
+        """Draw the consequences of a block that has ended, or that will never be, for turn, head and discourse."""
         now, fragment = self._bus.now(), performance.fragment
         self._follow_gaze(performance)
         self._discourse = self._discourse.without(fragment.id, performance.unsaid)
@@ -303,17 +308,18 @@ class FragmentRunner:
             self._arbiter.think(target)
 
     def _interrupt(self, fragments: Collection[str], reason: str, now: Seconds) -> None:
-        """The latest first: what follows the words of another must not begin because those end."""
+        """End these fragments, the latest first: a block that follows another's words must not begin as those end."""
         for performance in reversed(self._live.values()):
             if performance.is_over or performance.fragment.id not in fragments:
                 continue
             if performance.plan is not None:
                 self._requests.cancel(performance.block_id, reason)
             else:
-                performance.end(now, "interrupted", fault=Fault(reason=reason, where=performance.fragment.id))
+                fault = Fault(reason=reason, where=performance.fragment.id)
+                performance.end(Ended(now, "interrupted", fault=fault))
 
     def _abort(self, aborted: Aborted | None, now: Seconds) -> None:
-        """A turn has ended early: so have its fragments, and recognition learns of it."""
+        """End the fragments of a turn that has ended early, and tell recognition of it. None: no turn has."""
         if aborted is None:
             return
         self._arbiter.stop_thinking()

@@ -1,4 +1,4 @@
-"""One fragment from its acceptance to its outcome: what runs, what it started, and when nothing of it is open."""
+"""One fragment from its acceptance to its outcome: what is under way, and which events it still waits for."""
 
 from collections.abc import Mapping
 from itertools import zip_longest
@@ -22,20 +22,22 @@ from engage_hri.schemas.feedback import SyncPointProgress
 from engage_hri.schemas.fragments import FragmentOutcome, PerformFragment, ReferenceChoice, TurnFragment
 from engage_hri.schemas.speakable import has_words
 from engage_hri.schemas.units import Seconds
+from engage_hri.services.generation.block.emission import FragmentPlan
 from engage_hri.services.generation.permits import Permits
-from engage_hri.services.generation.pipeline import FragmentPlan
 from engage_hri.services.generation.references.policy import Unreferable
 from engage_hri.services.generation.turns.continuation import NO_CONTINUATION, Continuation
 from engage_hri.services.generation.turns.events import TurnEvents
 from engage_hri.services.generation.turns.policy import TurnPlan
 
 AWAITED = ("directed_gaze", "mutual_facial_gaze")
-"""Events that must be decided before the outcome. An adjacency pair may take as long as its answer."""
+"""Events that must be decided before the outcome. An adjacency pair is not: a person's answer may take long."""
 Looks = Gaze | GazeShift | HeadDirectionShift
-"""What moves the head to look at something."""
+"""Behaviors that move the head to look at something."""
 
 
 class Ended(Struct, frozen=True):
+    """The end of a fragment's block. at: local time."""
+
     at: Seconds
     status: str
     spoken: tuple[SpokenText, ...] = ()
@@ -44,7 +46,10 @@ class Ended(Struct, frozen=True):
 
 
 class FragmentPerformance:
-    """block_id: of the request for its block."""
+    """The state of a fragment that was taken: what of its block has been reached, and how it ended.
+
+    block_id: id of the request for its block. accepted: the requester was told that the fragment is accepted.
+    """
 
     def __init__(self, request: PerformFragment, fragment: TurnFragment, turn: TurnPlan, patience: Seconds) -> None:
         self.request = request
@@ -54,9 +59,9 @@ class FragmentPerformance:
         self.plan: FragmentPlan | None = None
         self.accepted = False
         self.refusal: Fault | None = None
-        """The realizer found the block impossible before the fragment was accepted: nothing has moved."""
+        """Set when the realizer found the block impossible before the fragment was accepted: nothing has moved."""
         self.signalled_end = False
-        """Has recognition been told that the turn is over?"""
+        """True once recognition has been told that the turn is over."""
         self._patience = patience
         self._considered: tuple[ReferenceChoice, ...] = ()
         self._tries = 0
@@ -66,15 +71,18 @@ class FragmentPerformance:
         self._gaze = ""
         """The behavior that holds the head."""
         self._started: set[str] = set()
-        """Events to be decided."""
+        """Ids of the events that have started and that the outcome waits for."""
         self._closed: set[str] = set()
-        """Those that the realizer has ended."""
+        """Ids of the behaviors and events that the realizer has ended."""
         self._forbidden: set[str] = set()
         self._reached: set[tuple[str, str]] = set()
         self._ended: Ended | None = None
 
     def begin(self, plan: FragmentPlan) -> None:
-        """Its block is to be sent; again, if what it referred to had ended when it came."""
+        """Take the plan whose block is sent next.
+
+        Called again, and with another request id, when a block to which the first one refers had ended meanwhile.
+        """
         self._tries += 1
         self.block_id = f"{self.request.id}.block" + (f"-{self._tries}" if self._tries > 1 else "")
         self.plan = plan
@@ -82,7 +90,7 @@ class FragmentPerformance:
         self._behaviors = {behavior.id: behavior for behavior in plan.block.behaviors}
 
     def feed(self, progress: SyncPointProgress) -> None:
-        """A sync point of this fragment's block."""
+        """Take a sync point of this fragment's block."""
         behavior = self._behaviors.get(progress.behavior)
         if behavior is None:
             return
@@ -103,17 +111,17 @@ class FragmentPerformance:
 
     @property
     def gaze(self) -> Looks | None:
-        """What holds the head now. A shift holds it until the block ends."""
+        """The behavior that holds the head now, if there is one. A shift holds it until the block ends."""
         behavior = self._behaviors.get(self._gaze) if self._ended is None else None
         return behavior if isinstance(behavior, Looks) else None
 
     def goes_on_with(self, other: "FragmentPerformance") -> bool:
-        """Is it another fragment of the same turn, and its block on its way or being performed?"""
+        """True if this is another fragment of the same turn, and its block is on its way or being performed."""
         return self is not other and self.turn.turn == other.turn.turn and self.plan is not None and not self.is_over
 
     @property
     def continuation(self) -> Continuation:
-        """What the turn's next fragment has to follow."""
+        """The points of this block that are ahead, and that the turn's next fragment has to follow."""
         return (
             self.plan.continuation.pending(self.fragment.id, self._reached)
             if self.plan is not None
@@ -122,14 +130,14 @@ class FragmentPerformance:
 
     @property
     def unsaid(self) -> frozenset[str]:
-        """The objects that it was to refer to, and has not."""
+        """Ids of the objects that the fragment was to refer to, and has not."""
         mentions = self.plan.mentions if self.plan is not None else ()
         said = {mention.object for mention in mentions if mention.by in self._reached}
         return frozenset(mention.object for mention in mentions) - said
 
     @property
     def moving(self) -> tuple[BlockBehavior, ...]:
-        """Gazes and points that are not over, in order: they say where the body will be."""
+        """Gazes and points that have not relaxed or ended, in order: they tell where the body will be."""
         return tuple(
             behavior
             for behavior in (self.plan.block.behaviors if self.plan is not None else ())
@@ -138,7 +146,7 @@ class FragmentPerformance:
         )
 
     def forbid(self, permits: Permits) -> tuple[str, ...]:
-        """Behaviors under way that an inhibition forbids, each once."""
+        """Ids of behaviors under way that the permits forbid; each is returned once."""
         ids = []
         for behavior in self._running.values():
             if permits.stops(behavior) and behavior.id not in self._forbidden:
@@ -146,33 +154,25 @@ class FragmentPerformance:
                 ids.append(behavior.id)
         return tuple(ids)
 
-    def end(
-        self,
-        at: Seconds,
-        status: str,
-        *,
-        spoken: tuple[SpokenText, ...] = (),
-        replaced_by: str = "",
-        fault: Fault | None = None,
-    ) -> None:
-        """The block is over, or will never be. Only the first end counts."""
+    def end(self, ended: Ended) -> None:
+        """Note that the block has ended, or that there will be none. Only the first call counts."""
         if self._ended is None:
-            self._ended = Ended(at, status, spoken, replaced_by, fault)
+            self._ended = ended
             self._running.clear()
 
     def fail(self, error: EngageError, at: Seconds) -> None:
-        """There is no block, or it went wrong."""
+        """Note that no block could be made or sent, or that it went wrong."""
         if isinstance(error, Unreferable):
             self._considered = error.choices
-        self.end(at, "failed", fault=error.fault)
+        self.end(Ended(at, "failed", fault=error.fault))
 
     def refuse(self, fault: Fault, at: Seconds) -> None:
-        """Its block was. A fragment that had been accepted already has failed."""
+        """Note that the realizer refused the block. A fragment that had been accepted already has failed."""
         self.refusal = None if self.accepted else fault
-        self.end(at, "failed", fault=fault)
+        self.end(Ended(at, "failed", fault=fault))
 
     def end_with(self, outcome: BlockOutcome, at: Seconds) -> None:
-        """What its realizer says. Where words were lost and not one was spoken the fragment was not performed."""
+        """Take the outcome of the block. A fragment with words of which none was spoken has failed."""
         given = zip_longest(outcome.dropped, outcome.reasons[: len(outcome.dropped)], fillvalue="")
         why = {id: reason.removeprefix(f"{id}: ") for id, reason in given}
         self._warnings += [f"{id} was dropped" + (f": {reason}" if reason else "") for id, reason in why.items()]
@@ -180,10 +180,10 @@ class FragmentPerformance:
         status, fault = outcome.status, outcome.fault
         if status == "done" and (silence := self._silence(outcome, why)) is not None:
             status, fault = "failed", silence
-        self.end(at, status, spoken=outcome.spoken, replaced_by=outcome.replaced_by, fault=fault)
+        self.end(Ended(at, status, outcome.spoken, outcome.replaced_by, fault))
 
     def _silence(self, outcome: BlockOutcome, why: Mapping[str, str]) -> Fault | None:
-        """Why nothing was said of a fragment with words; None if something was, or nobody wanted it any more."""
+        """Fault that names the dropped speeches of a fragment of which no word was spoken; None: there are none."""
         unspoken = [id for id in why if isinstance(it := self._behaviors.get(id), Speech) and has_words(it.text)]
         if not unspoken or any(has_words(spoken.text) for spoken in outcome.spoken):
             return None
@@ -193,7 +193,7 @@ class FragmentPerformance:
 
     @property
     def is_over(self) -> bool:
-        """Has the block ended? The outcome may have to wait for decisions."""
+        """True once the block has ended. The outcome may still have to wait for events to be decided."""
         return self._ended is not None
 
     @property
@@ -202,11 +202,11 @@ class FragmentPerformance:
 
     @property
     def deadline(self) -> Seconds | None:
-        """When to stop waiting for decisions."""
+        """Time when to stop waiting for events to be decided; None before the block has ended."""
         return self._ended.at + self._patience if self._ended else None
 
     def outcome(self, events: TurnEvents, now: Seconds) -> FragmentOutcome | None:
-        """None until the block has ended and every directed and facial gaze that it started is decided."""
+        """The outcome; None until the block has ended and its directed and facial gazes are decided, or too late."""
         if self._ended is None:
             return None
         undecided = [id for id in sorted(self._started) if not self._decided(id, events)]
@@ -220,23 +220,23 @@ class FragmentPerformance:
             status=status,  # type: ignore[arg-type]
             spoken=self._ended.spoken,
             replaced_by=self._ended.replaced_by,
-            events=events.of(self.turn.turn),
+            events=events.of_turn(self.turn.turn),
             choices=self.plan.choices if self.plan else self._considered,
             warnings=(*self._warnings, *(f"{id} was never decided" for id in undecided)),
             fault=self._ended.fault,
         )
 
     def _decided(self, behavior: str, events: TurnEvents) -> bool:
-        event = events.at(self.fragment.id, behavior)
+        event = events.last_begun_by(self.fragment.id, behavior)
         return behavior in self._closed if event is None else event.state != "started"
 
 
 class GazesOfFragments:
-    """Which gaze of a fragment has the head: of those that go on, the one that began last."""
+    """The gazes of all fragments that are performed: of those that go on, the one that began last has the head."""
 
     def __init__(self) -> None:
         self._gazes: dict[str, Looks | None] = {}
-        """By request, in the order of their starts; None once it has ended and its block has not."""
+        """By request, in the order of their starts; None where the gaze has ended and its block has not."""
 
     def follow(self, performance: FragmentPerformance) -> None:
         gaze, id = performance.gaze, performance.request.id
@@ -253,6 +253,6 @@ class GazesOfFragments:
         return next((gaze for gaze in reversed(self._gazes.values()) if gaze is not None), None)
 
     @property
-    def rest(self) -> bool:
-        """Does the block of one go on, whatever became of its gazes?"""
+    def goes_on(self) -> bool:
+        """True while the block of a fragment that has moved the head goes on, its gaze ended or not."""
         return bool(self._gazes)

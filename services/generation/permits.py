@@ -1,4 +1,4 @@
-"""What the robot may do just now, as far as inhibitions and the study's condition say."""
+"""Permissions of the moment: the behaviors that inhibitions and the study's condition leave to fragments."""
 
 from msgspec import Struct
 from msgspec.structs import replace
@@ -22,7 +22,7 @@ HANDS: tuple[Hand, ...] = ("LEFT_HAND", "RIGHT_HAND")
 
 
 class Permits(Struct, frozen=True, kw_only=True):
-    """hands: those it may point with. speech_only: words, and nothing else."""
+    """The behaviors that fragments may have now. hands: those to point with. speech_only: words, and nothing else."""
 
     gaze: bool = True
     hands: tuple[Hand, ...] = HANDS
@@ -37,7 +37,7 @@ class Permits(Struct, frozen=True, kw_only=True):
         return not self.speech_only or isinstance(behavior, Speech | Reference | Event | TurnSignal | Emit | Wait)
 
     def stops(self, running: Behavior) -> bool:
-        """Must it be aborted? A point without `mode` may be by either arm: only the body knows."""
+        """True if a behavior under way must be aborted. A point without `mode` may be made by either arm."""
         if isinstance(running, Pointing):
             return not self.allows(running if running.mode else replace(running, mode="BOTH_HANDS"))
         return isinstance(running, Gaze | GazeShift | HeadDirectionShift) and not self.looks
@@ -48,14 +48,15 @@ class Permits(Struct, frozen=True, kw_only=True):
 
     @property
     def only_hand(self) -> Hand | None:
-        """The hand to name when there is no choice."""
+        """The hand to name in a block when only one is left; None: the body may choose, or there is none."""
         return self.hands[0] if len(self.hands) == 1 else None
 
     @property
     def no_gaze(self) -> str:
-        """Why references are made without gaze; empty when they need not."""
+        """Reason why references are made without gaze; empty when gaze is permitted."""
         return "speech only" if self.speech_only else "" if self.gaze else "gaze is inhibited"
 
     @property
     def no_point(self) -> str:
+        """Reason why references are made without pointing; empty when a hand is permitted."""
         return "speech only" if self.speech_only else "" if self.hands else "pointing is inhibited"

@@ -1,17 +1,15 @@
-"""From a fragment to its block, in one pure step: phrases proposed, references chosen, then everything emitted."""
+"""Plan of a fragment, made in one pure step: phrases are proposed, references are chosen, the block is emitted."""
 
 from collections.abc import Sequence
 
-from msgspec import Struct
+from msgspec.structs import replace
 
 from engage_hri.schemas.behaviors import Reference
-from engage_hri.schemas.blocks import Block
 from engage_hri.schemas.body import Capabilities
-from engage_hri.schemas.fragments import ReferenceChoice, TurnFragment
+from engage_hri.schemas.fragments import TurnFragment
 from engage_hri.schemas.world import World
-from engage_hri.services.generation.block.emission import emit
+from engage_hri.services.generation.block.emission import Emission, FragmentPlan
 from engage_hri.services.generation.block.ordering import ordered
-from engage_hri.services.generation.block.parts import Mention
 from engage_hri.services.generation.config import GenerationConfig
 from engage_hri.services.generation.permits import Permits
 from engage_hri.services.generation.references.discourse import NO_DISCOURSE, Discourse
@@ -22,29 +20,19 @@ from engage_hri.services.generation.turns.continuation import NO_CONTINUATION, C
 from engage_hri.services.generation.turns.policy import TurnPlan, vain_delay
 
 
-class FragmentPlan(Struct, frozen=True, kw_only=True):
-    """continuation: for the turn's next fragment. mentions: when each object has been referred to."""
-
-    block: Block
-    continuation: Continuation = NO_CONTINUATION
-    mentions: tuple[Mention, ...] = ()
-    choices: tuple[ReferenceChoice, ...] = ()
-    warnings: tuple[str, ...] = ()
-
-
 def references(fragment: TurnFragment) -> tuple[Reference, ...]:
-    """In the order in which they are made (decision B12)."""
+    """The fragment's references in the order in which they are made (decision B12)."""
     order = ordered(fragment.behaviors, fragment.constraints, fragment.id)
     return tuple(behavior for behavior in order if isinstance(behavior, Reference))
 
 
 def targets(fragment: TurnFragment) -> Sequence[str]:
-    """Of its references, in order: what the body is asked about."""
+    """Targets of the fragment's references, in order: the body is asked for motions to them."""
     return [reference.target for reference in references(fragment)]
 
 
 def glance(fragment: TurnFragment, turn: TurnPlan, config: GenerationConfig) -> str:
-    """Who is looked at after each of its points but the last; "": nobody."""
+    """The person looked at after each of the fragment's points but the last; "": nobody."""
     return turn.addressee if config.profile == "check-back" and len(references(fragment)) > 1 else ""
 
 
@@ -59,24 +47,17 @@ def plan(
     before: Continuation = NO_CONTINUATION,
     discourse: Discourse = NO_DISCOURSE,
 ) -> FragmentPlan:
-    """The block of a checked fragment. body, motions: needed for references only. before: the turn's other blocks'.
+    """Plan the block of a checked fragment. Raises RunFailed where a reference cannot be made at all.
 
-    discourse: what was referred to before it.
-    Raises RunFailed where a reference cannot be made at all.
+    body, motions: needed for references only. before: continuation of the turn's blocks under way. discourse: what
+    was referred to before this fragment.
     """
     chosen = Choices()
     made = proposed(references(fragment), world, config, discourse)
     if made.references:
         chosen = choose(made.references, _scene(world, body, permits, config), motions, config)
-    emission = emit(fragment, turn, chosen.choices, config, permits, chosen.hands, before)
-    warnings = (*vain_delay(fragment), *made.warnings, *chosen.warnings, *emission.warnings)
-    return FragmentPlan(
-        block=emission.block,
-        continuation=emission.continuation,
-        mentions=emission.mentions,
-        choices=chosen.choices,
-        warnings=warnings,
-    )
+    emitted = Emission(fragment, turn, chosen.choices, config, permits, chosen.hands, before).plan()
+    return replace(emitted, warnings=(*vain_delay(fragment), *made.warnings, *chosen.warnings, *emitted.warnings))
 
 
 def _scene(world: World, body: Capabilities | None, permits: Permits, config: GenerationConfig) -> ReferenceScene:

@@ -1,4 +1,4 @@
-"""The generation service: fragments, people and the body in; blocks, outcomes and the owner of the head out."""
+"""The generation service: takes fragments and what is perceived; sends blocks, outcomes and the owner of the head."""
 
 import asyncio
 
@@ -53,7 +53,7 @@ async def generate(bus: Bus, ready: Ready, config: GenerationConfig, *, covered_
 
 
 class _Generation:
-    """Decodes, feeds the policies, publishes what they say."""
+    """The service's state: feeds messages to the policies and publishes what they decide."""
 
     def __init__(self, bus: Bus, config: GenerationConfig, objects: CoveredObjects) -> None:
         self._bus = bus
@@ -67,10 +67,10 @@ class _Generation:
         )
         self._objects = objects
         self._early: dict[str, tuple[PerformFragment, Seconds]] = {}
-        """Fragments that came before the first report of the world, and when they give up."""
+        """Fragments that wait for a report of the world, or for a person, and until when; by request id."""
         self._changed = asyncio.Event()
         self._session = f"{bus.name}@{bus.now():.6f}"
-        """Makes request ids of our own unique after a restart."""
+        """Part of each request id, so that the ids differ after a restart."""
 
     def close(self) -> None:
         self._requests.close()
@@ -129,7 +129,7 @@ class _Generation:
                 self._cancel(request)
 
     def _admit(self, request: PerformFragment, now: Seconds, until: Seconds) -> None:
-        """until: what it needs of the world is waited for."""
+        """Hand a fragment to the runner, or keep it while the world lacks what it needs. until: when to give up."""
         world = self._objects.at(now)
         if world is None or (now < until and lacks_people(request.fragment, world)):
             self._early[request.id] = (request, until)
@@ -157,11 +157,11 @@ class _Generation:
         self._bus.publish(keys.fault(NAME), fault)
 
     def _warn(self, fragment: str, kind: WarningKind, message: str) -> None:
-        """fragment: empty where nobody knows whose it was."""
+        """Publish a warning of a fragment. fragment: its id; empty if that could not be read."""
         self._bus.publish(keys.FRAGMENT_FEEDBACK, WarningFeedback(block=fragment or None, kind=kind, message=message))
 
     def _cancel(self, cancel: Cancel) -> None:
-        """On request, because the requester is gone, or because nobody has renewed it."""
+        """End a lease or a fragment: its requester asked for that, is gone, or has not renewed it."""
         now = self._bus.now()
         if self._leases.release(cancel.id):
             reason = {GONE: "owner_lost", LAPSED: "lapsed"}.get(cancel.reason, "released")
@@ -195,12 +195,12 @@ class _Generation:
         return min((each for each in due if each is not None), default=None)
 
     def _after(self, now: Seconds) -> None:
-        """Whatever happened: what follows from it by now."""
+        """Settle what has become due by now; called after every message and at every deadline."""
         for id, (request, until) in list(self._early.items()):
             if now >= until:
                 del self._early[id]
                 if self._objects.at(now) is not None:
-                    self._admit(request, now, until)  # which says whom it lacks
+                    self._admit(request, now, until)  # too late to wait: refuses it for the missing person
                     continue
                 fault = Fault(reason="the world is unknown", where=id, advice="is perception running?")
                 self._refuse(id, fault)

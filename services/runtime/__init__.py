@@ -1,1 +1,1 @@
-"""How a service lives: on the bus, with a status, on real or virtual time."""
+"""The life of a service: on the bus, with a status, on real or virtual time."""

@@ -1,4 +1,4 @@
-"""Timers of the loop that are set again and again."""
+"""Timers on the event loop that are set again and again."""
 
 import asyncio
 from collections.abc import Callable
@@ -7,7 +7,7 @@ from engage_hri.schemas.units import Seconds
 
 
 class Alarm:
-    """Calls `ring` when a deadline has come. It is set anew only for an earlier one: it may ring in vain."""
+    """A timer that calls `ring` at a deadline. A later deadline does not move it: then it rings too early."""
 
     def __init__(self, ring: Callable[[], None]) -> None:
         self._ring = ring
@@ -33,7 +33,7 @@ class Alarm:
 
 
 class Timer:
-    """Calls `ring` at the one instant it was set to last; never, if that is None."""
+    """A timer that calls `ring` at the instant to which it was set last; never, if that is None."""
 
     def __init__(self, ring: Callable[[], None]) -> None:
         self._ring = ring
@@ -44,7 +44,7 @@ class Timer:
 
     @property
     def at(self) -> Seconds | None:
-        """When it is to ring."""
+        """Time when the timer is to ring; None: never."""
         return None if self._handle is None else self._at
 
     def set(self, at: Seconds | None) -> None:

@@ -1,8 +1,9 @@
-"""How a service lives: joins the hub under its name, subscribes, shows its token, serves until cancelled.
+"""The life of a service: it joins the hub under its name, subscribes, shows its token, serves until cancelled.
 
 A service is one coroutine function of its bus, its configuration and `ready`, which it calls once its
-subscribers stand. Each answers how it is (`keys.status`). No message ends a service: what goes wrong while one is
-taken ends at most what the message is about (`Bus.containing`). What goes wrong elsewhere ends the process, loudly.
+subscriptions are made. Each answers questions for its status (`keys.status`). No message ends a service: an error
+while one is taken ends at most the block or event of that message (`Bus.containing`). An error elsewhere ends the
+process, loudly.
 """
 
 import asyncio
@@ -19,7 +20,7 @@ from engage_hri.services.bus.interface import Bus, Hub
 
 Ready = Callable[[], None]
 Service = Callable[[Bus, Ready], Awaitable[None]]
-"""With its configuration bound already (`functools.partial(realize, config=...)`)."""
+"""Coroutine function with its configuration bound already (`functools.partial(realize, config=...)`)."""
 
 
 async def serve(hub: Hub, name: str, service: Service, ready: Ready = lambda: None) -> None:
@@ -50,7 +51,7 @@ async def serve(hub: Hub, name: str, service: Service, ready: Ready = lambda: No
 
 @cache
 def installed_version() -> str:
-    """Of Engage, as its package says; `unknown` without one."""
+    """Version of Engage, as its package says; `unknown` without one."""
     try:
         return version("engage-hri")
     except PackageNotFoundError:  # run from its sources
@@ -59,7 +60,7 @@ def installed_version() -> str:
 
 @asynccontextmanager
 async def running(hub: Hub, services: Mapping[str, Service]) -> AsyncIterator[None]:
-    """Run services in this process; the body of `async with` starts when all stand, and its end stops them."""
+    """Run services in this process. The body of `async with` starts when all are ready, and its end stops them."""
     standing = {name: asyncio.Event() for name in services}
     async with asyncio.TaskGroup() as group:
         tasks = [

@@ -1,4 +1,4 @@
-"""An event loop whose clock jumps to the next timer: hours in seconds, exact times, and deadlocks found for free."""
+"""An event loop with a clock that jumps to the next timer: hours pass in seconds, times are exact, deadlocks show."""
 
 import asyncio
 import heapq
@@ -23,7 +23,7 @@ class TimeRanOut(RuntimeError):
 
 
 class _InstantSelector(selectors.SelectSelector):
-    """Never waits: reports readiness of the loop's own pipe at once and turns waiting into the passing of time."""
+    """A selector that does not wait: reports readiness of the loop's own pipe at once, and lets virtual time pass."""
 
     loop: "VirtualTimeLoop"
 
@@ -36,7 +36,7 @@ class _InstantSelector(selectors.SelectSelector):
 
 
 class _Timer(asyncio.TimerHandle):
-    """Of timers due together the one set first fires first; asyncio's heap leaves it to chance."""
+    """A timer in a firm order: of two due together the one set first fires first; asyncio leaves that to chance."""
 
     __slots__ = ("_place",)
 
@@ -50,7 +50,7 @@ class _Timer(asyncio.TimerHandle):
 
 
 class VirtualTimeLoop(asyncio.SelectorEventLoop):
-    """Starts at second 0. `loop.time()` moves only when nothing else is left to do.
+    """An event loop that starts at second 0. `loop.time()` moves only when nothing else is left to do.
 
     Nothing outside the loop may wake it: no sockets, threads or processes, which take real time.
     limit: the second at which TimeRanOut is raised; with a timer that repeats there is never a Deadlock.
@@ -88,19 +88,19 @@ class VirtualTimeLoop(asyncio.SelectorEventLoop):
         scheduled = self._scheduled  # type: ignore[attr-defined]
         # The exact instant of the next timer: now + timeout would be off by a rounding.
         self._virtual_now = scheduled[0]._when if scheduled else self._virtual_now + timeout
-        # Timers are due before now + resolution: at now, and never earlier, or who asks again at once what was due
-        # then would ask for ever, in one instant.
+        # Timers are due before now + resolution: at now, and never earlier, or a callback that sets its timer again
+        # at once would do so for ever, in one instant.
         self._clock_resolution = math.ulp(self._virtual_now)
 
 
 def _whereabouts(task: "asyncio.Task[Any]") -> str:
-    """`service realizer (service.py:57)`."""
+    """Name and place of a task, as in `service realizer (service.py:57)`."""
     stack = task.get_stack(limit=1)
     place = f" ({Path(stack[0].f_code.co_filename).name}:{stack[0].f_lineno})" if stack else ""
     return f"{task.get_name()}{place}"
 
 
 def run_virtual(main: Coroutine[Any, Any, T]) -> T:
-    """`asyncio.run` on a virtual clock. Raises Deadlock where real time would hang."""
+    """Run a coroutine as `asyncio.run` does, on a virtual clock. Raises Deadlock where real time would hang."""
     with asyncio.Runner(loop_factory=VirtualTimeLoop) as runner:
         return runner.run(main)

@@ -15,7 +15,7 @@ from msgspec import Struct
 import engage_hri
 from engage_hri.schemas import faults
 from engage_hri.schemas.faults import EngageError
-from engage_hri.services.client import ended, feeds, given, robot
+from engage_hri.services.client import feeds, inputs, results, robot
 from engage_hri.services.control import body
 
 Function = ast.FunctionDef | ast.AsyncFunctionDef
@@ -27,7 +27,7 @@ UNIT = re.compile(r"\b(seconds|metres|meters|radians|degrees|m/s|loop times?|how
 """What says of a bare number what it counts or measures; so does a range, such as 0..1."""
 RANGE = re.compile(r"\d\.\.\d|[([]\d, \d[)\]]|>= 0|from 1")
 RAISED = re.compile(r"^    (\w+): ", re.MULTILINE)
-CALLS_INTO = (robot, given, ended, body)
+CALLS_INTO = (robot, inputs, results, body)
 """Files whose functions the public ones call."""
 
 
@@ -150,7 +150,7 @@ def test_the_search_for_errors_finds_those_of_others() -> None:
 
 
 def _error(name: str) -> Any:
-    return next((vars(place)[name] for place in (faults, ended, body, builtins) if name in vars(place)), None)
+    return next((vars(place)[name] for place in (faults, results, body, builtins) if name in vars(place)), None)
 
 
 def _bases(names: set[str]) -> set[str]:

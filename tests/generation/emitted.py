@@ -14,7 +14,7 @@ from engage_hri.schemas.behaviors import (
 from engage_hri.schemas.blocks import Block
 from engage_hri.schemas.check import check
 from engage_hri.schemas.fragments import GestureChoice, ReferenceChoice, TurnFragment
-from engage_hri.services.generation.block.emission import Emission, emit
+from engage_hri.services.generation.block.emission import Emission, FragmentPlan
 from engage_hri.services.generation.config import GenerationConfig
 from engage_hri.services.generation.permits import Permits
 from engage_hri.services.generation.turns.continuation import NO_CONTINUATION, Continuation
@@ -41,7 +41,7 @@ def emission(
     permits: Permits | None = None,
     hands: dict[str, str] | None = None,
     before: Continuation = NO_CONTINUATION,
-) -> Emission:
+) -> FragmentPlan:
     """`made`: gesture and phrase of each reference in document order."""
     references = [behavior for behavior in fragment.behaviors if isinstance(behavior, Reference)]
     choices = [
@@ -52,7 +52,7 @@ def emission(
     ]
     config = GenerationConfig(profile=profile)  # type: ignore[arg-type]
     turn = plan_turn(fragment, "turn", "human")
-    result = emit(fragment, turn, choices, config, permits or Permits(), hands, before)  # type: ignore[arg-type]
+    result = Emission(fragment, turn, choices, config, permits or Permits(), hands or {}, before).plan()  # type: ignore[arg-type]
     check(result.block)  # every reference of the block is sound
     return result
 

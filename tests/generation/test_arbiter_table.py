@@ -290,7 +290,7 @@ def test_two_manipulations_of_one_person_end_one_by_one() -> None:
 def test_five_events_are_five_without_our_own_glances() -> None:
     stage = on_the_face()
     for number in range(3):
-        stage.feed(event(f"g{number}", "started", cause="maintenance", initiator="robot", responder="human"))
+        stage.feed(event(f"s-{number}", "started", cause="maintenance", initiator="robot", responder="human"))
     stage.feed(statistics(3.0, events=7), act())
     stage.until(20.0)
 

@@ -5,10 +5,11 @@ import pytest
 from engage_hri.schemas.behaviors import Event, Gaze, Pointing, Reference, Speech
 from engage_hri.schemas.documents.xml_decode import decode_xml
 from engage_hri.schemas.fragments import TurnFragment
+from engage_hri.services.generation.block.emission import FragmentPlan
 from engage_hri.services.generation.config import GenerationConfig
 from engage_hri.services.generation.fragment_check import checked
 from engage_hri.services.generation.permits import Permits
-from engage_hri.services.generation.pipeline import FragmentPlan, plan, targets
+from engage_hri.services.generation.pipeline import plan, targets
 from engage_hri.services.generation.turns.policy import plan_turn
 from tests.generation.emitted import POINT, by_id, lines
 from tests.generation.tables import TANGRAMS, body, flat_world, scene

@@ -1,4 +1,4 @@
-"""What programs that know only Zenoh may ask: the last states, and what was said lately.
+"""Answers for programs that know only Zenoh: the last states, and the commands and events of the last seconds.
 
 A `session.get` of all states (`keys.of_class`) brings them as they were published: encoding, attachment, Zenoh's
 timestamp. Parameters of the selector, joined by `;` as Zenoh has it: `format=json`, and `age=SECONDS`, how far back
@@ -20,13 +20,13 @@ from engage_hri.services.bus.zenoh.peers import finish, pack
 from engage_hri.services.bus.zenoh.session import LoopBridge
 
 BATCH = 32
-"""Replies in one go: a question for everything must not hold up the loop."""
+"""Number of replies in one go: a question for everything must not hold up the loop."""
 
 Kept = tuple[Written, zenoh.Timestamp]
 
 
 class ForeignClients:
-    """What this process has published, kept under the timestamps it was published with, and given to who asks."""
+    """The messages that this process has published, kept with Zenoh's timestamps and given out on request."""
 
     def __init__(self, session: zenoh.Session, bridge: LoopBridge) -> None:
         self._loop = asyncio.get_running_loop()
@@ -39,7 +39,7 @@ class ForeignClients:
         )
 
     def note(self, written: Written, stamp: zenoh.Timestamp) -> None:
-        """Keep what has just been published."""
+        """Keep a message that has just been published."""
         if keys.key_class(written.key) == "state":
             self._states[written.key] = (written, stamp)
         else:
@@ -81,7 +81,10 @@ class ForeignClients:
 
 
 def form_asked(query: zenoh.Query, otherwise: str = "msgpack") -> str:
-    """`json` or `msgpack`: what the selector asks for, or else what the question is in. Raises InputRefused."""
+    """Form of the answer: the selector's, or else that of the question. Raises InputRefused.
+
+    otherwise: for a question that is not in JSON.
+    """
     form = query.parameters.get("format")
     if form is None:
         return "json" if str(query.encoding).startswith("application/json") else otherwise
@@ -91,11 +94,12 @@ def form_asked(query: zenoh.Query, otherwise: str = "msgpack") -> str:
 
 
 def in_form(message: Message, form: str) -> tuple[bytes, str]:
-    """Payload and encoding."""
+    """Encode the message in this form; returns payload and encoding."""
     return (encode_json if form == "json" else encode)(message), encoding_of(message, form)
 
 
 def refuse(query: zenoh.Query, fault: Fault, form: str) -> None:
+    """Answer the query with an error."""
     payload, encoding = in_form(fault, form)
     query.reply_err(payload, encoding=encoding)
 

@@ -1,7 +1,7 @@
-"""The bus over Zenoh: one session per process, its participants beside each other on it.
+"""The bus over Zenoh: one session per process, shared by the participants in it.
 
-Zenoh carries; what it leaves open is settled here and in `order`: order across keys, history for late
-subscribers, loss in a cut (it never raises), who is there, and answers that do not come.
+Zenoh carries the messages. This module and `order` add what it leaves open: order across keys, history for late
+subscribers, repair of losses in a cut, the list of participants, and questions that get no answer.
 """
 
 import asyncio
@@ -19,7 +19,6 @@ from engage_hri.schemas.faults import EngageError, Fault, InputRefused, NoReply
 from engage_hri.schemas.messages import Message, decode, encode, encoding_of, published
 from engage_hri.schemas.status import BusHealth
 from engage_hri.schemas.units import Seconds, Stamp
-from engage_hri.services.bus import journal
 from engage_hri.services.bus.interface import LOG, Answer, Bus, Hub, Keep, Received, Subscription
 from engage_hri.services.bus.zenoh.clocks import Clocks
 from engage_hri.services.bus.zenoh.foreign_clients import ForeignClients, form_asked, in_form, refuse
@@ -31,25 +30,19 @@ from engage_hri.services.bus.zenoh.session import QOS, RENDEZVOUS, STREAM_QOS, L
 FIRST_PULSE: Seconds = 0.25
 NEXT_PULSE: Seconds = 1.0
 OPENING: Seconds = 0.5
-"""How long `open_hub` waits for the first acquaintance: who leaves before anybody knows him is heard by nobody."""
-
-
+"""Time that `open_hub` waits for the first other process: one that leaves before is heard by nobody."""
 ASK_AGAIN: Seconds = 0.5
-"""How long a question goes unanswered before it is asked once more."""
+"""Time without an answer after which a question is asked once more."""
 VACANCY: Seconds = 4.0
-"""How long one who is dead may seem to be there: the lease of a silent link, and as long again."""
+"""Time that a dead participant may seem to be there: the lease of a silent link, and as long again."""
 QUIET: Seconds = 0.25
-"""Who is found through others has been found when nobody has come for so long."""
+"""Time without a change after which all peers are known, also those found through others."""
 
 
 async def open_hub(
-    robot: str,
-    *,
-    connect: Sequence[str] = (),
-    listen: Sequence[str] = (),
-    rendezvous: str | None = RENDEZVOUS,
+    robot: str, *, connect: Sequence[str] = (), listen: Sequence[str] = (), rendezvous: str | None = RENDEZVOUS
 ) -> "ZenohHub":
-    """Join the bus of `robot`. Processes may start in any order: waits for nobody for longer than `OPENING`.
+    """Join the bus of `robot`. Processes may start in any order: this waits for others for `OPENING` at most.
 
     connect, listen: Zenoh endpoints (`tcp/HOST:PORT`). Without any, the processes of this machine find one another
     at `rendezvous`. Raises InputRefused when an endpoint is misspelled, RunFailed when it is taken.
@@ -63,6 +56,8 @@ async def open_hub(
 
 
 class ZenohHub(Hub):
+    """The hub of a process on a Zenoh session."""
+
     def __init__(self, robot: str, session: zenoh.Session) -> None:
         self.robot = robot
         self.run = str(session.zid())
@@ -83,7 +78,7 @@ class ZenohHub(Hub):
 
     @property
     def health(self) -> BusHealth:
-        """Of the process, without what is each participant's own."""
+        """Figures of the process, without those of its participants."""
         traffic = self.bridge.traffic
         return BusHealth(
             peers=tuple(sorted(self.peers.names)), refused=self.readers.refused,
@@ -111,7 +106,7 @@ class ZenohHub(Hub):
         self._buses.pop(name, None)
 
     def failed(self, error: Exception, what: str) -> None:
-        """Something went wrong before it was known which participant it concerns: the first one says so."""
+        """Tell an error that cannot be assigned to a participant: the first one of the process tells it."""
         if (bus := next(iter(self._buses.values()), None)) is not None:
             bus.failed(error, what)
         else:
@@ -161,7 +156,7 @@ class ZenohHub(Hub):
         return publisher
 
     def _send_pulse(self) -> None:
-        """Tell the recent counts, a few times: a receiver that lost the last message of a burst sees it by them."""
+        """Publish the recent counts, a few times: they show a receiver that it lost the last message of a burst."""
         counts = self._sent.recent(self._loop.time())
         self._pulse = self._loop.call_later(NEXT_PULSE, self._send_pulse) if counts else None
         if counts:
@@ -171,21 +166,15 @@ class ZenohHub(Hub):
 
 
 class ZenohBus(Bus):
+    """A participant's view of the bus over Zenoh."""
+
     def __init__(self, hub: ZenohHub, name: str, role: str) -> None:
-        self.robot = hub.robot
-        self.name = name
-        self.role = role
-        self.log = journal.logger(name, role)
-        self._life_numbers = hub.life_numbers
-        self.clock = hub.clocks.own
-        self.run = hub.run
+        super().__init__(hub.robot, name, role, hub.clocks.own, hub.run, hub.life_numbers)
         self._hub = hub
-        self._loop = asyncio.get_running_loop()
         self._subscriptions: list[Subscription] = []
         self._answers: list[Any] = []
         self._overflowed = 0
         self._token: Any = None
-        self._gone = False
 
     @property
     def health(self) -> BusHealth:
@@ -194,9 +183,6 @@ class ZenohBus(Bus):
         return msgspec.structs.replace(
             self._hub.health, overflowed=overflowed, gaps=gaps, lost=lost, failures=self.failures
         )
-
-    def now(self) -> Seconds:
-        return self._loop.time()
 
     def local(self, stamp: Stamp) -> Seconds:
         return self._hub.clocks.local(stamp)
@@ -227,15 +213,15 @@ class ZenohBus(Bus):
                 return decode(reply.ok.payload.to_bytes(), str(reply.ok.encoding))
             if reply is not None and reply.err is not None:
                 raise InputRefused(_fault(reply.err.payload.to_bytes(), str(reply.err.encoding)))
-            # Nobody serves it, or its server died over it: there is hope only if somebody comes.
+            # There is no server, or it died meanwhile: wait until a process comes or goes.
             if not await self._hub.peers.change(deadline, since=known):
                 break
         raise NoReply(Fault(reason=f"no reply within {timeout} s", where=key, advice="is its server running?"))
 
     async def _ask(self, key: str, payload: bytes, encoding: str, deadline: Seconds) -> zenoh.Reply | None:
-        """The first answer; None once every try has ended without one.
+        """Ask until the first answer; None once every try has ended without one.
 
-        It is asked again, as a cut may swallow a question; answers change nothing, so a second one does no harm.
+        The question is repeated, as a cut may swallow it; answers change nothing, so a second one does no harm.
         """
         answered: asyncio.Future[zenoh.Reply | None] = self._loop.create_future()
         going = 0
@@ -245,7 +231,7 @@ class ZenohBus(Bus):
                 answered.set_result(reply)
 
         def replied(reply: zenoh.Reply) -> None:
-            # Zenoh's own errors, as that the time is up, are no answer of a server.
+            # Errors of Zenoh itself, such as a timeout, are no answer of a server.
             if reply.ok is not None or (reply.err is not None and _is_ours(str(reply.err.encoding))):
                 settle(reply)
 
@@ -280,7 +266,7 @@ class ZenohBus(Bus):
 
         session = self._hub.session
         self._answers.append(session.declare_queryable(key, self._hub.bridge.on_loop(reply)))
-        # Whoever asked too early hears by this token that it is worth asking again.
+        # A participant that asked too early learns from this token that it may ask again.
         self._answers.append(session.liveliness().declare_token(keys.own(self._hub.run, f"answers/{key}")))
 
     def declare_alive(self) -> None:
@@ -316,7 +302,7 @@ def _fault(payload: bytes, encoding: str) -> Fault:
 
 
 def _clock_name(loop: asyncio.AbstractEventLoop, run: str) -> str:
-    """Loop time is the machine's monotonic clock, one for all its processes since boot; other loops stand alone."""
+    """Name of the clock that loop time is: the machine's, one for all processes since boot, or the loop's own."""
     boot = Path("/proc/sys/kernel/random/boot_id")
     if abs(loop.time() - time.monotonic()) < 0.1 and boot.exists():
         return f"boot-{boot.read_text()[:8]}"

@@ -1,4 +1,4 @@
-"""Which other robots are on the bus: for whoever waits for one that is not there."""
+"""Other robots on the bus: a hint for a client that waits for one that is not there."""
 
 import asyncio
 from collections.abc import AsyncIterator, Sequence
@@ -13,14 +13,14 @@ from engage_hri.services.bus.interface import LOG, Bus
 from engage_hri.services.bus.zenoh.session import RENDEZVOUS, open_session
 
 LOOK: Seconds = 1.0
-"""How long they may take to answer; nobody waits for this who has anything else to do."""
+"""Time that the other robots have to answer; nothing else waits for that."""
 POLL: Seconds = 0.05
 AFTER: Seconds = 3.0
-"""How long somebody waits in silence."""
+"""Time that a client waits before it gets the hint."""
 
 
 async def tell_if_alone(bus: Bus, connect: Sequence[str], after: Seconds = AFTER) -> None:
-    """Write into the log whom this waits for, once, if none of the robot's services is there by then."""
+    """Log a warning that names the robots on the bus, if none of this robot's services is there after this time."""
     await asyncio.sleep(after)
     if set(bus.health.peers) & set(keys.SERVICES):
         return
@@ -30,7 +30,7 @@ async def tell_if_alone(bus: Bus, connect: Sequence[str], after: Seconds = AFTER
 
 
 async def robots(connect: Sequence[str]) -> tuple[str, ...]:
-    """Their names, in order; without an endpoint of this machine. Nothing is raised: it is a hint."""
+    """Names of the robots on the bus, in order; without endpoints: on this machine's. Raises nothing."""
     try:
         session, _ = open_session(None, connect or (RENDEZVOUS,), (), None)
     except EngageError:

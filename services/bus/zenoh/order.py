@@ -1,4 +1,4 @@
-"""Order, history and loss on top of a wire that keeps order only per link. Pure: no zenoh, no clock, no loop.
+"""Order, history and repair of losses on a wire that keeps order only per link. Pure: no zenoh, no clock, no loop.
 
 Every process numbers what it publishes on ordered keys (`Envelope`), keeps the last of it (`SentLog`) and hands it
 out on request. Every subscription follows each publishing process (`Follower`): it starts by asking for the past,
@@ -20,17 +20,17 @@ from engage_hri.schemas import keys
 from engage_hri.schemas.units import Seconds
 
 KEPT = 4096
-"""How many messages a process keeps for those who missed them."""
+"""Number of messages that a process keeps for subscribers that missed them."""
 PULSE_FOR: Seconds = 3.0
-"""How long after a message its count is still told, for receivers that lost the last one of a burst."""
+"""Time after a message for which its count is published, for receivers that lost the last one of a burst."""
 
 
 class Envelope(Struct, frozen=True, array_like=True):
-    """The attachment of a sample: who sent it, when by which clock, and its place in the order.
+    """The attachment of a sample: its sender, the time by the sender's clock, and its place in the order.
 
-    run: the publishing process' life, or what a stranger's connection tells of it. number: of all its ordered
-    messages, from 1; 0 on a stream, and from a stranger.
-    nth: of its messages on this key.
+    run: the publishing process' life; of a program that sends no envelope, the life that its connection tells.
+    number: among all its ordered messages, from 1; 0 on a stream, and from a program that sends no envelope.
+    nth: among its messages on this key, from 1.
     """
 
     source: str
@@ -51,7 +51,7 @@ class Written(Struct, frozen=True, array_like=True):
 
 
 class Missing(Struct, frozen=True):
-    """What a follower asks for. seen: per key the last count it has; since: -1 if it has never caught up."""
+    """A follower's question for the past. seen: its last count, by key. since: -1 if it has never caught up."""
 
     patterns: tuple[str, ...]
     seen: dict[str, int]
@@ -67,13 +67,13 @@ class Past(Struct, frozen=True):
 
 
 class Pulse(Struct, frozen=True):
-    """Recent counts by key: who has less has lost something."""
+    """Recent counts by key: a receiver with a lower count has lost a message."""
 
     counts: dict[str, int]
 
 
 class SentLog:
-    """What one process has published: numbers it, keeps it, gives it out again."""
+    """The messages that one process has published: numbers them, keeps them, gives them out again."""
 
     def __init__(self, run: str, kept: int = KEPT) -> None:
         self.run = run
@@ -84,7 +84,7 @@ class SentLog:
         self._states: dict[str, Written] = {}
 
     def write(self, key: str, encoding: str, payload: bytes, source: str, clock: str, now: Seconds) -> Written:
-        """The next message in order, kept."""
+        """Number the next message and keep it."""
         self.number += 1
         nth = self.counts[key] = self.counts.get(key, 0) + 1
         written = Written(key, encoding, payload, Envelope(source, clock, now, self.run, self.number, nth))
@@ -96,7 +96,7 @@ class SentLog:
         return written
 
     def past(self, missing: Missing, now: Seconds) -> Past:
-        """What `missing` asks for; a first joiner gets the last states and `HISTORY_MAX_AGE` of the rest."""
+        """Answer `missing`; a first joiner gets the last states and `HISTORY_MAX_AGE` of the rest."""
         counts = {key: nth for key, nth in self.counts.items() if _wanted(missing.patterns, key)}
         written = [
             one
@@ -122,8 +122,8 @@ class Follower:
     """One publishing process as one subscription sees it.
 
     behind: the past is needed; until `catch_up` nothing is delivered. gaps: how often a message was missed.
-    lost: messages that were gone for good. asking, again: for the shell: the question is on its way, and is to be
-    asked once more after it.
+    lost: messages that were gone for good. asking, again: kept for `Readers`: the question is on its way, and is to
+    be asked once more after it.
     """
 
     def __init__(self, patterns: Iterable[str]) -> None:
@@ -138,7 +138,7 @@ class Follower:
         self._held: list[Written] = []
 
     def take(self, written: Written) -> list[Written]:
-        """What to deliver now that this one has arrived."""
+        """Take a message that has arrived; returns the messages to deliver now."""
         envelope = written.envelope
         expected = self._seen.get(written.key, 0) + 1
         if envelope.nth < expected:
@@ -152,7 +152,7 @@ class Follower:
         return [written]
 
     def pulse(self, pulse: Pulse) -> None:
-        """Compare counts; may set `behind`."""
+        """Compare counts; sets `behind` if a message is missing."""
         for key, nth in pulse.counts.items():
             if nth > self._seen.get(key, 0) and _wanted(self.patterns, key):
                 self._fall_behind()
@@ -165,7 +165,7 @@ class Follower:
         return Missing(self.patterns, dict(self._seen), self._since)
 
     def catch_up(self, past: Past | None) -> list[tuple[Written, bool]]:
-        """What to deliver now that the past, or None if there was no answer, has arrived; True: it is history."""
+        """Take the past (None: there was no answer). Returns the messages to deliver, and whether each is history."""
         first = self._since < 0
         live = {one.envelope.number for one in self._held}
         merged = {one.envelope.number: one for one in chain(past.written if past else (), self._held)}
@@ -191,7 +191,7 @@ class Follower:
         return deliver
 
     def _may_skip(self, key: str) -> bool:
-        """A state is its last value: older ones may be missing without harm."""
+        """True for a state: only its last value counts, so older ones may be missing."""
         return keys.key_class(key) == "state"
 
 

@@ -1,4 +1,4 @@
-"""Who else is on the bus, and what processes ask one another: the past, the time, and whether all has arrived."""
+"""Peers on the bus, and the questions of processes to one another: for the past, for the time, and for a flush."""
 
 import asyncio
 from collections.abc import Callable
@@ -15,14 +15,14 @@ from engage_hri.services.bus.zenoh.order import Missing, Past, Pulse, SentLog
 from engage_hri.services.bus.zenoh.session import QOS, LoopBridge
 
 CATCH_UP: Seconds = 1.0
-"""How long a process may take to hand out its past."""
+"""Time that a process has to hand out its past."""
 FLUSH: Seconds = 2.0
-"""How long closing waits for the others to have everything: as long as a silent one counts as alive."""
+"""Time that closing waits until the others have everything: as long as a silent one counts as alive."""
 CLOCK_TRIPS = 5
 CLOCK_TIMEOUT: Seconds = 1.0
 
 BAD = (msgspec.DecodeError, UnicodeDecodeError)
-"""What decoding raises for bytes that are none of ours."""
+"""Exceptions of decoding bytes from other programs."""
 pack = msgspec.msgpack.encode
 _missings = msgspec.msgpack.Decoder(Missing)
 _pasts = msgspec.msgpack.Decoder(Past)
@@ -32,16 +32,11 @@ _instants = msgspec.msgpack.Decoder(float)
 class Peers:
     """Liveliness and the questions between processes.
 
-    processes: runs whose process is there. names: participants, each with the runs that carry it.
+    processes: runs of the processes that are there. names: participants, each with the runs that have it. changes:
+    number of times that a peer has come or gone.
     """
 
-    def __init__(
-        self,
-        session: zenoh.Session,
-        bridge: LoopBridge,
-        sent: SentLog,
-        clocks: Clocks,
-    ) -> None:
+    def __init__(self, session: zenoh.Session, bridge: LoopBridge, sent: SentLog, clocks: Clocks) -> None:
         self.processes: set[str] = set()
         self.names: dict[str, set[str]] = {}
         self.changes = 0
@@ -58,7 +53,11 @@ class Peers:
         )
 
     def stand(self, on_process: Callable[[str], None], on_participant: Callable[[str, str, bool], None]) -> None:
-        """Look out for the others, and show the own process' token: its answers are there."""
+        """Watch for the others, and show the own process' token, now that it can answer.
+
+        on_process: called with the run of a process that has come, or come back. on_participant: called with name and
+        run of a participant, and with True if it has come, False if it has gone.
+        """
         self._on_process = on_process
         self._on_participant = on_participant
         liveliness = self._session.liveliness()
@@ -68,15 +67,13 @@ class Peers:
             liveliness.declare_token(keys.own(self._sent.run, "process")),
         )
 
-    # on_process: it has come, or come back. on_participant: come or, with False, gone.
-
     async def wait_for_discovery(self, deadline: Seconds) -> None:
         """Wait until the first other process is known."""
         while not self.processes and await self.change(deadline):
             pass
 
     async def wait_for_quiet(self, pause: Seconds) -> None:
-        """Wait until nobody has come or gone for this long; with no other process there is nobody to wait for."""
+        """Wait until no peer has come or gone for this long; returns at once without any other process."""
         while self.processes and await self.change(self._loop.time() + pause):
             pass
 
@@ -84,7 +81,7 @@ class Peers:
         for declared in reversed(self._declared):
             declared.undeclare()
 
-    # -- who is there -------------------------------------------------------------------------------------------
+    # -- liveliness ---------------------------------------------------------------------------------------------
 
     def _token_changed(self, sample: zenoh.Sample) -> None:
         run, *subject = str(sample.key_expr).split("/")[3:]
@@ -102,7 +99,7 @@ class Peers:
         self._wake_watchers()
 
     def note(self, name: str, run: str, there: bool) -> None:
-        """A participant has come or gone; those of the own process are noted by the hub."""
+        """Note that a participant has come or gone; the hub does so for those of the own process."""
         runs = self.names.setdefault(name, set())
         if there and run not in runs:
             runs.add(run)
@@ -115,7 +112,7 @@ class Peers:
             del self.names[name]
 
     async def change(self, deadline: Seconds, since: int | None = None) -> bool:
-        """Wait until somebody comes or goes; False at the deadline. since: true at once if `changes` is past it."""
+        """Wait until a peer comes or goes; False at the deadline. since: return at once if `changes` is past it."""
         if since is not None and self.changes > since:
             return True
         watcher: asyncio.Future[None] = self._loop.create_future()
@@ -146,7 +143,7 @@ class Peers:
         timeout: Seconds,
         encoding: str | None = None,
     ) -> None:
-        """A Zenoh query, all matching servers; `reply` for each answer and then `end`, on the loop."""
+        """Ask all matching servers; calls `reply` for each answer and then `end`, on the loop."""
         self._session.get(
             key,
             self._bridge.on_loop(reply, end),
@@ -159,12 +156,12 @@ class Peers:
         )
 
     def ask_past(self, run: str, missing: Missing, then: Callable[[Past | None], None]) -> None:
-        """`then` gets the past of the process, or None if it does not answer."""
+        """Ask a process for its past; calls `then` with it, or with None if there is no answer."""
         answer: list[Past] = []
 
         def reply(got: zenoh.Reply) -> None:
             if got.ok is not None:
-                with suppress(*BAD):  # then it has not answered
+                with suppress(*BAD):  # counts as no answer
                     answer.append(_pasts.decode(got.ok.payload.to_bytes()))
 
         self.ask(keys.own(run, "past"), pack(missing), reply, lambda _: then(answer[0] if answer else None), CATCH_UP)
@@ -197,7 +194,7 @@ class Peers:
         finish(query)
 
     async def flush(self) -> None:
-        """Wait until every process we know has what was written last: a put and then an exit loses most of it."""
+        """Wait until all known processes have the last messages: an exit right after a put loses most of them."""
         counts = self._sent.recent(self._loop.time())
         if counts and self.processes:
             done: asyncio.Future[None] = self._loop.create_future()
@@ -207,7 +204,7 @@ class Peers:
 
 
 def finish(query: zenoh.Query) -> None:
-    """Tell Zenoh that there will be no more replies: the asker waits for that."""
+    """Tell Zenoh that there will be no more replies: the asking process waits for that."""
     query.drop()  # type: ignore[no-untyped-call]
 
 

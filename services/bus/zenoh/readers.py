@@ -1,4 +1,4 @@
-"""Everything that arrives: which subscription gets what, in which order, and what is still missing. On the loop."""
+"""Delivers what arrives: to the right subscriptions, in order; asks for missing messages. On the loop."""
 
 import asyncio
 from functools import partial
@@ -25,11 +25,11 @@ _flushes = msgspec.msgpack.Decoder(tuple[str, Pulse])
 
 
 TRIES = 3
-"""How often a process that is there, but does not answer, is asked for its past."""
+"""Number of times that a process that is there, but does not answer, is asked for its past."""
 
 
 class _Reader:
-    """A subscription, whose it is, and how far it has followed each process."""
+    """A subscription of the participant `bus`, with its follower of each process, by run."""
 
     def __init__(self, bus: Bus, subscription: Subscription) -> None:
         self.bus = bus
@@ -38,7 +38,7 @@ class _Reader:
 
 
 class Readers:
-    """All subscriptions of the process. refused: how many payloads were bad. log: tells who comes and goes."""
+    """All subscriptions of the process. refused: number of bad payloads. log: for peers that come and go."""
 
     def __init__(self, session: zenoh.Session, bridge: LoopBridge, sent: SentLog, peers: Peers) -> None:
         self.refused = 0
@@ -58,7 +58,7 @@ class Readers:
         )
 
     def missed(self, bus: Bus) -> tuple[int, int]:
-        """Of one participant: how often it missed something, and how many messages were gone for good."""
+        """Gaps of one participant, and the number of its messages that were lost for good."""
         followers = [one for reader in self._readers if reader.bus is bus for one in reader.followers.values()]
         return sum(one.gaps for one in followers), sum(one.lost for one in followers)
 
@@ -107,7 +107,7 @@ class Readers:
         if self._peers.clocks.heard(envelope.clock, envelope.sent, self._loop.time()) and envelope.run:
             self._peers.measure_clock(envelope.run, envelope.clock)
         for reader in tuple(self._carriers[pattern][1]) if pattern in self._carriers else ():
-            # Of overlapping patterns only the first carries, so nothing comes twice.
+            # Only the first of overlapping patterns delivers, so that nothing comes twice.
             if reader.subscription.carrier(key) != pattern:
                 continue
             if not envelope.number:
@@ -119,18 +119,18 @@ class Readers:
             self._ask_past(reader, envelope.run, follower)
 
     def _envelope(self, sample: zenoh.Sample) -> Envelope:
-        """Samples of other languages may come without one."""
+        """Envelope of a sample; for one without, as programs in other languages send it, all but `run` is empty."""
         if sample.attachment is not None:
             try:
                 return _envelopes.decode(sample.attachment.to_bytes())
             except BAD:
                 self.refused += 1
-        return Envelope("", "", 0.0, self._stranger(sample))
+        return Envelope("", "", 0.0, self._foreign_life(sample))
 
-    def _stranger(self, sample: zenoh.Sample) -> str:
-        """Which life of a program without an envelope this is, as far as Zenoh tells.
+    def _foreign_life(self, sample: zenoh.Sample) -> str:
+        """Life of a program without an envelope, as far as Zenoh tells; else empty.
 
-        What a program has not stamped itself is stamped by the process that passes it on.
+        A sample that the program has not stamped itself is stamped by the process that passes it on.
         """
         if sample.source_info is not None:
             return str(sample.source_info.source_id.zid)
@@ -153,7 +153,7 @@ class Readers:
             reader.subscription.offer(received)
 
     def _decode(self, bus: Bus, written: Written) -> Message | None:
-        """The message, or what its server hears of a bad one, which is counted and complained about."""
+        """Decode a message. A bad one is counted, and told as a fault; returns the notice for its server, if any."""
         try:
             return read_payload(written.payload, written.encoding, written.key, written.envelope.source)
         except EngageError as error:
@@ -178,7 +178,7 @@ class Readers:
         def caught_up(past: Past | None) -> None:
             follower.asking = False
             if past is None and run in self._peers.processes and tries < TRIES:
-                # It is there, only slow, or the link was cut under the question: what it has is not lost yet.
+                # The process is there, only slow, or the link was cut meanwhile: the past is not lost yet.
                 self._ask_past(reader, run, follower, tries + 1)
                 return
             again, follower.again = follower.again, False
@@ -198,7 +198,7 @@ class Readers:
             if follower is None:
                 self._follow(reader, run)
                 continue
-            # It may be back after a cut in which messages were lost, the answer to a question on its way among them.
+            # The process may be back after a cut in which messages were lost, or the answer to a question.
             follower.again = follower.asking
             follower.behind = True
             self._ask_past(reader, run, follower)

@@ -1,4 +1,4 @@
-"""Opening a Zenoh session the way bus.md asks for, and the one place where Zenoh's threads meet the loop."""
+"""Opens a Zenoh session as the bus needs it, and passes everything from Zenoh's threads to the loop."""
 
 import asyncio
 import json
@@ -14,30 +14,26 @@ from engage_hri.schemas.faults import Fault, InputRefused, RunFailed
 from engage_hri.schemas.units import Seconds
 
 RENDEZVOUS = "tcp/127.0.0.1:7447"
-"""Where the processes of one machine find one another: the first listens there, all others connect."""
+"""Endpoint at which the processes of one machine find one another: the first listens there, all others connect."""
 ADVICE = "tcp/HOST:PORT or tls/HOST:PORT"
 LOOPBACK = "tcp/127.0.0.1:0"
 LEASE_MS = 2000
-"""Shorter leases flap on cuts of 0.4 s."""
+"""Time in which a silent link counts as alive: with shorter ones peers seem to go and come on cuts of 0.4 s."""
 STALL_US = 200_000
-"""How long a full link may stall `put`, and so the loop, before it is closed. Zenoh's default is 5 s."""
+"""Time that a full link may stall `put`, and so the loop, before it is closed. Zenoh's default is 5 s."""
 ENDPOINT = re.compile(r"(?:tcp|tls)/[^\s/]+:(\d{1,5})(?:[?#]\S*)?")
-"""Only what retransmits. Zenoh itself would go on calling a misspelled one in silence."""
+"""Endpoints of protocols that retransmit. Zenoh itself would go on calling a misspelled one in silence."""
 RUST_PLACE = re.compile(r" at /\S+\.rs:\d+\.?")
-"""Where in its source Zenoh failed: of no use to who reads the message."""
+"""Place in Zenoh's source, at the end of its errors: of no use to a user."""
 RETRY_MS = {"period_init_ms": 100, "period_max_ms": 500, "period_increase_factor": 2}
 BATCH = 256
 CROWD = 65_536
-"""Messages waiting for the loop before even ordered ones are dropped (and then asked for again)."""
+"""Number of messages waiting for the loop from which on even ordered ones are dropped (and asked for again)."""
 STREAM_CROWD = 1024
 
 CAUSAL = zenoh.Priority.DATA
-"""One priority for everything whose order matters: mixed ones reorder."""
-QOS: dict[str, Any] = {
-    "congestion_control": zenoh.CongestionControl.BLOCK,
-    "priority": CAUSAL,
-    "express": True,
-}
+"""Priority of all ordered messages: Zenoh does not keep the order of messages with different ones."""
+QOS: dict[str, Any] = {"congestion_control": zenoh.CongestionControl.BLOCK, "priority": CAUSAL, "express": True}
 STREAM_QOS: dict[str, Any] = {
     "congestion_control": zenoh.CongestionControl.DROP,
     "priority": zenoh.Priority.DATA_LOW,
@@ -48,10 +44,10 @@ STREAM_QOS: dict[str, Any] = {
 def open_session(
     robot: str | None, connect: Sequence[str], listen: Sequence[str], rendezvous: str | None, mode: str = "peer"
 ) -> tuple[zenoh.Session, bool]:
-    """A session in the robot's namespace, and whether it calls others. Blocks for some milliseconds.
+    """Open a session in the robot's namespace; returns it, and whether it connects to others. Blocks for some ms.
 
-    An endpoint where nobody is costs nothing. rendezvous None: only the endpoints given. Raises InputRefused when one
-    is misspelled, RunFailed when it is taken, or not ours. robot None: in nobody's namespace.
+    An endpoint where nobody listens costs nothing. robot None: in no namespace. rendezvous None: only the endpoints
+    given. Raises InputRefused when one is misspelled, RunFailed when it is taken, or not of this machine.
     """
     for endpoint in (*connect, *listen):
         match = ENDPOINT.fullmatch(endpoint)
@@ -62,7 +58,7 @@ def open_session(
             session = zenoh.open(_config(robot, connect, (*listen, LOOPBACK, rendezvous), mode))
             return session, bool(connect)
         except zenoh.ZError:
-            # Somebody listens there already. Never both listen and connect: the holder would call itself for ever.
+            # Another process listens there. Never both listen and connect: the first would call itself for ever.
             connect = (*connect, rendezvous)
     try:
         session = zenoh.open(_config(robot, connect, tuple(listen) or (LOOPBACK,), mode))
@@ -101,7 +97,7 @@ def _config(robot: str | None, connect: Sequence[str], listen: Sequence[str], mo
 
 
 class Traffic(Struct):
-    """What the bridge has seen. depth: most that ever waited. lag: longest wait of a batch for the loop."""
+    """Figures of the bridge. depth: most items that ever waited. lag: longest wait of a batch for the loop."""
 
     passed: int = 0
     dropped: int = 0
@@ -110,13 +106,13 @@ class Traffic(Struct):
 
 
 class LoopBridge:
-    """From Zenoh's threads to the loop: one queue for all keys, in order; streams apart, the oldest dropped first.
+    """Queues from Zenoh's threads to the loop: one for all ordered keys; one for streams, the oldest dropped first.
 
-    A callback appends and wakes the loop if nobody has, nothing else: whatever blocks there stalls the link.
+    A callback appends an item and wakes the loop if need be, nothing else: any waiting there stalls the link.
     """
 
     def __init__(self, failed: Callable[[Exception, str], None]) -> None:
-        """failed: told what goes wrong while one item is let in; the others go on."""
+        """failed: called with an error while one item is taken, and its text; the other items go on."""
         self.traffic = Traffic()
         self._failed = failed
         self._loop = asyncio.get_running_loop()
@@ -127,7 +123,7 @@ class LoopBridge:
         self._open = True
 
     def on_loop(self, enter: Callable[[Any], None], end: Callable[[Any], None] | None = None) -> Any:
-        """A handler for Zenoh: `enter` runs on the loop with each item, `end` when there will be no more."""
+        """Make a handler for Zenoh: `enter` runs on the loop with each item, `end` when there will be no more."""
 
         def ended() -> None:
             if end is not None:
@@ -137,7 +133,7 @@ class LoopBridge:
         return zenoh.handlers.Callback(lambda item: self._let_in(enter, item), ended, indirect=False)
 
     def samples(self, enter: Callable[[zenoh.Sample], None]) -> Any:
-        """As `on_loop`, for subscribers: samples that may be dropped take the streams' queue."""
+        """Make a handler for subscribers: as `on_loop`, but samples that may be dropped take the streams' queue."""
 
         def sort(sample: zenoh.Sample) -> None:
             if sample.congestion_control == zenoh.CongestionControl.DROP:
@@ -155,7 +151,7 @@ class LoopBridge:
         return len(self._ordered) + len(self._streams)
 
     def close(self) -> None:
-        """Let nothing in any more."""
+        """Drop all items, waiting or to come."""
         self._open = False
         self._ordered.clear()
         self._streams.clear()
@@ -177,7 +173,7 @@ class LoopBridge:
                 self._open = False
 
     def _drain(self) -> None:
-        # The flag first: what is appended from here on wakes again, so nothing is left behind.
+        # The flag first: an item that is appended from here on wakes the loop again, so none is left behind.
         self._woken = False
         self.traffic.lag = max(self.traffic.lag, self._loop.time() - self._woken_at)
         waiting = self.waiting

@@ -1,1 +1,1 @@
-"""From a fragment and what the policies chose to a block."""
+"""Emission: makes a block of a fragment and of what the policies chose."""

@@ -1,4 +1,4 @@
-"""A fragment becomes a BML block: references replaced, the turn's events and gaze added. Two profiles of timing.
+"""Makes a BML block of a fragment: replaces references, adds the turn's events and gaze. Two profiles of timing.
 
 Events are behaviors of the block, so they begin exactly when the speech or gaze they belong to does. They carry
 their timing inline: the constraints that remain, but for the hold of a point until its event has ended, are
@@ -12,10 +12,12 @@ from msgspec import Struct
 
 from engage_hri.schemas.behavior_types import TYPES
 from engage_hri.schemas.behaviors import (
+    Action,
     After,
     BlockBehavior,
     Constraint,
     Event,
+    EventKind,
     Gaze,
     Hand,
     Head,
@@ -32,7 +34,7 @@ from engage_hri.schemas.references import type_name
 from engage_hri.services.generation.block.ordering import ordered
 from engage_hri.services.generation.block.parts import FreshIds, Mention, Parts
 from engage_hri.services.generation.block.profiles import after, as_in_the_figure, checking_back, same
-from engage_hri.services.generation.block.punctuation import joined
+from engage_hri.services.generation.block.punctuation import moved_punctuation
 from engage_hri.services.generation.block.rewriting import Operator, Rewriting, instants, points_named
 from engage_hri.services.generation.config import GenerationConfig
 from engage_hri.services.generation.permits import Permits
@@ -40,33 +42,26 @@ from engage_hri.services.generation.turns.continuation import NO_CONTINUATION, C
 from engage_hri.services.generation.turns.policy import TurnPlan
 
 
-class Emission(Struct, frozen=True):
-    """The block of a fragment; what it leaves for the next one; what of the input was left out, and why."""
+class FragmentPlan(Struct, frozen=True, kw_only=True):
+    """The block of a fragment and what is known of it before it is sent.
+
+    continuation: for the turn's next fragment. mentions: when each object has been referred to.
+    """
 
     block: Block
-    continuation: Continuation
-    mentions: tuple[Mention, ...]
-    warnings: tuple[str, ...]
+    continuation: Continuation = NO_CONTINUATION
+    mentions: tuple[Mention, ...] = ()
+    choices: tuple[ReferenceChoice, ...] = ()
+    warnings: tuple[str, ...] = ()
 
 
-def emit(
-    fragment: TurnFragment,
-    turn: TurnPlan,
-    choices: Sequence[ReferenceChoice],
-    config: GenerationConfig,
-    permits: Permits,
-    hands: Mapping[str, Hand] | None = None,
-    before: Continuation = NO_CONTINUATION,
-) -> Emission:
-    """The block that performs `fragment`.
+class Emission:
+    """The making of the block that performs a fragment: its behaviors and constraints so far.
 
-    choices: one for each reference. hands: the one to point with, by reference; where it is left to the body, two
-    points count as of the same arm. before: what the turn's earlier fragments still have to do.
+    choices: one for each reference. hands: the one to point with, by reference; where none is given, two points count
+    as made with the same arm. before: what the turn's earlier fragments still have to do.
     """
-    return _Emitter(fragment, turn, choices, config, permits, hands or {}, before).emit()
 
-
-class _Emitter:
     def __init__(
         self,
         fragment: TurnFragment,
@@ -75,17 +70,17 @@ class _Emitter:
         config: GenerationConfig,
         permits: Permits,
         hands: Mapping[str, Hand],
-        before: Continuation,
+        before: Continuation = NO_CONTINUATION,
     ) -> None:
         self.fragment, self.turn, self.config, self.permits, self.hands = fragment, turn, config, permits, hands
-        self.before = before
+        self.choices, self.before = choices, before
         self.names = FreshIds(fragment)
         self.figure = config.profile == "figure-3.3"
         self.dropped = [behavior for behavior in fragment.behaviors if not permits.allows(behavior)]
         kept = [behavior for behavior in fragment.behaviors if permits.allows(behavior)]
         order = ordered(kept, fragment.constraints, fragment.id)
         chosen = {choice.reference: choice for choice in choices}
-        punctuation = joined(order, [id for id, choice in chosen.items() if choice.phrase])
+        punctuation = moved_punctuation(order, [id for id, choice in chosen.items() if choice.phrase])
         self.kept = [each for old in kept if (each := punctuation.rest.get(old.id, old)) is not None]
         self.order = [each for old in order if (each := punctuation.rest.get(old.id, old)) is not None]
         self.parts = {
@@ -114,10 +109,11 @@ class _Emitter:
         )
         self.constraints: list[Constraint] = []
         self.last_gaze = self.last_glance = ""
-        """The one before the end-of-turn gaze, if it may be told when to relax; and the last glance."""
+        """Ids of the gaze before the end-of-turn gaze, if its timing leaves `relax` free, and of the last glance."""
         self.strokes: list[Stroke] = []
 
-    def emit(self) -> Emission:
+    def plan(self) -> FragmentPlan:
+        """Make the block; called once."""
         for constraint in self.fragment.constraints:
             if (rewritten := self.rewriting.constraint(constraint)) is not None:
                 self.constraints.append(rewritten)
@@ -125,13 +121,20 @@ class _Emitter:
         self._time_speeches_and_references()
         opening, closing = self._opening(), self._closing()
         behaviors = (*opening, *self._in_document_order(), *closing)
-        block = Block(
-            id=self.fragment.id, behaviors=behaviors, constraints=tuple(self.constraints), unread=self.fragment.unread
+        return FragmentPlan(
+            block=Block(
+                id=self.fragment.id,
+                behaviors=behaviors,
+                constraints=tuple(self.constraints),
+                unread=self.fragment.unread,
+            ),
+            continuation=Continuation(
+                self.speeches[-1] if self.speeches else "", self.last_glance, tuple(self.strokes)
+            ),
+            mentions=tuple(parts.mention for parts in self.parts.values()),
+            choices=tuple(self.choices),
+            warnings=tuple(f"{behavior.id} is left out: inhibited" for behavior in self.dropped),
         )
-        continuation = Continuation(self.speeches[-1] if self.speeches else "", self.last_glance, tuple(self.strokes))
-        mentions = tuple(parts.mention for parts in self.parts.values())
-        left_out = tuple(f"{behavior.id} is left out: inhibited" for behavior in self.dropped)
-        return Emission(block, continuation, mentions, left_out)
 
     def _speeches(self) -> list[str]:
         """Ids of plain speeches and phrases, in order."""
@@ -158,12 +161,13 @@ class _Emitter:
             return msgspec.structs.replace(behavior, timing=timing, mode=self.permits.only_hand)
         return msgspec.structs.replace(behavior, timing=timing) if timing != behavior.timing else behavior
 
-    # -- what the turn is still at ---------------------------------------------------------------------------------
+    # -- after the turn's earlier fragments -----------------------------------------------------------------------
 
     def _follow_the_turn(self) -> None:
-        """Nothing of the fragment begins before the words before it have ended, nor a stroke before its limb is free.
+        """Let everything begin after the turn's words so far, and each stroke only when its limb is free.
 
-        What nobody mentions follows the one before it of its type; naming it would let it go at once.
+        A behavior that the input does not name is left out, unless it is the first of its type: the realizer has it
+        follow the one before it of its type, but only as long as nothing names it.
         """
         operators: list[Operator] = []
         free: list[str] = []
@@ -235,7 +239,7 @@ class _Emitter:
         return same(f"{parts.gaze}:relax", f"{parts.glance}:start")
 
     def _is_said(self, operator: Operator, inherited: Sequence[Operator]) -> bool:
-        """Does the input, or the reference's own timing, ask for this order already?"""
+        """True if the input, or the reference's own timing, asks for this order already."""
         said = [*inherited, *(each for constraint in self.constraints for each in constraint.operators)]
         return isinstance(operator, After) and any(
             {operator.ref, *operator.syncs} <= {each.ref, *each.syncs}
@@ -244,8 +248,11 @@ class _Emitter:
         )
 
     def _keep_in_line(self, speech: Speech, preceding: str) -> None:
-        """Speeches whose start nobody times follow one another by document order. The realizer has them do so only
-        while nothing names them, but we do, and so does an author who ties something to a word."""
+        """Let a speech without a timed start begin after the words before it in the document.
+
+        The realizer does so only for speeches that nothing names. This block names them, and so does an author who
+        ties something to a word.
+        """
         if preceding and preceding != self.before.speech and (speech.id, "start") not in self.named:
             start = f"{speech.id}:start"
             is_free = speech.id not in self.named_behaviors
@@ -255,7 +262,7 @@ class _Emitter:
             self.constraints.append(Constraint(id=id, operators=(operator,), line=speech.line))
 
     def _last_reference(self) -> str:
-        """The reference whose gaze lasts until the end-of-turn gaze, if there is one."""
+        """Id of the reference with the gaze that lasts until the end-of-turn gaze; "": there is none."""
         if not self._ends_with_gaze or not self.parts:
             return ""
         return next(behavior.id for behavior in reversed(self.order) if isinstance(behavior, Reference))
@@ -266,39 +273,34 @@ class _Emitter:
     def _ends_with_gaze(self) -> bool:
         return self.turn.closes and self.permits.looks
 
+    def _event(
+        self, id: str, kind: EventKind, start: str, *, accept: tuple[Action, ...] = (), optional: bool = False
+    ) -> Event:
+        """An event of the turn. start: the sync point with which it begins; "": it begins with the block."""
+        return Event(
+            id=self.names.fresh(id), kind=kind, responder=self.turn.addressee, cause="turn", turn=self.turn.turn,
+            timing=(Timing("start", start),) if start else (), accept=accept, optional=optional,
+        )  # fmt: skip
+
     def _opening(self) -> list[BlockBehavior]:
-        """What begins with the first speech, or with the block if there is none."""
+        """The turn's event or signal that begins with the first speech, or with the block if there is none."""
         turn = self.turn
-        timing = (Timing("start", f"{self.speeches[0]}:start"),) if self.speeches else ()
+        start = f"{self.speeches[0]}:start" if self.speeches else ""
         if turn.announces_pair:
-            return [
-                Event(
-                    id=self.names.fresh("turn-pair"),
-                    kind="adjacency_pair",
-                    responder=turn.addressee,
-                    cause="turn",
-                    accept=turn.accept,
-                    turn=turn.turn,
-                    timing=timing,
-                )
-            ]
+            return [self._event("turn-pair", "adjacency_pair", start, accept=turn.accept)]
         if turn.reply:
             id = self.names.fresh(f"turn-{turn.reply}")
+            timing = (Timing("start", start),) if start else ()
             return [TurnSignal(id=id, turn=turn.turn, signal=turn.reply, actor=turn.addressee, timing=timing)]
         if turn.backchannel:
             nod = next((behavior.id for behavior in self.order if isinstance(behavior, Head)), "")
-            if not timing and nod and not self.permits.speech_only:
-                timing = (Timing("start", f"{nod}:start"),)
-            id = self.names.fresh("backchannel")
-            return [
-                Event(
-                    id=id, kind="backchannel", responder=turn.addressee, cause="turn", turn=turn.turn, timing=timing
-                )
-            ]
+            if not start and nod and not self.permits.speech_only:
+                start = f"{nod}:start"
+            return [self._event("backchannel", "backchannel", start)]
         return []
 
     def _closing(self) -> list[BlockBehavior]:
-        """End of the turn: facial gaze with an optional mutual facial gaze, and the clock of the pair."""
+        """Behaviors that end the turn: facial gaze, an optional mutual facial gaze, and the signal to recognition."""
         turn = self.turn
         if not turn.closes:
             return []
@@ -310,17 +312,7 @@ class _Emitter:
         if self._ends_with_gaze:
             gaze = self.names.fresh("turn-gaze")
             closing.append(Gaze(id=gaze, target=turn.addressee))
-            closing.append(
-                Event(
-                    id=self.names.fresh("turn-gaze-event"),
-                    kind="mutual_facial_gaze",
-                    responder=turn.addressee,
-                    cause="turn",
-                    optional=True,
-                    turn=turn.turn,
-                    timing=(Timing("start", f"{gaze}:start"),),
-                )
-            )
+            closing.append(self._event("turn-gaze-event", "mutual_facial_gaze", f"{gaze}:start", optional=True))
             if wordless:
                 operators += [after(end, f"{gaze}:start") for end in (f"{self.speeches[-1]}:end", *wordless)]
             elif self.speeches:
@@ -340,7 +332,7 @@ class _Emitter:
         return closing
 
     def _wordless_at_the_end(self) -> Sequence[str]:
-        """Ends of references made after the last words, by a gesture alone: the turn is not over before."""
+        """Last sync points of the references that follow all words, by a gesture alone: the turn ends after them."""
         ends: list[str] = []
         for behavior in reversed(self.order):
             if isinstance(behavior, Speech):
@@ -353,7 +345,7 @@ class _Emitter:
         return ends
 
     def _once_all_is_done(self, sync: str) -> list[Operator]:
-        """After the last words of the turn, and all that ends by itself; a gaze or a face lasts until that has."""
+        """Operators that put `sync` after the turn's last words and after all behaviors that end by themselves."""
         ends = [self.before.start] if self.before.start else []
         ends += [f"{behavior.id}:end" for behavior in self._in_document_order() if _ends_by_itself(behavior)]
         return [after(end, sync) for end in ends]

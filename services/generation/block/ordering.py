@@ -19,14 +19,17 @@ from engage_hri.schemas.units import Seconds
 Sync = tuple[str, str, str]
 """Block ("" for this one), behavior ("" for the block itself), sync point."""
 Instant = tuple[int, Seconds]
-"""Sync points a fixed time apart share the first number; among them the second tells when."""
+"""Number of a group of sync points that are a fixed time apart, and the time within the group."""
 START, END = "start", "end"
 ROUNDING = 6
 """Decimals of seconds that count."""
 
 
 class _Relations(Struct):
-    """ties: the second point comes so many seconds after the first. orders: it comes no earlier than the first."""
+    """Relations between sync points.
+
+    ties: the second point comes so many seconds after the first. orders: it comes no earlier than the first.
+    """
 
     ties: list[tuple[Sync, Sync, Seconds]] = []
     orders: list[tuple[Sync, Sync]] = []
@@ -37,8 +40,8 @@ def ordered(
 ) -> tuple[FragmentBehavior, ...]:
     """The behaviors, each after those that its constraints put before it. A cycle is left in document order.
 
-    What takes no turn with voice or gaze (a nod) comes as soon as it may: a reference that is tied to it need not
-    wait for the words between. fragment: its id, by which sync references may name it.
+    A behavior that needs neither voice nor gaze (a nod) comes as soon as it may: a reference that is tied to it need
+    not wait for the words between. fragment: its id, by which sync references may name it.
     """
     behaviors = sorted(behaviors, key=lambda behavior: isinstance(behavior, Speech | Reference | Gaze))
     relations = _relations(behaviors, constraints, fragment)
@@ -80,7 +83,7 @@ def _relations(behaviors: Sequence[FragmentBehavior], constraints: Sequence[Cons
 
 
 def _instants(begins: Sequence[Sync], relations: _Relations) -> dict[Sync, Instant]:
-    """When each sync point is, as far as fixed distances tell. Where those contradict one another the first holds."""
+    """Instant of each sync point, as far as fixed distances tell; where two contradict each other the first holds."""
     apart: dict[Sync, list[tuple[Sync, Seconds]]] = defaultdict(list)
     for one, other, seconds in relations.ties:
         apart[one].append((other, seconds))
@@ -101,7 +104,7 @@ def _instants(begins: Sequence[Sync], relations: _Relations) -> dict[Sync, Insta
 
 
 def _passing_of_time(instants: Mapping[Sync, Instant]) -> Iterator[tuple[Instant, Instant]]:
-    """Earlier and later: among points a fixed time apart, and among those of one behavior."""
+    """Pairs of an earlier and a later instant: of points a fixed time apart, and of points of one behavior."""
     for one, other in pairwise(sorted(set(instants.values()))):
         if one[0] == other[0]:
             yield one, other
@@ -116,7 +119,10 @@ def _passing_of_time(instants: Mapping[Sync, Instant]) -> Iterator[tuple[Instant
 
 
 def _sorted(starts: Sequence[Instant], orders: Iterable[tuple[Instant, Instant]]) -> Iterator[int]:
-    """Places in `starts`: an instant is over once all that starts in it is listed, and opens the next ones."""
+    """Places in `starts` in the order asked for.
+
+    An instant is over once all that starts in it is listed; then it opens those that wait for it alone.
+    """
     later: dict[Instant, list[Instant]] = defaultdict(list)
     waits: Counter[Instant] = Counter()
     for one, other in set(orders):

@@ -1,4 +1,4 @@
-"""The behaviors that replace one reference, and ids that nobody in the fragment uses."""
+"""Behaviors that replace one reference, and ids that the fragment does not use."""
 
 from msgspec import Struct
 
@@ -9,19 +9,20 @@ from engage_hri.services.generation.turns.policy import TurnPlan
 
 
 class Mention(Struct, frozen=True):
-    """by: the sync point of the block from which on `object` has been referred to."""
+    """An object that a block refers to. by: the sync point from which on it has been referred to."""
 
     object: str
     by: Point
 
 
 class FreshIds:
-    """Ids nobody in the fragment uses."""
+    """Maker of ids that the fragment does not use."""
 
     def __init__(self, fragment: TurnFragment) -> None:
         self._taken = {behavior.id for behavior in fragment.behaviors}
 
     def fresh(self, wish: str) -> str:
+        """Take `wish` as an id, or the first of `wish-2`, `wish-3`... that is free."""
         name, count = wish, 2
         while name in self._taken:
             name, count = f"{wish}-{count}", count + 1
@@ -30,7 +31,7 @@ class FreshIds:
 
 
 class Parts:
-    """The behaviors that replace one reference. closing: what its phrase ends with, no words."""
+    """The behaviors that replace one reference. closing: punctuation at the end of its phrase."""
 
     def __init__(
         self,
@@ -80,14 +81,16 @@ class Parts:
 
     @property
     def closing(self) -> Replacement:
-        """Of a speech of which all is said with the phrase."""
+        """Replacement of a speech that is nothing but the phrase's punctuation."""
         return Replacement((self.phrase, "end"), (self.phrase, "end"))
 
     @property
     def mention(self) -> Mention:
+        """The reference's object, and the end of its phrase or gesture."""
         return Mention(self.reference.target, self.replacement(gaze_leads=False).end)
 
     def replacement(self, *, gaze_leads: bool) -> Replacement:
+        """The points that stand for start and end of the reference. gaze_leads: before the phrase, as in Fig. 3.3."""
         if self.phrase:
             end = (self.phrase, "end")
         else:

@@ -1,4 +1,4 @@
-"""How a chosen gesture and phrase are timed: as in Appendix B (`check-back`), or as in Fig. 3.3 (`figure-3.3`)."""
+"""Timing of a chosen gesture and phrase: as in Appendix B (`check-back`), or as in Fig. 3.3 (`figure-3.3`)."""
 
 from engage_hri.schemas.behaviors import After, Synchronize
 from engage_hri.schemas.units import Seconds
@@ -11,8 +11,9 @@ def checking_back(
 ) -> list[Operator]:
     """Profile `check-back`: phrase, look and point begin together and last until the other has looked.
 
-    preceding: the speech or phrase before this one. earlier: the last of the turn's earlier fragments. is_timed: the
-    author has said when the reference starts. glance: the last before it. previous_point: of the same arm. "": none.
+    preceding: the speech or phrase before this one. earlier: the last one of the turn's earlier fragments. is_timed:
+    the author has said when the reference starts. glance: the last one before it. previous_point: the last one of the
+    same arm. "": there is none.
     """
     gaze, point, phrase, event = parts.gaze, parts.point, parts.phrase, parts.event
     operators: list[Operator] = []
@@ -43,7 +44,7 @@ def checking_back(
 def as_in_the_figure(parts: Parts, preceding: str, earlier: str, is_timed: bool, lead: Seconds) -> list[Operator]:
     """Profile `figure-3.3`: the gaze leads by a phrase, and the point is over when the phrase begins.
 
-    See `checking_back`. lead: from the gaze on target to the stroke of the point.
+    lead: seconds from the gaze on target to the stroke of the point. The other parameters: see `checking_back`.
     """
     gaze, point, phrase = parts.gaze, parts.point, parts.phrase
     operators: list[Operator] = []

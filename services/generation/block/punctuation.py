@@ -1,4 +1,7 @@
-"""What directly follows a referring phrase and is no word belongs to it: a voice can't say a comma by itself."""
+"""Moves punctuation from the start of a speech to the referring phrase before it: a voice can't say a comma alone.
+
+In "[the red cup], please" the phrase becomes "the red cup,", and "please" is left of the speech.
+"""
 
 import re
 from collections.abc import Collection, Sequence
@@ -10,25 +13,28 @@ from engage_hri.schemas.behaviors import FragmentBehavior, Mark, Reference, Spee
 
 _ALPHABETIC = r"""(?:['’](?:s|d|m|ll|re|ve)\b)?[.,;:!?…)\]"'”’»]*(?=\s|$)"""
 _IDEOGRAPHIC = "[、。，．；：！？…）］」』】》〉]+"
-"""Without a space behind it."""
+"""Punctuation that needs no space behind it."""
 _CLOSING = re.compile(rf"\s*({_ALPHABETIC}|{_IDEOGRAPHIC})\s*")
 
 
-class Joined(Struct, frozen=True):
-    """closings: what a reference's phrase ends with, by reference. rest: what is left of a speech, by speech; None:
-    nothing. follows: the reference whose phrase says all of a speech, by speech."""
+class MovedPunctuation(Struct, frozen=True):
+    """Punctuation that was moved to phrases.
+
+    closings: what a reference's phrase ends with, by reference. rest: what is left of a speech, by speech; None:
+    nothing. follows: by speech of which nothing is left, the reference with the phrase that has its punctuation.
+    """
 
     closings: dict[str, str]
     rest: dict[str, Speech | None]
     follows: dict[str, str]
 
 
-def joined(order: Sequence[FragmentBehavior], phrased: Collection[str]) -> Joined:
-    """order: of the voice. phrased: references that are made with a phrase.
+def moved_punctuation(order: Sequence[FragmentBehavior], phrased: Collection[str]) -> MovedPunctuation:
+    """Find the punctuation to move. order: that of the voice. phrased: references that are made with a phrase.
 
-    Speech with prosodic markup is left as it is: its words stand twice.
+    Speech with prosodic markup is left as it is: its words stand in the text and in the markup.
     """
-    result = Joined({}, {}, {})
+    result = MovedPunctuation({}, {}, {})
     before = ""
     for behavior in order:
         if isinstance(behavior, Reference):
@@ -37,7 +43,7 @@ def joined(order: Sequence[FragmentBehavior], phrased: Collection[str]) -> Joine
             match = _CLOSING.match(behavior.text)
             if before and match and match[1] and not behavior.markup:
                 result.closings[before] = result.closings.get(before, "") + match[1]
-                result.rest[behavior.id] = _without(behavior, match.end())
+                result.rest[behavior.id] = _without_start(behavior, match.end())
                 if match.end() == len(behavior.text):
                     result.follows[behavior.id] = before
                     continue
@@ -45,8 +51,8 @@ def joined(order: Sequence[FragmentBehavior], phrased: Collection[str]) -> Joine
     return result
 
 
-def _without(speech: Speech, length: int) -> Speech | None:
-    """Its text from there on."""
+def _without_start(speech: Speech, length: int) -> Speech | None:
+    """The speech without its first `length` characters; None if nothing is left."""
     if length == len(speech.text):
         return None
     marks = tuple(Mark(mark.id, max(0, mark.position - length)) for mark in speech.marks)

@@ -1,4 +1,7 @@
-"""A fragment's constraints as its block needs them: ids of removed references stay usable, dropped ones vanish."""
+"""Rewrites a fragment's constraints for its block, in which behaviors have replaced references.
+
+A constraint that names a reference names its replacement then; one that names a dropped behavior vanishes.
+"""
 
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
@@ -16,10 +19,10 @@ Point = tuple[str, str]
 
 
 class Replacement(Struct, frozen=True):
-    """What stands for what was removed.
+    """The points that stand for start and end of a removed reference or speech.
 
-    start_of_words: of a reference whose gaze leads (Fig. 3.3), the start of its phrase. Words and clock times are not
-    tied to the gaze, then: the phrase comes no earlier than they do.
+    start_of_words: where the gaze leads (Fig. 3.3), the start of the phrase. Words and clock times are tied to it and
+    not to the gaze: the phrase comes no earlier than they do.
     """
 
     start: Point
@@ -28,9 +31,10 @@ class Replacement(Struct, frozen=True):
 
 
 class Rewriting(Struct, frozen=True, kw_only=True, dict=True):
-    """words: ids of speeches and phrases. instants: the input's sync points that are each other's, a few at a time.
+    """The rules by which the constraints of one fragment are rewritten.
 
-    begins: the sync point of another block that stands for the start of this one; "": it begins by itself.
+    words: ids of speeches and phrases. instants: groups of the input's sync points that are one instant, or a fixed
+    time apart. begins: the sync point of another block that stands for the start of this one; "": there is none.
     """
 
     fragment: str
@@ -41,9 +45,9 @@ class Rewriting(Struct, frozen=True, kw_only=True, dict=True):
     begins: str = ""
 
     def text(self, text: str, *, among_words: bool = False) -> str | None:
-        """A sync reference as the block must have it; None if what it names was dropped.
+        """A sync reference as the block must have it; None if the behavior that it names was dropped.
 
-        among_words: it is related to words or the clock.
+        among_words: the constraint relates it to words or the clock.
         """
         ref = self._parse(text)
         if ref is None:
@@ -61,7 +65,7 @@ class Rewriting(Struct, frozen=True, kw_only=True, dict=True):
         return str(SyncRef(behavior=behavior, sync=sync, offset=ref.offset))
 
     def constraint(self, constraint: Constraint) -> Constraint | None:
-        """None if nothing is left of it."""
+        """A constraint as the block must have it; None if nothing is left of it."""
         operators = tuple(new for old in constraint.operators for new in self._operators(old))
         return replace(constraint, operators=operators) if operators else None
 
@@ -82,9 +86,9 @@ class Rewriting(Struct, frozen=True, kw_only=True, dict=True):
         )
 
     def is_timed(self, reference: str, named: Counter[Point]) -> bool:
-        """Does the input say when `reference` starts? Not if all it says is that something free starts with it.
+        """True if the input says when `reference` starts. named: see `points_named`.
 
-        named: see `points_named`.
+        Another behavior that starts with it, and is named nowhere else, does not say when.
         """
         start, ties = (reference, "start"), 0
         uses: Counter[str] = Counter()
@@ -116,7 +120,7 @@ class Rewriting(Struct, frozen=True, kw_only=True, dict=True):
             yield replace(operator, ref=ref, syncs=tuple(syncs))
 
     def _leads(self, other: str, is_later: bool) -> bool:
-        """Does a gaze lead what comes before or after `other`, so that this is the phrase's to keep?"""
+        """True if the phrase, and not the gaze that leads it, has to come before or after `other`."""
         return self._is_of_words(other) if is_later else self._is_timed(other)
 
     def _synchronize(self, operator: Synchronize) -> Iterator[Operator]:
@@ -134,13 +138,14 @@ class Rewriting(Struct, frozen=True, kw_only=True, dict=True):
             yield After(ref=texts[0], syncs=syncs, line=operator.line)
 
     def _have_become_one(self, one: str, other: str) -> bool:
-        """Two different points of the input, whatever their offsets."""
+        """True if two different points of the input are one in the block, whatever their offsets."""
         parsed, made = (self._parse(one), self._parse(other)), (self.text(one), self.text(other))
         if None in parsed or None in made or _is_same(one, other):
             return False
         return _is_same(str(made[0]), str(made[1]))
 
     def _is_loose(self, text: str) -> bool:
+        """True for the start of a reference with a gaze that leads its phrase: words are not tied to that gaze."""
         ref = self._parse(text)
         if ref is None or ref.sync != "start":
             return False
@@ -148,12 +153,12 @@ class Rewriting(Struct, frozen=True, kw_only=True, dict=True):
         return replacement is not None and replacement.start_of_words is not None
 
     def _is_timed(self, text: str) -> bool:
-        """Is it a point of words or of the clock, or of the same instant as one?"""
+        """True for a point of words or of the clock, and for one at the same instant as such a point."""
         ref = self._parse(text)
         return ref is None or (ref.behavior, ref.sync) in self._timed or self._is_of_words(text)
 
     def _is_of_words(self, text: str) -> bool:
-        """Or of the clock, as the points of other blocks are, which nothing here can move."""
+        """True for a point of words, of the clock, or of another block: nothing in this block can move the latter."""
         ref = self._parse(text)
         if ref is None or ref.behavior in ("", BLOCK_ITSELF):
             return True
@@ -163,7 +168,7 @@ class Rewriting(Struct, frozen=True, kw_only=True, dict=True):
 
     @cached_property
     def _timed(self) -> frozenset[Point]:
-        """Points of the same instant as words or the clock, but not through a start that is loose."""
+        """Points at the same instant as words or the clock, found without those that are loose (`_is_loose`)."""
         timed: set[Point] = set()
         groups = [[text for text in group if text and not self._is_loose(text)] for group in self.instants]
         points = [{(ref.behavior, ref.sync) for text in group if (ref := self._parse(text))} for group in groups]
@@ -176,7 +181,7 @@ class Rewriting(Struct, frozen=True, kw_only=True, dict=True):
         return frozenset(timed)
 
     def _parse(self, text: str) -> SyncRef | None:
-        """None for what is not of this fragment."""
+        """The reference; None for a clock time (empty) or a point of another block."""
         if not text:
             return None
         ref = SyncRef.parse(text)
@@ -184,12 +189,12 @@ class Rewriting(Struct, frozen=True, kw_only=True, dict=True):
 
 
 def _is_same(one: str, other: str) -> bool:
-    """Is it one sync point, whatever the offsets?"""
+    """True if both name one sync point, whatever their offsets."""
     return replace(SyncRef.parse(one), offset=0.0) == replace(SyncRef.parse(other), offset=0.0)
 
 
 def instants(behaviors: Sequence[Behavior], constraints: Sequence[Constraint]) -> Sequence[Sequence[str]]:
-    """Sync points that the input puts at one instant, or a fixed time apart."""
+    """Groups of sync points that the input puts at one instant, or a fixed time apart."""
     inline = [(f"{behavior.id}:{timing.sync}", timing.ref) for behavior in behaviors for timing in behavior.timing]
     operators = [operator for constraint in constraints for operator in constraint.operators]
     return [*inline, *((each.ref, *each.syncs) for each in operators if isinstance(each, Synchronize))]
@@ -198,7 +203,7 @@ def instants(behaviors: Sequence[Behavior], constraints: Sequence[Constraint]) -
 def points_named(
     fragment: str, behaviors: tuple[Behavior, ...], constraints: tuple[Constraint, ...]
 ) -> Counter[Point]:
-    """How often the input times or names each (behavior, sync), on either side of a constraint."""
+    """Number of times that the input names each (behavior, sync), on either side of a constraint or inline."""
     texts = [f"{behavior.id}:{timing.sync}" for behavior in behaviors for timing in behavior.timing]
     texts += [timing.ref for behavior in behaviors for timing in behavior.timing]
     texts += [

@@ -1,1 +1,1 @@
-"""Whom and what the head looks at: maintenance and response policy, inhibitions, and who of them wins."""
+"""Decides what the head looks at: claims of maintenance and response policy, inhibitions, and the arbiter of them."""

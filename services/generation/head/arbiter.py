@@ -1,10 +1,11 @@
-"""Who owns the robot's head: six claims by priority, one owner at a time. Thesis 3.3.4.
+"""Arbiter of the robot's head: six claims by priority, one owner at a time. Thesis 3.3.4.
 
 A higher claim takes over at once; when the owner lets go the head stays for a dwell before a lower claim gets it.
-Claims 3 to 6 move the base gaze by `gazeShift` blocks, which end on arrival and hold nothing; a fragment's own
-gaze overlays it, and is never fought: while it owns the head nothing else is sent. Where it is on a face the base
-goes there too, unseen beneath it: the gaze at the end of a turn must not fall back to where the head was before.
-So it does when an inhibition that holds the head has a fragment's gaze aborted: else the head would go home.
+Claims 3 to 6 move the base gaze by `gazeShift` blocks, which end on arrival and hold nothing. A fragment's own gaze
+lies over the base gaze: while it owns the head no shift is sent, with two exceptions. While that gaze is on a face
+the base gaze goes there, too, unseen: at the end of a turn the head must not fall back to where it was before. And
+when an inhibition that holds the head has that gaze aborted, the base gaze goes to its target: else the head would
+go home.
 """
 
 from msgspec import Struct
@@ -24,14 +25,14 @@ from engage_hri.services.generation.head.response_policy import ResponsePolicy
 
 NOBODY = Claim(kind="none", priority=0, reason="nobody has been seen")
 UP_RIGHT: Degrees = 60.0
-"""From the table: at nothing that anybody could mean, as far as the neck turns. Thesis 5.3."""
+"""Angle past the table: as far as the neck turns, at nothing that anybody could mean. Thesis 5.3."""
 Observation = (
     World | RobotState | Statistics | ConnectionEvent | ActionBegan | ActionEnded | ActorFound | ActorLost
 )  # fmt: skip
 
 
 class Aim(Struct, frozen=True):
-    """Where the base gaze belongs. target: empty to leave it where it is. beside: past it, to the upper right."""
+    """A place for the base gaze. target: "": leave it where it is. beside: past the target, to the upper right."""
 
     target: str = ""
     beside: bool = False
@@ -41,9 +42,9 @@ NOWHERE = Aim()
 
 
 class Shift(Struct, frozen=True):
-    """Move the base gaze to `target`. glance: announce an optional mutual facial gaze with it.
+    """An order to move the base gaze to `target`. glance: announce an optional mutual facial gaze with it.
 
-    beside: look past it, to the upper right.
+    beside: look past the target, to the upper right.
     """
 
     id: str
@@ -70,7 +71,7 @@ class Shift(Struct, frozen=True):
 
 
 class Ruling(Struct, frozen=True):
-    """Who owns the head now. changed: since the last ruling, so worth publishing."""
+    """The owner of the head. changed: owner or waiting claims differ from the last ruling, so it is published."""
 
     owner: Claim
     since: Seconds
@@ -80,7 +81,7 @@ class Ruling(Struct, frozen=True):
 
 
 class Arbiter:
-    """Feed it what happens, then ask for its ruling; ask again when `deadline` has come."""
+    """The six claims and the owner of the head. `feed` it what happens; `rule` then, and when `deadline` has come."""
 
     def __init__(self, robot: str, config: GenerationConfig) -> None:
         self._config = config
@@ -97,14 +98,15 @@ class Arbiter:
         self._owner = NOBODY
         self._since: Seconds = 0.0
         self._waiting: tuple[Claim, ...] | None = None
-        """None before the first ruling, which is always news."""
+        """Claims without the head; None before the first ruling, so that this counts as changed."""
         self._lapsed: Seconds | None = None
+        """Time when the owner let go, while the head still dwells on its target."""
         self._base = NOWHERE
-        """Where the base gaze was last sent."""
+        """Place to which the base gaze was last sent."""
         self._held = NOWHERE
-        """Where an inhibition with mode hold found the gaze of a fragment."""
+        """Target of the fragment's gaze that an inhibition with mode hold has found."""
         self._failed: tuple[Aim, Seconds] | None = None
-        """What the last shift did not reach, and when to try that again."""
+        """Place that the last shift did not reach, and when to try it again."""
         self._shifts = 0
 
     # -- what happens ---------------------------------------------------------------------------------------------
@@ -138,34 +140,34 @@ class Arbiter:
                 self._hands.feed(observation, now)
 
     def gaze_perceived_within(self, half_angle: Radians) -> None:
-        """What the body says of its gaze cone; the configuration goes before."""
+        """Take the half angle of the body's gaze cone; one in the configuration goes before."""
         self._half_angle = self._config.gaze_half_angle or half_angle
 
     def inhibit(self, inhibition: Inhibition | None) -> None:
-        """The newest lease on gaze, if there is one."""
+        """Take the inhibition in force: that of the newest lease on gaze, if there is one."""
         self._inhibition = inhibition
         if self._mode != "hold":
             self._held = NOWHERE
 
     def fragment_gazes(self, target: str, reason: str = "") -> None:
-        """A gaze of a fragment has started."""
+        """Note that a gaze of a fragment has started."""
         self._fragment = Claim(kind="fragment", priority=2, target=target, reason=reason)
 
     def fragment_shifts(self, target: str, reason: str = "") -> None:
-        """A fragment moves the base gaze itself."""
+        """Note that a fragment has started to move the base gaze."""
         self.fragment_gazes(target, reason)
         self._base = Aim(target)
 
     def fragment_rests(self) -> None:
-        """Its gaze has ended, its block has not: the head is back on the base gaze, and stays the fragment's."""
+        """Note that a fragment's gaze has ended and its block has not: it keeps the head, on the base gaze."""
         self._fragment = Claim(kind="fragment", priority=2, target=self._base.target, reason="until its block ends")
 
     def fragment_lets_go(self) -> None:
-        """Its block has ended."""
+        """Note that the blocks of all fragments that moved the head have ended."""
         self._fragment = None
 
     def think(self, target: str) -> None:
-        """Between two fragments of a turn: avert the gaze until the next one."""
+        """Claim the head for `target` until the turn's next fragment: the robot averts its gaze to think."""
         self._thought = Claim(kind="fragment", priority=2, target=target, reason="thinks")
 
     def stop_thinking(self) -> None:
@@ -175,17 +177,17 @@ class Arbiter:
         self._faces.partner = person
 
     def shift_failed(self, id: str, now: Seconds) -> None:
-        """The base gaze is not where it was sent: try that again after a pause, and anything else at once."""
+        """Note that shift `id` did not arrive: the same place is tried again after a pause, any other at once."""
         if id.rpartition("-")[2] == str(self._shifts):
             self._failed = self._base, now + self._config.retry
             self._base = NOWHERE
 
     def body_lost(self) -> None:
-        """Another may come, and look elsewhere."""
+        """Forget where the base gaze is: another body may come, and look elsewhere."""
         self._base = NOWHERE
 
     def recognition_lost(self) -> None:
-        """Nobody will say how the events end that it began."""
+        """Drop the claims of the response policy: their events will never be told to end."""
         self._responses.forget()
 
     # -- what follows ---------------------------------------------------------------------------------------------
@@ -199,7 +201,7 @@ class Arbiter:
         return min((each for each in due if each is not None), default=None)
 
     def rule(self, now: Seconds) -> Ruling:
-        """The owner by now, and the gaze shift that takes the head there."""
+        """Decide on the owner by now, and on the gaze shift that takes the head to its target."""
         claims = self._claims(now)
         before, waited = self._owner, self._waiting
         self._owner = self._next_owner(claims, now)
@@ -229,7 +231,7 @@ class Arbiter:
         return [claim for claim in claims if claim is not None]
 
     def _head_on(self) -> str:
-        """What the head is on or on its way to: the owner's target, else what the body says."""
+        """The target that the head is on or on its way to: the owner's, else the one that the body says."""
         return self._owner.target or (self._state.looking_at if self._state else "") or self._base.target
 
     def _next_owner(self, claims: list[Claim], now: Seconds) -> Claim:
@@ -245,7 +247,7 @@ class Arbiter:
         return best if now >= self._lapsed + self._config.dwell else self._owner
 
     def _shift(self, now: Seconds) -> Shift | None:
-        """None while the head is where it belongs, or is not ours to move."""
+        """The shift to send; None while the base gaze is where it belongs, or a fragment's gaze has the head."""
         if self._failed is not None and now >= self._failed[1]:
             self._failed = None
         owner, aim = self._owner, self._aim()
@@ -272,7 +274,7 @@ class Arbiter:
         return self._inhibition.mode if self._inhibition is not None else ""
 
     def _landmark(self) -> str:
-        """What the head stares past in the study's condition without gaze: a surface, or else whatever there is."""
+        """The entity that the head stares past in the study's condition without gaze: a surface, else any; or ""."""
         entities = self._world.entities if self._world else ()
         surfaces = [entity.id for entity in entities if entity.kind == "surface"]
         return next(iter([*surfaces, *(entity.id for entity in entities)]), "")

@@ -16,18 +16,18 @@ _HAND_OF: dict[str, Hand] = {"point-left": "LEFT_HAND", "point-right": "RIGHT_HA
 
 
 SHORTEST: Seconds = 0.1
-"""Of a lease: it is renewed three times as often."""
+"""Least `ttl` of a lease: it is renewed three times as often."""
 
 
 class Inhibition(Struct, frozen=True):
-    """A claim on the head. hold: it stays on what it is on; stare: past everything, to the upper right."""
+    """A claim on the head. mode `hold`: stay on the present target; `stare`: past everything, to the upper right."""
 
     claim: Claim
     mode: Literal["release", "hold", "target", "stare"]
 
 
 SPEECH_ONLY = Inhibition(Claim(kind="inhibition", priority=1, reason="speech only: head up right"), "stare")
-"""Stands in degraded generation: the study had the head there, so that nobody takes it for a look. Thesis 5.3."""
+"""Inhibition in degraded generation: the study had the head there, so that nobody takes it for a look. Thesis 5.3."""
 
 
 class Leases:
@@ -38,7 +38,7 @@ class Leases:
         self._leases: dict[str, Inhibit] = {}
 
     def take(self, request: Inhibit) -> None:
-        """A new lease, or one whose owner has changed its mind. Raises InputRefused."""
+        """Take a new lease, or replace the one of the same id. Raises InputRefused."""
         if not SHORTEST <= request.ttl < inf:
             reason = f"ttl {request.ttl} is not a number of seconds, {SHORTEST} or more"
             raise InputRefused(Fault(reason=reason, where=f"{request.id}: ttl"))
@@ -52,7 +52,7 @@ class Leases:
 
     @property
     def inhibition(self) -> Inhibition | None:
-        """Of the newest lease on gaze."""
+        """The inhibition by the newest lease on gaze; None: there is none. The study's condition goes before."""
         if self._config.speech_only:
             return SPEECH_ONLY
         for request in reversed(self._leases.values()):
@@ -64,11 +64,11 @@ class Leases:
 
     @property
     def holds_head(self) -> bool:
-        """Is the head to stay on what it is on? Then it must not even start for home."""
+        """True if the head is to stay on its target: an aborted gaze must not even start to go back."""
         return self.inhibition is not None and self.inhibition.mode == "hold"
 
     def permits(self) -> Permits:
-        """What fragments may do now."""
+        """The permits of fragments under the leases in force."""
         inhibited = {request.part for request in self._leases.values()}
         return Permits(
             gaze="gaze" not in inhibited,

@@ -1,6 +1,10 @@
-"""What the maintenance policy keeps an eye on: moving hands, the face, and how long nothing has connected."""
+"""The maintenance policy: three watches, each with a claim on the head.
+
+They watch moving hands, the face of the person, and the time since the last connection event. Thesis 3.3.4.
+"""
 
 import math
+from collections import Counter
 
 from msgspec import Struct
 
@@ -13,6 +17,8 @@ from engage_hri.services.generation.config import GenerationConfig
 
 
 class _Hand(Struct):
+    """A hand that has moved. active: it is tracked, for it has moved for long, and has not been still for long."""
+
     moving_since: Seconds | None = None
     still_since: Seconds | None = None
     active: bool = False
@@ -27,7 +33,7 @@ class HandWatch:
         self._hands: dict[str, _Hand] = {}
         self._places: dict[str, Entity] = {}
         self._acts: dict[tuple[str, tuple[str, ...]], str] = {}
-        """Manipulations under way: actor and targets -> the hand, or the object if no hand of theirs is known."""
+        """Manipulations under way: actor and targets -> the hand, or the object if no hand of the actor is known."""
         self._watched = ""
 
     def feed(self, message: World | ActionBegan | ActionEnded | ActorLost, now: Seconds) -> None:
@@ -45,7 +51,7 @@ class HandWatch:
                     self._rest(act, now)
 
     def _rest(self, act: tuple[str, tuple[str, ...]], now: Seconds) -> None:
-        """A manipulation is over: its hand is still from now, unless it goes on moving."""
+        """End a manipulation: its hand counts as still from now, unless it goes on moving."""
         id = self._acts.pop(act, None)
         if id is not None and (hand := self._hands[id]).moving_since is None:
             hand.still_since = now
@@ -113,7 +119,7 @@ class HandWatch:
 
 
 class FaceWatch:
-    """Claim 6: the face of the person spoken to last, else of whoever was nearest; lost for long, its direction."""
+    """Claim 6: the face of the person spoken to last, else the nearest one; if all are lost, the last direction."""
 
     def __init__(self, robot: str, config: GenerationConfig) -> None:
         self._robot = robot
@@ -124,7 +130,7 @@ class FaceWatch:
         self._seen: Seconds = float("-inf")
         self._followed = ""
         self.partner = ""
-        """Who was spoken to last."""
+        """Id of the person spoken to last."""
 
     def feed(self, message: World | ActorFound | ActorLost, now: Seconds) -> None:
         match message:
@@ -142,7 +148,7 @@ class FaceWatch:
                 self._lost.pop(actor, None)
 
     def present(self, now: Seconds) -> list[str]:
-        """People whose face is seen, or was a moment ago; the nearest first."""
+        """Ids of the people with a face that is seen, or was a moment ago; the nearest first."""
 
         def distance(id: str) -> tuple[float, str]:
             person = self._people.get(id)
@@ -176,7 +182,7 @@ class GlanceWatch:
     """Claim 3: a quick look at the face when nothing has connected for longer than usual.
 
     The quiet is counted from the last start of a connection event or from when the head last was on a face,
-    whichever is later: who has just looked need not check.
+    whichever is later: a robot that has just looked need not check.
     """
 
     def __init__(self, config: GenerationConfig) -> None:
@@ -184,20 +190,25 @@ class GlanceWatch:
         self._statistics: dict[str, Statistics] = {}
         self._quiet_since: Seconds | None = None
         self._on_face = False
-        self._own = 0
-        """Glances of ours among the events so far."""
+        self._session = ""
+        self._own: Counter[str] = Counter()
+        """Number of the robot's glances in this session of recognition, by person; "": at all together."""
         self._until: Seconds | None = None
         self._seen: Seconds = float("-inf")
         self.face = ""
-        """Where a glance would go."""
+        """Id of the person at whom a glance would look; empty: there is none."""
 
     def feed(self, message: Statistics | ConnectionEvent, now: Seconds) -> None:
         match message:
             case Statistics(actor=actor):
                 self._statistics[actor] = message
-            case ConnectionEvent(state="started", cause=cause):
+            case ConnectionEvent(state="started", cause=cause, responder=responder, session=session):
                 self._quiet_since = now
-                self._own += cause == "maintenance"
+                if session != self._session:  # another life of recognition counts from zero
+                    self._session = session
+                    self._own.clear()
+                if cause == "maintenance":
+                    self._own.update((responder, ""))
 
     def head_is_on_face(self, on_face: bool, now: Seconds) -> None:
         if self._on_face != on_face or self._quiet_since is None:
@@ -205,19 +216,20 @@ class GlanceWatch:
         self._on_face = on_face
 
     def began(self, now: Seconds) -> None:
-        """The arbiter gives the head to the glance."""
+        """Note that the arbiter gives the head to the glance."""
         self._until = now + self._config.glance_duration
 
     def ended(self, now: Seconds) -> None:
-        """It has taken it away."""
+        """Note that the arbiter has taken the head from the glance."""
         self._until = None
         self._quiet_since = now
 
     @property
     def pace(self) -> Seconds:
-        """Mean time between connection events, without our own glances, within its limits."""
-        seen = self._statistics.get(self.face) or self._statistics.get("")
-        if seen is None or seen.session.events - self._own < self._config.mtbce_events:
+        """Mean time between connection events, without the robot's glances, within its limits."""
+        actor = self.face if self.face in self._statistics else ""
+        seen = self._statistics.get(actor)
+        if seen is None or seen.session.events - self._own[actor] < self._config.mtbce_events:
             return self._config.mtbce_prior
         recent = seen.recent.mtbce_without_maintenance
         if recent is None:

@@ -1,4 +1,4 @@
-"""How the robot answers directed gaze and facial gaze that people initiate: it looks there. Thesis 3.3.3."""
+"""The response policy: answers directed gaze and facial gaze that people initiate by looking there. Thesis 3.3.3."""
 
 from collections.abc import Sequence
 
@@ -14,16 +14,19 @@ from engage_hri.services.generation.config import GenerationConfig
 from engage_hri.services.generation.references.distractors import TOLERANCE, angle_off_axis
 
 ANSWERED = ("directed_gaze", "mutual_facial_gaze")
-"""Adjacency pairs and backchannels belong to the collaboration manager."""
+"""Kinds of event that this policy answers. Adjacency pairs and backchannels belong to the collaboration manager."""
 
 
 class _Answer(Struct):
+    """The robot's answer to an open event.
+
+    targets: to be looked at one after the other. until: when the shared gaze will have lasted long enough.
+    """
+
     event: ConnectionEvent
     targets: tuple[str, ...]
-    """To be looked at one after the other."""
     since: Seconds
     until: Seconds | None = None
-    """When the shared gaze will have lasted long enough."""
 
 
 class ResponsePolicy:
@@ -45,7 +48,7 @@ class ResponsePolicy:
         half_angle: Radians,
         fragment_target: str = "",
     ) -> None:
-        """fragment_target: where a fragment's gaze holds the head; directing elsewhere is not answered then."""
+        """Take an event. fragment_target: of a fragment's gaze; directing to anything else is not answered then."""
         if event.initiator == self._robot or event.responder != self._robot or event.kind not in ANSWERED:
             return
         if event.state == "started":
@@ -64,7 +67,7 @@ class ResponsePolicy:
 
     @property
     def deadline(self) -> Seconds | None:
-        """When the claim changes by itself."""
+        """Time of the next change of the claim without an event."""
         due = [answer.until for answer in self._open.values() if answer.until is not None]
         for answer in self._open.values():
             due += [turn for turn in self._turns(answer) if turn > self._seen]
@@ -86,17 +89,17 @@ class ResponsePolicy:
         return None
 
     def _turns(self, answer: _Answer) -> list[Seconds]:
-        """When the gaze goes on from each of several objects to the next."""
+        """Times at which the gaze goes on from one of several objects to the next."""
         return [answer.since + index * self._config.response_hold for index in range(1, len(answer.targets))]
 
 
 def viewing_order(
     objects: Sequence[str], world: World | None, gaze: Ray | None, half_angle: Radians
 ) -> tuple[str, ...]:
-    """Where to look when somebody directs to several objects.
+    """Ids of the objects to look at, in order, when somebody directs to several.
 
-    All within one gaze cone: the object nearest to their centroid, since gaze follows entities and not places.
-    Else one after the other, the one nearest to the present gaze first.
+    If one gaze cone holds all of them: the object nearest to their centroid, since gaze follows entities and not
+    places. Else all of them, the one nearest to the present gaze first.
     """
     entities = [entity for id in objects if world is not None and (entity := world.entity(id)) is not None]
     if len(entities) < 2 or gaze is None:

@@ -1,1 +1,1 @@
-"""The reference policy: with which words and gestures an object is referred to."""
+"""The reference policy: chooses the words and gestures that refer to an object."""

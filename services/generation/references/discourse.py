@@ -1,4 +1,4 @@
-"""What the robot has referred to, in its turn and the one before: what "it" can mean. Values in, values out."""
+"""Memory of the objects that the robot has referred to, in its turn and the one before: what "it" can mean. Pure."""
 
 from collections.abc import Collection
 
@@ -16,7 +16,7 @@ class Named(Struct, frozen=True):
 
 
 class Discourse(Struct, frozen=True):
-    """named: in the turn. before: in the turn before it. addressee: who has heard that."""
+    """The objects referred to. named: in the turn. before: in the turn before it. addressee: the person who heard."""
 
     turn: str = ""
     addressee: str = ""
@@ -24,18 +24,18 @@ class Discourse(Struct, frozen=True):
     before: tuple[Named, ...] = ()
 
     def in_turn(self, turn: str, addressee: str) -> "Discourse":
-        """As `turn` finds it. To somebody else nothing has been said."""
+        """The discourse at a fragment of `turn`. For another addressee nothing was referred to before."""
         if turn == self.turn:
             return self
         before = self.named if addressee == self.addressee else ()
         return Discourse(turn=turn, addressee=addressee, before=before)
 
     def naming(self, fragment: str, objects: Collection[str]) -> "Discourse":
-        """After a fragment that refers, or is going to refer, to `objects`."""
+        """The discourse after a fragment that refers, or is going to refer, to `objects`."""
         return replace(self, named=(*self.named, *(Named(fragment, each) for each in objects)))
 
     def without(self, fragment: str, unsaid: Collection[str]) -> "Discourse":
-        """The fragment has ended and never came to refer to some of its objects."""
+        """The discourse after a fragment that has ended before it referred to the objects in `unsaid`."""
 
         def said(named: tuple[Named, ...]) -> tuple[Named, ...]:
             return tuple(each for each in named if each.fragment != fragment or each.object not in unsaid)
@@ -43,7 +43,7 @@ class Discourse(Struct, frozen=True):
         return replace(self, named=said(self.named), before=said(self.before))
 
     def hearing(self, event: ConnectionEvent, robot: str) -> "Discourse":
-        """A person who directs to something else makes that the topic: "it" is not what the robot named before."""
+        """The discourse after an event: a person who directs to something else ends the topic of "it"."""
         directs = event.kind == "directed_gaze" and event.state == "started" and event.initiator != robot
         if not directs or not event.objects or set(event.objects) == {self.topic}:
             return self

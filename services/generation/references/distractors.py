@@ -1,4 +1,4 @@
-"""Which objects a gaze or a point may also seem to mean: distractors from rays and places. Thesis 3.3.2."""
+"""Distractors of a gaze or a point, from rays and places: objects that it may also seem to mean. Thesis 3.3.2."""
 
 import math
 from collections.abc import Iterable, Sequence
@@ -12,7 +12,7 @@ from engage_hri.schemas.units import Meters, Radians, Vector
 from engage_hri.schemas.world import Entity
 
 TOLERANCE = 1e-9
-"""On an angle or distance: an object exactly on the edge is inside, whatever the rounding."""
+"""Slack of an angle or distance: an object exactly on the edge is inside, whatever the rounding."""
 
 
 class Layout(Struct, frozen=True):
@@ -22,14 +22,15 @@ class Layout(Struct, frozen=True):
     places: NDArray[np.float64]
     """Centres and footprint corners of all objects, (m, 3)."""
     owner: NDArray[np.intp]
-    """Which object each of the `places` belongs to, (m,)."""
+    """Index of the object that each of the `places` belongs to, (m,)."""
     centres: NDArray[np.float64]
-    """(n, 3)"""
+    """Centres of the objects, (n, 3)."""
     radii: NDArray[np.float64]
-    """(n,)"""
+    """Radii of the objects, (n,)."""
 
 
 def laid_out(objects: Sequence[Entity]) -> Layout:
+    """Make the layout of these objects; a footprint is turned by the object's yaw."""
     places: list[Vector] = []
     owner: list[int] = []
     for index, entity in enumerate(objects):
@@ -48,7 +49,7 @@ def laid_out(objects: Sequence[Entity]) -> Layout:
 
 
 def in_gaze_cone(gaze: Ray, half_angle: Radians, layout: Layout) -> frozenset[str]:
-    """Ids of the objects whose centre or any footprint corner lies in the cone around the gaze axis.
+    """Ids of the objects that have their centre or a corner of their footprint in the cone around the gaze axis.
 
     The angle between axis and eye-to-point decides: the same set as the ellipse the cone cuts from the table
     (decision B4).
@@ -75,19 +76,19 @@ def in_pointing_cylinder(forearm: Ray, radius: Meters, layout: Layout) -> frozen
 
 
 def extent(entity: Entity) -> Meters:
-    """Radius of an object: what it says, else that of its footprint."""
+    """Radius of an object: the one that is given, else that of its footprint."""
     if entity.radius or not entity.footprint:
         return entity.radius
     return max(math.hypot(x, y) for x, y in entity.footprint)
 
 
 def in_zone(place: Vector, zones: Iterable[NoPointZone]) -> bool:
-    """Is `place` where the robot must not point?"""
+    """True if the robot must not point at `place`."""
     return any(math.dist(place, zone.center) <= zone.radius for zone in zones)
 
 
 def angle_off_axis(gaze: Ray, place: Vector) -> Radians:
-    """Between the gaze axis and the direction from the eye to `place`."""
+    """Angle between the gaze axis and the direction from the eye to `place`."""
     reach = np.asarray(place) - np.asarray(gaze.origin)
     distance = float(np.linalg.norm(reach))
     if distance <= TOLERANCE:

@@ -1,4 +1,4 @@
-"""What the body has to say before references can be chosen: which motions to ask about, and its answers by pose."""
+"""Motions that references may need: the questions to the body, and its estimates by pose."""
 
 from collections.abc import Iterator, Sequence
 
@@ -8,13 +8,13 @@ from engage_hri.schemas.behaviors import BlockBehavior, Gaze, Hand, Pointing
 from engage_hri.schemas.body import BodyPose, Estimate, EstimateItem
 
 CURRENT_POSE = ""
-"""Where the body is now, as the place a motion starts from."""
+"""Start of a motion: where the body is now."""
 
 
 class Motions(Struct, frozen=True):
     """Estimates by (since, target): a head or an arm that is on `since`, or CURRENT_POSE, goes to `target`.
 
-    glance: who is looked at after each point, before the next reference is made; "": nobody, the head stays.
+    glance: the person looked at after each point, before the next reference is made; "": nobody, the head stays.
     """
 
     gazes: dict[tuple[str, str], Estimate]
@@ -29,19 +29,19 @@ class Motions(Struct, frozen=True):
 
 
 def arm_of(point: Estimate) -> str:
-    """Which arm the body would point with."""
+    """Name of the arm (or arms) that the body would point with."""
     return "+".join(sorted(point.parts))
 
 
 def hand_of(point: Estimate) -> Hand | None:
-    """The hand to name in the block, so that the body points with the arm it estimated."""
+    """The hand to name in the block, so that the body points with the arm it estimated; None: both, or neither."""
     arms: dict[str, Hand] = {"left_arm": "LEFT_HAND", "right_arm": "RIGHT_HAND"}
     hands = [hand for part, hand in arms.items() if part in point.parts]
     return hands[0] if len(hands) == 1 else None
 
 
 class ExpectedPose(Struct, frozen=True):
-    """Where head and arms will be when what moves them now is on target; None: where they are."""
+    """Poses of head and arms once the behaviors that move them now are on target; None: the present pose."""
 
     head: BodyPose | None = None
     arms: BodyPose | None = None
@@ -51,14 +51,14 @@ HERE_AND_NOW = ExpectedPose()
 
 
 def last_motions(moving: Sequence[BlockBehavior]) -> tuple[EstimateItem, ...]:
-    """Of what moves the head and the arms, in order: whatever comes last."""
+    """Questions for the last gaze and the last point of `moving`: they decide where head and arms will be."""
     points = [behavior for behavior in moving if isinstance(behavior, Pointing)]
     gazes = [behavior for behavior in moving if not isinstance(behavior, Pointing)]
     return tuple(EstimateItem(behavior=behavior) for behavior in (*gazes[-1:], *points[-1:]))
 
 
 def pose_after(items: Sequence[EstimateItem], answers: Sequence[Estimate]) -> ExpectedPose:
-    """answers: to `last_motions`."""
+    """The pose once these motions are on target. items, answers: of `last_motions`."""
     pose = ExpectedPose()
     for item, answer in zip(items, answers, strict=True):
         if isinstance(item.behavior, Pointing):
@@ -131,7 +131,7 @@ def _gaze(target: str) -> Gaze:
 
 
 def _after_glances(sequence: Sequence[str], motions: Motions) -> tuple[str, ...]:
-    """What may be looked at after a glance."""
+    """Targets that may be looked at after a glance."""
     return distinct(sequence[1:]) if motions.glance else ()
 
 
@@ -148,7 +148,7 @@ def _from_here(sequence: Sequence[str], answers: Sequence[Estimate], glance: str
 
 
 def _steps(sequence: Sequence[str], motions: Motions) -> Iterator[tuple[str, str, bool]]:
-    """From each target to each later one, and whether one arm points at both."""
+    """Pairs of a target and a later one, each once, and whether one arm points at both."""
     seen: set[tuple[str, str]] = set()
     for index, target in enumerate(sequence):
         there = motions.point(CURRENT_POSE, target)

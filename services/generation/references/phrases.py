@@ -23,28 +23,28 @@ from engage_hri.services.generation.references.discourse import NO_DISCOURSE, Di
 from engage_hri.services.generation.references.distractors import extent
 
 SPOKEN: tuple[PhraseAttribute, ...] = get_args(PhraseAttribute)
-"""The order in which English says modifiers, whatever the order of preference."""
+"""Attributes in the order in which English says modifiers, whatever the order of preference."""
 MOST_MODIFIERS = 3
-"""In one phrase. Nobody listens to more, and there would be ever more of them to weigh."""
+"""Number of modifiers in one phrase, at most: nobody listens to more, and all combinations have to be weighed."""
 SIZES_APART = 1.25
-"""Objects of a kind are big and small if the greatest step between two successive sizes is at least this ratio."""
+"""Least ratio of two successive sizes at which the objects of a kind are divided into big and small ones."""
 
 SHORTEST_NOUN = 3
-"""Letters of a word in an id: what is shorter numbers things, as in `block-a`."""
+"""Least number of letters that a noun in an id has: shorter words number things, as in `block-a`."""
 NO_NOUNS = {"entity", "item", "marker", "node", "obj", "object", "piece", "tag", "thing", "track", "unknown"}
-"""What trackers call things that they know nothing of."""
+"""Words that trackers use for things that they know nothing of."""
 _ID_SEPARATORS = re.compile(r"[\W_]+|(?<=[a-z])(?=[A-Z])")
 
 
 class Property(Struct, frozen=True):
-    """What a word says of an object. An attribute of the world, or the noun."""
+    """A word that holds of an object: the value of an attribute or, without `attribute`, the noun."""
 
     attribute: PhraseAttribute | None
     word: str
 
 
 class Proposals(Struct, frozen=True):
-    """The references with phrases, and what is to be warned of."""
+    """References, each with phrases, and warnings of those for which the world knows too little."""
 
     references: tuple[Reference, ...]
     warnings: tuple[str, ...] = ()
@@ -53,10 +53,7 @@ class Proposals(Struct, frozen=True):
 def proposed(
     references: Sequence[Reference], world: World, config: GenerationConfig, discourse: Discourse = NO_DISCOURSE
 ) -> Proposals:
-    """The same references, in the order in which they are made; those that came without phrases have some.
-
-    discourse: what was referred to before them.
-    """
+    """Give phrases to those references that came without any. discourse: what was referred to before them."""
     objects = _Objects(world)
     made: list[Reference] = []
     warnings: list[str] = []
@@ -79,7 +76,7 @@ def proposed(
 def phrases(
     target: str, objects: "_Objects", config: GenerationConfig, *, is_the_topic: bool = False
 ) -> tuple[SpeechOption, ...]:
-    """From short to long, each with its cost in words and its distractors.
+    """Phrases for `target`, from short to long, each with its cost in words and its distractors.
 
     is_the_topic: the target alone was mentioned before, so that "it" can mean nothing else.
     """
@@ -87,13 +84,13 @@ def phrases(
     demonstrative = "this" if objects.distance(target) <= config.this_within else "that"
     if not objects.describes(target) and not objects.noun(target).word:
         demonstrative += " one"
-    # What a deictic phrase leaves is what pointing leaves: the policy knows.
+    # The distractors of a deictic phrase are those of pointing: the reference policy computes them.
     options.append(SpeechOption(text=demonstrative, cost=word_count(demonstrative), deictic=True))
     return (*options, *_descriptions(target, objects, config))
 
 
 def _descriptions(target: str, objects: "_Objects", config: GenerationConfig) -> Iterator[SpeechOption]:
-    """Those that no other one of as few words beats."""
+    """Descriptions such as "the big square", without those that another one of as few words beats."""
     noun = objects.noun(target)
     others = objects.ids - {target}
     modifiers = [known for attribute in config.phrase_attributes for known in objects.properties(target, attribute)]
@@ -120,7 +117,7 @@ def _option(text: str, distractors: frozenset[str]) -> SpeechOption:
 
 
 class _Objects:
-    """What the world knows of its objects, as words."""
+    """The world's objects and the words that hold of them."""
 
     def __init__(self, world: World) -> None:
         self._objects = {entity.id: entity for entity in world.objects}
@@ -129,7 +126,7 @@ class _Objects:
         self.ids = frozenset(self._objects)
 
     def distance(self, id: str) -> float:
-        """From the robot, metres along the floor."""
+        """Metres from the robot, along the floor."""
         x, y, _ = self._objects[id].position
         return float((x * x + y * y) ** 0.5)
 
@@ -137,28 +134,29 @@ class _Objects:
         return Property(None, _noun(self._objects[id]))
 
     def describes(self, id: str) -> bool:
-        """Does the world say anything of it but its id?"""
-        return bool(_names(self._objects[id])) or any(self._said(self._objects[id], each) for each in SPOKEN)
+        """True if the world has more of an object than its id: a name, a category or an attribute."""
+        return bool(_names(self._objects[id])) or any(self._words(self._objects[id], each) for each in SPOKEN)
 
     def properties(self, id: str, attribute: PhraseAttribute) -> tuple[Property, ...]:
         entity = self._objects[id]
         noun = _noun(entity)
-        return tuple(Property(attribute, word) for word in self._said(entity, attribute) if word != noun)
+        return tuple(Property(attribute, word) for word in self._words(entity, attribute) if word != noun)
 
     def may_be(self, known: Property) -> frozenset[str]:
-        """The objects of which it holds, or of which nobody knows."""
+        """Ids of the objects of which the word holds, or of which the world does not say whether it holds."""
         if known not in self._holders:
-            self._holders[known] = frozenset(id for id, entity in self._objects.items() if self._may(entity, known))
+            ids = (id for id, entity in self._objects.items() if self._may_hold(entity, known))
+            self._holders[known] = frozenset(ids)
         return self._holders[known]
 
-    def _may(self, entity: Entity, known: Property) -> bool:
+    def _may_hold(self, entity: Entity, known: Property) -> bool:
         if known.attribute is None:
             names = _names(entity) or {_noun_in(entity.id)} - {""}
             return not known.word or not names or known.word in names
-        said = self._said(entity, known.attribute)
+        said = self._words(entity, known.attribute)
         return known.word in said or (not said and known.attribute != "feature")
 
-    def _said(self, entity: Entity, attribute: PhraseAttribute) -> tuple[str, ...]:
+    def _words(self, entity: Entity, attribute: PhraseAttribute) -> tuple[str, ...]:
         match attribute:
             case "feature":
                 return entity.features
@@ -180,14 +178,14 @@ def _names(entity: Entity) -> set[str]:
 
 
 def _noun_in(id: str) -> str:
-    """What an id says if a person chose it: `cup` of `cup-2`, `coffee cup` of `coffeeCup`; nothing of `obj-17`."""
+    """Noun in an id that a person has chosen: `cup` of `cup-2`, `coffee cup` of `coffeeCup`; "" of `obj-17`."""
     words = [word.lower() for part in _ID_SEPARATORS.split(id) if (word := part.rstrip("0123456789"))]
     telling = [word for word in words if word.isalpha() and (len(word) >= SHORTEST_NOUN or not word.isascii())]
     return "" if NO_NOUNS.intersection(telling) else " ".join(telling)
 
 
 def _sizes(objects: Sequence[Entity]) -> dict[str, str]:
-    """`big` and `small` among the objects of each kind, by id; nothing where they are about the same."""
+    """Sizes `big` and `small` by id, within each kind of object; none where all are about the same size."""
     kinds: dict[str, list[Entity]] = {}
     for entity in objects:
         if extent(entity) > 0:

@@ -1,8 +1,8 @@
-"""Which gesture and which phrase make each object reference: the cheapest pairs that are understood. Thesis 3.3.2.
+"""The reference policy: for each object reference the cheapest pair of gesture and phrase that is understood.
 
-Cost depends on where the head and the arms are, and every gesture moves them, so a sequence of references is
-chosen as a whole: a dynamic program over what head and arms point at. Reliability does not depend on posture,
-so pairs that are not understood go first, and per gesture only the best phrase can win.
+Thesis 3.3.2. Cost depends on where the head and the arms are, and every gesture moves them, so a sequence of
+references is chosen as a whole: a dynamic program over what head and arms point at. Reliability does not depend on
+posture, so pairs that are not understood are left out first, and per gesture only the best phrase can win.
 """
 
 from collections.abc import Collection, Mapping, Sequence
@@ -30,14 +30,14 @@ from engage_hri.services.generation.references.motions import CURRENT_POSE, Moti
 from engage_hri.services.generation.references.reliability import channel_reliability, reliability
 
 GESTURES: tuple[GestureChoice, ...] = get_args(GestureChoice)
-"""J, from fewer gestures to more."""
+"""All gestures, the set J of the thesis, from fewer movements to more."""
 ROUNDING = 9
-"""Decimals of costs and reliabilities that count: sums in another order are still ties."""
+"""Decimals of costs and reliabilities that count: sums of the same numbers in another order are equal."""
 FROM_NOWHERE = "cannot be done from where the references before it leave the body"
 
 
 class ReferenceScene(Struct, frozen=True, kw_only=True, dict=True):
-    """Where references are made. no_gaze, no_point: why the robot may not look or point; empty when it may."""
+    """The objects and the limits of gestures. no_gaze, no_point: why the robot may not look or point; "": it may."""
 
     world: World
     half_angle: Radians
@@ -56,11 +56,13 @@ class ReferenceScene(Struct, frozen=True, kw_only=True, dict=True):
 
 
 class Pair(Struct, frozen=True, kw_only=True):
-    """A gesture with a phrase, as far as posture does not matter. ruled_out: why it cannot be performed, or empty."""
+    """A gesture with a phrase, as far as posture does not matter.
+
+    order: the place of the phrase among the reference's options. ruled_out: why it cannot be performed, or empty.
+    """
 
     gesture: GestureChoice
     order: int
-    """Of the phrase among the reference's options."""
     option: SpeechOption
     distractors: frozenset[str]
     channel: Probability
@@ -69,7 +71,7 @@ class Pair(Struct, frozen=True, kw_only=True):
 
     @property
     def preference(self) -> tuple[bool, float, int, int]:
-        """Among equal costs the least wins (decision B13)."""
+        """Sort key among pairs of equal cost: the least wins (decision B13)."""
         points = self.gesture == "directed_gaze_with_pointing"
         return (
             not (points and self.option.deictic), -round(self.reliability, ROUNDING),
@@ -78,7 +80,7 @@ class Pair(Struct, frozen=True, kw_only=True):
 
 
 class HeadAndArms(Struct, frozen=True):
-    """What the head looks at and each arm points at: a reference's target, who was glanced at, or CURRENT_POSE."""
+    """Targets of the head and of each arm: that of a reference, the person glanced at, or CURRENT_POSE."""
 
     head: str = CURRENT_POSE
     arms: tuple[tuple[str, str], ...] = ()
@@ -88,6 +90,7 @@ class HeadAndArms(Struct, frozen=True):
         return dict(self.arms).get(arm, CURRENT_POSE)
 
     def after(self, gesture: GestureChoice, target: str, motions: Motions) -> "HeadAndArms":
+        """The posture that a gesture at `target` leaves."""
         if gesture == "none":
             return self
         if gesture != "directed_gaze_with_pointing":
@@ -97,7 +100,7 @@ class HeadAndArms(Struct, frozen=True):
 
 
 class Choices(Struct, frozen=True):
-    """hands: the one that points, by reference id, where the body says which."""
+    """The choices for a fragment's references. hands: the one that points, by reference, if the body says which."""
 
     choices: tuple[ReferenceChoice, ...] = ()
     warnings: tuple[str, ...] = ()
@@ -113,14 +116,16 @@ class Unreferable(RunFailed):
 
 
 class _Way(Struct, frozen=True):
-    """The best way to reach a posture. rank: what decides, its rounded cost and then its preferences."""
+    """The best sequence of pairs that leads to a posture.
+
+    rank: sort key, the rounded cost and then the preferences. pairs: None for a reference that cannot be made.
+    postures: before each pair, and after the last.
+    """
 
     cost: Seconds
     rank: tuple[float, tuple[tuple[bool, float, int, int], ...]]
     pairs: tuple[Pair | None, ...]
-    """None: of a reference that cannot be made."""
     postures: tuple[HeadAndArms, ...]
-    """Before each pair, and after the last."""
 
     @property
     def posture(self) -> HeadAndArms:
@@ -130,14 +135,14 @@ class _Way(Struct, frozen=True):
 def choose(
     references: Sequence[Reference], scene: ReferenceScene, motions: Motions, config: GenerationConfig
 ) -> Choices:
-    """The pairs of least total cost for `references` in this order, each with the table it was chosen from.
+    """Choose the pairs of least total cost for `references` in this order, each with the table it was chosen from.
 
-    A reference none of whose pairs reaches its minimum gets one of its most reliable, with a warning (decision B10).
+    A reference with no pair that reaches its minimum gets one of its most reliable, with a warning (decision B10).
     Raises Unreferable where a reference cannot be made at all.
     """
     warnings: list[str] = []
     for reference in references:
-        warnings += _doubts(reference, scene)
+        warnings += _deictic_warnings(reference, scene)
     tables = [considered(reference, scene, motions, config) for reference in references]
     best = _cheapest_way(references, tables, motions, config)
     choices = tuple(
@@ -147,12 +152,12 @@ def choose(
     hands: dict[str, Hand] = {}
     for reference, table, pair, choice in zip(references, tables, best.pairs, choices, strict=True):
         if pair is None:
-            raise Unreferable(_no_way(reference, table), choices)
+            raise Unreferable(_unreferable(reference, table), choices)
         minimum = _minimum(reference, config)
         if _below(pair.reliability, minimum):
             warnings.append(
                 f"{reference.id}: nothing reaches the minimum reliability {minimum:g}; chose "
-                f"{_name(pair.gesture, pair.option.text)} with R {pair.reliability:.4g}"
+                f"{_pair_name(pair.gesture, pair.option.text)} with R {pair.reliability:.4g}"
             )
         if choice.gesture == "directed_gaze_with_pointing" and (
             hand := hand_of(motions.point(CURRENT_POSE, choice.target))
@@ -161,9 +166,9 @@ def choose(
     return Choices(choices, tuple(warnings), hands)
 
 
-def _no_way(reference: Reference, table: Sequence[Pair]) -> Fault:
+def _unreferable(reference: Reference, table: Sequence[Pair]) -> Fault:
     reasons = dict.fromkeys(
-        f"{_name(pair.gesture, pair.option.text)}: {pair.ruled_out or FROM_NOWHERE}" for pair in table
+        f"{_pair_name(pair.gesture, pair.option.text)}: {pair.ruled_out or FROM_NOWHERE}" for pair in table
     )
     return Fault(reason=f"no way to refer to {reference.target}: {'; '.join(reasons)}", where=reference.id)
 
@@ -171,7 +176,7 @@ def _no_way(reference: Reference, table: Sequence[Pair]) -> Fault:
 def considered(
     reference: Reference, scene: ReferenceScene, motions: Motions, config: GenerationConfig
 ) -> tuple[Pair, ...]:
-    """Every pair of J x S with its distractors and reliability."""
+    """The table of a reference: every pair of gesture and phrase (J x S) with its distractors and reliability."""
     target = reference.target
     universe = scene.universe - {target}
     gaze, point = motions.gaze(CURRENT_POSE, target), motions.point(CURRENT_POSE, target)
@@ -210,7 +215,7 @@ def considered(
 
 
 def cost(pair: Pair, target: str, posture: HeadAndArms, motions: Motions, config: GenerationConfig) -> Seconds:
-    """C(j, s) in seconds, from `posture`: head, wait for shared gaze (decision B7), arm, words."""
+    """Cost C(j, s) in seconds, from `posture`: head, wait for shared gaze (decision B7), arm, words."""
     seconds = _speaking(pair, config)
     if pair.gesture != "none":
         seconds += config.head_cost(motions.gaze(posture.head, target).head_degrees)
@@ -227,7 +232,7 @@ def _speaking(pair: Pair, config: GenerationConfig) -> Seconds:
 
 
 def _obstacles(target: str, scene: ReferenceScene, motions: Motions) -> tuple[str, str]:
-    """Why the robot cannot look, or point, at `target` (decision B9)."""
+    """Reasons why the robot cannot look, and cannot point, at `target`; each empty if it can (decision B9)."""
     gaze, point = motions.gaze(CURRENT_POSE, target), motions.point(CURRENT_POSE, target)
     no_gaze = scene.no_gaze or _refusal("look", gaze)
     no_point = scene.no_point or _refusal("point", point)
@@ -238,7 +243,7 @@ def _obstacles(target: str, scene: ReferenceScene, motions: Motions) -> tuple[st
 
 
 def _hindrance(gesture: GestureChoice, target: str, posture: HeadAndArms, motions: Motions) -> str:
-    """Why the body cannot make `gesture` from `posture`; empty if it can."""
+    """Reason why the body cannot make `gesture` from `posture`; empty if it can."""
     if gesture == "none":
         return ""
     no_gaze = _refusal("look from there", motions.gaze(posture.head, target))
@@ -257,8 +262,10 @@ def _refusal(verb: str, motion: Estimate) -> str:
 def _candidates(
     possible: Sequence[Pair], minimum: Probability, config: GenerationConfig
 ) -> Mapping[GestureChoice, Pair]:
-    """By gesture the one pair that may win whatever the posture: of those that reach `minimum`, or else of the
-    most reliable (decision B10), that with the best phrase."""
+    """The pair of each gesture that may win, whatever the posture: the one with the best phrase.
+
+    Only pairs that reach `minimum` count or, if there are none, the most reliable ones (decision B10).
+    """
     good = [pair for pair in possible if not _below(pair.reliability, minimum)]
     if not good:
         most = max(round(pair.reliability, ROUNDING) for pair in possible)
@@ -270,14 +277,11 @@ def _candidates(
 
 
 def _cheapest_way(
-    references: Sequence[Reference],
-    tables: Sequence[tuple[Pair, ...]],
-    motions: Motions,
-    config: GenerationConfig,
+    references: Sequence[Reference], tables: Sequence[tuple[Pair, ...]], motions: Motions, config: GenerationConfig
 ) -> _Way:
-    """argmin of the summed cost over all sequences of pairs, the posture carried along (decision B11).
+    """The sequence of pairs with the least total cost, each from the posture before it (decision B11).
 
-    A reference that cannot be made is passed over.
+    A reference that cannot be made gets no pair.
     """
     ways = [_Way(0.0, (0.0, ()), (), (HeadAndArms(),))]
     for reference, table in zip(references, tables, strict=True):
@@ -365,8 +369,8 @@ def _explain(
     )
 
 
-def _doubts(reference: Reference, scene: ReferenceScene) -> list[str]:
-    """Warn of deictic phrases whose listed distractors are not everything else (decision B8)."""
+def _deictic_warnings(reference: Reference, scene: ReferenceScene) -> list[str]:
+    """Warnings of deictic phrases with a list of distractors that are not all other objects (decision B8)."""
     universe = scene.universe - {reference.target}
     return [
         f"{reference.id}: the distractors of the deictic {option.text!r} are everything else, not those listed"
@@ -384,6 +388,6 @@ def _below(value: Probability, minimum: Probability) -> bool:
     return round(value - minimum, ROUNDING) < 0
 
 
-def _name(gesture: GestureChoice, phrase: str) -> str:
+def _pair_name(gesture: GestureChoice, phrase: str) -> str:
     said = repr(phrase) if phrase else "no phrase"
     return f"{'no gesture' if gesture == 'none' else gesture.replace('_', ' ')} with {said}"

@@ -1,4 +1,4 @@
-"""How likely a reference is understood: R(j, s) = 1 / (|D| + 1 / r), and the channel r of a gesture with a phrase."""
+"""Reliability of a reference, R(j, s) = 1 / (|D| + 1 / r), and of its channel, r of a gesture with a phrase."""
 
 from engage_hri.schemas.fragments import GestureChoice
 from engage_hri.schemas.units import Probability
@@ -9,7 +9,7 @@ def reliability(distractors: int, channel: Probability) -> Probability:
     """Likelihood that the reference is understood: 1 / (|D| + 1/r). Thesis 3.3.2.
 
     distractors: |D(j, s)|, objects besides the target still possible, >= 0.
-    channel: r(j, s) in [0, 1); 0 (neither gesture nor phrase) is understood by nobody (decision B2).
+    channel: r(j, s) in [0, 1); with 0 (neither gesture nor phrase) the reliability is 0, too (decision B2).
     Raises ValueError outside.
     """
     if distractors < 0:
@@ -20,7 +20,7 @@ def reliability(distractors: int, channel: Probability) -> Probability:
 
 
 def channel_reliability(gesture: GestureChoice, phrase: str, config: GenerationConfig) -> Probability:
-    """r(j, s) of a gesture with a phrase (empty: none), by the configured model. Thesis 3.3.2, decision B1."""
+    """Channel r(j, s) of a gesture with a phrase (empty: none), as configured. Thesis 3.3.2, decision B1."""
     r_gesture = {
         "none": 0.0,
         "gaze": config.gaze_reliability,

@@ -1,1 +1,1 @@
-"""The turn policy: who has the floor, and what a turn's fragments are to each other."""
+"""The turn policy: follows the robot's turns, and says how the fragments of one turn follow each other."""

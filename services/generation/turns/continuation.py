@@ -1,7 +1,7 @@
-"""What a turn's fragments leave for its next one to follow while they are still performed: points of live blocks.
+"""Continuation of a turn: the sync points of blocks under way that the turn's next fragment has to follow.
 
-Fragments of one turn are blocks at the same time. What one of them asks of the others is said here once: words
-follow words, a gaze the glance before it, a stroke the stroke before it on the same arm.
+The fragments of one turn are blocks that live at the same time. Between them hold three rules: words follow words, a
+gaze follows the glance before it, and a stroke follows the stroke before it on the same arm.
 """
 
 from collections.abc import Collection, Iterator
@@ -15,13 +15,13 @@ from engage_hri.schemas.references import type_name
 from engage_hri.schemas.syncref import SYNC_POINTS
 
 Limb = Hand | Literal["head"] | None
-"""What a stroke is made with; None: whichever arm the body chooses."""
+"""Part of the body that makes a stroke; None: either arm, as the body chooses."""
 Reached = Collection[tuple[str, str]]
 """Behavior and sync point of all that was reached in a block."""
 
 
 class Stroke(Struct, frozen=True):
-    """over: its sync point from which on the limb is free for another."""
+    """The stroke of a behavior. over: its sync point from which on the limb is free for another one."""
 
     behavior: str
     limb: Limb
@@ -31,7 +31,7 @@ class Stroke(Struct, frozen=True):
 class Continuation(Struct, frozen=True):
     """Ids of a block's last speech or phrase, of its last glance and of its strokes. "": it has none.
 
-    In the continuation of a turn they are `block:behavior`.
+    In the continuation of a turn, which joins those of several blocks, the ids are `block:behavior`.
     """
 
     speech: str = ""
@@ -44,7 +44,7 @@ class Continuation(Struct, frozen=True):
         return f"{self.speech}:end" if self.speech else ""
 
     def pending(self, block: str, reached: Reached) -> "Continuation":
-        """Of this continuation of `block`, named from elsewhere, what has not been `reached`."""
+        """The part of this continuation of `block` that has not been `reached`, with ids for use in other blocks."""
         ahead = tuple(
             Stroke(f"{block}:{each.behavior}", each.limb, each.over)
             for each in self.strokes
@@ -57,10 +57,11 @@ class Continuation(Struct, frozen=True):
         )
 
     def then(self, later: "Continuation") -> "Continuation":
+        """Join this continuation with that of a later block: its words and glance go before."""
         return Continuation(later.speech or self.speech, later.glance or self.glance, (*self.strokes, *later.strokes))
 
     def frees(self, limb: Limb) -> Iterator[str]:
-        """The sync points before which `limb` is in use."""
+        """The sync points up to which strokes use `limb`, or may use it."""
         return (f"{each.behavior}:{each.over}" for each in self.strokes if _may_be_one(each.limb, limb))
 
 
@@ -68,7 +69,7 @@ NO_CONTINUATION = Continuation()
 
 
 def stroke(behavior: Behavior, hand: Hand | None = None) -> Stroke | None:
-    """The stroke of a behavior, if that is what it is made for. hand: the one it is made with if it names none."""
+    """The stroke of a pointing, gesture or head movement; None for others. hand: for a behavior that names none."""
     match behavior:
         case Pointing(mode=mode) | Gesture(mode=mode):
             return Stroke(behavior.id, mode or hand)
@@ -78,10 +79,10 @@ def stroke(behavior: Behavior, hand: Hand | None = None) -> Stroke | None:
 
 
 def first_met(behavior: Behavior, named: Collection[tuple[str, str]]) -> str:
-    """The sync point of `behavior` that the words before its fragment must not come after: its start, as a rule.
+    """The sync point of `behavior` that has to come after the words before its fragment: its start, as a rule.
 
-    Whose stroke is tied to something may set out before, so that it meets the first words: the realizer knows when.
-    named: behavior and sync point of all that the fragment names.
+    A behavior with a stroke that is tied to something has to have only the stroke after them: it may set out before,
+    so that the stroke meets the first words. named: behavior and sync point of all that the fragment names.
     """
     type = type_name(behavior)
     syncs = {canonical_sync(sync, type) for id, sync in named if id == behavior.id}
@@ -90,6 +91,7 @@ def first_met(behavior: Behavior, named: Collection[tuple[str, str]]) -> str:
 
 
 def _may_be_one(one: Limb, other: Limb) -> bool:
+    """True unless these are certainly different limbs."""
     if "head" in (one, other):
         return one == other
     return one == other or None in (one, other) or "BOTH_HANDS" in (one, other)

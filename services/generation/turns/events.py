@@ -1,4 +1,4 @@
-"""The connection events of the robot's turns, and the outcome of each turn once all of it is decided."""
+"""Connection events of the robot's turns, and the outcome of each turn once all of it is decided."""
 
 from collections.abc import Collection, Iterable
 from typing import Literal
@@ -19,34 +19,35 @@ class TurnEvents:
     def __init__(self) -> None:
         self._events: dict[str, ConnectionEvent] = {}
         self._turn_of: dict[str, str] = {}
-        """Which turn each block belongs to."""
+        """The turn of each block."""
 
     def expect(self, block: str, turn: str) -> None:
         self._turn_of[block] = turn
 
     def feed(self, event: ConnectionEvent) -> None:
-        # What is first heard of in a later state belongs to an earlier performance under the same id.
+        # An event that is first heard of in a later state belongs to an earlier performance under the same id.
         if event.block in self._turn_of and (event.state == "started" or event.id in self._events):
             self._events[event.id] = event
 
     def lose(self, session: str = "") -> None:
-        """Recognition is gone, or there as this session: no other's undecided events will ever be decided."""
+        """End undecided events of other sessions as lost: recognition is gone, or has come back as `session`."""
         for id, event in self._events.items():
             if event.state == "started" and event.session != session:
                 self._events[id] = replace(event, state="lost")
 
-    def of(self, turn: str) -> tuple[ConnectionEvent, ...]:
-        """By start."""
+    def of_turn(self, turn: str) -> tuple[ConnectionEvent, ...]:
+        """The events of a turn, by their start."""
         events = [event for event in self._events.values() if self._turn_of[event.block] == turn]
         return tuple(sorted(events, key=lambda event: event.started.seconds))
 
-    def at(self, block: str, behavior: str) -> ConnectionEvent | None:
+    def last_begun_by(self, block: str, behavior: str) -> ConnectionEvent | None:
+        """The last event that this behavior of the block has begun, if there is one."""
         mine = (event for event in reversed(self._events.values()) if event.block == block)
         return next((event for event in mine if event.behavior == behavior), None)
 
     def open_pair(self, turn: str) -> ConnectionEvent | None:
         """The adjacency pair of a turn, while it is undecided."""
-        pairs = (event for event in self.of(turn) if event.kind == "adjacency_pair")
+        pairs = (event for event in self.of_turn(turn) if event.kind == "adjacency_pair")
         return next((event for event in pairs if event.state == "started"), None)
 
     def forget(self, turns: Iterable[str]) -> None:
@@ -57,7 +58,7 @@ class TurnEvents:
 
 
 class _Record(Struct):
-    """spoken: by fragment, in the order in which they came. ended: when its last fragment was, or it was aborted."""
+    """A turn that is not closed. spoken: by fragment, in order of arrival. ended: time of its end so far."""
 
     addressee: str
     spoken: dict[str, tuple[SpokenText, ...]] = {}
@@ -67,22 +68,22 @@ class _Record(Struct):
 
 
 class TurnOutcomes:
-    """What became of each of the robot's turns, not of backchannels. `deadline`: when to ask `closed` again."""
+    """Outcomes of the robot's turns; backchannels have none. `deadline`: when to call `close_due` again."""
 
     def __init__(self, events: TurnEvents, patience: Seconds) -> None:
         self._events = events
         self._patience = patience
         self._records: dict[str, _Record] = {}
         self._given_up: dict[str, Seconds] = {}
-        """When to stop waiting for the answer to a turn that is over."""
+        """Turns that are over, and when to stop waiting for the answer."""
 
     @property
     def turns(self) -> Collection[str]:
-        """Those that are not closed."""
+        """Ids of the turns that are not closed."""
         return self._records.keys()
 
     def expect(self, fragment: str, turn: TurnPlan) -> TurnClosed | None:
-        """A fragment is accepted. A turn of the same name whose answer was still waited for is closed."""
+        """Take an accepted fragment. Returns the outcome of a turn of this name that still waited for its answer."""
         displaced = None
         if fragment == turn.turn and fragment in self._records:
             displaced = self._close(fragment)
@@ -92,17 +93,18 @@ class TurnOutcomes:
         return displaced
 
     def refuse(self, fragment: str, turn: TurnPlan) -> None:
-        """It was never part of the turn."""
+        """Take a fragment out of its turn again: the realizer has refused it."""
         if record := self._records.get(turn.turn):
             record.spoken.pop(fragment, None)
 
     def end(self, outcome: FragmentOutcome, turn: TurnPlan, now: Seconds) -> None:
+        """Take the outcome of a fragment."""
         if record := self._records.get(turn.turn):
             record.spoken[outcome.fragment] = outcome.spoken
             record.ended = now
 
     def abort(self, aborted: Aborted, now: Seconds) -> None:
-        """Recognition has yet to withdraw what the turn left open."""
+        """Note that a turn was aborted. It is not closed yet: recognition has still to withdraw its open events."""
         if record := self._records.get(aborted.turn):
             record.status, record.reason, record.ended = "aborted", aborted.reason, now
 
@@ -110,14 +112,14 @@ class TurnOutcomes:
     def deadline(self) -> Seconds | None:
         return min(self._given_up.values(), default=None)
 
-    def closed(self, going: Collection[str], now: Seconds) -> tuple[TurnClosed, ...]:
-        """Turns that are over by now. going: those that are open, or have a fragment without an outcome."""
-        over = [turn for turn in self._records if turn not in going and now >= self._until(turn)]
-        self._given_up = {turn: self._until(turn) for turn in self._records if turn not in (*going, *over)}
+    def close_due(self, going: Collection[str], now: Seconds) -> tuple[TurnClosed, ...]:
+        """Close the turns that are over by now. going: turns that are open, or have a fragment without an outcome."""
+        over = [turn for turn in self._records if turn not in going and now >= self._due_at(turn)]
+        self._given_up = {turn: self._due_at(turn) for turn in self._records if turn not in (*going, *over)}
         return tuple(closed for turn in over if (closed := self._close(turn)).fragments)
 
-    def _until(self, turn: str) -> Seconds:
-        """When its outcome is due. Recognition ends a pair at its limit, if there is a recognition."""
+    def _due_at(self, turn: str) -> Seconds:
+        """Time when the outcome of a turn is due: its end or, with an open pair, some time after the pair's limit."""
         pair = self._events.open_pair(turn)
         ended = self._records[turn].ended
         return ended + (pair.limit or 0.0) + self._patience if pair is not None else ended
@@ -135,5 +137,5 @@ class TurnOutcomes:
                 for fragment, all_said in record.spoken.items()
                 for said in all_said
             ),
-            events=self._events.of(turn),
+            events=self._events.of_turn(turn),
         )

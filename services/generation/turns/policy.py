@@ -1,4 +1,4 @@
-"""What a turn fragment adds to a conversation (thesis Table 3.1), and whether the turn may go on like this.
+"""The turn policy: what a turn fragment adds to a conversation (thesis Table 3.1), and which fragments may follow.
 
 Fragments of one turn arrive one by one while earlier ones are still performed. The policy follows the turn as it
 was accepted; whatever ends it early (barge-in, fault, cancellation, silence) also ends the fragments in line.
@@ -17,7 +17,7 @@ from engage_hri.services.generation.config import GenerationConfig
 
 
 class StatusRule(Struct, frozen=True):
-    """One row of Table 3.1. opens: announce the pair, if this is its first turn. closes: facial gaze and MFG."""
+    """One row of Table 3.1. opens: announce an adjacency pair, or the reply to one. closes: end with facial gaze."""
 
     opens: bool
     closes: bool
@@ -34,22 +34,22 @@ TABLE: dict[TurnStatus, StatusRule] = {
 
 
 class TurnPlan(Struct, frozen=True, kw_only=True):
-    """What a fragment adds. turn: id of the fragment that opened the turn; its own for a backchannel."""
+    """The behavior that a fragment adds. turn: id of the fragment that opened the turn; its own for a backchannel."""
 
     turn: str
     addressee: str
     accept: tuple[Action, ...] = ()
     announces_pair: bool = False
     reply: Literal["", "answered", "repaired"] = ""
-    """Second and third turns start no pair: they tell recognition what became of the pending one."""
+    """Message of a second or third turn, which starts no pair: tells recognition what became of the pending one."""
     closes: bool = False
     backchannel: bool = False
 
 
 class Aborted(Struct, frozen=True):
-    """A turn that ended early. fragments: those of it not yet ended, in order.
+    """A turn that ended early. fragments: its fragments that have not ended, in order.
 
-    is_known: it had begun and was not over, so recognition has to be told.
+    is_known: recognition has to be told, for the turn had begun and was not over.
     """
 
     turn: str
@@ -60,7 +60,7 @@ class Aborted(Struct, frozen=True):
 
 
 def plan_turn(fragment: TurnFragment, turn: str, addressee: str) -> TurnPlan:
-    """Table 3.1 for a legal fragment of turn `turn`."""
+    """Apply Table 3.1 to a legal fragment of turn `turn`."""
     rule = TABLE[fragment.turn_status]
     return TurnPlan(
         turn=turn,
@@ -88,13 +88,13 @@ class TurnPolicy:
         self._begun: dict[str, bool] = {}
         """Turns of which a block was sent, and whether their end was signalled."""
         self._delay_target = ""
-        """Of the last fragment."""
+        """The entity to look at after the last fragment, if that holds the turn."""
         self._silent_since: Seconds | None = None
         self._robot_speaks = False
         self._spoke_in = ""
         """The turn of the robot's last words."""
         self._interrupters: dict[str, Seconds | None] = {}
-        """People who began to speak within the robot's turn, and since when he speaks too."""
+        """People who began to speak within the robot's turn, and since when the robot speaks, too."""
 
     @property
     def open_turn(self) -> str:
@@ -106,7 +106,7 @@ class TurnPolicy:
 
     @property
     def _current(self) -> TurnPlan | None:
-        """The turn that the robot has, until its end is signalled. A backchannel is said in the other's."""
+        """The turn that the robot has, until its end is signalled. A backchannel is said in the other's turn."""
         plans = (*self._live.values(), *([self._open] if self._open else []))
         return next((plan for plan in plans if not plan.backchannel and not self._begun.get(plan.turn)), None)
 
@@ -147,17 +147,17 @@ class TurnPolicy:
         return plan
 
     def fragment_begins(self, turn: str) -> None:
-        """The block of a fragment of `turn` is on its way."""
+        """Note that the block of a fragment of `turn` is on its way."""
         self._begun.setdefault(turn, False)
 
     def turn_ended(self, turn: str) -> None:
-        """Its last words were said and its end signalled; the last block may go on for a moment."""
+        """Note that a turn is over: its end was signalled. Its last block may go on for a moment."""
         if turn in self._begun:
             self._begun[turn] = True
             self._interrupters.clear()
 
     def fragment_ended(self, id: str, *, complete: bool, now: Seconds, reason: str = "") -> Aborted | None:
-        """The fragment's block is over. Unless it was performed to its end its turn is aborted."""
+        """End a fragment. Its turn is aborted unless the block was performed completely."""
         plan = self._live.pop(id, None)
         if plan is None:
             return None
@@ -169,7 +169,7 @@ class TurnPolicy:
         return None
 
     def fragment_refused(self, id: str, now: Seconds) -> Aborted | None:
-        """The realizer found it impossible: it never was. Its turn goes on, unless that has nothing else to it."""
+        """Take back a fragment that the realizer found impossible. Its turn goes on, unless the fragment began it."""
         plan = self._live.get(id)
         if plan is None:
             return None
@@ -181,13 +181,14 @@ class TurnPolicy:
 
     @property
     def averted_to(self) -> str:
-        """Where the robot looks to think, now that nothing of its open turn is performed; "": it does not think."""
+        """The entity at which the robot looks while its open turn pauses; "": it does not avert its gaze."""
         return self._delay_target if self._open is not None and not self._live else ""
 
     def feed(self, message: ActionBegan | ActionEnded, now: Seconds) -> None:
-        """Who speaks: whoever is spoken to and talks into the robot's turn for long takes it.
+        """Note who speaks: an addressee who talks into the robot's turn for long takes it.
 
-        Between two of its utterances nobody is talked into: that counts again from where the robot goes on.
+        Between two of its utterances nobody takes it. Of a person who begins there the time counts from where the
+        robot goes on.
         """
         if message.action != "speak":
             return
@@ -212,13 +213,13 @@ class TurnPolicy:
 
     @property
     def _talked_into(self) -> dict[str, Seconds]:
-        """Since when people talk into what the robot says now."""
+        """People who talk into what the robot says now, and since when."""
         if not self._robot_speaks or not self._live:
             return {}
         return {actor: began for actor, began in self._interrupters.items() if began is not None}
 
     def tick(self, now: Seconds) -> Aborted | None:
-        """What silence or a barge-in has ended by `now`."""
+        """Abort the turn that silence or a barge-in has ended by `now`; None: there is none."""
         if self._silent_since is not None and now >= self._silent_since + self._config.turn_silence:
             assert self._open is not None
             return self._abort(self._open, f"silence for {self._config.turn_silence:g} s")
@@ -241,7 +242,7 @@ class TurnPolicy:
         return Aborted(plan.turn, plan.addressee, ended, reason, is_known)
 
     def _forget(self) -> None:
-        """What no longer concerns anybody: who talks into a turn that is over, and what became of it."""
+        """Drop what is known of turns that are over, and of the people who talked into them."""
         kept = {plan.turn for plan in self._live.values()} | {self.open_turn}
         self._begun = {turn: is_over for turn, is_over in self._begun.items() if turn in kept}
         if self._current is None or self._current.turn != self._spoke_in:

@@ -1,4 +1,4 @@
-"""What a client is given, checked before it is sent: a fragment in any form, a request as its server will read it."""
+"""Checks of a client's input before it is sent: a fragment in any form, a request as its server will read it."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -18,7 +18,7 @@ FragmentSource = TurnFragment | str | bytes | Path | dict[str, Any]
 
 
 def fragment_in(source: FragmentSource, unnamed: str) -> TurnFragment:
-    """unnamed: the id of one that has none. Raises InputRefused with file, line or JSON path."""
+    """Read a fragment. unnamed: the id for one without an id. Raises InputRefused with file, line or JSON path."""
     match source:
         case TurnFragment():
             return source
@@ -46,7 +46,7 @@ R = TypeVar("R", bound=Request)
 
 
 def checked(request: R) -> R:
-    """As its server will get it: structs take any values where they are made. Raises InputRefused."""
+    """Check that the server can read the request: a struct takes values of any type. Raises InputRefused."""
     try:
         decode(*published(request))  # type: ignore[arg-type]
     except (UnicodeEncodeError, OverflowError, TypeError, ValueError, RecursionError, msgspec.MsgspecError) as error:
@@ -55,7 +55,7 @@ def checked(request: R) -> R:
 
 
 def _encoded(encode: Callable[[], bytes]) -> bytes:
-    """Raises InputRefused for half a character, and for values that JSON does not have."""
+    """Encode input. Raises InputRefused for half a character, and for values that JSON does not have."""
     try:
         return encode()
     except (UnicodeEncodeError, TypeError, ValueError, RecursionError, msgspec.MsgspecError) as error:

@@ -1,4 +1,4 @@
-"""What becomes of what a client asks for: the outcome or answer, or the error that a caller gets."""
+"""Results of a client's requests: the outcome or answer that a caller gets, or the error that is raised."""
 
 from typing import TypeVar
 
@@ -21,7 +21,8 @@ class PerformFailed(RunFailed):
 O = TypeVar("O", FragmentOutcome, BlockOutcome)  # noqa: E741
 
 
-def unless_failed(outcome: O, subject: str) -> O:
+def successful(outcome: O, subject: str) -> O:
+    """Return the outcome, or raise PerformFailed if it says so. subject: id of the fragment or block."""
     if outcome.status == "failed":
         raise PerformFailed(outcome.fault or Fault(reason="it failed", where=subject), outcome)
     return outcome
@@ -30,7 +31,8 @@ def unless_failed(outcome: O, subject: str) -> O:
 S = TypeVar("S", bound=Struct)
 
 
-def answered(message: S | None, what: str, timeout: Seconds | None) -> S:
+def in_time(message: S | None, what: str, timeout: Seconds | None) -> S:
+    """Return the message, or raise NoReply if none has come in time. what: its name, for the reader."""
     if message is None:
         raise NoReply(Fault(reason=f"no {what} within {timeout} s", advice="is its service running?"))
     return message
