@@ -22,7 +22,7 @@ from engage_hri.services.tangram.table import tangram_table
 
 
 async def collaborate(bus: Bus, ready: Ready, config: CollaborationConfig) -> None:
-    """Play the tangram once, with whoever comes; returns after the goodbye."""
+    """Play the tangram once, with the first person who comes; return after the goodbye."""
     manager = plans.Manager(config, tangram_table())
     plan = plans.script(manager, turns(manager)) if config.mode == "scripted" else plans.task(manager)
     async with Robot.on(bus) as robot, asyncio.TaskGroup() as tasks:
@@ -45,7 +45,7 @@ async def _follow(plan: plans.Plan[None], engine: "_Engine") -> None:
 
 
 class _Engine:
-    """Does what a plan wishes, and watches the table all the while."""
+    """Grants the wishes of a plan, and watches the table all the while."""
 
     def __init__(self, robot: Robot, bus: Bus, sight: PiecesInView) -> None:
         self._robot = robot
@@ -82,7 +82,7 @@ class _Engine:
                 return None
 
     async def _until(self, holds: Callable[[Seconds], bool], deadline: Seconds) -> bool:
-        """Wait until the table is seen to be so. False: it was not by `deadline`."""
+        """Wait until `holds`, asked at loop time, is true of the table. False: it was not by `deadline`."""
         while not holds(now := self._robot.now()):
             if now >= deadline:
                 return False

@@ -1,4 +1,4 @@
-"""The service `control`: puts a body on the bus. It decodes, feeds and publishes; the rest is the body's business."""
+"""The service `control`: takes requests from the bus, has the body perform them, and publishes what it reports."""
 
 import asyncio
 from contextlib import aclosing
@@ -51,7 +51,7 @@ from engage_hri.services.runtime.alarm import Timer
 from engage_hri.services.runtime.service import Ready
 
 IDLE: Seconds = 1.0
-"""Between two `RobotState` while nothing moves."""
+"""Interval of `RobotState` messages while nothing moves."""
 
 
 async def embody(
@@ -74,7 +74,7 @@ async def embody(
 
 
 def _simulated(config: ControlConfig) -> Body:
-    """The torso, which a robot with a body of its own never loads."""
+    """Create the simulated torso. Imported here: a robot with a body of its own never loads it."""
     from engage_hri.services.control.torso.body import SimulatedBody
 
     return SimulatedBody(config.no_point_zones, config.variability)
@@ -84,14 +84,14 @@ class _UnderWay:
     """A `PerformBehavior` that is under way."""
 
     def __init__(self, request: PerformBehavior, id: str, authority: MovementAuthority) -> None:
-        """id: what the requester calls it, unlike `request.id`, which is its name here."""
+        """id: as the requester gave it; `request.id` is unique among the requests of all requesters."""
         self.request = request
         self.id = id
         self.authority = authority
         self.position = 0
         self.status: Literal["done", "aborted", "failed"] = "aborted"
         self.aborts: list[str] = []
-        """Requests that end with it."""
+        """Ids of the abort requests that end with this behavior."""
 
     @property
     def label(self) -> str:
@@ -99,13 +99,13 @@ class _UnderWay:
 
     @property
     def spoken(self) -> str:
-        """What the voice has said of it."""
+        """Text that the voice has said so far; empty for a behavior that is no speech."""
         behavior = self.request.behavior
         return behavior.text[: self.position] if isinstance(behavior, Speech) else ""
 
 
 class _Control:
-    """What the loop of `embody` feeds."""
+    """State of the service, and what it does with each message that `embody` receives."""
 
     def __init__(
         self, bus: Bus, config: ControlConfig, body: Body, tasks: asyncio.TaskGroup, objects: CoveredObjects
@@ -120,7 +120,7 @@ class _Control:
         self._objects = objects
         self._live: dict[str, _UnderWay] = {}
         self._ways: dict[str, asyncio.Task[None]] = {}
-        """Home, as somebody has asked for."""
+        """Tasks that take the body home, by the id of the request that asked for it."""
         self._sent = 0
         self._next_state = Timer(self.publish_state)
         self._published: Seconds = -inf
@@ -161,7 +161,7 @@ class _Control:
             self._keep_publishing()
 
     def serve(self, request: Request) -> None:
-        """A request that is new, or that says something new about a live one."""
+        """Serve a request that is new, or that changes a live one."""
         live = self._live.get(request.id)
         match request:
             case PerformBehavior() if live is not None:
@@ -196,7 +196,7 @@ class _Control:
         self._tasks.create_task(self._perform(live), name=f"behavior {request.id}")
 
     def _abort(self, request: AbortBehavior) -> None:
-        """Whoever has asked for the behavior."""
+        """End every live behavior of that name, whichever requester has asked for it."""
         label = f"{request.block}:{request.behavior}"
         meant = [live for live in self._live.values() if live.label == label]
         if not meant:
@@ -208,7 +208,7 @@ class _Control:
             live.aborts.append(request.id)
 
     def _revoke(self, live: _UnderWay, how: How = "relax") -> None:
-        """What a driver does on hearing of it may go wrong; the authority is gone all the same."""
+        """Revoke the authority of a behavior. An error of a driver that watches it is contained."""
         with self._bus.containing(f"the end of behavior {live.label}"):
             live.authority.revoke(how)
 
@@ -224,7 +224,7 @@ class _Control:
             self._bus.publish(keys.fault("control"), Fault(reason=str(error), where=where, service="control"))
 
     async def _perform(self, live: _UnderWay) -> None:
-        """From the request to its one terminal state."""
+        """Perform a behavior, from its request to the one terminal answer."""
         request, fault = live.request, None
         accepted = False
         try:
@@ -244,7 +244,7 @@ class _Control:
         except (Exception, asyncio.CancelledError) as error:
             if is_asked_to_stop():
                 raise
-            # A mistake of the body's driver ends this behavior. Where its parts are nobody knows: all go home.
+            # An error of the driver ends this behavior. Nothing is known of where its parts are, so all go home.
             live.status, fault = "failed", self._bus.failed(error, f"behavior {live.label}")
             self._take_home(f"after {live.label} broke")
         del self._live[request.id]
@@ -270,7 +270,7 @@ class _Control:
         )
 
     def _end_aborts(self, live: _UnderWay) -> None:
-        """Of several behaviors that one request means, the last to end ends it."""
+        """Answer the abort requests that waited for this behavior and wait for no other one."""
         awaited = {id for other in self._live.values() for id in other.aborts}
         for id in live.aborts:
             if id not in awaited:
@@ -283,7 +283,7 @@ class _Control:
             self.desk.end(HomeReached(id=request.id, at=self._bus.stamp()))
 
     def _take_home(self, name: str) -> None:
-        """The whole body, at nobody's request."""
+        """Move the whole body home without a request."""
 
         async def go() -> None:
             with self._bus.containing(f"way home {name}"):
@@ -343,7 +343,7 @@ class _Control:
             self._publish(self._deeds.looks_at(entity, label, self._bus.now() if at is None else at))
 
     def publish_state(self) -> None:
-        """Tell how the body stands, and once more after a while: soon if it moves."""
+        """Publish the state of the body, and set the timer for the next time: soon if the body moves."""
         self._next_state.set(self._bus.now() + IDLE)
         with self._bus.containing("the state of the body"):
             self._publish_state()
@@ -362,7 +362,7 @@ class _Control:
         self._next_state.set(now + (1.0 / self._config.state_rate if state.moving else IDLE))
 
     def _keep_publishing(self) -> None:
-        """Something has begun to move."""
+        """Bring the next `RobotState` forward, as something has begun to move."""
         due = self._published + 1.0 / self._config.state_rate
         if self._next_state.at is None or self._next_state.at > due:
             self._next_state.set(due)
@@ -370,7 +370,7 @@ class _Control:
     # -- dead man -----------------------------------------------------------------------------------------------
 
     def _requester_lost(self, cancel: Cancel) -> None:
-        """Nobody directs this behavior any more. After the last one of its requester the body takes its safe pose."""
+        """Revoke a behavior that has lost its requester. With the last one of that requester the body goes home."""
         live = self._live.get(cancel.id)
         if live is None:
             return

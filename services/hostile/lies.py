@@ -1,4 +1,4 @@
-"""What a body that lies does with a behavior: pure, from chance alone. services/hostile/service.py carries it out."""
+"""Lies of a body about its behaviors. Pure, from chance alone; services/hostile/service.py carries them out."""
 
 from collections.abc import Sequence
 from typing import Literal
@@ -23,13 +23,13 @@ from engage_hri.services.hostile.chance import Chance, happens
 Status = Literal["done", "aborted", "failed"]
 FAR = (1e9, -1e9, 1e308, -1e308, -1.0, 60.0)
 WAITS = {"stroke_start", "stroke_end", "stroke", "relax"}
-"""Points before which an honest body waits for its authority."""
+"""Sync points before which an honest body waits for its authority."""
 
 
 class Step(Struct, frozen=True):
-    """After `delay` seconds something is said. off: what is added to the time that it tells.
+    """A report, `delay` seconds after the one before. off: seconds added to the true time.
 
-    twice: the same message comes once more. stranger: it is about a behavior that nobody has asked for.
+    twice: it is sent twice. stranger: it names a behavior that was never asked for.
     """
 
     say: Literal["reached", "arrived", "word"]
@@ -39,14 +39,14 @@ class Step(Struct, frozen=True):
     twice: bool = False
     stranger: bool = False
     waits: bool = False
-    """For its authority, as it should."""
+    """True if it waits for its authority, as it should."""
 
 
 class Lie(Struct, frozen=True, kw_only=True):
-    """What becomes of one behavior. end: None if it never ends. ends_after: seconds after the last step.
+    """Course of one behavior. end: None if it never ends. ends_after: seconds after the last step.
 
-    answer: how long the acceptance takes. deaf: to cancellations. mourning: how late one is answered.
-    afterwards: what it says of the behavior once that has ended.
+    answer: seconds until it is accepted or refused. deaf: it ignores cancellations. mourning: seconds until one is
+    answered. afterwards: reports after the end.
     """
 
     refuse: bool = False
@@ -60,7 +60,7 @@ class Lie(Struct, frozen=True, kw_only=True):
 
 
 def lie(chance: Chance, behavior: BlockBehavior) -> Lie:
-    """Half of them are honest."""
+    """Draw what a body does with a behavior. Half of the draws are honest."""
     points = sync_points(behavior)
     if happens(chance, 0.5):
         return Lie(steps=_steps(chance, points, 1.0))
@@ -118,7 +118,7 @@ def _pause(chance: Chance) -> Seconds:
 
 
 def estimate(chance: Chance, behavior: BlockBehavior) -> Estimate:
-    """Mostly what it will do."""
+    """Draw an estimate of a behavior. Most are sound, and say no more of what the body then does."""
     points = sync_points(behavior)
     natural = [chance.uniform(0.0, 0.6) for _ in points[1:]]
     what = chance.randrange(0, 40)

@@ -1,4 +1,4 @@
-"""BML and EBML that were good documents until somebody moved their elements about."""
+"""BML and EBML documents that were valid before some of their elements and attributes were changed at random."""
 
 from collections.abc import Callable
 
@@ -29,7 +29,7 @@ DEPTH = 80
 
 
 def document(chance: Chance, entities: tuple[str, ...]) -> bytes:
-    """One document with up to six changes, most of them still well formed."""
+    """Make a document with up to six changes. Most are still well-formed XML."""
     text = chance.choice(SEEDS).format(id=f"m{chance.randrange(0, 9)}", entity=chance.choice(entities))
     root = etree.fromstring(text)
     for _ in range(chance.randrange(0, 7)):
@@ -82,7 +82,7 @@ def _say(chance: Chance, root: etree._Element) -> None:
 
 
 def _nest(chance: Chance, root: etree._Element) -> None:
-    """Deeper than the reader goes."""
+    """Nest elements, at times deeper than the reader goes."""
     element = _any(chance, root)
     for _ in range(DEPTH if happens(chance, 0.3) else 2):
         element = etree.SubElement(element, "required")

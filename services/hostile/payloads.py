@@ -23,7 +23,7 @@ from engage_hri.services.hostile.markup import document
 from engage_hri.services.hostile.typed import SURROGATE, Typed, distorted
 
 BROKEN = 0.05
-"""Of the payloads have bits flipped, or end early."""
+"""Share of the payloads that have bits flipped, or end early."""
 DISTORTED = 0.15
 MARKUP = 0.05
 
@@ -37,11 +37,11 @@ PLACES: Mapping[type, str] = {
     **dict.fromkeys((ActorFound, ActorLost), keys.PERCEIVED_ACTION),
     TurnClosed: keys.TURN_CLOSED, World: keys.WORLD, HeadOwner: keys.HEAD_OWNER, RobotState: keys.ROBOT_STATE,
 }  # fmt: skip
-"""Where those go that always go to one key."""
+"""Key of each type of message that always has the same."""
 
 
 class Payload(NamedTuple):
-    """What another program puts on the bus. kind: the message that it was made from."""
+    """Bytes that another program puts on the bus. kind: type of the message that they were made from."""
 
     key: str
     data: bytes
@@ -50,7 +50,7 @@ class Payload(NamedTuple):
 
 
 class Payloads:
-    """An endless row of them. entities: ids of what the world holds, for markup."""
+    """Makes payloads without end. entities: ids of what the world holds, for markup."""
 
     def __init__(self, chance: Chance, typed: Typed, entities: tuple[str, ...]) -> None:
         self._chance = chance
@@ -76,7 +76,7 @@ class Payloads:
             data = encode(thing)
         except (OverflowError, ValueError):  # an integer that no MessagePack holds
             data = encode(message)
-        # Half a surrogate pair in three bytes, as long as the letter that stands for it.
+        # Half a surrogate pair takes three bytes, as many as the character that stands for it.
         return data.replace(SURROGATE.encode(), b"\xed\xa0\x80")
 
     def _encoding(self, form: str, name: str) -> str:
@@ -101,7 +101,7 @@ class Payloads:
         return f"{keys.PREFIX}/{kind}/{server}{tail}"
 
     def right_key(self, message: Message) -> str:
-        """Where this message belongs; what is sent to nobody in particular goes to any server."""
+        """Key on which this message belongs; one that any server may get goes to a random one."""
         server = HOME.get(type(message)) or self._chance.choice(keys.SERVICES)
         match message:
             case KeepAlive():
@@ -135,7 +135,7 @@ def _chunk(actor: str) -> str:
 
 
 def broken(chance: Chance, data: bytes) -> bytes:
-    """With a few bits flipped, or without its end."""
+    """Flip a few bits of the data, or cut off its end."""
     if len(data) < 2:
         return data
     if happens(chance, 0.3):

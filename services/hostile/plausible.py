@@ -1,4 +1,4 @@
-"""Blocks and fragments that a manager might write: what is done to them is the attack."""
+"""Blocks and fragments that a manager might write. They are valid: the attack is what is done to them later."""
 
 from collections.abc import Sequence
 from itertools import pairwise

@@ -1,4 +1,4 @@
-"""Requests at bad moments: what peers do who know the protocol and keep none of its manners. Pure, from chance."""
+"""Requests at bad moments, from peers that know the protocol and break its rules. Pure, from chance."""
 
 from collections import deque
 from collections.abc import Callable, Sequence
@@ -32,14 +32,14 @@ from engage_hri.services.hostile.chance import Chance, happens
 from engage_hri.services.hostile.typed import NASTY_FLOATS, NASTY_INTS, Typed, Words
 
 IDS = ("1", "2", "3", "same", "1~2")
-"""Which all peers use."""
+"""Request ids that all peers share."""
 KEPT = 32
 
 
 class Deed(Struct, frozen=True):
     """Peer number `who` publishes `message` after `delay` seconds; None: it leaves, and comes back as another life.
 
-    expression: of the key, for a command that of all requesters.
+    expression: the key; for a command the key expression of all requesters.
     """
 
     who: int
@@ -55,7 +55,7 @@ class _Sent(Struct, frozen=True):
 
 
 class Schemer:
-    """Thinks of one deed after the other. peers: how many take part."""
+    """Draws what a peer does next. peers: number of peers that take part."""
 
     def __init__(self, chance: Chance, typed: Typed, words: Words, entities: tuple[str, ...], peers: int = 2) -> None:
         self._chance = chance
@@ -84,7 +84,7 @@ class Schemer:
         return Deed(who, _message(request), expression)
 
     def _again(self, who: int, now: Seconds) -> Deed:
-        """The same, perhaps as somebody else, or on another key, with another revision, or after a new life began."""
+        """Send a request again: perhaps as another peer, on another key, with another revision, or in a new life."""
         if not self._sent:
             return self._ask(who, now)
         sent = self._chance.choice(self._sent)
@@ -98,7 +98,7 @@ class Schemer:
         return Deed(sent.who if happens(self._chance, 0.8) else who, _message(request), expression)
 
     def _cancel(self, who: int, now: Seconds) -> Deed:
-        """One's own request, somebody else's, or one that was never made."""
+        """Cancel a request of any peer, or one that was never made."""
         if self._sent and happens(self._chance, 0.7):
             sent = self._chance.choice(self._sent)
             server, id, kind, life = keys.server_of(sent.expression), sent.request.id, kind_of(sent.request), ""
@@ -109,7 +109,7 @@ class Schemer:
         return Deed(who, Cancel(id=id, life=life, of=of, reason="why not"), keys.cancel(server))
 
     def _keep(self, who: int, now: Seconds) -> Deed:
-        """Alive what is not, with authority that does not exist, in revisions that never were."""
+        """Renew requests, some with a kind, revision or authority that does not exist."""
         requests = [each.request for each in self._sent if happens(self._chance, 0.5)][:4]
         kept = [
             Kept(kind_of(request), request.id, request.revision, request.authority, 5.0)
@@ -130,7 +130,7 @@ class Schemer:
         return Deed(who, KeepAlive(live=tuple(kept), at=at, life=life), keys.keep_alive(server))
 
     def _answer(self, who: int, now: Seconds) -> Deed:
-        """For a server that it is not."""
+        """Answer requests in the name of a server."""
         at = Stamp("loop", now)
         fault = Fault(reason="because I say so")
         id, block = self._word("id"), self._word("block")

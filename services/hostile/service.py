@@ -1,4 +1,4 @@
-"""A `control` that lies: it takes behaviors as control does, and then does what services/hostile/lies.py says."""
+"""A service `control` that lies: it takes behaviors as control does, and then follows services/hostile/lies.py."""
 
 import asyncio
 from random import Random
@@ -30,11 +30,11 @@ from engage_hri.services.runtime.service import Ready
 
 NAME = "control"
 TERM: Seconds = 2.0
-"""Movement authority that names no lease lasts this long, as control's own."""
+"""Seconds that movement authority lasts if its request names no lease."""
 
 
 class LyingBody:
-    """chance: of all its lies, which are the same for the same one."""
+    """A body on the bus that lies about its behaviors. chance: source of its lies; the same seed, the same lies."""
 
     def __init__(self, chance: Random) -> None:
         self._chance = chance
@@ -145,7 +145,7 @@ class LyingBody:
 
 
 class _Act:
-    """A behavior under way."""
+    """A behavior that is being performed, and the lie about it."""
 
     def __init__(self, request: PerformBehavior, plan: Lie) -> None:
         self.request = request

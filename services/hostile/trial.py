@@ -1,9 +1,9 @@
-"""One attack on services in this process, and what came of it. On a memory bus and in virtual time, and nowhere else.
+"""Trial of services in this process: one attack, and a report on it. On a memory bus and in virtual time only.
 
     report = run(Attack(seed=7), services)
     assert not report.wrong
 
-What the peer does is chance, from the seed alone: the same seed does the same each time.
+The attack is drawn from its seed alone: the same seed gives the same attack.
 """
 
 import asyncio
@@ -43,19 +43,19 @@ Kind = Literal["messages", "requests", "body"]
 KINDS: tuple[Kind, ...] = get_args(Kind)
 Client = Callable[[Hub], Awaitable[None]]
 SETTLE: Seconds = 100.0
-"""After the attack: longer than all patience in a row, so that what is still open then is open for ever."""
+"""Time after the attack: longer than all time limits in a row, so that a request still open then never ends."""
 QUIET: Seconds = 10.0
-"""At its end nobody may speak of old requests any more."""
+"""Time at the end of `SETTLE` in which no service may mention old requests any more."""
 LIMIT: Seconds = 3600.0
 PEERS = 2
 TOLD = 5
-"""How many of each kind of mistake a report names."""
+"""Most mistakes of one kind that a report names."""
 
 
 class Attack(Struct, frozen=True, kw_only=True):
-    """seconds: how long, in virtual time. rate: random messages per second.
+    """An attack to be made. seconds: its length, in virtual time. rate: random messages per second.
 
-    own_body: the body is somebody's own, behind the real control: it is cut off, but nothing takes its place.
+    own_body: the body under test is behind the real control: it is cut off at times, but no lying body replaces it.
     """
 
     seed: int = 0
@@ -66,17 +66,17 @@ class Attack(Struct, frozen=True, kw_only=True):
 
 
 class Report(Struct, kw_only=True):
-    """counts: of all that was sent and done. wrong: what should not have come of it, in words."""
+    """Report on an attack. counts: of all that was sent and done. wrong: mistakes of the services, in words."""
 
     attack: Attack
     counts: Counter[str]
     wrong: list[str]
     failures: list[str]
-    """Tracebacks of exceptions that nobody had foreseen."""
+    """Tracebacks of unexpected exceptions."""
 
 
 def run(attack: Attack, services: Mapping[str, Service], client: Client | None = None) -> Report:
-    """A trial on a virtual loop of its own, for whoever has none."""
+    """Make a trial on a virtual loop of its own, for a caller without one."""
     try:
         with asyncio.Runner(loop_factory=partial(VirtualTimeLoop, LIMIT)) as runner:
             return runner.run(trial(attack, services, client))
@@ -85,7 +85,7 @@ def run(attack: Attack, services: Mapping[str, Service], client: Client | None =
 
 
 async def trial(attack: Attack, services: Mapping[str, Service], client: Client | None = None) -> Report:
-    """Run the services under the attack, let them settle, and judge. client: somebody's own, which is to end by then.
+    """Run the services under the attack, let them settle, and judge. client: one under test, which has to end, too.
 
     Raises InputRefused if time is real: what is sent here is no good for motors.
     """
@@ -96,14 +96,14 @@ async def trial(attack: Attack, services: Mapping[str, Service], client: Client 
 
 
 def insist_on_memory(hub: Hub) -> None:
-    """Raises InputRefused if the hub reaches further than this process."""
+    """Raise InputRefused if the hub reaches further than this process."""
     if not isinstance(hub, MemoryHub):
         reason = f"the hostile peer runs on a MemoryHub only, not on a {type(hub).__name__}"
         raise InputRefused(Fault(reason=reason, advice="motors may be behind it"))
 
 
 class _Tapped(MemoryHub):
-    """A memory bus on which each message is written into the book."""
+    """A memory bus that has each message audited."""
 
     def __init__(self, services: frozenset[str]) -> None:
         super().__init__()
@@ -123,7 +123,7 @@ class _Tapped(MemoryHub):
 
 
 class _Log(logging.Handler):
-    """What was contained, with its traceback."""
+    """Collects the tracebacks of contained failures."""
 
     def __init__(self) -> None:
         super().__init__(logging.ERROR)
@@ -147,7 +147,7 @@ class _Trial:
         self.entities: tuple[str, ...] = ("nobody",)
 
     def chance(self, of: str) -> Random:
-        """Each part of the attack has its own, so that one can be left out and the others stay the same."""
+        """Create the random numbers of one part of the attack: without that part the others stay the same."""
         return Random(f"{self.attack.seed}/{of}")
 
     # -- from beginning to end ------------------------------------------------------------------------------------
@@ -305,7 +305,7 @@ class _Trial:
         peer.publish(key, deed.message)
 
     async def _cut(self) -> None:
-        """Cuts between anybody and all others, and a body that vanishes and comes back."""
+        """Cut one participant off from all others, or have the body vanish and come back; again and again."""
         chance, loop = self.chance("cuts"), asyncio.get_running_loop()
         until = loop.time() + self.attack.seconds
         while True:
@@ -326,7 +326,7 @@ class _Trial:
                 await self._start(BODY)
 
     async def _end_attack(self) -> None:
-        """All is whole again, and what the peers have asked for they do not want any more."""
+        """Heal the bus, and cancel all that the peers have asked for."""
         self.hub.heal()
         await asyncio.sleep(1.0)
         for entry in self.hub.book.open:

@@ -1,7 +1,7 @@
 """The simulated body: the torso of `kinematics` on loop time, with the deviations of `Variability`.
 
-Where everything is at an instant is a formula (`tracks`, `motion`); a behavior's task only sleeps until its next
-sync point, or until its authority changes. So a part needs no task to go home: it is told the way once.
+The position of each part at an instant is a formula (`tracks`, `motion`); a behavior's task only sleeps until its
+next sync point, or until its authority changes. So a part needs no task to go home: it is given its path once.
 """
 
 import asyncio
@@ -39,11 +39,11 @@ from engage_hri.services.control.voice.timeline import utter
 from engage_hri.services.control.waiting import Bell
 
 FREEZE: Seconds = 0.5
-"""How long a part stands still when it is told to freeze, before it relaxes."""
+"""Seconds that a part stands still when it is told to freeze, before it relaxes."""
 
 
 class SimulatedBody(Body):
-    """Behaviors take the time that `estimate` says, unless `deviations` has other plans."""
+    """A simulated torso with a voice. Behaviors take as long as `estimate` says, but for `deviations`."""
 
     def __init__(self, zones: tuple[NoPointZone, ...] = (), deviations: Variability | None = None) -> None:
         self.capabilities = Capabilities(
@@ -114,7 +114,7 @@ class SimulatedBody(Body):
     # -- planning -----------------------------------------------------------------------------------------------
 
     def _scene(self, world: World, pose: BodyPose | None = None, *, true: bool = False) -> Situation:
-        """true: with joints where they are, not where the body believes them to be."""
+        """Describe what a course starts from. true: with the real joint angles, not those that the body believes."""
         now = self._loop.time()
         here: dict[str, float] = {}
         for part, track in self._tracks.items():
@@ -129,7 +129,10 @@ class SimulatedBody(Body):
         return Situation(tracks.updated(here, pose), rest, world, zones, tuple(self._runs))
 
     def _path(self, course: Course, scene: Situation | None = None) -> Path:
-        """scene: start from rest there, instead of from where the parts are and move. Raises Impossible."""
+        """Lay a path along `course`. Raises Impossible.
+
+        scene: start at rest in its pose; None: start from where the parts are, as they move.
+        """
         if scene is not None and course.parts != ("nod",):
             start = resting([scene.pose[joint] for joint in course.joints])
         else:
@@ -172,14 +175,14 @@ class SimulatedBody(Body):
                 await self._freeze(run)
         finally:
             unwatch()
-            # Whatever remains goes home without us: after an abort, a failure, a task that was cancelled.
+            # After an abort, a failure or a cancelled task the parts go home by themselves.
             if self._owns(run):
                 self._release(run)
                 if run.pending:
                     self._abandon(run)
 
     def _take_over(self, run: Run, path: Path) -> None:
-        """Make `run` the owner of its parts and set it going."""
+        """Make `run` the owner of its parts, cut the runs that had them, and start its motion."""
         now = self._loop.time()
         for joint in run.course.joints:
             self._misbelieved.pop(joint, None)
@@ -237,7 +240,7 @@ class SimulatedBody(Body):
             run.pending.clear()
 
     def _leave_hold(self, run: Run, hold: str) -> list[str]:
-        """Go on: where it stands, what is left is planned afresh from rest. Returns the sync points it leaves."""
+        """Let `run` go on from a hold point, on a new path if it stands still. Returns the sync points it passes."""
         now = self._loop.time()
         stood, passed = run.stands, run.leave(hold, now)
         if stood and not run.holding:
@@ -282,7 +285,7 @@ class SimulatedBody(Body):
             del self._runs[part]
 
     def _abandon(self, run: Run) -> None:
-        """The parts of `run` go to rest. A shift of the head that is broken off stays where it can stop."""
+        """Send the parts of `run` to rest. A shift of the head that is broken off stays where it can stop."""
         if head.is_shift(run.behavior):
             self._attention.stay(head.brake(run.motion, self._loop.time()))
             self._attention.expect("", 0.0, self._loop.time())
@@ -307,7 +310,7 @@ class SimulatedBody(Body):
     async def _shift_beneath(
         self, behavior: BlockBehavior, authority: MovementAuthority
     ) -> AsyncGenerator[Progress, None]:
-        """A new base while a gaze lies over it: nothing moves until that gaze ends. As slow as it is asked to be."""
+        """Change the base gaze while a `Gaze` lies over it: nothing moves until that ends. `end` comes as asked."""
         try:
             self._attention.shift(behavior, choreography.plan(behavior, self._scene(self._world)))
         except Impossible as impossible:
@@ -326,7 +329,7 @@ class SimulatedBody(Body):
             yield Reached("end", now, now)
 
     def _follow(self) -> None:
-        """Turn the head after what it looks at, or is about to look at."""
+        """Turn the head to follow the entity that it looks at, or is about to look at."""
         now, scene, track = self._loop.time(), self._scene(self._world, true=True), self._tracks["head"]
         self._attention.update(scene)
         if (run := self._runs.get("head")) is None:
@@ -368,7 +371,7 @@ class SimulatedBody(Body):
             self._hushed.set()
 
     async def _silence(self, authority: MovementAuthority) -> None:
-        """Aborted words end with the word that is being said: wait for that, as long as these are wanted."""
+        """Wait until an aborted speech has finished its current word; return at once if `authority` is revoked."""
         unwatch = authority.watch(self._hushed.set)
         try:
             while self._utterance is not None and self._utterance.revoked is not None and authority.revoked is None:

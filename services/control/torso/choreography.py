@@ -1,7 +1,7 @@
-"""What each behavior is made of, on the simulated torso: legs of a path, sync points on them, and where it may hold.
+"""Course of each behavior on the simulated torso: legs of a path, sync points on them, and where it may hold.
 
 Motion out and back never retraces itself: at the stroke the joints drift sideways, so that their speed
-passes through no zero and a gesture that nobody holds is one fluid motion.
+passes through no zero and a gesture that is not held is one fluid motion.
 """
 
 import math
@@ -40,24 +40,24 @@ from engage_hri.services.control.torso.motion import Leg
 from engage_hri.services.control.torso.vocabulary import ACTION_UNITS, FACES, GESTURES, POSTURES
 
 NOD_RESERVE = radians(18.0)
-"""Kept free of the neck's range by gaze, so that a nod finds room anywhere."""
+"""Part of the neck's range that gaze keeps free, so that a nod finds room anywhere."""
 SAME = 0.3
 """Degrees: a gaze that would turn less does not move."""
 THERE = 0.8
 """Degrees: a torso that has less to go stays; twice what it drifts on target."""
 SHAPED = 0.04
-"""The same of a face, as a share of its joints' ranges."""
+"""A face that has less to go stays. A share of its joints' ranges."""
 SETTLE: Seconds = 0.08
 SLIDE: Seconds = 0.2
 TYPES: tuple[type[BlockBehavior], ...] = (
     Gaze, GazeShift, HeadDirectionShift, Pointing, Gesture, Head, Face, FaceLexeme, FaceFacs, FaceShift, Posture,
     PostureShift, Pose, Speech, Wait,
 )  # fmt: skip
-"""What this body performs."""
+"""Types of behaviors that this body performs."""
 
 
 def plan(behavior: BlockBehavior, scene: Situation) -> Course:
-    """The course of `behavior` in `scene`. Not for speech and wait, which move nothing. Raises Impossible."""
+    """Plan the course of `behavior` in `scene`. Speech and wait move nothing and have none. Raises Impossible."""
     match behavior:
         case Gaze(target=target, offset_angle=offset, offset_direction=direction):
             return _glance(_neck(target, offset, direction, scene), scene)
@@ -217,7 +217,7 @@ def _gesture(lexeme: str, mode: str | None, scene: Situation) -> Course:
     )
     here, home = _angles(joints, scene.pose), _angles(joints, scene.rest)
     stops = (here, ready, stroke, after, home)
-    # So slow a stroke takes no longer from rest, where it waited for something: estimates hold either way.
+    # The stroke is slow enough to take no longer from rest, after a hold: estimates are right with and without one.
     seconds = (_time(here, ready, 0.3, 130), _time(ready, stroke, 0.36, 100), _time(stroke, after, 0.25, 100),
                max(0.4, return_time(after, home)))  # fmt: skip
     velocities = [
@@ -240,7 +240,7 @@ def _gesture(lexeme: str, mode: str | None, scene: Situation) -> Course:
 
 
 def _nod(lexeme: str, repetition: int, amount: float) -> Course:
-    """On top of the gaze: angles are offsets. A narrow ellipse, since a line would stop at both ends."""
+    """Course of a nod or shake, in offsets on top of the gaze. A narrow ellipse: a line would stop at both ends."""
     if lexeme not in ("NOD", "SHAKE"):
         raise Impossible("CANNOT_CREATE_BEHAVIOR", f"no head gesture {lexeme!r}: there are NOD and SHAKE")
     size, aside, half = radians(4 + 10 * amount), radians(5.0), 0.32
@@ -269,7 +269,7 @@ def _nod(lexeme: str, repetition: int, amount: float) -> Course:
 
 
 def _excursion(part: str, goal: tuple[float, ...], scene: Situation) -> Course:
-    """Out to `goal`, held there, back: a face or a posture."""
+    """Course of a face or a posture: out to `goal`, held there, and back."""
     joints = kinematics.joints_of(part)
     joint, size = _sideways(part, dict(zip(joints, goal, strict=True)))
     here, rest = _angles(joints, scene.pose), _angles(joints, scene.rest)
@@ -302,7 +302,7 @@ def _course(
 
 
 def _sideways(part: str, goal: Mapping[str, float]) -> tuple[str, float]:
-    """A joint that the motion to `goal` hardly uses and that has room on both sides, and how far it drifts."""
+    """Choose a joint that the motion to `goal` hardly uses and that has room on both sides, and how far it drifts."""
     if part == "torso":
         return ("torso_turn", radians(0.4)) if not goal["torso_turn"] else ("torso_lean", radians(0.4))
     return ("mouth_corners" if not goal["mouth_corners"] else "brows", 0.02)
@@ -329,7 +329,7 @@ def _torso(lexeme: str) -> tuple[float, float]:
 
 
 def _sides(mode: str | None, rank: Callable[[Side], float], scene: Situation) -> list[Side]:
-    """Arms to try, best first: the one named, or free ones before busy ones."""
+    """Arms to try, best first: the one that `mode` names, or free ones before busy ones."""
     match mode:
         case "LEFT_HAND":
             return ["left"]
@@ -340,7 +340,7 @@ def _sides(mode: str | None, rank: Callable[[Side], float], scene: Situation) ->
 
 
 def _held_on_target(*arrival: str) -> tuple[CoursePoint, ...]:
-    """arrival: points at which it is first on target."""
+    """Sync points of a course that can hold while it is on target. arrival: points at which it is first there."""
     before = SYNC_POINTS[: SYNC_POINTS.index("stroke_end")]
     return (
         *(
@@ -352,7 +352,7 @@ def _held_on_target(*arrival: str) -> tuple[CoursePoint, ...]:
 
 
 def _held_around_stroke(strokes: Sequence[str] = ()) -> tuple[CoursePoint, ...]:
-    """strokes: the repetitions of the first."""
+    """Sync points of a course that can hold before and after its stroke. strokes: the stroke's repetitions."""
     number = SYNC_POINTS.index("stroke_end")
     syncs = (*SYNC_POINTS[:number], *strokes, *SYNC_POINTS[number:])
     return tuple(CoursePoint(sync, sync if sync in ("stroke_start", "stroke_end") else "") for sync in syncs)

@@ -32,11 +32,11 @@ TABLE_EDGE: Meters = 0.20
 """x of the edge at the robot's side."""
 CLEARANCE: Meters = 0.01
 REACH: Meters = 1.5
-"""How far from the shoulder something may be that is pointed at: farther, people can't tell."""
+"""Greatest distance from the shoulder to a target of pointing: farther, people can't tell which object is meant."""
 HAND_TO_TARGET: Meters = 0.06
-"""Pointing is not touching."""
+"""Least distance from the hand to the surface of a target: pointing is not touching."""
 SLIDE: Radians = radians(2.0)
-"""Shoulder pitch from stroke to stroke_end, the axis staying on target: what keeps the arm in motion."""
+"""Change of the shoulder pitch from stroke to stroke_end, the axis staying on target: it keeps the arm in motion."""
 
 
 def _joint(
@@ -54,7 +54,7 @@ def _face(name: str, low: float) -> tuple[JointLimit, float]:
 
 
 def _arm(side: Side, inward: int) -> list[tuple[JointLimit, float]]:
-    """inward: sign of a yaw towards the middle."""
+    """Joints of one arm with their home angles. inward: sign of a yaw towards the middle."""
     low, high = sorted((-45.0 * inward, 80.0 * inward))
     return [
         _joint(f"{side}_shoulder_yaw", f"{side}_arm", low, high, 200, 2000),
@@ -82,7 +82,7 @@ PARTS: tuple[str, ...] = ("head", "torso", "left_arm", "right_arm", "face")
 
 
 class Unreachable(ValueError):
-    """No joint angles do it; the message says why."""
+    """No joint angles look or point at the target; the message says why."""
 
 
 class ArmAim(Struct, frozen=True):
@@ -90,7 +90,7 @@ class ArmAim(Struct, frozen=True):
 
     stroke: tuple[float, float, float]
     held: tuple[float, float, float]
-    """A little later, still on target."""
+    """Angles a little later, still on target."""
 
 
 def joints_of(part: str) -> tuple[str, ...]:
@@ -111,7 +111,7 @@ def gaze(pose: Pose) -> Ray:
 
 
 def arm(pose: Pose, side: Side) -> Ray:
-    """Forearm: from the elbow, tip at the hand."""
+    """Forearm as a ray: from the elbow, tip at the hand."""
     yaw, pitch = pose[f"{side}_shoulder_yaw"], pose[f"{side}_shoulder_pitch"]
     elbow = _add(SHOULDER[side], _scale(_hanging(yaw, pitch), UPPER_ARM))
     axis = _hanging(yaw, pitch + pose[f"{side}_elbow"])
@@ -171,7 +171,7 @@ def degrees_between(one: Iterable[float], other: Iterable[float]) -> float:
 
 
 def _pointing(x: float, y: float, z: float, pitch: Radians) -> tuple[float, float, float]:
-    """For a target relative to the shoulder: the arm's plane holds it, and the forearm runs through it."""
+    """Arm angles whose forearm axis runs through (x, y, z), relative to the shoulder. pitch: of the shoulder."""
     ahead = hypot(x, y) - UPPER_ARM * sin(pitch)
     above = z + UPPER_ARM * cos(pitch)
     return atan2(y, x), pitch, atan2(ahead, -above) - pitch
@@ -197,7 +197,7 @@ def _in_table(point: Vector) -> bool:
 
 
 def _edge_crossing(forearm: Ray) -> Vector:
-    """Where the forearm passes the table's edge; its hand if it does not."""
+    """Point at which the forearm passes the table's edge; the hand if it does not."""
     assert forearm.tip is not None
     (x0, y0, z0), (x1, y1, z1) = forearm.origin, forearm.tip
     if not x0 < TABLE_EDGE < x1:

@@ -2,7 +2,7 @@
 
 A `Path` is a twice differentiable curve q(s), where s is the time in seconds at natural speed; each sync point lies
 at some s. A `Motion` plays it: s(t) is made of few parabolas, so that the instant at which a sync point is crossed
-is a formula and nobody has to step through the trajectory. It runs at a steady rate, brakes to a stop exactly at
+is a formula, without stepping through the trajectory. It runs at a steady rate, brakes to a stop exactly at
 the authority's limit, and goes on without having stopped if the limit is moved in time.
 
 Speed and acceleration limits: q'' alone stays within `SHARE` of the acceleration, which leaves the rest to changes of
@@ -26,10 +26,10 @@ Array = NDArray[np.float64]
 
 SHARE = 0.6
 MARGIN = 0.97
-"""Peaks are found by sampling; what lies between two samples gets this much room."""
+"""Share of a limit that sampled peaks may reach: between two samples a peak may be higher."""
 AT_REST = 1e-9
 SLOWEST = 0.01
-"""The least steady rate. A time that its author has fixed is kept, however slow that looks."""
+"""The least steady rate: a time that the author of a block has fixed is kept, however slow that looks."""
 SAMPLES = np.linspace(0.0, 1.0, 33)
 _STRETCHES = tuple(1.1**step for step in range(40)) + tuple(0.9**step for step in range(1, 12))
 
@@ -115,7 +115,7 @@ class Path:
         return _evaluate(segment.coefficients, min(max(s - segment.start, 0.0), segment.seconds))
 
     def after(self, s: Seconds, untold: Collection[str] = ()) -> tuple[Leg, ...]:
-        """What is left at s, as legs, with the sync points beyond s; those `untold` that lie at s come at once."""
+        """Legs that are left at s, with the sync points beyond s. Those in `untold` that are not come at once."""
         index = max((i for i, start in enumerate(self._leg_starts) if start <= s + 1e-12), default=0)
         ends = [*self._leg_starts[1:], self.length]
         legs = []
@@ -144,7 +144,7 @@ class Path:
         return max(1.0, min(4.0, MARGIN / max(speed, 0.01), sqrt(MARGIN * SHARE / max(acceleration, 0.01))))
 
     def steepest_brake(self, s: Seconds, rate: float = 1.0) -> float:
-        """How quickly the rate may fall to 0 at s, in 1/s: quickly where the path is slow anyway."""
+        """Speed at which the rate may fall to 0 at s, in 1/s: high where the path is slow anyway."""
         brake = 40.0
         while brake > 0.5:
             window = np.linspace(max(0.0, s - rate * rate / (2 * brake)), s, 9)
@@ -155,7 +155,7 @@ class Path:
 
     @property
     def gentlest_brake(self) -> float:
-        """A change of the rate that the limits permit anywhere on this path, in 1/s."""
+        """Speed at which the rate may change anywhere on this path, in 1/s."""
         return self._limits.brake_anywhere
 
     def _segment(self, s: Seconds) -> _Segment:
@@ -227,7 +227,7 @@ class _Piece(Struct, frozen=True):
 
 
 class Motion:
-    """A path being played from `start` on. Pure: ask it about any instant from the last change on.
+    """A path that is played from `start` on. Pure: it answers for any instant from its last change on.
 
     cruise: the steady rate, 1 = natural. limit: the s where it has to stop, until `extend` moves it.
     """
@@ -237,7 +237,7 @@ class Motion:
         self.cruise = min(cruise, path.fastest)
         self.limit = limit
         self._rest: JointMotion | None = None
-        """Where it stands once it is over, when somebody has asked."""
+        """State of the joints after the end, once it has been asked for."""
         # From rest the rate may jump: nothing moves yet. A path that starts in motion was built for rate 1.
         self._replan(start, 0.0, self.cruise if path.start.at_rest else 1.0)
 
@@ -287,7 +287,7 @@ class Motion:
         return 0.0 if t >= self.end else self._piece(t).rate_at(t)
 
     def at(self, t: Seconds) -> JointMotion:
-        """Where the joints are, and how they move."""
+        """Position, velocity and acceleration of the joints at t."""
         if t >= self.end:
             if self._rest is None:
                 self._rest = resting(self.path.at(self._stop).q)
@@ -297,7 +297,7 @@ class Motion:
         return JointMotion(state.q, state.v * rate, state.a * rate * rate + state.v * piece.slope)
 
     def crossing(self, s: Seconds) -> Seconds | None:
-        """When s is reached; None if it lies beyond the limit."""
+        """Instant at which s is reached; None if s lies beyond the limit."""
         if s > self._stop + 1e-12:
             return None
         if s >= self._stop - 1e-12:
@@ -353,7 +353,7 @@ class Motion:
 
 
 def _top_rate(rate: float, cruise: float, left: Seconds, change: float, brake: float) -> tuple[float, Seconds]:
-    """The highest rate from which one can still stop after `left`, and how much of `left` the braking takes."""
+    """The highest rate from which the motion can stop within `left`, and the part of `left` that braking takes."""
     if brake == inf:
         return cruise, 0.0
     ramp = abs(cruise * cruise - rate * rate) / (2 * change)

@@ -11,9 +11,9 @@ from engage_hri.services.control.waiting import Bell
 
 
 async def speak(behavior: Speech, authority: MovementAuthority, pace: float = 1.0) -> AsyncGenerator[Progress, None]:
-    """Say it word by word, with a pause at a mark between two words that it may not pass yet.
+    """Say a text word by word. At a mark between two words the voice pauses until it may pass the mark.
 
-    Revoked, it finishes the word that it is in. pace: 2 takes twice as long.
+    If the authority is revoked, the voice finishes the current word. pace: 2 takes twice as long.
     """
     bell = Bell()
     begin = bell.now()
@@ -51,7 +51,7 @@ def _at(progress: Reached | Spoke, at: Seconds, arrived: Seconds) -> Progress:
 
 
 async def wait(behavior: Wait, authority: MovementAuthority) -> AsyncGenerator[Progress, None]:
-    """Let its duration pass, and then hold until its end may be passed."""
+    """Let the duration of the behavior pass, and then hold until its end may be passed."""
     bell = Bell()
     begin = bell.now()
     due = begin + (behavior.duration or 0.0)
@@ -73,8 +73,10 @@ async def wait(behavior: Wait, authority: MovementAuthority) -> AsyncGenerator[P
 
 
 def _score(behavior: Speech, utterance: Utterance) -> list[Reached | Spoke]:
-    """Everything the voice is going to report, in time order, seconds from its start; at one instant in the order of
-    the text, a word before the mark after it."""
+    """List all that the voice is going to report in time order, seconds from its start.
+
+    Reports of one instant are in the order of the text, a word before the mark after it.
+    """
     last = len(behavior.text)
     score: list[tuple[Seconds, int, Reached | Spoke]] = [(0.0, -1, Reached("start", 0.0, 0.0))]
     score += [(word.end, word.position, Spoke(word.text, word.position, word.end)) for word in utterance.words]
