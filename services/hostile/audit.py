@@ -60,7 +60,7 @@ class Book:
     def hear(
         self, key: str, message: Message, sender: str, life: str, now: Seconds, *, arrives: bool, is_foreign: bool
     ) -> None:
-        """Take note of a published message. arrives: its server is alive and gets it. is_foreign: not from a service."""
+        """Record a published message. arrives: its server is alive and gets it. is_foreign: not from a service."""
         match message:
             case Request() | KeepAlive() if key.startswith(f"{keys.PREFIX}/cmd/"):
                 self._ask(key, message, message.life or life, now, arrives, is_foreign)

@@ -80,7 +80,7 @@ class Typed:
         self._now: Seconds = 0.0
 
     def message(self, now: Seconds, kind: str = "") -> Message:
-        """Make a message; it may break bounds of its fields, and then does not decode. kind: its class; empty: any."""
+        """Make a message. It may break bounds of its fields, and then not decode. kind: its class; empty: any."""
         self._now = now
         self._nastiness = self._chance.choice(NASTINESS)
         name = kind or self._chance.choice(tuple(KINDS))
