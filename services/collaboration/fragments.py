@@ -73,15 +73,9 @@ def fragment(
         behaviors.append(behavior)
         previous = f"{behavior.id}:end"
     return TurnFragment(
-        id=id,
-        turn_status=status,
-        behaviors=tuple(behaviors),
-        constraints=tuple(order),
-        addressee=addressee,
-        accept=accept,
-        delay=bool(delay_target),
-        delay_target=delay_target,
-    )
+        id=id, turn_status=status, behaviors=tuple(behaviors), constraints=tuple(order), addressee=addressee,
+        accept=accept, delay=bool(delay_target), delay_target=delay_target,
+    )  # fmt: skip
 
 
 def _spoken(number: int, part: str | PieceMention, universe: tuple[str, ...]) -> Speech | Reference:

@@ -7,6 +7,7 @@ over it. A piece that is not in view keeps its last place, with confidence 0.
 import math
 from collections import deque
 from collections.abc import Callable, Iterable
+from itertools import accumulate
 
 from msgspec import Struct
 from msgspec.structs import replace
@@ -109,9 +110,6 @@ def _middle(weighted: list[tuple[float, float]]) -> float:
     half = sum(weight for _, weight in weighted) / 2
     if half == 0.0:
         return weighted[-1][0]
-    reached = 0.0
-    for value, weight in sorted(weighted):
-        reached += weight
-        if reached >= half:
-            return value
-    raise AssertionError("half of the whole is reached before its end")
+    ordered = sorted(weighted)
+    reached = accumulate(weight for _, weight in ordered)
+    return next(value for (value, _), share in zip(ordered, reached, strict=True) if share >= half)

@@ -89,16 +89,15 @@ class Manager:
 
     def approve(self, id: str) -> Plan[None]:
         """Say "Ummmm, good.": look away as if thinking, then look back. Steps 20 and 23 of Appendix B."""
-        begin, end = f"{id}-a", f"{id}-b"
         yield Perform(
             fragment(
-                begin, ("Ummmm,",), addressee=self._person, universe=self._universe,
+                f"{id}-a", ("Ummmm,",), addressee=self._person, universe=self._universe,
                 status="beginning", delay_target=self.table.surface.id,
             )
         )  # fmt: skip
         yield Pause(self.config.thinking)
         yield Perform(
-            fragment(end, ("good.",), addressee=self._person, universe=self._universe, status="end", look=False)
+            fragment(f"{id}-b", ("good.",), addressee=self._person, universe=self._universe, status="end", look=False)
         )
         yield Pause(self.config.pause)
 

@@ -68,27 +68,17 @@ class Goal:
 
         Pieces nearest the base come first, then the order of the table's file. given_up: not to be asked for.
         """
-        placed = self.placed(pieces)
-        candidates = [
-            rel
-            for rel in self.relations
-            if rel.landmark in placed and rel.piece not in placed and rel.piece not in given_up
-        ]
-        if not candidates:
-            return None
-        steps = self._steps_from_base()
-        return Instruction(
-            wanted=min(
-                candidates,
-                key=lambda rel: (steps[rel.piece], self.order.index(rel.piece), self.order.index(rel.landmark)),
-            )
-        )
+        placed, steps = self.placed(pieces), self._steps_from_base()
+        done = placed.union(given_up)
+        candidates = [rel for rel in self.relations if rel.landmark in placed and rel.piece not in done]
+
+        def rank(rel: Relation) -> tuple[int, int, int]:
+            return (steps[rel.piece], self.order.index(rel.piece), self.order.index(rel.landmark))
+
+        return Instruction(wanted=min(candidates, key=rank)) if candidates else None
 
     def _steps_from_base(self) -> dict[str, int]:
         steps = {self.base: 0}
-        while grown := {rel.piece: steps[rel.landmark] + 1 for rel in self.relations if rel.landmark in steps}:
-            new = {piece: count for piece, count in grown.items() if piece not in steps}
-            if not new:
-                break
-            steps |= new
+        while next_to := {rel.piece for rel in self.relations if rel.landmark in steps} - steps.keys():
+            steps |= dict.fromkeys(next_to, max(steps.values()) + 1)
         return steps

@@ -32,7 +32,8 @@ class ActionReporter:
             case _:
                 return []
         if reached.sync == first:
-            return [self._begin(id, action, targets, label, reached.at)]
+            self._open[id] = began = self._began(action, targets, label, reached.at)
+            return [began]
         return self.ended(id, reached.at) if reached.sync == last else []
 
     def ended(self, id: str, at: Seconds) -> list[ActionMessage]:
@@ -47,20 +48,12 @@ class ActionReporter:
         if entity == (self._look.targets[0] if self._look else ""):
             return []
         messages: list[ActionMessage] = [self._end(self._look, at)] if self._look else []
-        self._look = None
-        if entity:
-            self._look = ActionBegan(
-                actor=self._actor, action="look", at=Stamp(self._clock, at), targets=(entity,), behavior=label
-            )
-            messages.append(self._look)
-        return messages
+        self._look = self._began("look", (entity,), label, at) if entity else None
+        return [*messages, self._look] if self._look else messages
 
-    def _begin(self, id: str, action: Action, targets: tuple[str, ...], label: str, at: Seconds) -> ActionBegan:
-        began = ActionBegan(
-            actor=self._actor, action=action, at=Stamp(self._clock, at), targets=targets, behavior=label
-        )
-        self._open[id] = began
-        return began
+    def _began(self, action: Action, targets: tuple[str, ...], label: str, at: Seconds) -> ActionBegan:
+        stamp = Stamp(self._clock, at)
+        return ActionBegan(actor=self._actor, action=action, at=stamp, targets=targets, behavior=label)
 
     def _end(self, began: ActionBegan, at: Seconds) -> ActionEnded:
         return ActionEnded(

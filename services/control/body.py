@@ -12,9 +12,7 @@ from typing import Literal
 from msgspec import Struct
 
 from engage_hri.schemas.behavior_types import sync_points
-from engage_hri.schemas.behaviors import (
-    BlockBehavior,
-)
+from engage_hri.schemas.behaviors import BlockBehavior
 from engage_hri.schemas.body import BodyPose, Capabilities, Estimate, Ray
 from engage_hri.schemas.faults import EngageError
 from engage_hri.schemas.units import Seconds

@@ -257,17 +257,11 @@ class _Control:
         self._publish(self._deeds.ended(request.id, at))
         self.note_look()
         self._keep_publishing()
-        self.desk.end(
-            BehaviorOutcome(
-                id=request.id,
-                block=request.block,
-                behavior=request.behavior.id,
-                status=live.status,
-                at=self._bus.stamp(at),
-                spoken=live.spoken,
-                fault=fault,
-            )
-        )
+        outcome = BehaviorOutcome(
+            id=request.id, block=request.block, behavior=request.behavior.id, status=live.status,
+            at=self._bus.stamp(at), spoken=live.spoken, fault=fault,
+        )  # fmt: skip
+        self.desk.end(outcome)
 
     def _end_aborts(self, live: _UnderWay) -> None:
         """Answer the abort requests that waited for this behavior and wait for no other one."""
@@ -297,32 +291,25 @@ class _Control:
     def _report(self, live: _UnderWay, progress: Progress) -> None:
         request = live.request
         id, block, behavior, requester = live.id, request.block, request.behavior.id, request.requester
+        at = self._bus.stamp(progress.at)
         match progress:
-            case Arrived(sync=sync, at=at):
-                stamp = self._bus.stamp(at)
+            case Arrived(sync=sync):
                 self._tell(
-                    SyncPointArrived(id=id, block=block, behavior=behavior, sync=sync, at=stamp, requester=requester)
+                    SyncPointArrived(id=id, block=block, behavior=behavior, sync=sync, at=at, requester=requester)
                 )
-                self.note_look(live, at)
-            case Reached(sync=sync, at=at, arrived=arrived):
-                self._tell(
-                    SyncPointReached(
-                        id=id,
-                        block=block,
-                        behavior=behavior,
-                        sync=sync,
-                        at=self._bus.stamp(at),
-                        arrived=self._bus.stamp(arrived),
-                        requester=requester,
-                    )
+                self.note_look(live, progress.at)
+            case Reached(sync=sync):
+                came = self._bus.stamp(progress.arrived)
+                reached = SyncPointReached(
+                    id=id, block=block, behavior=behavior, sync=sync, at=at, arrived=came, requester=requester
                 )
+                self._tell(reached)
                 live.status = "done" if sync == "end" else live.status
                 self._publish(self._deeds.reached(request.id, live.label, request.behavior, progress))
-                self.note_look(live, at)
-            case Spoke(word=word, position=position, at=at):
+                self.note_look(live, progress.at)
+            case Spoke(word=word, position=position):
                 live.position = int(position)  # a driver's number, of whatever type
-                stamp = self._bus.stamp(at)
-                self._tell(WordSpoken(block=block, behavior=behavior, word=word, position=position, at=stamp))
+                self._tell(WordSpoken(block=block, behavior=behavior, word=word, position=position, at=at))
         self._keep_publishing()
 
     def _tell(self, message: SyncPointArrived | SyncPointReached | WordSpoken) -> None:

@@ -6,15 +6,7 @@ from typing import Literal
 from msgspec import Struct
 
 from engage_hri.schemas.behavior_types import sync_points
-from engage_hri.schemas.behaviors import (
-    BlockBehavior,
-    Face,
-    FaceFacs,
-    FaceLexeme,
-    Gesture,
-    Pointing,
-    Speech,
-)
+from engage_hri.schemas.behaviors import BlockBehavior, Face, FaceFacs, FaceLexeme, Gesture, Pointing, Speech
 from engage_hri.schemas.body import Estimate, Phase
 from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.units import Seconds

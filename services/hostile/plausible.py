@@ -21,7 +21,7 @@ from engage_hri.schemas.behaviors import (
     Wait,
 )
 from engage_hri.schemas.blocks import Block
-from engage_hri.schemas.fragments import TurnFragment
+from engage_hri.schemas.fragments import TurnFragment, TurnStatus
 from engage_hri.services.hostile.chance import Chance, happens
 
 TEXT = "Please move the blue piece"
@@ -42,11 +42,8 @@ def fragment(chance: Chance, id: str, entities: Sequence[str]) -> TurnFragment:
     behaviors: list[FragmentBehavior] = [Speech(id="words", text=TEXT)]
     if happens(chance, 0.5):
         behaviors.append(Reference(id="it", target=chance.choice(entities)))
-    return TurnFragment(
-        id=id,
-        turn_status=chance.choice(("full", "full", "beginning", "end", "backchannel")),
-        behaviors=tuple(behaviors),
-    )
+    status: TurnStatus = chance.choice(("full", "full", "beginning", "end", "backchannel"))
+    return TurnFragment(id=id, turn_status=status, behaviors=tuple(behaviors))
 
 
 def _behavior(chance: Chance, id: str, entities: Sequence[str]) -> BlockBehavior:

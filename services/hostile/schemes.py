@@ -2,7 +2,7 @@
 
 from collections import deque
 from collections.abc import Callable, Sequence
-from typing import Literal
+from typing import Literal, cast
 
 from msgspec import Struct
 from msgspec.structs import replace
@@ -16,7 +16,6 @@ from engage_hri.schemas.fragments import FragmentOutcome, PerformFragment
 from engage_hri.schemas.messages import COMMANDS, Message
 from engage_hri.schemas.requests import (
     Accepted,
-    Answer,
     Cancel,
     Heard,
     KeepAlive,
@@ -81,7 +80,7 @@ class Schemer:
         request = self._request(kind, now)
         request = replace(request, id=self._id(), life=self._lives[who], requester="", revision=0, lease=lease)
         self._sent.append(_Sent(who, expression, request))
-        return Deed(who, _message(request), expression)
+        return Deed(who, cast(Message, request), expression)
 
     def _again(self, who: int, now: Seconds) -> Deed:
         """Send a request again: perhaps as another peer, on another key, with another revision, or in a new life."""
@@ -95,13 +94,13 @@ class Schemer:
             other = self._request(type(request), now)
             request = replace(other, id=request.id, life=request.life, requester="", revision=request.revision)
         expression = sent.expression if happens(self._chance, 0.9) else self._chance.choice(tuple(COMMANDS))
-        return Deed(sent.who if happens(self._chance, 0.8) else who, _message(request), expression)
+        return Deed(sent.who if happens(self._chance, 0.8) else who, cast(Message, request), expression)
 
     def _cancel(self, who: int, now: Seconds) -> Deed:
         """Cancel a request of any peer, or one that was never made."""
         if self._sent and happens(self._chance, 0.7):
             sent = self._chance.choice(self._sent)
-            server, id, kind, life = keys.server_of(sent.expression), sent.request.id, kind_of(sent.request), ""
+            server, id, kind = keys.server_of(sent.expression), sent.request.id, kind_of(sent.request)
             life, who = sent.request.life, sent.who
         else:
             server, id, kind, life = self._chance.choice(keys.SERVICES), self._id(), "perform_block", self._lives[who]
@@ -146,7 +145,7 @@ class Schemer:
             life=self._word("life"),
             kind=self._chance.choice(("perform_block", "perform_behavior", "perform_fragment", "request_event", "")),
         )
-        return Deed(who, _told(answer), keys.request_state(self._chance.choice((*keys.SERVICES, "nobody"))))
+        return Deed(who, cast(Message, answer), keys.request_state(self._chance.choice((*keys.SERVICES, "nobody"))))
 
     def _new_life(self, who: int, now: Seconds) -> Deed:
         self._lives[who] = self._chance.choice(("", "life-1", f"life-{now:.3f}"))
@@ -188,11 +187,3 @@ DEEDS: Sequence[Callable[[Schemer, int, Seconds], Deed]] = (
     *(Schemer._ask,) * 5, *(Schemer._again,) * 4, *(Schemer._cancel,) * 3, Schemer._keep, *(Schemer._answer,) * 2,
     Schemer._new_life,
 )  # fmt: skip
-
-
-def _message(request: Request) -> Message:
-    return request  # type: ignore[return-value]
-
-
-def _told(answer: Answer) -> Message:
-    return answer  # type: ignore[return-value]

@@ -95,13 +95,6 @@ async def trial(attack: Attack, services: Mapping[str, Service], client: Client 
     return await _Trial(attack, services, client).judged()
 
 
-def insist_on_memory(hub: Hub) -> None:
-    """Raise InputRefused if the hub reaches further than this process."""
-    if not isinstance(hub, MemoryHub):
-        reason = f"the hostile peer runs on a MemoryHub only, not on a {type(hub).__name__}"
-        raise InputRefused(Fault(reason=reason, advice="motors may be behind it"))
-
-
 class _Tapped(MemoryHub):
     """A memory bus that has each message audited."""
 
@@ -159,7 +152,6 @@ class _Trial:
         propagates, LOG.propagate = LOG.propagate, False
         loop.set_exception_handler(self._unhandled)
         try:
-            insist_on_memory(self.hub)
             async with self.hub:
                 await self._play()
         finally:
@@ -184,8 +176,7 @@ class _Trial:
         visitor = Visitor(self.chance("visitor"), self.entities, servers)
         async with Requester(bus) as requests:
             bus.declare_alive()
-            guests = [] if self.client is None else [self.client(self.hub)]
-            clients = [asyncio.ensure_future(self._client(each)) for each in guests]
+            clients = [] if self.client is None else [asyncio.ensure_future(self.client(self.hub))]
             async with asyncio.TaskGroup() as group:
                 for deeds in self._deeds(visitor, bus, requests):
                     group.create_task(deeds)
@@ -201,9 +192,6 @@ class _Trial:
             await peer.leave()
         for name in self.services:
             await self._stop(name)
-
-    async def _client(self, client: Awaitable[None]) -> None:
-        await client
 
     def _deeds(self, visitor: Visitor, bus: MemoryBus, requests: Requester) -> list[Any]:
         attack = self.attack

@@ -60,13 +60,9 @@ class Words:
         return self._heard.get(field, ())
 
 
-def _struct_types(types: Sequence[shapes.Type]) -> dict[str, shapes.StructType]:
-    return {kind.cls.__name__: kind for kind in types if isinstance(kind, shapes.StructType)}
-
-
 _UNION = shapes.type_info(Message)
 assert isinstance(_UNION, shapes.UnionType)
-KINDS = _struct_types(_UNION.types)
+KINDS = {kind.cls.__name__: kind for kind in _UNION.types if isinstance(kind, shapes.StructType)}
 """Every message that may travel, by the name of its class."""
 
 

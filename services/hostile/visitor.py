@@ -1,6 +1,7 @@
 """An honest client in bad company: it asks for blocks and fragments, changes its mind, and counts how each ends."""
 
 import asyncio
+from collections import Counter
 from random import Random
 
 from engage_hri.schemas import keys
@@ -32,15 +33,11 @@ class Visitor:
         """Ids of requests that have not ended."""
         return [pending.request.id for pending in self.asked if not pending.outcome.done()]
 
-    def ends(self) -> dict[str, int]:
+    def ends(self) -> Counter[str]:
         """Count the requests that have ended, by the name of the outcome or error."""
-        counts: dict[str, int] = {}
-        for pending in self.asked:
-            if pending.outcome.done() and not pending.outcome.cancelled():
-                error = pending.outcome.exception()
-                end = type(error).__name__ if error is not None else type(pending.outcome.result()).__name__
-                counts[end] = counts.get(end, 0) + 1
-        return counts
+        outcomes = [pending.outcome for pending in self.asked if pending.outcome.done()]
+        ended = [outcome for outcome in outcomes if not outcome.cancelled()]
+        return Counter(type(outcome.exception() or outcome.result()).__name__ for outcome in ended)
 
     async def visit(self, bus: Bus, requests: Requester, seconds: Seconds) -> None:
         """Ask for a few blocks and fragments, again and again, for so many seconds."""

@@ -73,10 +73,7 @@ class TangramTable(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
 
     def piece(self, id: str) -> Piece:
         """Find a piece. Raises KeyError if there is none with that id."""
-        for piece in self.pieces:
-            if piece.id == id:
-                return piece
-        raise KeyError(id)
+        return {piece.id: piece for piece in self.pieces}[id]
 
     def lying(self, piece: Piece, pose: PiecePose) -> Entity:
         """The piece as perception reports it when it lies at `pose`."""

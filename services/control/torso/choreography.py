@@ -279,12 +279,7 @@ def _excursion(part: str, goal: tuple[float, ...], scene: Situation) -> Course:
     settle = SETTLE if any(drift) else 0.0
     after = tuple(angle + speed * settle for angle, speed in zip(goal, drift, strict=True))
     legs = (
-        Leg(
-            goal=goal,
-            velocity=drift,
-            seconds=out,
-            marks=(("start", 0.0), *_at(1.0, "ready", "stroke_start", "stroke")),
-        ),
+        Leg(goal=goal, velocity=drift, seconds=out, marks=(("start", 0.0), *_at(1.0, *SYNC_POINTS[1:4]))),
         Leg(goal=after, velocity=drift, seconds=settle, marks=_at(1.0, "stroke_end", "relax")),
         Leg(goal=rest, seconds=back, marks=_at(1.0, "end")),
     )
@@ -342,13 +337,8 @@ def _sides(mode: str | None, rank: Callable[[Side], float], scene: Situation) ->
 def _held_on_target(*arrival: str) -> tuple[CoursePoint, ...]:
     """Sync points of a course that can hold while it is on target. arrival: points at which it is first there."""
     before = SYNC_POINTS[: SYNC_POINTS.index("stroke_end")]
-    return (
-        *(
-            CoursePoint(sync, "stroke", stands_at="relax") if sync in arrival else CoursePoint(sync)
-            for sync in before
-        ),
-        *(CoursePoint("stroke_end", "relax"), CoursePoint("relax", "relax"), CoursePoint("end")),
-    )
+    points = [CoursePoint(sync, "stroke", "relax") if sync in arrival else CoursePoint(sync) for sync in before]
+    return (*points, CoursePoint("stroke_end", "relax"), CoursePoint("relax", "relax"), CoursePoint("end"))
 
 
 def _held_around_stroke(strokes: Sequence[str] = ()) -> tuple[CoursePoint, ...]:

@@ -1,7 +1,10 @@
 """Gaze of the simulated torso: the base gaze, the entity the eyes rest on, and following entities that move. Pure."""
 
 from collections.abc import Mapping
+from contextlib import suppress
 from math import inf, radians
+
+from msgspec.structs import replace
 
 from engage_hri.schemas.behaviors import BlockBehavior, Gaze, GazeShift, HeadDirectionShift
 from engage_hri.schemas.units import Seconds
@@ -46,7 +49,7 @@ class EyeTarget:
         return eyes_on(self.base)
 
     def shift(self, behavior: BlockBehavior, course: Course) -> None:
-        self.base, self.angles = behavior, (course.legs[-1].goal[0], course.legs[-1].goal[1])
+        self.base, self.angles = behavior, course.legs[-1].goal
 
     def stay(self, angles: tuple[float, ...]) -> None:
         """Make a direction the base gaze, without an entity."""
@@ -55,11 +58,8 @@ class EyeTarget:
     def update(self, scene: Situation) -> None:
         """Turn the base after its entity; the last direction stays when it is gone or out of view."""
         if self.base is not None:
-            try:
-                goal = choreography.plan(self.base, scene).legs[-1].goal
-            except Impossible:
-                return
-            self.angles = (goal[0], goal[1])
+            with suppress(Impossible):
+                self.angles = choreography.plan(self.base, scene).legs[-1].goal
 
     def fixated(self, now: Seconds) -> str:
         """Id of the entity that the eyes rest on; empty: none."""
@@ -110,8 +110,8 @@ def retargeted(run: Run, course: Course, track: Track, now: Seconds) -> Path | N
         return None
     left = run.motion.path.after(run.motion.s(now))
     seconds = max(left[0].seconds if left else 0.0, SHORTEST)
-    first = Leg(goal=legs[0].goal, velocity=legs[0].velocity, seconds=seconds, marks=legs[0].marks)
-    return Path(track.at(now), run.with_faults((first, *legs[1:])), tracks.LIMITS["head"])
+    legs = (replace(legs[0], seconds=seconds), *legs[1:])
+    return Path(track.at(now), run.with_faults(legs), tracks.LIMITS["head"])
 
 
 def apart(one: tuple[float, ...], other: tuple[float, ...]) -> bool:

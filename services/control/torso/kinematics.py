@@ -155,14 +155,10 @@ def point_at(side: Side, target: Vector, radius: Meters, pose: Pose) -> ArmAim:
     raise Unreachable(f"the {side} arm finds no way to point at it: {reason}")
 
 
-def touches_table(pose: Pose, sides: Iterable[Side] = ("left", "right")) -> str:
-    """Name of an arm of which elbow or hand is in the table or closer than the clearance, or nothing."""
-    for side in sides:
-        forearm = arm(pose, side)
-        assert forearm.tip is not None
-        if _in_table(forearm.origin) or _in_table(forearm.tip) or _in_table(_edge_crossing(forearm)):
-            return f"{side}_arm"
-    return ""
+def touches_table(pose: Pose, sides: Iterable[Side] = ("left", "right")) -> bool:
+    """True if an elbow, forearm or hand is in the table or closer than the clearance."""
+    forearms = [arm(pose, side) for side in sides]
+    return any(_in_table(point) for ray in forearms for point in (ray.origin, _tip(ray), _edge_crossing(ray)))
 
 
 def degrees_between(one: Iterable[float], other: Iterable[float]) -> float:
@@ -185,11 +181,16 @@ def _objection(side: Side, angles: tuple[float, float, float], target: Vector, r
     there = {**pose, **dict(zip(names, angles, strict=True))}
     if touches_table(there, (side,)):
         return "the table is in the way"
-    hand = arm(there, side).tip
-    assert hand is not None
-    if math.dist(hand, target) < radius + HAND_TO_TARGET or math.dist(arm(there, side).origin, target) < FOREARM:
-        return "it is too near"
-    return ""
+    forearm = arm(there, side)
+    is_near = (
+        math.dist(_tip(forearm), target) < radius + HAND_TO_TARGET or math.dist(forearm.origin, target) < FOREARM
+    )
+    return "it is too near" if is_near else ""
+
+
+def _tip(forearm: Ray) -> Vector:
+    assert forearm.tip is not None
+    return forearm.tip
 
 
 def _in_table(point: Vector) -> bool:
@@ -198,10 +199,9 @@ def _in_table(point: Vector) -> bool:
 
 def _edge_crossing(forearm: Ray) -> Vector:
     """Point at which the forearm passes the table's edge; the hand if it does not."""
-    assert forearm.tip is not None
-    (x0, y0, z0), (x1, y1, z1) = forearm.origin, forearm.tip
+    (x0, y0, z0), (x1, y1, z1) = forearm.origin, _tip(forearm)
     if not x0 < TABLE_EDGE < x1:
-        return forearm.tip
+        return (x1, y1, z1)
     part = (TABLE_EDGE - x0) / (x1 - x0)
     return (TABLE_EDGE, y0 + part * (y1 - y0), z0 + part * (z1 - z0))
 

@@ -112,7 +112,7 @@ class Path:
         if not self._segments:
             return resting(self.legs[-1].goal if self.legs else self.start.q)
         segment = self._segment(s)
-        return _evaluate(segment.coefficients, min(max(s - segment.start, 0.0), segment.seconds))
+        return JointMotion(*_evaluated(segment.coefficients, min(max(s - segment.start, 0.0), segment.seconds)))
 
     def after(self, s: Seconds, untold: Collection[str] = ()) -> tuple[Leg, ...]:
         """Legs that are left at s, with the sync points beyond s. Those in `untold` that are not come at once."""
@@ -194,7 +194,7 @@ class _Limits:
         return bool(np.all(np.abs(state.v) * brake <= (1 - SHARE) * self.acceleration))
 
     def _judged(self, coefficients: Array, seconds: Seconds) -> "_Connection":
-        position, velocity, change = _sampled(coefficients, seconds)
+        position, velocity, change = _evaluated(coefficients, (SAMPLES * seconds)[:, None])
         speed = float(np.max(np.abs(velocity) / self.speed))
         acceleration = float(np.max(np.abs(change) / self.acceleration))
         outside = float(np.max(np.maximum(self.low - position, position - self.high) / (self.high - self.low)))
@@ -320,12 +320,11 @@ class Motion:
             return
         if rate == 0.0 and self.path.at(s).at_rest:
             rate = self.cruise
-        brake = (
-            inf if self.path.at(self._stop).at_rest else self.path.steepest_brake(self._stop, max(rate, self.cruise))
-        )
-        change = self.path.gentlest_brake
-        top, braking = _top_rate(rate, self.cruise, left, change, brake)
-        now, s, rate = self._ramp(now, s, rate, top, change, self._stop)
+        brake = inf
+        if not self.path.at(self._stop).at_rest:
+            brake = self.path.steepest_brake(self._stop, max(rate, self.cruise))
+        top, braking = _top_rate(rate, self.cruise, left, self.path.gentlest_brake, brake)
+        now, s, rate = self._ramp(now, s, rate, top)
         steady = self._stop - s - braking
         if rate > 0.0 and steady > 0.0:
             self._pieces.append(_Piece(now, s, rate, 0.0))
@@ -337,12 +336,10 @@ class Motion:
             self._pieces.append(_Piece(now, s, 0.0, 0.0))
         self.end = now
 
-    def _ramp(
-        self, now: Seconds, s: Seconds, rate: float, to: float, change: float, stop: Seconds
-    ) -> tuple[Seconds, Seconds, float]:
+    def _ramp(self, now: Seconds, s: Seconds, rate: float, to: float) -> tuple[Seconds, Seconds, float]:
         if math.isclose(rate, to, rel_tol=1e-12, abs_tol=1e-12):
             return now, s, to
-        slope = math.copysign(change, to - rate)
+        slope, stop = math.copysign(self.path.gentlest_brake, to - rate), self._stop
         seconds = (to - rate) / slope
         piece = _Piece(now, s, rate, slope)
         self._pieces.append(piece)
@@ -386,13 +383,7 @@ _FIRST = np.arange(1, 6)
 _SECOND = np.arange(2, 6) * np.arange(1, 5)
 
 
-def _evaluate(c: Array, t: Seconds) -> JointMotion:
+def _evaluated(c: Array, t: Seconds | Array) -> tuple[Any, Any, Any]:
+    """Value and first two derivatives of the polynomials at t, or at each t of a column."""
     powers = t**_POWERS
-    first = powers[:5] * _FIRST
-    second = powers[:4] * _SECOND
-    return JointMotion(powers @ c, first @ c[1:], second @ c[2:])
-
-
-def _sampled(c: Array, seconds: Seconds) -> tuple[Any, Any, Any]:
-    powers = (SAMPLES * seconds)[:, None] ** _POWERS
-    return powers @ c, (powers[:, :5] * _FIRST) @ c[1:], (powers[:, :4] * _SECOND) @ c[2:]
+    return powers @ c, (powers[..., :5] * _FIRST) @ c[1:], (powers[..., :4] * _SECOND) @ c[2:]

@@ -166,5 +166,4 @@ def _marked(leg: Leg, fault: str, before: str) -> Leg:
     if before not in fractions:
         return leg
     earlier = max((fraction for fraction in fractions.values() if fraction < fractions[before]), default=0.0)
-    marks = (*leg.marks, (fault, (earlier + fractions[before]) / 2))
-    return Leg(goal=leg.goal, velocity=leg.velocity, seconds=leg.seconds, marks=marks)
+    return replace(leg, marks=(*leg.marks, (fault, (earlier + fractions[before]) / 2)))

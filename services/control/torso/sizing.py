@@ -5,6 +5,7 @@ from copy import copy
 from math import inf
 
 from msgspec import Struct
+from msgspec.structs import replace
 
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.control.torso import tracks
@@ -26,8 +27,9 @@ class Reduced(Struct, frozen=True):
 
 def quickest(course: Course, path: Path) -> dict[str, Seconds]:
     """Earliest times of the sync points: as fast as the joints permit and, where allowed, at the least size."""
-    if course.is_resizable and _is_clear(small := _reduced(course, Motion(path, 0.0), 0.0, SIZES[-1]), course):
-        path = small
+    if course.is_resizable:
+        small = _reduced(course, Motion(path, 0.0), 0.0, SIZES[-1])
+        path = path if tracks.meets_table(small, course.joints) else small
     return {sync: s / path.fastest for sync, s in path.marks.items()}
 
 
@@ -44,7 +46,7 @@ def hurried(
         if each < size and least > 0.0:
             path = _reduced(course, motion, now, each / size)
             late = lateness(Motion(path, now, cruise=cruise), aims, now, cruise)
-            if late < least and _is_clear(path, course):
+            if late < least and not tracks.meets_table(path, course.joints):
                 least, best = late, Reduced(path, each)
     return best
 
@@ -72,9 +74,4 @@ def _reduced(course: Course, motion: Motion, now: Seconds, by: float) -> Path:
 
 def _nearer(leg: Leg, home: tuple[float, ...], by: float) -> Leg:
     goal = tuple(rest + by * (angle - rest) for angle, rest in zip(leg.goal, home, strict=True))
-    velocity = tuple(by * speed for speed in leg.velocity)
-    return Leg(goal=goal, velocity=velocity, seconds=leg.seconds, marks=leg.marks)
-
-
-def _is_clear(path: Path, course: Course) -> bool:
-    return not course.parts[0].endswith("_arm") or not tracks.meets_table(path, course.joints)
+    return replace(leg, goal=goal, velocity=tuple(by * speed for speed in leg.velocity))

@@ -85,7 +85,7 @@ class Track:
         time = choreography.turning_time if self.part in ("head", "nod") else choreography.return_time
         seconds = time(self.angles(now), goal)
         direct = Path(start, (Leg(goal=goal, seconds=seconds),), LIMITS[self.part])
-        if not self.part.endswith("_arm") or not meets_table(direct, self.joints):
+        if not meets_table(direct, self.joints):
             self.play(Motion(direct, now))
             return
         # Up first: the elbow bends and the upper arm lifts, which takes elbow and hand away from the table.
@@ -111,9 +111,9 @@ def joined(states: Sequence[JointMotion]) -> JointMotion:
 
 def meets_table(path: Path, joints: Sequence[str]) -> bool:
     """True if an elbow or hand comes into the table anywhere on `path`."""
-    if not path.length:
-        return False
     sides = [side for side in kinematics.SHOULDER if f"{side}_elbow" in joints]
+    if not path.length or not sides:
+        return False
     for step in range(17):
         angles = dict(zip(joints, path.at(path.length * step / 16).q.tolist(), strict=True))
         if kinematics.touches_table({**kinematics.HOME, **angles}, sides):

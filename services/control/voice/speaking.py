@@ -3,6 +3,8 @@
 from collections.abc import AsyncGenerator
 from math import inf
 
+from msgspec.structs import replace
+
 from engage_hri.schemas.behaviors import Speech, Wait
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.control.body import Arrived, MovementAuthority, Progress, Reached, Spoke
@@ -33,7 +35,7 @@ async def speak(behavior: Speech, authority: MovementAuthority, pace: float = 1.
                 begin += at - arrived
             if authority.revoked is not None:
                 break
-            yield _at(progress, at, arrived)
+            yield Reached(progress.sync, at, arrived) if isinstance(progress, Reached) else replace(progress, at=at)
         since = bell.now() - begin
         for word in utterance.words:
             if authority.revoked is not None and word.start < since < word.end:
@@ -42,12 +44,6 @@ async def speak(behavior: Speech, authority: MovementAuthority, pace: float = 1.
                 yield Spoke(word.text, word.position, begin + word.end)
     finally:
         unwatch()
-
-
-def _at(progress: Reached | Spoke, at: Seconds, arrived: Seconds) -> Progress:
-    if isinstance(progress, Reached):
-        return Reached(progress.sync, at, arrived)
-    return Spoke(progress.word, progress.position, at)
 
 
 async def wait(behavior: Wait, authority: MovementAuthority) -> AsyncGenerator[Progress, None]:
