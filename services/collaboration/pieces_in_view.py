@@ -33,7 +33,7 @@ class _View(Struct):
         while len(self.samples) > 1 and self.samples[1][0] <= now - WINDOW:
             self.samples.popleft()
 
-    def middle(self, now: Seconds) -> Entity:
+    def median(self, now: Seconds) -> Entity:
         """The piece at the median of where it was seen in the window, coordinate by coordinate, weighted by time."""
         times = [max(at, now - WINDOW) for at, _ in self.samples]
         held = [end - at for at, end in zip(times, [*times[1:], now], strict=True)]
@@ -41,7 +41,7 @@ class _View(Struct):
         last = pieces[-1]
 
         def of(value: Callable[[Entity], float]) -> float:
-            return _middle(list(zip(map(value, pieces), held, strict=True)))
+            return _median(list(zip(map(value, pieces), held, strict=True)))
 
         place = (of(lambda it: it.position[0]), of(lambda it: it.position[1]), of(lambda it: it.position[2]))
         turned = of(lambda it: math.remainder(it.yaw - last.yaw, math.tau))
@@ -68,7 +68,7 @@ class PiecesInView:
         hands = [entity for entity in world.entities if entity.kind == "hand"]
         in_view = {piece.id: piece for piece in world.objects if _is_clear(piece, hands)}
         for id in self._views.keys() - in_view.keys():
-            self._known[id] = self._views.pop(id).middle(now)
+            self._known[id] = self._views.pop(id).median(now)
         for piece in world.objects:
             self._known.setdefault(piece.id, piece)
         for id, piece in in_view.items():
@@ -77,7 +77,7 @@ class PiecesInView:
     def pieces(self, now: Seconds) -> tuple[Entity, ...]:
         """Every piece seen so far, at its last known place; with confidence 0 while that is uncertain."""
         return tuple(
-            self._views[id].middle(now) if self._is_steady(id, now) else replace(known, confidence=0.0)
+            self._views[id].median(now) if self._is_steady(id, now) else replace(known, confidence=0.0)
             for id, known in self._known.items()
         )
 
@@ -105,7 +105,7 @@ def _is_clear(piece: Entity, hands: Iterable[Entity]) -> bool:
     return piece.confidence >= TRUSTED and not covered and not is_moving(piece)
 
 
-def _middle(weighted: list[tuple[float, float]]) -> float:
+def _median(weighted: list[tuple[float, float]]) -> float:
     """The median of values with weights; the last value if nothing has weight."""
     half = sum(weight for _, weight in weighted) / 2
     if half == 0.0:

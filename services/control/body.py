@@ -18,7 +18,7 @@ from engage_hri.schemas.faults import EngageError
 from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.world import World
 
-How = Literal["relax", "freeze"]
+AbortMode = Literal["relax", "freeze"]
 
 
 class Arrived(Struct, frozen=True):
@@ -93,7 +93,7 @@ class MovementAuthority:
         """
         self.points = sync_points(behavior)
         self.pace: Mapping[str, Seconds] = dict(pace or {})
-        self.revoked: How | None = None
+        self.revoked: AbortMode | None = None
         self._through = self._index(through)
         self._watchers: list[Callable[[], None]] = []
 
@@ -133,7 +133,7 @@ class MovementAuthority:
             self.pace = dict(pace)
             self._tell()
 
-    def revoke(self, how: How = "relax") -> None:
+    def revoke(self, how: AbortMode = "relax") -> None:
         """End the behavior now. A second call changes nothing.
 
         how: go to the safe pose at once (`relax`), or stand still for a moment and then go (`freeze`).

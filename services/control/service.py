@@ -35,11 +35,11 @@ from engage_hri.services.bus.interface import Bus, Received, is_asked_to_stop
 from engage_hri.services.control import variability
 from engage_hri.services.control.actions import ActionMessage, ActionReporter
 from engage_hri.services.control.body import (
+    AbortMode,
     Arrived,
     BehaviorRefused,
     Body,
     BodyFailed,
-    How,
     MovementAuthority,
     Progress,
     Reached,
@@ -80,7 +80,7 @@ def _simulated(config: ControlConfig) -> Body:
     return SimulatedBody(config.no_point_zones, config.variability)
 
 
-class _UnderWay:
+class _LiveBehavior:
     """A `PerformBehavior` that is under way."""
 
     def __init__(self, request: PerformBehavior, id: str, authority: MovementAuthority) -> None:
@@ -115,11 +115,11 @@ class _Control:
         self._config = config
         self._body = body
         self._tasks = tasks
-        self._deeds = ActionReporter(bus.robot, bus.clock)
+        self._actions = ActionReporter(bus.robot, bus.clock)
         self._world = World(entities=())
         self._objects = objects
-        self._live: dict[str, _UnderWay] = {}
-        self._ways: dict[str, asyncio.Task[None]] = {}
+        self._live: dict[str, _LiveBehavior] = {}
+        self._homeward: dict[str, asyncio.Task[None]] = {}
         """Tasks that take the body home, by the id of the request that asked for it."""
         self._sent = 0
         self._next_state = Timer(self.publish_state)
@@ -175,10 +175,10 @@ class _Control:
             case GoHome():
                 self.desk.accept(request.id)
                 way = self._tasks.create_task(self._go_home(request), name=f"home {request.id}")
-                self._ways[request.id] = way
-                way.add_done_callback(lambda _: self._ways.pop(request.id, None))
-            case Cancel(id=id) if id in self._ways:
-                self._ways[id].cancel()
+                self._homeward[request.id] = way
+                way.add_done_callback(lambda _: self._homeward.pop(request.id, None))
+            case Cancel(id=id) if id in self._homeward:
+                self._homeward[id].cancel()
                 self.desk.refuse(id, Fault(reason="given up on the way home", where=id, service="control"))
 
     def _begin(self, request: PerformBehavior) -> None:
@@ -192,7 +192,7 @@ class _Control:
             self.desk.refuse(request.id, Fault(reason=str(error), where=request.behavior.id, service="control"))
             return
         id = self.desk.asked(request.id).id
-        live = self._live[request.id] = _UnderWay(request, id, authority)
+        live = self._live[request.id] = _LiveBehavior(request, id, authority)
         self._tasks.create_task(self._perform(live), name=f"behavior {request.id}")
 
     def _abort(self, request: AbortBehavior) -> None:
@@ -207,7 +207,7 @@ class _Control:
             self._revoke(live, request.how)
             live.aborts.append(request.id)
 
-    def _revoke(self, live: _UnderWay, how: How = "relax") -> None:
+    def _revoke(self, live: _LiveBehavior, how: AbortMode = "relax") -> None:
         """Revoke the authority of a behavior. An error of a driver that watches it is contained."""
         with self._bus.containing(f"the end of behavior {live.label}"):
             live.authority.revoke(how)
@@ -215,7 +215,7 @@ class _Control:
     def _pace(self, request: PerformBehavior) -> dict[str, Seconds]:
         return {planned.sync: self._bus.local(planned.at) for planned in request.pace}
 
-    def _extend(self, live: _UnderWay, request: PerformBehavior) -> None:
+    def _extend(self, live: _LiveBehavior, request: PerformBehavior) -> None:
         live.authority.set_pace(self._pace(request))
         try:
             live.authority.extend(request.through)
@@ -223,7 +223,7 @@ class _Control:
             where = live.request.behavior.id
             self._bus.publish(keys.fault("control"), Fault(reason=str(error), where=where, service="control"))
 
-    async def _perform(self, live: _UnderWay) -> None:
+    async def _perform(self, live: _LiveBehavior) -> None:
         """Perform a behavior, from its request to the one terminal answer."""
         request, fault = live.request, None
         accepted = False
@@ -252,9 +252,9 @@ class _Control:
             self._end(live, fault)
         self._end_aborts(live)
 
-    def _end(self, live: _UnderWay, fault: Fault | None) -> None:
+    def _end(self, live: _LiveBehavior, fault: Fault | None) -> None:
         request, at = live.request, self._bus.now()
-        self._publish(self._deeds.ended(request.id, at))
+        self._publish(self._actions.ended(request.id, at))
         self.note_look()
         self._keep_publishing()
         outcome = BehaviorOutcome(
@@ -263,7 +263,7 @@ class _Control:
         )  # fmt: skip
         self.desk.end(outcome)
 
-    def _end_aborts(self, live: _UnderWay) -> None:
+    def _end_aborts(self, live: _LiveBehavior) -> None:
         """Answer the abort requests that waited for this behavior and wait for no other one."""
         awaited = {id for other in self._live.values() for id in other.aborts}
         for id in live.aborts:
@@ -288,7 +288,7 @@ class _Control:
 
     # -- reports ------------------------------------------------------------------------------------------------
 
-    def _report(self, live: _UnderWay, progress: Progress) -> None:
+    def _report(self, live: _LiveBehavior, progress: Progress) -> None:
         request = live.request
         id, block, behavior, requester = live.id, request.block, request.behavior.id, request.requester
         at = self._bus.stamp(progress.at)
@@ -305,7 +305,7 @@ class _Control:
                 )
                 self._tell(reached)
                 live.status = "done" if sync == "end" else live.status
-                self._publish(self._deeds.reached(request.id, live.label, request.behavior, progress))
+                self._publish(self._actions.reached(request.id, live.label, request.behavior, progress))
                 self.note_look(live, progress.at)
             case Spoke(word=word, position=position):
                 live.position = int(position)  # a driver's number, of whatever type
@@ -321,13 +321,13 @@ class _Control:
         for action in actions:
             self._bus.publish(keys.ROBOT_ACTION, action)
 
-    def note_look(self, live: _UnderWay | None = None, at: Seconds | None = None) -> None:
+    def note_look(self, live: _LiveBehavior | None = None, at: Seconds | None = None) -> None:
         """Publish what the eyes rest on, if that has changed."""
         of_head = live is not None and isinstance(live.request.behavior, Gaze | GazeShift | HeadDirectionShift)
         label = live.label if live is not None and of_head else ""
         with self._bus.containing("what the body looks at"):
             entity = self._body.state().looking_at
-            self._publish(self._deeds.looks_at(entity, label, self._bus.now() if at is None else at))
+            self._publish(self._actions.looks_at(entity, label, self._bus.now() if at is None else at))
 
     def publish_state(self) -> None:
         """Publish the state of the body, and set the timer for the next time: soon if the body moves."""
@@ -337,7 +337,7 @@ class _Control:
 
     def _publish_state(self) -> None:
         now, state = self._bus.now(), self._body.state()
-        self._publish(self._deeds.looks_at(state.looking_at, "", now))
+        self._publish(self._actions.looks_at(state.looking_at, "", now))
         self._published = now
         self._bus.publish(
             keys.ROBOT_STATE,

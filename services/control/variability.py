@@ -33,7 +33,7 @@ def stall(variability: Variability, parts: tuple[str, ...], behavior: BlockBehav
     )
 
 
-def overheats(variability: Variability, parts: tuple[str, ...]) -> str:
+def overheated_part(variability: Variability, parts: tuple[str, ...]) -> str:
     """Name of the part whose motor fails; empty: none."""
     return next((part for part in parts if part in variability.overheated), "")
 

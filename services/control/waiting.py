@@ -10,7 +10,7 @@ EARLY: Seconds = 1e-9
 
 
 class Bell:
-    """Wakes the one task that waits in `heard`; `ring` may come before or during that. Tells the loop time, too."""
+    """Wakes the one task that waits in `wait`; `ring` may come before or during that. Tells the loop time, too."""
 
     def __init__(self) -> None:
         self._loop = asyncio.get_running_loop()
@@ -26,7 +26,7 @@ class Bell:
     def ring(self) -> None:
         self._rung.set()
 
-    async def heard(self, until: Seconds) -> None:
+    async def wait(self, until: Seconds) -> None:
         """Return once the bell has been rung since the last time, or at loop time `until` (inf: never)."""
         if self.is_past(until):
             return

@@ -20,7 +20,7 @@ REFUSED = b"refused"
 """Stands for every refusal among the ends of a request."""
 
 
-class Name(Struct, frozen=True):
+class RequestName(Struct, frozen=True):
     """Names one request among all on the bus."""
 
     server: str
@@ -36,7 +36,7 @@ class Entry(Struct):
     is_owed: it has reached its server, which has not been restarted since. is_foreign: no service has sent it.
     """
 
-    name: Name
+    name: RequestName
     asked_at: Seconds
     role: str
     is_owed: bool
@@ -49,11 +49,11 @@ class Entry(Struct):
     """Time at which it was last sent, renewed, or cancelled."""
 
 
-class Book:
+class Audit:
     """All requests on a bus, with their answers."""
 
     def __init__(self) -> None:
-        self.entries: dict[Name, Entry] = {}
+        self.entries: dict[RequestName, Entry] = {}
         self.commands = 0
         self.answers = 0
 
@@ -67,7 +67,7 @@ class Book:
             case Answer() if sender and key == keys.request_state(sender):
                 self._answer(sender, message, now)
 
-    def restarted(self, server: str) -> None:
+    def note_restart(self, server: str) -> None:
         """Note that `server` has a new life: it owes nothing from its former one, and may end old requests anew."""
         for entry in self.entries.values():
             if entry.name.server == server:
@@ -81,11 +81,11 @@ class Book:
         server, requester = keys.server_of(key), keys.requester_of(key)
         if isinstance(message, KeepAlive):
             for kept in message.live:
-                if entry := self.entries.get(Name(server, requester, life, kept.kind, kept.id)):
+                if entry := self.entries.get(RequestName(server, requester, life, kept.kind, kept.id)):
                     entry.mentioned_at = now
             return
         requester = requester or message.requester
-        name = Name(server, requester, life, kind_meant(message), message.id)
+        name = RequestName(server, requester, life, kind_meant(message), message.id)
         entry = self.entries.get(name)
         if entry is None and not isinstance(message, Cancel):
             role = key.split("/")[4] if keys.expression_of(key) else "manager"
@@ -97,7 +97,7 @@ class Book:
 
     def _answer(self, server: str, answer: Answer, now: Seconds) -> None:
         self.answers += 1
-        name = Name(server, answer.requester, answer.life, answer.kind, answer.id)
+        name = RequestName(server, answer.requester, answer.life, answer.kind, answer.id)
         entry = self.entries.get(name)
         if entry is None or not isinstance(answer, Refused | Outcome):
             return

@@ -21,7 +21,7 @@ WAITS = {"stroke_start", "stroke_end", "stroke", "relax"}
 class Step(Struct, frozen=True):
     """A report, `delay` seconds after the one before. off: seconds added to the true time.
 
-    twice: it is sent twice. stranger: it names a behavior that was never asked for.
+    twice: it is sent twice. unasked: it names a behavior that was never asked for.
     """
 
     say: Literal["reached", "arrived", "word"]
@@ -29,25 +29,25 @@ class Step(Struct, frozen=True):
     delay: Seconds
     off: Seconds = 0.0
     twice: bool = False
-    stranger: bool = False
+    unasked: bool = False
     waits: bool = False
     """True if it waits for its authority, as it should."""
 
 
 class Lie(Struct, frozen=True, kw_only=True):
-    """Course of one behavior. end: None if it never ends. ends_after: seconds after the last step.
+    """Course of one behavior. end: None if it never ends. end_delay: seconds after the last step.
 
-    answer: seconds until it is accepted or refused. deaf: it ignores cancellations. mourning: seconds until one is
-    answered. afterwards: reports after the end.
+    accept_delay: seconds until it is accepted or refused. ignores_cancel: it goes on when it is cancelled.
+    cancel_delay: seconds from a cancellation to the end. afterwards: reports after the end.
     """
 
     refuse: bool = False
-    answer: Seconds = 0.0
+    accept_delay: Seconds = 0.0
     steps: tuple[Step, ...] = ()
     end: Status | None = "done"
-    ends_after: Seconds = 0.0
-    deaf: bool = False
-    mourning: Seconds = 0.0
+    end_delay: Seconds = 0.0
+    ignores_cancel: bool = False
+    cancel_delay: Seconds = 0.0
     afterwards: tuple[Step, ...] = ()
 
 
@@ -58,12 +58,12 @@ def lie(chance: Chance, behavior: BlockBehavior) -> Lie:
         return Lie(steps=_steps(chance, points, 1.0))
     match chance.randrange(0, 11):
         case 0:
-            return Lie(refuse=True, answer=_pause(chance))
+            return Lie(refuse=True, accept_delay=_pause(chance))
         case 1:  # slow
-            return Lie(steps=_steps(chance, points, chance.uniform(2.0, 10.0)), answer=_pause(chance))
-        case 2:  # stalled, and perhaps deaf
+            return Lie(steps=_steps(chance, points, chance.uniform(2.0, 10.0)), accept_delay=_pause(chance))
+        case 2:  # stalled, perhaps even when it is cancelled
             reached = _steps(chance, points, 1.0)[: chance.randrange(0, len(points))]
-            return Lie(steps=reached, end=None, deaf=happens(chance, 0.5), mourning=_pause(chance))
+            return Lie(steps=reached, end=None, ignores_cancel=happens(chance, 0.5), cancel_delay=_pause(chance))
         case 3:  # out of order
             steps = list(_steps(chance, points, 1.0))
             chance.shuffle(steps)
@@ -76,12 +76,13 @@ def lie(chance: Chance, behavior: BlockBehavior) -> Lie:
             return Lie(steps=_steps(chance, points, 1.0)[: chance.randrange(0, len(points))])
         case 7:
             broken = _steps(chance, points, 1.0)[: chance.randrange(0, len(points))]
-            return Lie(steps=broken, end="failed", ends_after=_pause(chance))
+            return Lie(steps=broken, end="failed", end_delay=_pause(chance))
         case 8:  # aborted by itself
-            return Lie(steps=_steps(chance, points, 1.0)[:1], end="aborted", mourning=_pause(chance))
+            return Lie(steps=_steps(chance, points, 1.0)[:1], end="aborted", cancel_delay=_pause(chance))
         case 9:  # late after a cut, or a cancellation
-            return Lie(steps=_steps(chance, points, 3.0), mourning=chance.uniform(4.0, 40.0))
-    return Lie(steps=tuple(_changed(chance, step) for step in _steps(chance, (*points, *points), 0.5)), deaf=True)
+            return Lie(steps=_steps(chance, points, 3.0), cancel_delay=chance.uniform(4.0, 40.0))
+    twofold = _steps(chance, (*points, *points), 0.5)
+    return Lie(steps=tuple(_changed(chance, step) for step in twofold), ignores_cancel=True)
 
 
 def _steps(chance: Chance, points: Sequence[str], slow: float) -> tuple[Step, ...]:
@@ -100,7 +101,7 @@ def _changed(chance: Chance, step: Step) -> Step:
         step.delay,
         off=chance.choice(FAR) if happens(chance, 0.3) else 0.0,
         twice=happens(chance, 0.5),
-        stranger=happens(chance, 0.2),
+        unasked=happens(chance, 0.2),
         waits=step.waits,
     )
 

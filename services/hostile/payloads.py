@@ -20,18 +20,18 @@ from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.world import World
 from engage_hri.services.hostile.chance import Chance, happens
 from engage_hri.services.hostile.markup import document
-from engage_hri.services.hostile.typed import SURROGATE, Typed, distorted
+from engage_hri.services.hostile.typed import SURROGATE, RandomMessages, distorted
 
 BROKEN = 0.05
 """Share of the payloads that have bits flipped, or end early."""
 DISTORTED = 0.15
 MARKUP = 0.05
 
-HOME: Mapping[type, str] = {
+SERVER: Mapping[type, str] = {
     FragmentOutcome: "generation", InhibitionEnded: "generation", BlockOutcome: "realizer",
     BehaviorInterrupted: "realizer", EventOutcome: "recognition", TurnOutcome: "recognition",
 }  # fmt: skip
-PLACES: Mapping[type, str] = {
+FIXED_KEYS: Mapping[type, str] = {
     **dict.fromkeys((BlockProgress, SyncPointProgress, PredictionFeedback, WarningFeedback), keys.FEEDBACK),
     **dict.fromkeys((SyncPointArrived, SyncPointReached, WordSpoken), keys.SYNC_POINT),
     **dict.fromkeys((ActorFound, ActorLost), keys.PERCEIVED_ACTION),
@@ -52,16 +52,16 @@ class Payload(NamedTuple):
 class Payloads:
     """Makes payloads without end. entities: ids of what the world holds, for markup."""
 
-    def __init__(self, chance: Chance, typed: Typed, entities: tuple[str, ...]) -> None:
+    def __init__(self, chance: Chance, messages: RandomMessages, entities: tuple[str, ...]) -> None:
         self._chance = chance
-        self._typed = typed
+        self._messages = messages
         self._entities = entities
 
     def next(self, now: Seconds) -> Payload:
         if happens(self._chance, MARKUP):
             key = self._command(self._chance.choice((keys.BLOCK, keys.FRAGMENT)))
             return Payload(key, document(self._chance, self._entities), "application/xml", "markup")
-        message = self._typed.message(now)
+        message = self._messages.message(now)
         form = self._chance.choice(("msgpack", "json"))
         data = self._encoded(message, form)
         if happens(self._chance, BROKEN):
@@ -92,7 +92,7 @@ class Payloads:
         if where < 0.85:
             return self.right_key(message)
         if where < 0.95:
-            return self.right_key(self._typed.message(0.0))
+            return self.right_key(self._messages.message(0.0))
         server = self._chance.choice((*keys.SERVICES, "nobody"))
         kind = self._chance.choice(("cmd", "evt", "state", "stream", "rpc"))
         tail = self._chance.choice(
@@ -102,7 +102,7 @@ class Payloads:
 
     def right_key(self, message: Message) -> str:
         """Key on which this message belongs; one that any server may get goes to a random one."""
-        server = HOME.get(type(message)) or self._chance.choice(keys.SERVICES)
+        server = SERVER.get(type(message)) or self._chance.choice(keys.SERVICES)
         match message:
             case KeepAlive():
                 return self._command(keys.keep_alive(server))
@@ -122,7 +122,7 @@ class Payloads:
                 return keys.open_events(_chunk(actor))
             case Statistics(actor=actor):
                 return keys.statistics(_chunk(actor))
-        return PLACES.get(type(message)) or keys.request_state(server)
+        return FIXED_KEYS.get(type(message)) or keys.request_state(server)
 
     def _command(self, expression: str) -> str:
         role = self._chance.choice(("manager", "observer", "realizer"))

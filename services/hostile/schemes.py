@@ -28,27 +28,27 @@ from engage_hri.schemas.requests import (
 from engage_hri.schemas.units import Seconds, Stamp
 from engage_hri.services.hostile import plausible
 from engage_hri.services.hostile.chance import Chance, happens
-from engage_hri.services.hostile.typed import NASTY_FLOATS, NASTY_INTS, Typed, Words
+from engage_hri.services.hostile.typed import NASTY_FLOATS, NASTY_INTS, RandomMessages, Words
 
 IDS = ("1", "2", "3", "same", "1~2")
 """Request ids that all peers share."""
-KEPT = 32
+REMEMBERED = 32
 
 
-class Deed(Struct, frozen=True):
-    """Peer number `who` publishes `message` after `delay` seconds; None: it leaves, and comes back as another life.
+class Move(Struct, frozen=True):
+    """Peer number `peer` publishes `message` after `delay` seconds; None: it leaves, and comes back as another life.
 
     expression: the key; for a command the key expression of all requesters.
     """
 
-    who: int
+    peer: int
     message: Message | None = None
     expression: str = ""
     delay: Seconds = 0.0
 
 
 class _Sent(Struct, frozen=True):
-    who: int
+    peer: int
     expression: str
     request: Request
 
@@ -56,36 +56,38 @@ class _Sent(Struct, frozen=True):
 class Schemer:
     """Draws what a peer does next. peers: number of peers that take part."""
 
-    def __init__(self, chance: Chance, typed: Typed, words: Words, entities: tuple[str, ...], peers: int = 2) -> None:
+    def __init__(
+        self, chance: Chance, messages: RandomMessages, words: Words, entities: tuple[str, ...], peers: int
+    ) -> None:
         self._chance = chance
-        self._typed = typed
+        self._messages = messages
         self._words = words
         self._entities = entities
         self._peers = peers
-        self._sent: deque[_Sent] = deque(maxlen=KEPT)
+        self._sent: deque[_Sent] = deque(maxlen=REMEMBERED)
         self._lives = [""] * peers
 
-    def next(self, now: Seconds) -> Deed:
-        who = self._chance.randrange(0, self._peers)
-        deed = self._chance.choice(DEEDS)(self, who, now)
+    def next(self, now: Seconds) -> Move:
+        peer = self._chance.randrange(0, self._peers)
+        move = self._chance.choice(MOVES)(self, peer, now)
         late = self._chance.choice((0.0, 0.0, 0.0, self._chance.uniform(0.0, 3.0)))
-        return replace(deed, delay=late)
+        return replace(move, delay=late)
 
-    # -- deeds ----------------------------------------------------------------------------------------------------
+    # -- moves ----------------------------------------------------------------------------------------------------
 
-    def _ask(self, who: int, now: Seconds) -> Deed:
+    def _ask(self, peer: int, now: Seconds) -> Move:
         expression = self._chance.choice(tuple(COMMANDS))
         kind = self._chance.choice(COMMANDS[expression])
         lease = self._chance.choice((0.0, 0.0, 1.0, 5.0, *NASTY_FLOATS[:3]))
         request = self._request(kind, now)
-        request = replace(request, id=self._id(), life=self._lives[who], requester="", revision=0, lease=lease)
-        self._sent.append(_Sent(who, expression, request))
-        return Deed(who, cast(Message, request), expression)
+        request = replace(request, id=self._id(), life=self._lives[peer], requester="", revision=0, lease=lease)
+        self._sent.append(_Sent(peer, expression, request))
+        return Move(peer, cast(Message, request), expression)
 
-    def _again(self, who: int, now: Seconds) -> Deed:
+    def _repeat(self, peer: int, now: Seconds) -> Move:
         """Send a request again: perhaps as another peer, on another key, with another revision, or in a new life."""
         if not self._sent:
-            return self._ask(who, now)
+            return self._ask(peer, now)
         sent = self._chance.choice(self._sent)
         request = sent.request
         if happens(self._chance, 0.4):
@@ -94,20 +96,21 @@ class Schemer:
             other = self._request(type(request), now)
             request = replace(other, id=request.id, life=request.life, requester="", revision=request.revision)
         expression = sent.expression if happens(self._chance, 0.9) else self._chance.choice(tuple(COMMANDS))
-        return Deed(sent.who if happens(self._chance, 0.8) else who, cast(Message, request), expression)
+        return Move(sent.peer if happens(self._chance, 0.8) else peer, cast(Message, request), expression)
 
-    def _cancel(self, who: int, now: Seconds) -> Deed:
+    def _cancel(self, peer: int, now: Seconds) -> Move:
         """Cancel a request of any peer, or one that was never made."""
         if self._sent and happens(self._chance, 0.7):
             sent = self._chance.choice(self._sent)
             server, id, kind = keys.server_of(sent.expression), sent.request.id, kind_of(sent.request)
-            life, who = sent.request.life, sent.who
+            life, peer = sent.request.life, sent.peer
         else:
-            server, id, kind, life = self._chance.choice(keys.SERVICES), self._id(), "perform_block", self._lives[who]
+            server, id = self._chance.choice(keys.SERVICES), self._id()
+            kind, life = "perform_block", self._lives[peer]
         of = self._chance.choice((kind, kind, kind, "", "inhibit", "nothing"))
-        return Deed(who, Cancel(id=id, life=life, of=of, reason="why not"), keys.cancel(server))
+        return Move(peer, Cancel(id=id, life=life, of=of, reason="why not"), keys.cancel(server))
 
-    def _keep(self, who: int, now: Seconds) -> Deed:
+    def _keep_alive(self, peer: int, now: Seconds) -> Move:
         """Renew requests, some with a kind, revision or authority that does not exist."""
         requests = [each.request for each in self._sent if happens(self._chance, 0.5)][:4]
         kept = [
@@ -124,11 +127,11 @@ class Schemer:
         ]
         clock = self._chance.choice(("loop", "loop", "sundial"))
         at = Stamp(clock, now + self._chance.choice((0.0, -5.0, 1e9, 1e308)))
-        life = self._chance.choice((self._lives[who], *[request.life for request in requests]))
+        life = self._chance.choice((self._lives[peer], *[request.life for request in requests]))
         server = self._chance.choice(keys.SERVICES)
-        return Deed(who, KeepAlive(live=tuple(kept), at=at, life=life), keys.keep_alive(server))
+        return Move(peer, KeepAlive(live=tuple(kept), at=at, life=life), keys.keep_alive(server))
 
-    def _answer(self, who: int, now: Seconds) -> Deed:
+    def _answer(self, peer: int, now: Seconds) -> Move:
         """Answer requests in the name of a server."""
         at = Stamp("loop", now)
         fault = Fault(reason="because I say so")
@@ -145,11 +148,11 @@ class Schemer:
             life=self._word("life"),
             kind=self._chance.choice(("perform_block", "perform_behavior", "perform_fragment", "request_event", "")),
         )
-        return Deed(who, cast(Message, answer), keys.request_state(self._chance.choice((*keys.SERVICES, "nobody"))))
+        return Move(peer, cast(Message, answer), keys.request_state(self._chance.choice((*keys.SERVICES, "nobody"))))
 
-    def _new_life(self, who: int, now: Seconds) -> Deed:
-        self._lives[who] = self._chance.choice(("", "life-1", f"life-{now:.3f}"))
-        return Deed(who)
+    def _new_life(self, peer: int, now: Seconds) -> Move:
+        self._lives[peer] = self._chance.choice(("", "life-1", f"life-{now:.3f}"))
+        return Move(peer)
 
     # -- what is asked for ----------------------------------------------------------------------------------------
 
@@ -178,12 +181,12 @@ class Schemer:
         if kind is Inhibit:
             target = chance.choice(("", *self._entities))
             return Inhibit(id="", mode=chance.choice(("release", "hold", "target")), target=target, ttl=2.0)
-        made = self._typed.message(now, kind.__name__)
+        made = self._messages.message(now, kind.__name__)
         assert isinstance(made, Request)
         return made
 
 
-DEEDS: Sequence[Callable[[Schemer, int, Seconds], Deed]] = (
-    *(Schemer._ask,) * 5, *(Schemer._again,) * 4, *(Schemer._cancel,) * 3, Schemer._keep, *(Schemer._answer,) * 2,
-    Schemer._new_life,
+MOVES: Sequence[Callable[[Schemer, int, Seconds], Move]] = (
+    *(Schemer._ask,) * 5, *(Schemer._repeat,) * 4, *(Schemer._cancel,) * 3, Schemer._keep_alive,
+    *(Schemer._answer,) * 2, Schemer._new_life,
 )  # fmt: skip

@@ -27,14 +27,14 @@ from engage_hri.schemas.world import World
 from engage_hri.services.bus.interface import LOG, Hub, Received
 from engage_hri.services.bus.memory import MemoryBus, MemoryHub
 from engage_hri.services.bus.payloads import read_payload
-from engage_hri.services.hostile.audit import REFUSED, Book, Entry
+from engage_hri.services.hostile.audit import REFUSED, Audit, Entry
 from engage_hri.services.hostile.payloads import Payload, Payloads
-from engage_hri.services.hostile.schemes import Deed, Schemer
+from engage_hri.services.hostile.schemes import Move, Schemer
 from engage_hri.services.hostile.service import NAME as BODY
 from engage_hri.services.hostile.service import LyingBody
-from engage_hri.services.hostile.typed import Typed, Words
+from engage_hri.services.hostile.typed import RandomMessages, Words
 from engage_hri.services.hostile.visitor import NAME as VISITOR
-from engage_hri.services.hostile.visitor import Visitor, guest
+from engage_hri.services.hostile.visitor import Visitor, client_fault
 from engage_hri.services.requests.ends import Requester
 from engage_hri.services.runtime.service import Service, serve
 from engage_hri.services.runtime.virtual_time import Deadlock, TimeRanOut, VirtualTimeLoop
@@ -48,7 +48,7 @@ QUIET: Seconds = 10.0
 """Time at the end of `SETTLE` in which no service may mention old requests any more."""
 LIMIT: Seconds = 3600.0
 PEERS = 2
-TOLD = 5
+MOST_NAMED = 5
 """Most mistakes of one kind that a report names."""
 
 
@@ -95,12 +95,12 @@ async def trial(attack: Attack, services: Mapping[str, Service], client: Client 
     return await _Trial(attack, services, client).judged()
 
 
-class _Tapped(MemoryHub):
+class _AuditedHub(MemoryHub):
     """A memory bus that has each message audited."""
 
     def __init__(self, services: frozenset[str]) -> None:
         super().__init__()
-        self.book = Book()
+        self.audit = Audit()
         self.words = Words()
         self._services = services
 
@@ -111,11 +111,11 @@ class _Tapped(MemoryHub):
         arrives = server in self.alive and not self._is_cut(sender, server)
         is_foreign = sender not in self._services
         now = self._loop.time()
-        self.book.hear(key, message, sender, received.life, now, arrives=arrives, is_foreign=is_foreign)
+        self.audit.hear(key, message, sender, received.life, now, arrives=arrives, is_foreign=is_foreign)
         super()._pass_on(sender, received)
 
 
-class _Log(logging.Handler):
+class _FailureLog(logging.Handler):
     """Collects the tracebacks of contained failures."""
 
     def __init__(self) -> None:
@@ -131,7 +131,7 @@ class _Trial:
         self.attack = attack
         self.client = client
         self.services = dict(services)
-        self.hub = _Tapped(frozenset((*services, BODY, VISITOR)))
+        self.hub = _AuditedHub(frozenset((*services, BODY, VISITOR)))
         self.counts: Counter[str] = Counter()
         self.wrong: list[str] = []
         self.failures: list[str] = []
@@ -146,7 +146,7 @@ class _Trial:
     # -- from beginning to end ------------------------------------------------------------------------------------
 
     async def judged(self) -> Report:
-        before, log = asyncio.all_tasks(), _Log()
+        before, log = asyncio.all_tasks(), _FailureLog()
         loop = asyncio.get_running_loop()
         LOG.addHandler(log)
         propagates, LOG.propagate = LOG.propagate, False
@@ -178,13 +178,13 @@ class _Trial:
             bus.declare_alive()
             clients = [] if self.client is None else [asyncio.ensure_future(self.client(self.hub))]
             async with asyncio.TaskGroup() as group:
-                for deeds in self._deeds(visitor, bus, requests):
-                    group.create_task(deeds)
+                for part in self._parts(visitor, bus, requests):
+                    group.create_task(part)
             await self._end_attack()
             await asyncio.sleep(SETTLE - QUIET)
             quiet_since = bus.now()
             for client in clients:
-                self._note("clients that failed", list(filter(None, [await guest(client, QUIET, SETTLE)])))
+                self._note("clients that failed", list(filter(None, [await client_fault(client, QUIET, SETTLE)])))
             await asyncio.sleep(QUIET)
             await self._judge(bus, visitor, quiet_since)
         await bus.leave()
@@ -193,19 +193,20 @@ class _Trial:
         for name in self.services:
             await self._stop(name)
 
-    def _deeds(self, visitor: Visitor, bus: MemoryBus, requests: Requester) -> list[Any]:
+    def _parts(self, visitor: Visitor, bus: MemoryBus, requests: Requester) -> list[Any]:
         attack = self.attack
-        typed = Typed(self.chance("typed"), self.hub.words)
-        deeds: list[Any] = []
+        messages = RandomMessages(self.chance("typed"), self.hub.words)
+        parts: list[Any] = []
         if "realizer" in self.services:
-            deeds.append(visitor.visit(bus, requests, attack.seconds))
+            parts.append(visitor.visit(bus, requests, attack.seconds))
         if "messages" in attack.kinds:
-            deeds.append(self._send_messages(Payloads(self.chance("payloads"), typed, self.entities)))
+            parts.append(self._send_messages(Payloads(self.chance("payloads"), messages, self.entities)))
         if "requests" in attack.kinds:
-            deeds.append(self._scheme(Schemer(self.chance("schemes"), typed, self.hub.words, self.entities, PEERS)))
+            schemer = Schemer(self.chance("schemes"), messages, self.hub.words, self.entities, PEERS)
+            parts.append(self._scheme(schemer))
         if "body" in attack.kinds:
-            deeds.append(self._cut())
-        return deeds
+            parts.append(self._cut())
+        return parts
 
     # -- services -------------------------------------------------------------------------------------------------
 
@@ -275,22 +276,22 @@ class _Trial:
             bus.declare_alive()
         return bus
 
-    async def _do(self, deed: Deed) -> None:
-        await asyncio.sleep(deed.delay)
-        peer = self.peers[deed.who]
-        if deed.message is None:
+    async def _do(self, move: Move) -> None:
+        await asyncio.sleep(move.delay)
+        peer = self.peers[move.peer]
+        if move.message is None:
             self.counts["new lives of peers"] += 1
             await peer.leave()
-            self.peers[deed.who] = self._join(deed.who)
+            self.peers[move.peer] = self._join(move.peer)
             return
-        is_command = deed.expression.startswith(f"{keys.PREFIX}/cmd/")
+        is_command = move.expression.startswith(f"{keys.PREFIX}/cmd/")
         self.counts["bad commands" if is_command else "false answers"] += 1
-        key = keys.command(deed.expression, peer.role, peer.name) if is_command else deed.expression
+        key = keys.command(move.expression, peer.role, peer.name) if is_command else move.expression
         try:
-            encode(deed.message)
+            encode(move.message)
         except (OverflowError, ValueError):
             return
-        peer.publish(key, deed.message)
+        peer.publish(key, move.message)
 
     async def _cut(self) -> None:
         """Cut one participant off from all others, or have the body vanish and come back; again and again."""
@@ -309,7 +310,7 @@ class _Trial:
                 self.counts["vanished bodies"] += 1
                 self.hub.kill(BODY)
                 await self._stop(BODY)
-                self.hub.book.restarted(BODY)
+                self.hub.audit.note_restart(BODY)
                 await asyncio.sleep(chance.choice((0.0, 0.5, chance.uniform(0.0, 8.0))))
                 await self._start(BODY)
 
@@ -317,7 +318,7 @@ class _Trial:
         """Heal the bus, and cancel all that the peers have asked for."""
         self.hub.heal()
         await asyncio.sleep(1.0)
-        for entry in self.hub.book.open:
+        for entry in self.hub.audit.open:
             if entry.is_foreign:
                 self._cancel(entry)
 
@@ -332,10 +333,10 @@ class _Trial:
     # -- the verdict ----------------------------------------------------------------------------------------------
 
     async def _judge(self, bus: MemoryBus, visitor: Visitor, quiet_since: Seconds) -> None:
-        book = self.hub.book
-        self.counts["commands"] += book.commands
-        self.counts["answers"] += book.answers
-        self.counts["requests"] += len(book.entries)
+        audit = self.hub.audit
+        self.counts["commands"] += audit.commands
+        self.counts["answers"] += audit.answers
+        self.counts["requests"] += len(audit.entries)
         self.counts["honest requests"] += len(visitor.asked)
         self.counts.update({f"honest: {end}": count for end, count in visitor.ends().items()})
         lies = "body" in self.attack.kinds and not self.attack.own_body
@@ -343,11 +344,11 @@ class _Trial:
         ended = [f"{name}: {_why(task)}" for name, task in self.running.items() if task.done()]
         self._note("services that ended", ended)
         self._note("requests without outcome", visitor.hung)
-        old = [entry for entry in book.open if entry.asked_at < quiet_since and entry.name.server in judged]
-        self._note("pending afterwards", [_told(entry) for entry in old])
-        doubled = [_told(entry) for entry in book.doubled if entry.name.server in judged]
+        old = [entry for entry in audit.open if entry.asked_at < quiet_since and entry.name.server in judged]
+        self._note("pending afterwards", [_described(entry) for entry in old])
+        doubled = [_described(entry) for entry in audit.doubled if entry.name.server in judged]
         self._note("requests with two outcomes", doubled)
-        self._note("still spoken of", [_told(entry) for entry in book.lingering(quiet_since)])
+        self._note("still spoken of", [_described(entry) for entry in audit.lingering(quiet_since)])
         for name in self.services:
             await self._ask_status(bus, name)
 
@@ -362,10 +363,10 @@ class _Trial:
 
     def _note(self, what: str, found: list[str]) -> None:
         self.counts[what] += len(found)
-        self.wrong += [f"{what}: {each}" for each in found[:TOLD]]
+        self.wrong += [f"{what}: {each}" for each in found[:MOST_NAMED]]
 
 
-def _told(entry: Entry) -> str:
+def _described(entry: Entry) -> str:
     name = entry.name
     ends = ", then ".join(_readable(end) for end in entry.ends)
     return f"{name.kind} {name.id!r} of {name.requester!r} ({name.life!r}) at {name.server} {ends}".strip()

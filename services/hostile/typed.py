@@ -25,7 +25,7 @@ NASTY_FLOATS = (
     float("nan"), float("inf"), float("-inf"), 1e308, -1e308, 5e-324, -0.0, 0.0, -1.0, -1e-9, 1e-9, 1e9, 1e16,
 )  # fmt: skip
 NASTY_INTS = (0, -1, 1, 2, 255, 2**31, -(2**31), 2**53 + 1, 2**63 - 1, -(2**63))
-KEPT = 24
+REMEMBERED = 24
 """Number of words remembered for each field."""
 DEEPEST = 5
 NASTINESS = (0.0, 0.05, 0.3, 0.9)
@@ -52,7 +52,7 @@ class Words:
                     self.hear(value, depth + 1)
 
     def add(self, field: str, word: str) -> None:
-        known = self._heard.setdefault(field, deque(maxlen=KEPT))
+        known = self._heard.setdefault(field, deque(maxlen=REMEMBERED))
         if word not in known:
             known.append(word)
 
@@ -66,7 +66,7 @@ KINDS = {kind.cls.__name__: kind for kind in _UNION.types if isinstance(kind, sh
 """Every message that may travel, by the name of its class."""
 
 
-class Typed:
+class RandomMessages:
     """Makes random messages. Each has its own share of nasty fields, which hold what only their type allows."""
 
     def __init__(self, chance: Chance, words: Words) -> None:

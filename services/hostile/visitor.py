@@ -72,7 +72,7 @@ class Visitor:
                 self.asked.append(requests.send(keys.BLOCK, interrupt))
 
 
-async def guest(client: asyncio.Task[None], patience: Seconds, since: Seconds) -> str:
+async def client_fault(client: asyncio.Task[None], patience: Seconds, since: Seconds) -> str:
     """Say what is wrong with how a client under test ended; empty: it ended well, or with an `EngageError`.
 
     patience: seconds that it may still take. since: seconds from the end of the attack until then.

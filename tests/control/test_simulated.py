@@ -350,7 +350,7 @@ async def test_an_instant_that_rounding_puts_behind_its_timer_is_waited_for_once
 
     assert bell.now() < almost
     assert bell.is_past(almost)
-    await bell.heard(almost)
+    await bell.wait(almost)
 
 
 async def test_words_wait_for_the_word_that_an_aborted_utterance_ends_with() -> None:

@@ -14,7 +14,7 @@ from engage_hri.services.control.torso.motion import Leg, Motion, Path
 from engage_hri.services.control.torso.runs import Run
 from engage_hri.services.control.torso.tracks import Track
 
-NOTICED = radians(0.5)
+NOTICEABLE = radians(0.5)
 """Radians: a target that moves less does not move the head."""
 SHORTEST: Seconds = 0.1
 """Least time that is given to catch up with a target."""
@@ -24,14 +24,14 @@ def is_shift(behavior: BlockBehavior) -> bool:
     return isinstance(behavior, GazeShift | HeadDirectionShift)
 
 
-def eyes_on(behavior: BlockBehavior | None) -> str:
+def eye_target(behavior: BlockBehavior | None) -> str:
     """Id of the entity on the gaze axis once the motion is done; empty: none, as with an offset."""
     if isinstance(behavior, Gaze | GazeShift) and behavior.offset_angle and behavior.offset_direction:
         return ""
     return behavior.target if isinstance(behavior, Gaze | GazeShift | HeadDirectionShift) else ""
 
 
-class EyeTarget:
+class Fixation:
     """The base gaze and the fixation: the entity that the eyes rest on, and the instant from which they do.
 
     The instant of a fixation is known in advance, since the motion that leads to it is.
@@ -46,7 +46,7 @@ class EyeTarget:
     @property
     def entity(self) -> str:
         """Id of the entity of the base gaze; empty: none."""
-        return eyes_on(self.base)
+        return eye_target(self.base)
 
     def shift(self, behavior: BlockBehavior, course: Course) -> None:
         self.base, self.angles = behavior, course.legs[-1].goal
@@ -55,11 +55,11 @@ class EyeTarget:
         """Make a direction the base gaze, without an entity."""
         self.base, self.angles = None, angles
 
-    def update(self, scene: Situation) -> None:
+    def update(self, situation: Situation) -> None:
         """Turn the base after its entity; the last direction stays when it is gone or out of view."""
         if self.base is not None:
             with suppress(Impossible):
-                self.angles = choreography.plan(self.base, scene).legs[-1].goal
+                self.angles = choreography.plan(self.base, situation).legs[-1].goal
 
     def fixated(self, now: Seconds) -> str:
         """Id of the entity that the eyes rest on; empty: none."""
@@ -76,16 +76,16 @@ class EyeTarget:
         marks, motion = run.motion.path.marks, run.motion
         if isinstance(run.behavior, Gaze):
             if run.awaits("stroke"):
-                self.expect(eyes_on(run.behavior), motion.crossing(marks["stroke"]), now)
+                self.expect(eye_target(run.behavior), motion.crossing(marks["stroke"]), now)
             elif not run.awaits("relax"):
                 self.expect(self.entity, motion.crossing(marks["end"]), now)
         elif isinstance(run.behavior, GazeShift | HeadDirectionShift) and run.awaits("end"):
-            self.expect(eyes_on(run.behavior), motion.crossing(marks["end"]), now)
+            self.expect(eye_target(run.behavior), motion.crossing(marks["end"]), now)
 
 
 def turn(track: Track, goal: tuple[float, ...], now: Seconds) -> None:
     """Turn the head to `goal` if it is noticeably elsewhere than where the head goes now."""
-    if apart(goal, tuple(track.motion.at(inf).q)):
+    if differ(goal, tuple(track.motion.at(inf).q)):
         track.return_to(goal, now)
 
 
@@ -106,7 +106,7 @@ def retargeted(run: Run, course: Course, track: Track, now: Seconds) -> Path | N
         return None
     else:
         legs, goal, old = course.legs[-1:], course.legs[-1].goal, run.course.legs[-1].goal
-    if not apart(goal, old):
+    if not differ(goal, old):
         return None
     left = run.motion.path.after(run.motion.s(now))
     seconds = max(left[0].seconds if left else 0.0, SHORTEST)
@@ -114,8 +114,8 @@ def retargeted(run: Run, course: Course, track: Track, now: Seconds) -> Path | N
     return Path(track.at(now), run.with_faults(legs), tracks.LIMITS["head"])
 
 
-def apart(one: tuple[float, ...], other: tuple[float, ...]) -> bool:
-    return any(abs(a - b) > NOTICED for a, b in zip(one, other, strict=True))
+def differ(one: tuple[float, ...], other: tuple[float, ...]) -> bool:
+    return any(abs(a - b) > NOTICEABLE for a, b in zip(one, other, strict=True))
 
 
 def _target(angles: Mapping[str, float]) -> tuple[float, ...]:

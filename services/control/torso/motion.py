@@ -114,8 +114,8 @@ class Path:
         segment = self._segment(s)
         return JointMotion(*_evaluated(segment.coefficients, min(max(s - segment.start, 0.0), segment.seconds)))
 
-    def after(self, s: Seconds, untold: Collection[str] = ()) -> tuple[Leg, ...]:
-        """Legs that are left at s, with the sync points beyond s. Those in `untold` that are not come at once."""
+    def after(self, s: Seconds, unreported: Collection[str] = ()) -> tuple[Leg, ...]:
+        """Legs that are left at s, with the sync points beyond s. Those in `unreported` that are not come at once."""
         index = max((i for i, start in enumerate(self._leg_starts) if start <= s + 1e-12), default=0)
         ends = [*self._leg_starts[1:], self.length]
         legs = []
@@ -130,7 +130,7 @@ class Path:
                 if self.marks[sync] > s + 1e-12
             )
             legs.append(Leg(goal=leg.goal, velocity=leg.velocity, seconds=left, marks=marks))
-        missed = tuple([(sync, 0.0) for sync in self.marks if sync in untold and self.marks[sync] <= s + 1e-12])
+        missed = tuple([(sync, 0.0) for sync in self.marks if sync in unreported and self.marks[sync] <= s + 1e-12])
         if missed:
             first = legs[0] if legs else Leg(goal=self.legs[-1].goal, seconds=0.0)
             legs[:1] = [replace(first, marks=(*missed, *first.marks))]
@@ -255,7 +255,7 @@ class Motion:
         # Where nothing moves yet the rate may jump.
         self._replan(now, s, self.cruise if self.path.at(s).at_rest else rate)
 
-    def come(self, s: Seconds, at: Seconds, now: Seconds, fastest: float) -> None:
+    def reach(self, s: Seconds, at: Seconds, now: Seconds, fastest: float) -> None:
         """Change the rate such that `s` is reached at `at`, or as near to that as between `SLOWEST` and `fastest`."""
         here, rate = self.s(now), self.rate(now)
         left, time, change = s - here, at - now, self.path.gentlest_brake

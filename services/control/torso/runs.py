@@ -52,14 +52,14 @@ class Run:
         self.stall: Stall | None = variability.stall(deviations, real, behavior)
         if self.stall is not None:
             self._expect(STALL, self.stall.before)
-        if variability.overheats(deviations, real):
+        if variability.overheated_part(deviations, real):
             self._expect(OVERHEAT, "stroke" if self.awaits("stroke") else "end")
 
     def awaits(self, sync: str) -> bool:
         return any(point.sync == sync for point in self.pending)
 
     @property
-    def left(self) -> list[str]:
+    def unreported(self) -> list[str]:
         """Sync points still to be reported."""
         return [point.sync for point in self.pending if point.sync not in (STALL, OVERHEAT)]
 
@@ -95,7 +95,7 @@ class Run:
             self.motion.run_at(self.cruise, now)
         else:
             # A slow motor is slow at its fastest, too; up to that rate the body makes up for it.
-            self.motion.come(marks[aim[0]], aim[1], now, self.cruise * self.motion.path.fastest)
+            self.motion.reach(marks[aim[0]], aim[1], now, self.cruise * self.motion.path.fastest)
         return True
 
     def _aims(self, now: Seconds) -> list[tuple[str, Seconds]]:

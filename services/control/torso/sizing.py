@@ -14,7 +14,7 @@ from engage_hri.services.control.torso.motion import Leg, Motion, Path
 
 SIZES = (0.9, 0.8, 0.7, 0.6, 0.5, 0.4)
 """Shares of the full amplitude, largest first. Anything smaller than the last would not be taken for a gesture."""
-PUNCTUAL: Seconds = 0.001
+LATE: Seconds = 0.001
 """A sync point counts as late if it comes more than this after the instant asked for."""
 
 
@@ -57,11 +57,11 @@ def lateness(motion: Motion, aims: Sequence[tuple[str, Seconds]], now: Seconds, 
     trial.extend(inf, now)
     for sync, at in aims:
         s = trial.path.marks[sync]
-        trial.come(s, at, now, cruise * trial.path.fastest)
+        trial.reach(s, at, now, cruise * trial.path.fastest)
         crossing = trial.crossing(s)
         assert crossing is not None, "nothing limits the trial"
         worst, now = max(worst, crossing - at), max(now, crossing)
-    return worst if worst > PUNCTUAL else 0.0
+    return worst if worst > LATE else 0.0
 
 
 def _reduced(course: Course, motion: Motion, now: Seconds, by: float) -> Path:

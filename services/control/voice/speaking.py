@@ -25,12 +25,12 @@ async def speak(behavior: Speech, authority: MovementAuthority, pace: float = 1.
     try:
         for progress in _score(behavior, utterance):
             while not bell.is_past(begin + progress.at) and authority.revoked is None:
-                await bell.heard(begin + progress.at)
+                await bell.wait(begin + progress.at)
             arrived = at = begin + progress.at
             if isinstance(progress, Reached) and progress.sync in gaps and not authority.covers(progress.sync):
                 yield Arrived(progress.sync, arrived)
                 while authority.revoked is None and not authority.covers(progress.sync):
-                    await bell.heard(inf)
+                    await bell.wait(inf)
                 at = bell.now()
                 begin += at - arrived
             if authority.revoked is not None:
@@ -40,7 +40,7 @@ async def speak(behavior: Speech, authority: MovementAuthority, pace: float = 1.
         for word in utterance.words:
             if authority.revoked is not None and word.start < since < word.end:
                 while not bell.is_past(begin + word.end):
-                    await bell.heard(begin + word.end)
+                    await bell.wait(begin + word.end)
                 yield Spoke(word.text, word.position, begin + word.end)
     finally:
         unwatch()
@@ -55,12 +55,12 @@ async def wait(behavior: Wait, authority: MovementAuthority) -> AsyncGenerator[P
     try:
         yield Reached("start", begin, begin)
         while not bell.is_past(due) and authority.revoked is None:
-            await bell.heard(due)
+            await bell.wait(due)
         left = due
         if authority.revoked is None and not authority.covers("end"):
             yield Arrived("end", due)
             while authority.revoked is None and not authority.covers("end"):
-                await bell.heard(inf)
+                await bell.wait(inf)
             left = bell.now()
         if authority.revoked is None:
             yield Reached("end", left, due)
