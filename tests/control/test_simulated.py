@@ -2,6 +2,7 @@
 
 import asyncio
 import math
+from functools import partial
 
 import msgspec
 import numpy as np
@@ -276,6 +277,23 @@ async def test_taking_one_arm_of_two_sends_the_other_home():
     await one.over()
 
 
+async def test_behaviors_that_go_home_together_end_in_the_order_in_which_they_began():
+    body, ended = body_in(), list[str]()
+    behaviors = (
+        Pointing(id="right", target="near-right", mode="RIGHT_HAND"), Gaze(id="eyes", target="human"),
+        Posture(id="torso", lexeme="LEAN_FORWARD"), Gesture(id="left", lexeme="BEAT", mode="LEFT_HAND"),
+        FaceLexeme(id="face", lexeme="SMILE"), Head(id="nod", lexeme="NOD"),
+    )  # fmt: skip
+    stages = [Stage(body, behavior) for behavior in behaviors]
+    await asyncio.sleep(0.05)
+    for behavior, stage in zip(behaviors, stages, strict=True):
+        stage.authority.watch(partial(ended.append, behavior.id))
+    await body.home()
+
+    assert ended == [behavior.id for behavior in behaviors]
+    await asyncio.gather(*(stage.over() for stage in stages))
+
+
 async def test_a_frozen_arm_stands_still_before_it_relaxes():
     body = body_in()
     stage = Stage(body, Pointing(id="p", target="far-left"), "end")
@@ -343,7 +361,7 @@ def test_no_story_breaks_a_limit_or_leaves_an_arm_in_the_air(story: list[tuple[B
 
 
 async def test_an_instant_that_rounding_puts_behind_its_timer_is_waited_for_once():
-    """A loop runs its timers a nanosecond early; who looked again would find his instant still to come, for ever."""
+    """A loop runs its timers a nanosecond early; looking again, a task would find its instant ahead for ever."""
     bell = Bell()
     await asyncio.sleep(1.0)
     almost = 1.0 + 2**-52

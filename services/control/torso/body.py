@@ -86,7 +86,7 @@ class SimulatedBody(Body):
         going = {part for part in self._tracks if not parts or part.replace("nod", "head") in parts}
         if self._utterance is not None and (not parts or "voice" in parts):
             self._utterance.revoke()
-        for run in {run for part, run in self._runs.items() if part in going}:
+        for run in dict.fromkeys(run for part, run in self._runs.items() if part in going):
             going.update(run.course.parts)
             self._release(run)
             run.authority.revoke()
@@ -187,7 +187,7 @@ class SimulatedBody(Body):
         now = self._loop.time()
         for joint in run.course.joints:
             self._misbelieved.pop(joint, None)
-        for earlier in {self._runs[part] for part in run.course.parts if part in self._runs}:
+        for earlier in dict.fromkeys(self._runs[part] for part in run.course.parts if part in self._runs):
             self._release(earlier)
             earlier.cut(now)
             self._relax(tuple(part for part in earlier.course.parts if part not in run.course.parts))
