@@ -31,9 +31,9 @@ class CollaborationConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fiel
     farewell: Seconds = 15.0
     """Time that the robot waits for the person to leave after its goodbye."""
     piece_reliability: Probability = 0.95
-    """Rmin of the piece to move and of the trapezoid when introduced. Scenario page, after Appendix B."""
+    """Least reliability of a reference to the piece to move, and to the trapezoid when introduced. Scenario page."""
     landmark_reliability: Probability = 0.85
-    """Rmin of a landmark, and of the rectangle when introduced."""
+    """Least reliability of a reference to a landmark, and to the rectangle when introduced."""
 
     def __post_init__(self) -> None:
         times = ("placement", "steady", "patience", "settle", "pause", "thinking", "arrival", "farewell")

@@ -109,7 +109,7 @@ def request(
     piece_reliability: float,
     landmark_reliability: float,
 ) -> tuple[str | PieceMention, ...]:
-    """ "Please move the blue piece so that it is touching the top of the rectangle." """
+    """Word a request, such as "Please move the blue piece so that it is touching the top of the rectangle"."""
     side = SIDE_WORDS.get(wanted.side, wanted.side)
     landmark = name_of(wanted.landmark, table)
     piece = name_of(wanted.piece, table)

@@ -83,7 +83,7 @@ class Manager:
         yield Pause(self.config.arrival)
 
     def say(self, id: str, sentence: Sentence, *, look: bool = True) -> Plan[None]:
-        """A full turn that asks for nothing."""
+        """Say a full turn that asks for nothing."""
         yield Perform(fragment(id, sentence, addressee=self._person, universe=self._universe, look=look))
         yield Pause(self.config.pause)
 

@@ -125,7 +125,7 @@ def estimate(chance: Chance, behavior: BlockBehavior) -> Estimate:
     if what == 3:
         points = (*points[1:], *points[:1])
     shortest = longest = natural
-    if what == 5:  # in no order
+    if what == 5:  # shortest and longest in no order
         shortest, longest = ([chance.uniform(0.0, 2.0) for _ in natural] for _ in range(2))
     phases = [
         Phase(since=since, to=to, shortest=least, natural=seconds, longest=most, hold=to in WAITS)

@@ -28,7 +28,7 @@ TEXT = "Please move the blue piece"
 
 
 def block(chance: Chance, id: str, entities: Sequence[str]) -> Block:
-    """entities: ids of what the world holds."""
+    """Make a block of one to four behaviors. entities: ids of what the world holds."""
     behaviors = tuple(_behavior(chance, f"b{n}", entities) for n in range(1, chance.randrange(2, 6)))
     return Block(
         id=id,

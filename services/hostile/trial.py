@@ -153,7 +153,7 @@ class _Trial:
         loop.set_exception_handler(self._unhandled)
         try:
             async with self.hub:
-                await self._play()
+                await self._run()
         finally:
             LOG.removeHandler(log)
             LOG.propagate = propagates
@@ -165,7 +165,7 @@ class _Trial:
         self._note("contained failures", [_last_line(text) for text in self.failures])
         return Report(attack=self.attack, counts=self.counts, wrong=self.wrong, failures=self.failures)
 
-    async def _play(self) -> None:
+    async def _run(self) -> None:
         if "body" in self.attack.kinds and not self.attack.own_body:
             self.services[BODY] = LyingBody(self.chance("lies")).serve
         for name in self.services:
@@ -203,9 +203,9 @@ class _Trial:
             parts.append(self._send_messages(Payloads(self.chance("payloads"), messages, self.entities)))
         if "requests" in attack.kinds:
             schemer = Schemer(self.chance("schemes"), messages, self.hub.words, self.entities, PEERS)
-            parts.append(self._scheme(schemer))
+            parts.append(self._make_moves(schemer))
         if "body" in attack.kinds:
-            parts.append(self._cut())
+            parts.append(self._disrupt())
         return parts
 
     # -- services -------------------------------------------------------------------------------------------------
@@ -255,19 +255,19 @@ class _Trial:
         except EngageError:
             self.counts["messages that were none"] += 1
         except Exception:
-            pass  # told below
+            pass  # reported below
         try:
             self.hub.inject(payload.key, payload.data, payload.encoding)
         except Exception as error:
             self.failures.append(f"{payload.kind} on {payload.key}\n{''.join(traceback.format_exception(error))}")
 
-    async def _scheme(self, schemer: Schemer) -> None:
+    async def _make_moves(self, schemer: Schemer) -> None:
         chance, loop = self.chance("scheming"), asyncio.get_running_loop()
         self.peers = [self._join(number) for number in range(PEERS)]
         until = loop.time() + self.attack.seconds
         async with asyncio.TaskGroup() as late:
             while loop.time() < until:
-                late.create_task(self._do(schemer.next(loop.time())))
+                late.create_task(self._make(schemer.next(loop.time())))
                 await asyncio.sleep(chance.choice((0.0, chance.uniform(0.0, 0.2), chance.uniform(0.0, 2.0))))
 
     def _join(self, number: int) -> MemoryBus:
@@ -276,7 +276,7 @@ class _Trial:
             bus.declare_alive()
         return bus
 
-    async def _do(self, move: Move) -> None:
+    async def _make(self, move: Move) -> None:
         await asyncio.sleep(move.delay)
         peer = self.peers[move.peer]
         if move.message is None:
@@ -293,7 +293,7 @@ class _Trial:
             return
         peer.publish(key, move.message)
 
-    async def _cut(self) -> None:
+    async def _disrupt(self) -> None:
         """Cut one participant off from all others, or have the body vanish and come back; again and again."""
         chance, loop = self.chance("cuts"), asyncio.get_running_loop()
         until = loop.time() + self.attack.seconds
@@ -341,7 +341,7 @@ class _Trial:
         self.counts.update({f"honest: {end}": count for end, count in visitor.ends().items()})
         lies = "body" in self.attack.kinds and not self.attack.own_body
         judged = set(keys.SERVICES) & set(self.services) - ({BODY} if lies else set())
-        ended = [f"{name}: {_why(task)}" for name, task in self.running.items() if task.done()]
+        ended = [f"{name}: {_end_of(task)}" for name, task in self.running.items() if task.done()]
         self._note("services that ended", ended)
         self._note("requests without outcome", visitor.hung)
         old = [entry for entry in audit.open if entry.asked_at < quiet_since and entry.name.server in judged]
@@ -376,7 +376,7 @@ def _readable(end: bytes) -> str:
     return "refused" if end == REFUSED else encode_json(decode(end)).decode()[:300]
 
 
-def _why(task: "asyncio.Task[None]") -> str:
+def _end_of(task: "asyncio.Task[None]") -> str:
     return "cancelled" if task.cancelled() else repr(task.exception())
 
 

@@ -63,7 +63,7 @@ class Words:
 _UNION = shapes.type_info(Message)
 assert isinstance(_UNION, shapes.UnionType)
 KINDS = {kind.cls.__name__: kind for kind in _UNION.types if isinstance(kind, shapes.StructType)}
-"""Every message that may travel, by the name of its class."""
+"""Types of all messages that may travel on the bus, by the name of their class."""
 
 
 class RandomMessages:

@@ -1,4 +1,4 @@
-"""An honest client in bad company: it asks for blocks and fragments, changes its mind, and counts how each ends."""
+"""An honest client during an attack: it asks for blocks and fragments, cancels some, and counts how each ends."""
 
 import asyncio
 from collections import Counter

@@ -60,11 +60,11 @@ def plan(behavior: BlockBehavior, situation: Situation) -> Course:
     """Plan the course of `behavior` in `situation`. Speech and wait move nothing and have none. Raises Impossible."""
     match behavior:
         case Gaze(target=target, offset_angle=offset, offset_direction=direction):
-            return _glance(_neck(target, offset, direction, situation), situation)
+            return _glance(_neck_angles(target, offset, direction, situation), situation)
         case GazeShift(target=target, offset_angle=offset, offset_direction=direction):
-            return _shift(("neck_yaw", "neck_pitch"), _neck(target, offset, direction, situation), situation)
+            return _shift(("neck_yaw", "neck_pitch"), _neck_angles(target, offset, direction, situation), situation)
         case HeadDirectionShift(target=target):
-            return _shift(("neck_yaw", "neck_pitch"), _neck(target, 0.0, "", situation), situation)
+            return _shift(("neck_yaw", "neck_pitch"), _neck_angles(target, 0.0, "", situation), situation)
         case Pointing(target=target, mode=mode):
             return _point(_entity(target, situation.world), mode, situation)
         case Gesture(lexeme=lexeme, mode=mode):
@@ -72,24 +72,24 @@ def plan(behavior: BlockBehavior, situation: Situation) -> Course:
         case Head(lexeme=lexeme, repetition=repetition, amount=amount):
             return _nod(lexeme.upper(), repetition, amount)
         case Face(amount=amount):
-            return _excursion("face", _face("RAISE_BROWS", amount), situation)
+            return _excursion("face", _face_angles("RAISE_BROWS", amount), situation)
         case FaceLexeme(lexeme=lexeme, amount=amount):
-            return _excursion("face", _face(lexeme, amount), situation)
+            return _excursion("face", _face_angles(lexeme, amount), situation)
         case FaceFacs(au=unit, amount=amount):
-            return _excursion("face", _face(_unit(unit), amount), situation)
+            return _excursion("face", _face_angles(_action_unit(unit), amount), situation)
         case FaceShift(lexeme=lexeme, au=unit, amount=amount):
-            return _shift(kinematics.joints_of("face"), _face(lexeme or _unit(unit), amount), situation)
+            return _shift(kinematics.joints_of("face"), _face_angles(lexeme or _action_unit(unit), amount), situation)
         case Posture(lexeme=lexeme):
-            return _excursion("torso", _torso(lexeme), situation)
+            return _excursion("torso", _torso_angles(lexeme), situation)
         case PostureShift(lexeme=lexeme) | Pose(lexeme=lexeme):
-            return _shift(("torso_turn", "torso_lean"), _torso(lexeme), situation)
+            return _shift(("torso_turn", "torso_lean"), _torso_angles(lexeme), situation)
         case _:
             raise Impossible("BEHAVIOR_TYPE_NOT_SUPPORTED", f"this body has no {type(behavior).__name__.lower()}")
 
 
 def look(target: str, situation: Situation) -> tuple[float, float]:
     """Neck angles that look at an entity, as near as the joints come. Raises Impossible if there is none."""
-    return _neck(target, 0.0, "", situation)
+    return _neck_angles(target, 0.0, "", situation)
 
 
 def turning_time(start: tuple[float, ...], goal: tuple[float, ...]) -> Seconds:
@@ -110,7 +110,7 @@ def _entity(target: str, world: World) -> Entity:
     return entity
 
 
-def _neck(target: str, offset: Degrees, direction: str, situation: Situation) -> tuple[float, float]:
+def _neck_angles(target: str, offset: Degrees, direction: str, situation: Situation) -> tuple[float, float]:
     entity = _entity(target, situation.world)
     try:
         yaw, pitch = kinematics.look_at(entity.position, situation.pose, NOD_RESERVE)
@@ -121,8 +121,8 @@ def _neck(target: str, offset: Degrees, direction: str, situation: Situation) ->
         "UPLEFT": (-1, 1), "DOWNRIGHT": (1, -1), "DOWNLEFT": (-1, -1),
     }.get(direction.upper(), (0, 0))  # fmt: skip
     return (
-        _within("neck_yaw", yaw - right * radians(offset), NOD_RESERVE),
-        _within("neck_pitch", pitch + up * radians(offset), NOD_RESERVE),
+        _clamped("neck_yaw", yaw - right * radians(offset), NOD_RESERVE),
+        _clamped("neck_pitch", pitch + up * radians(offset), NOD_RESERVE),
     )
 
 
@@ -141,9 +141,9 @@ def _glance(goal: tuple[float, float], situation: Situation) -> Course:
     settle = SETTLE if any(drift) else 0.0
     before = tuple(angle - speed * settle for angle, speed in zip(goal, drift, strict=True))
     legs = (
-        Leg(goal=before, velocity=drift, seconds=out, marks=(*_at(0.0, *SYNC_POINTS[:3]), ("stroke", 1.0))),
-        Leg(goal=goal, velocity=drift, seconds=settle, marks=_at(1.0, "stroke_end", "relax")),
-        Leg(goal=base, seconds=back, marks=_at(1.0, "end")),
+        Leg(goal=before, velocity=drift, seconds=out, marks=(*_marks(0.0, *SYNC_POINTS[:3]), ("stroke", 1.0))),
+        Leg(goal=goal, velocity=drift, seconds=settle, marks=_marks(1.0, "stroke_end", "relax")),
+        Leg(goal=base, seconds=back, marks=_marks(1.0, "end")),
     )
     ray = kinematics.gaze({**situation.pose, **dict(zip(joints, goal, strict=True))})
     return _course(("head",), joints, legs, _held_on_target("stroke"), goal, situation, ray)
@@ -166,7 +166,7 @@ def _point(entity: Entity, mode: str | None, situation: Situation) -> Course:
         if math.dist(zone.center, entity.position) <= zone.radius:
             raise Impossible("CANNOT_CREATE_BEHAVIOR", f"{entity.id!r} is in a no-point zone")
     sides = _sides(mode, lambda side: math.dist(kinematics.SHOULDER[side], entity.position), situation)
-    if len(sides) == 2 and mode == "BOTH_HANDS":
+    if mode == "BOTH_HANDS":
         raise Impossible("CANNOT_CREATE_BEHAVIOR", "pointing takes one hand")
     reasons = []
     for side in sides:
@@ -189,8 +189,8 @@ def _point_with(side: Side, aim: kinematics.ArmAim, situation: Situation) -> Cou
         max(elbow + 0.4 * (here[2] - elbow), elbow + radians(18)),
     )
     slide = tuple((b - a) / SLIDE for a, b in zip(aim.stroke, aim.held, strict=True))
-    raising = _time(here, ready, 0.25, 150.0)
-    stroke = _time(ready, aim.stroke, 0.4, 120.0)
+    raising = _arm_time(here, ready, 0.25, 150.0)
+    stroke = _arm_time(ready, aim.stroke, 0.4, 120.0)
     back = max(0.4, return_time(aim.held, home))
     through = tuple(
         0.35 * ((b - a) / raising + (c - b) / stroke) for a, b, c in zip(here, ready, aim.stroke, strict=True)
@@ -198,7 +198,7 @@ def _point_with(side: Side, aim: kinematics.ArmAim, situation: Situation) -> Cou
     legs = (
         Leg(goal=ready, velocity=through, seconds=raising, marks=(("start", 0.0), ("ready", 1.0))),
         Leg(goal=aim.stroke, velocity=slide, seconds=stroke, marks=(("stroke_start", 0.1 / stroke), ("stroke", 1.0))),
-        Leg(goal=aim.held, velocity=slide, seconds=SLIDE, marks=_at(1.0, "stroke_end")),
+        Leg(goal=aim.held, velocity=slide, seconds=SLIDE, marks=_marks(1.0, "stroke_end")),
         Leg(goal=home, seconds=back, marks=(("relax", 0.1 / back), ("end", 1.0))),
     )
     ray = kinematics.arm({**situation.pose, **dict(zip(joints, aim.held, strict=True))}, side)
@@ -219,8 +219,10 @@ def _gesture(lexeme: str, mode: str | None, situation: Situation) -> Course:
     here, home = _angles(joints, situation.pose), _angles(joints, situation.rest)
     stops = (here, ready, stroke, after, home)
     # The stroke is slow enough to take no longer from rest, after a hold: estimates are right with and without one.
-    seconds = (_time(here, ready, 0.3, 130), _time(ready, stroke, 0.36, 100), _time(stroke, after, 0.25, 100),
-               max(0.4, return_time(after, home)))  # fmt: skip
+    seconds = (
+        _arm_time(here, ready, 0.3, 130), _arm_time(ready, stroke, 0.36, 100), _arm_time(stroke, after, 0.25, 100),
+        max(0.4, return_time(after, home)),
+    )  # fmt: skip
     velocities = [
         tuple(
             0.4 * ((b - a) / before + (c - b) / behind)
@@ -232,7 +234,7 @@ def _gesture(lexeme: str, mode: str | None, situation: Situation) -> Course:
         Leg(goal=ready, velocity=velocities[0], seconds=seconds[0], marks=(("start", 0.0), ("ready", 1.0))),
         Leg(goal=stroke, velocity=velocities[1], seconds=seconds[1],
             marks=(("stroke_start", 0.05 / seconds[1]), ("stroke", 1.0))),
-        Leg(goal=after, velocity=velocities[2], seconds=seconds[2], marks=_at(1.0, "stroke_end")),
+        Leg(goal=after, velocity=velocities[2], seconds=seconds[2], marks=_marks(1.0, "stroke_end")),
         Leg(goal=home, seconds=seconds[3], marks=(("relax", 0.1 / seconds[3]), ("end", 1.0))),
     )  # fmt: skip
     parts = tuple(f"{side}_arm" for side in sides)
@@ -259,13 +261,13 @@ def _nod(lexeme: str, repetition: int, amount: float) -> Course:
     strokes = [f"stroke:{number}" for number in range(2, repetition + 1)]
     for stroke in strokes:
         legs.append(Leg(goal=high, velocity=turned(0.0, aside), seconds=again))
-        legs.append(Leg(goal=low, velocity=turned(0.0, -aside), seconds=again, marks=_at(1.0, stroke)))
+        legs.append(Leg(goal=low, velocity=turned(0.0, -aside), seconds=again, marks=_marks(1.0, stroke)))
     legs.append(Leg(goal=turned(-0.25 * size, 0.0), velocity=turned(2.0 * size, aside / 2), seconds=0.25,
-                    marks=_at(1.0, "stroke_end")))  # fmt: skip
+                    marks=_marks(1.0, "stroke_end")))  # fmt: skip
     legs.append(Leg(goal=(0.0, 0.0), seconds=0.3, marks=(("relax", 0.15), ("end", 1.0))))
     return Course(
         parts=("nod",), joints=("neck_yaw", "neck_pitch"), legs=tuple(legs), points=_held_around_stroke(strokes),
-        on_target={}, degrees=math.degrees(size), is_resizable=True,
+        degrees=math.degrees(size), is_resizable=True,
     )  # fmt: skip
 
 
@@ -280,9 +282,9 @@ def _excursion(part: str, goal: tuple[float, ...], situation: Situation) -> Cour
     settle = SETTLE if any(drift) else 0.0
     after = tuple(angle + speed * settle for angle, speed in zip(goal, drift, strict=True))
     legs = (
-        Leg(goal=goal, velocity=drift, seconds=out, marks=(("start", 0.0), *_at(1.0, *SYNC_POINTS[1:4]))),
-        Leg(goal=after, velocity=drift, seconds=settle, marks=_at(1.0, "stroke_end", "relax")),
-        Leg(goal=rest, seconds=back, marks=_at(1.0, "end")),
+        Leg(goal=goal, velocity=drift, seconds=out, marks=(("start", 0.0), *_marks(1.0, *SYNC_POINTS[1:4]))),
+        Leg(goal=after, velocity=drift, seconds=settle, marks=_marks(1.0, "stroke_end", "relax")),
+        Leg(goal=rest, seconds=back, marks=_marks(1.0, "end")),
     )
     return _course((part,), joints, legs, _held_on_target("ready", "stroke_start", "stroke"), goal, situation, None)
 
@@ -304,20 +306,20 @@ def _sideways(part: str, goal: Mapping[str, float]) -> tuple[str, float]:
     return ("mouth_corners" if not goal["mouth_corners"] else "brows", 0.02)
 
 
-def _face(lexeme: str, amount: float) -> tuple[float, ...]:
+def _face_angles(lexeme: str, amount: float) -> tuple[float, ...]:
     if (shape := FACES.get(lexeme.upper())) is None:
         raise Impossible("CANNOT_CREATE_BEHAVIOR", f"no face {lexeme!r}: there are {', '.join(FACES)}")
     return tuple(0.95 * amount * shape.get(joint, 0.0) for joint in kinematics.joints_of("face"))
 
 
-def _unit(number: int) -> str:
+def _action_unit(number: int) -> str:
     if number not in ACTION_UNITS:
         known = ", ".join(map(str, ACTION_UNITS))
         raise Impossible("CANNOT_CREATE_BEHAVIOR", f"no action unit {number}: there are {known}")
     return ACTION_UNITS[number]
 
 
-def _torso(lexeme: str) -> tuple[float, float]:
+def _torso_angles(lexeme: str) -> tuple[float, float]:
     if (angles := POSTURES.get(lexeme.upper())) is None:
         known = ", ".join(filter(None, POSTURES))
         raise Impossible("CANNOT_CREATE_BEHAVIOR", f"no posture {lexeme!r}: there are {known}")
@@ -349,7 +351,7 @@ def _held_around_stroke(strokes: Sequence[str] = ()) -> tuple[CoursePoint, ...]:
     return tuple(CoursePoint(sync, sync if sync in ("stroke_start", "stroke_end") else "") for sync in syncs)
 
 
-def _at(fraction: float, *syncs: str) -> tuple[tuple[str, float], ...]:
+def _marks(fraction: float, *syncs: str) -> tuple[tuple[str, float], ...]:
     return tuple((sync, fraction) for sync in syncs)
 
 
@@ -357,12 +359,12 @@ def _angles(joints: tuple[str, ...], pose: Mapping[str, float]) -> tuple[float, 
     return tuple(pose[joint] for joint in joints)
 
 
-def _within(joint: str, angle: float, reserve: float) -> float:
+def _clamped(joint: str, angle: float, reserve: float) -> float:
     limit = kinematics.LIMIT[joint]
     return min(max(angle, limit.low + reserve), limit.high - reserve)
 
 
-def _time(start: tuple[float, ...], goal: tuple[float, ...], least: Seconds, speed: Degrees) -> Seconds:
+def _arm_time(start: tuple[float, ...], goal: tuple[float, ...], least: Seconds, speed: Degrees) -> Seconds:
     return max(least, 0.15 + max(abs(math.degrees(b - a)) for a, b in zip(start, goal, strict=True)) / speed)
 
 

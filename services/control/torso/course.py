@@ -12,7 +12,7 @@ from engage_hri.services.control.torso.motion import Leg
 
 
 class Impossible(Exception):
-    """The body cannot do a behavior: the warning it deserves and the reason."""
+    """The body cannot do a behavior. kind: of the warning that says so. reason: in words."""
 
     def __init__(self, kind: WarningKind, reason: str) -> None:
         super().__init__(reason)

@@ -49,11 +49,11 @@ def _joint(
     return limit, radians(home)
 
 
-def _face(name: str, low: float) -> tuple[JointLimit, float]:
+def _face_joint(name: str, low: float) -> tuple[JointLimit, float]:
     return JointLimit(joint=name, part="face", low=low, high=1.0, speed=8.0, acceleration=120.0), 0.0
 
 
-def _arm(side: Side, inward: int) -> list[tuple[JointLimit, float]]:
+def _arm_joints(side: Side, inward: int) -> list[tuple[JointLimit, float]]:
     """Joints of one arm with their home angles. inward: sign of a yaw towards the middle."""
     low, high = sorted((-45.0 * inward, 80.0 * inward))
     return [
@@ -68,12 +68,12 @@ _TABLE = [
     _joint("torso_lean", "torso", -15, 25, 60, 300),
     _joint("neck_yaw", "head", -85, 85, 400, 6000),
     _joint("neck_pitch", "head", -80, 40, 400, 6000),
-    *_arm("left", inward=-1),
-    *_arm("right", inward=1),
-    _face("brows", -1.0),
-    _face("lids", 0.0),
-    _face("mouth_corners", -1.0),
-    _face("mouth", 0.0),
+    *_arm_joints("left", inward=-1),
+    *_arm_joints("right", inward=1),
+    _face_joint("brows", -1.0),
+    _face_joint("lids", 0.0),
+    _face_joint("mouth_corners", -1.0),
+    _face_joint("mouth", 0.0),
 ]
 JOINTS: tuple[JointLimit, ...] = tuple(limit for limit, _ in _TABLE)
 HOME: Mapping[str, float] = {limit.joint: home for limit, home in _TABLE}
@@ -102,7 +102,7 @@ def pose_message(pose: Pose) -> BodyPose:
 
 
 def gaze(pose: Pose) -> Ray:
-    """Gaze axis from between the eyes."""
+    """Gaze as a ray: from between the eyes along their axis."""
     yaw, pitch = pose["neck_yaw"], pose["neck_pitch"]
     ahead = (cos(pitch) * cos(yaw), cos(pitch) * sin(yaw), sin(pitch))
     up = (-sin(pitch) * cos(yaw), -sin(pitch) * sin(yaw), cos(pitch))
@@ -113,8 +113,8 @@ def gaze(pose: Pose) -> Ray:
 def arm(pose: Pose, side: Side) -> Ray:
     """Forearm as a ray: from the elbow, tip at the hand."""
     yaw, pitch = pose[f"{side}_shoulder_yaw"], pose[f"{side}_shoulder_pitch"]
-    elbow = _add(SHOULDER[side], _scale(_hanging(yaw, pitch), UPPER_ARM))
-    axis = _hanging(yaw, pitch + pose[f"{side}_elbow"])
+    elbow = _add(SHOULDER[side], _scale(_arm_direction(yaw, pitch), UPPER_ARM))
+    axis = _arm_direction(yaw, pitch + pose[f"{side}_elbow"])
     hand = _add(elbow, _scale(axis, FOREARM))
     return Ray(origin=_to_world(elbow, pose), axis=_turned(axis, pose), tip=_to_world(hand, pose))
 
@@ -206,7 +206,7 @@ def _edge_crossing(forearm: Ray) -> Vector:
     return (TABLE_EDGE, y0 + part * (y1 - y0), z0 + part * (z1 - z0))
 
 
-def _hanging(yaw: Radians, angle: Radians) -> Vector:
+def _arm_direction(yaw: Radians, angle: Radians) -> Vector:
     """Unit vector at `angle` from straight down, forward in the vertical plane at `yaw`."""
     return (sin(angle) * cos(yaw), sin(angle) * sin(yaw), -cos(angle))
 

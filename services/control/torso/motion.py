@@ -65,10 +65,12 @@ class Leg(Struct, frozen=True, kw_only=True):
 
 
 class _Segment(Struct, frozen=True):
+    """One leg of a path as a polynomial. start: in seconds at natural speed."""
+
     start: Seconds
     seconds: Seconds
     coefficients: Array
-    """6 x joints, of ascending powers of the time since `start`."""
+    """Array of 6 x joints, for ascending powers of the time since `start`."""
 
 
 class Path:
@@ -86,7 +88,7 @@ class Path:
         self._peaks: list[tuple[float, float]] = []
         self._leg_starts: list[Seconds] = []
         self.length = 0.0
-        state = self._limits.soften(start)
+        state = self._limits.softened(start)
         for leg in self.legs:
             state = self._append(leg, state)
 
@@ -108,7 +110,7 @@ class Path:
         return end
 
     def at(self, s: Seconds) -> JointMotion:
-        """q, q' and q'' at s."""
+        """Position q at s, and its derivatives q' and q''."""
         if not self._segments:
             return resting(self.legs[-1].goal if self.legs else self.start.q)
         segment = self._segment(s)
@@ -173,7 +175,7 @@ class _Limits:
         self.acceleration = np.array([limit.acceleration for limit in limits])
         self.brake_anywhere = float(np.min((1 - SHARE) * self.acceleration / self.speed)) if len(limits) else 1.0
 
-    def soften(self, state: JointMotion) -> JointMotion:
+    def softened(self, state: JointMotion) -> JointMotion:
         """The state with an acceleration that a path may have."""
         bound = MARGIN * SHARE * self.acceleration
         return JointMotion(state.q, state.v, np.clip(state.a, -bound, bound))
@@ -182,7 +184,7 @@ class _Limits:
         """The quintic between two states that takes `seconds`, or as near to it as keeps the limits."""
         best: _Connection | None = None
         for stretch in _STRETCHES:
-            connection = self._judged(_quintic(start, end, seconds * stretch), seconds * stretch)
+            connection = self._with_peaks(_quintic(start, end, seconds * stretch), seconds * stretch)
             if connection.excess <= 0.0:
                 return connection
             if best is None or connection.excess < best.excess:
@@ -193,7 +195,7 @@ class _Limits:
     def permits_brake(self, state: JointMotion, brake: float) -> bool:
         return bool(np.all(np.abs(state.v) * brake <= (1 - SHARE) * self.acceleration))
 
-    def _judged(self, coefficients: Array, seconds: Seconds) -> "_Connection":
+    def _with_peaks(self, coefficients: Array, seconds: Seconds) -> "_Connection":
         position, velocity, change = _evaluated(coefficients, (SAMPLES * seconds)[:, None])
         speed = float(np.max(np.abs(velocity) / self.speed))
         acceleration = float(np.max(np.abs(change) / self.acceleration))
@@ -203,7 +205,7 @@ class _Limits:
 
 
 class _Connection(Struct, frozen=True):
-    """A quintic with its peaks, as fractions of the joints' limits. excess: of the worst one; <= 0: all are kept."""
+    """A quintic with its peaks, as fractions of the joints' limits. excess: of the worst; <= 0: all are kept."""
 
     coefficients: Array
     seconds: Seconds
@@ -213,6 +215,8 @@ class _Connection(Struct, frozen=True):
 
 
 class _Piece(Struct, frozen=True):
+    """A parabola of s(t), from instant `t` on. slope: change of the rate per second."""
+
     t: Seconds
     s: Seconds
     rate: float

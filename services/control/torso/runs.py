@@ -45,15 +45,15 @@ class Run:
         """Share of the full amplitude, 0 to 1."""
         self._aim: tuple[str, Seconds] | None = None
         """The sync point that the rate is set for, with the instant asked for; None: it runs at its own rate."""
-        self._tried: list[tuple[str, Seconds]] = []
+        self._tried_aims: list[tuple[str, Seconds]] = []
         """Instants asked for when a smaller path was last looked for."""
         real = ("head",) if course.parts == ("nod",) else course.parts
         self.cruise = variability.rate(deviations, real, behavior.id, occasion)
         self.stall: Stall | None = variability.stall(deviations, real, behavior)
         if self.stall is not None:
-            self._expect(STALL, self.stall.before)
+            self._insert_fault(STALL, self.stall.before)
         if variability.overheated_part(deviations, real):
-            self._expect(OVERHEAT, "stroke" if self.awaits("stroke") else "end")
+            self._insert_fault(OVERHEAT, "stroke" if self.awaits("stroke") else "end")
 
     def awaits(self, sync: str) -> bool:
         return any(point.sync == sync for point in self.pending)
@@ -76,9 +76,9 @@ class Run:
         aims, here = self._aims(now), self.motion.s(now)
         # The point that it is just passing is reported first: no other path has it.
         is_passing = 0.0 < here >= self.motion.path.marks[self.pending[0].sync] - 1e-9
-        if is_passing or aims == self._tried:
+        if is_passing or aims == self._tried_aims:
             return None
-        self._tried = aims
+        self._tried_aims = aims
         if (reduced := hurried(self.course, self.motion, self.size, aims, now, self.cruise)) is None:
             return None
         self.size = reduced.size
@@ -151,7 +151,7 @@ class Run:
         self.cut_at = now
         self.bell.ring()
 
-    def _expect(self, fault: str, before: str) -> None:
+    def _insert_fault(self, fault: str, before: str) -> None:
         """Put `fault` half-way to sync point `before`, on the leg that has it."""
         index = next((i for i, point in enumerate(self.pending) if point.sync == before), None)
         if index is None:

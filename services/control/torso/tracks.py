@@ -18,7 +18,7 @@ GAZE_SHARE = 0.7
 """Share of the neck's speed and acceleration for gaze; the rest is for nods."""
 
 
-def _neck(share: float, reserve: float | None) -> tuple[JointLimit, ...]:
+def _neck_limits(share: float, reserve: float | None) -> tuple[JointLimit, ...]:
     """Limits of the neck's joints for one track, with a share of speed and acceleration.
 
     reserve: kept free at both ends of the range; None: the range is `NOD_RESERVE` around 0.
@@ -37,8 +37,8 @@ def _neck(share: float, reserve: float | None) -> tuple[JointLimit, ...]:
 
 
 LIMITS: Mapping[str, tuple[JointLimit, ...]] = {
-    "head": _neck(GAZE_SHARE, choreography.NOD_RESERVE),
-    "nod": _neck(1.0 - GAZE_SHARE, None),
+    "head": _neck_limits(GAZE_SHARE, choreography.NOD_RESERVE),
+    "nod": _neck_limits(1.0 - GAZE_SHARE, None),
     **{
         part: tuple(kinematics.LIMIT[joint] for joint in kinematics.joints_of(part))
         for part in ("torso", "left_arm", "right_arm", "face")
