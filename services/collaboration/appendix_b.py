@@ -1,6 +1,7 @@
 """The transcript of thesis Appendix B as a script. The robot's words are the source's; steps 7-17 are ours.
 
-The id of a fragment is its step, and ends in `ours` where the source has none: so is every connection event's block.
+The id of a fragment, and of the block of its connection events, is its step; it ends in `ours` where the source has
+no such step.
 """
 
 from engage_hri.services.collaboration.plans import Manager, Turn
@@ -9,11 +10,11 @@ from engage_hri.services.collaboration.task import Instruction
 from engage_hri.services.tangram.table import Side
 
 AS_IN_STEP_19 = Relation("purple-triangle", "top right", "trapezoid")
-"""Where the human puts it, against step 18; the robot of step 20 says "good" all the same."""
+"""Place where the human puts the piece, against step 18; the robot says "good" in step 20 all the same."""
 
 
 def asks(step: str, piece: str, side: Side, landmark: str, deictic: str = "", *also: Relation) -> Turn:
-    """A request for a placement. deictic: the word that may stand for the piece. also: what else will do."""
+    """A request for a placement. deictic: the word that may stand for the piece. also: other places that will do."""
     wanted = Relation(piece, side, landmark)
     return Turn(step=step, instruction=Instruction(wanted=wanted, deictic=deictic, also=also))
 

@@ -1,4 +1,4 @@
-"""How the collaboration manager plays the tangram."""
+"""Configuration of the collaboration manager: how it plays the tangram."""
 
 from typing import Literal
 
@@ -9,31 +9,31 @@ from engage_hri.schemas.units import Probability, Seconds
 
 
 class CollaborationConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """mode: `scripted` plays Appendix B; `task` chooses pieces and words itself from the goal figure."""
+    """The section `collaboration`. mode: `scripted` plays Appendix B; `task` chooses pieces and words itself."""
 
     mode: Literal["scripted", "task"] = "scripted"
     placement: Seconds = 15.0
-    """How long the person has to place a piece before the robot asks again."""
+    """Time that the person has to place a piece before the robot asks again."""
     attempts: int = 3
-    """How often the robot asks for one placement before it goes on without."""
+    """Number of times that the robot asks for one placement before it goes on without."""
     steady: Seconds = 0.5
-    """How long a piece must rest in view, no hand over it, before the robot believes where it lies."""
+    """Time that a piece must rest in view, with no hand over it, before the robot believes where it lies."""
     patience: Seconds = 2.0
-    """How long the robot waits for a hand to go away before it judges what lies where."""
+    """Time that the robot waits for a hand to go away before it judges what lies where."""
     settle: Seconds = 0.75
-    """From when a placement is seen until the robot speaks: the person looks up, and the robot looks back."""
+    """Time from when a placement is seen until the robot speaks: the person looks up, and the robot looks back."""
     pause: Seconds = 0.4
-    """Between two turns of the robot."""
+    """Time between two turns of the robot."""
     thinking: Seconds = 1.0
-    """Between "Ummmm," and "good."."""
+    """Time between "Ummmm," and "good."."""
     arrival: Seconds = 4.0
-    """From when a person is seen until the robot greets them."""
+    """Time from when a person is seen until the robot greets them."""
     farewell: Seconds = 15.0
-    """How long the robot waits for the person to leave after its goodbye."""
+    """Time that the robot waits for the person to leave after its goodbye."""
     piece_reliability: Probability = 0.95
-    """Rmin of the piece to move and of the trapezoid when introduced. Scenario page, after Appendix B."""
+    """Least reliability of a reference to the piece to move, and to the trapezoid when introduced. Scenario page."""
     landmark_reliability: Probability = 0.85
-    """Rmin of a landmark, and of the rectangle when introduced."""
+    """Least reliability of a reference to a landmark, and to the rectangle when introduced."""
 
     def __post_init__(self) -> None:
         times = ("placement", "steady", "patience", "settle", "pause", "thinking", "arrival", "farewell")

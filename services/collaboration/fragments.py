@@ -1,4 +1,4 @@
-"""What the robot says, as turn fragments: words, references with their phrases, and the look at the person.
+"""Turn fragments that the robot says: words, references with their phrases, and the look at the person.
 
 Pure. A reference offers the phrase that names its piece without doubt; its cost is its number of words. A deictic
 phrase costs 1 and only singles the piece out together with pointing. Parameters: scenario page, "World".
@@ -24,10 +24,10 @@ from engage_hri.services.collaboration.relations import Relation
 from engage_hri.services.tangram.table import Side, TangramTable
 
 MANIPULATION: tuple[Action, ...] = ("act", "speak", "nod", "shake")
-"""What answers a request to move a piece."""
+"""Actions that answer a request to move a piece."""
 
 SIDE_WORDS: dict[Side, str] = {"left": "left side", "right": "right side"}
-"""The others are called what they are: "the top right of"."""
+"""Words for sides that are not called by their name alone, as "the top right of" is."""
 
 
 class PieceMention(Struct, frozen=True, kw_only=True):
@@ -53,10 +53,10 @@ def fragment(
     accept: tuple[Action, ...] = (),
     delay_target: str = "",
 ) -> TurnFragment:
-    """A fragment that says the sentence, part after part.
+    """Make a fragment that says the sentence, part after part.
 
-    look: first look at the addressee; the first word follows the gaze. delay_target: hold the turn, looking there.
-    universe: ids of all the pieces there are.
+    look: first look at the addressee; the first word follows the gaze. delay_target: what the robot looks at while it
+    holds the turn; empty: it does not hold it. universe: ids of all the pieces there are.
     """
     pieces = tuple(universe)
     behaviors: list[FragmentBehavior] = []
@@ -73,15 +73,9 @@ def fragment(
         behaviors.append(behavior)
         previous = f"{behavior.id}:end"
     return TurnFragment(
-        id=id,
-        turn_status=status,
-        behaviors=tuple(behaviors),
-        constraints=tuple(order),
-        addressee=addressee,
-        accept=accept,
-        delay=bool(delay_target),
-        delay_target=delay_target,
-    )
+        id=id, turn_status=status, behaviors=tuple(behaviors), constraints=tuple(order), addressee=addressee,
+        accept=accept, delay=bool(delay_target), delay_target=delay_target,
+    )  # fmt: skip
 
 
 def _spoken(number: int, part: str | PieceMention, universe: tuple[str, ...]) -> Speech | Reference:
@@ -115,7 +109,7 @@ def request(
     piece_reliability: float,
     landmark_reliability: float,
 ) -> tuple[str | PieceMention, ...]:
-    """ "Please move the blue piece so that it is touching the top of the rectangle." """
+    """Word a request, such as "Please move the blue piece so that it is touching the top of the rectangle"."""
     side = SIDE_WORDS.get(wanted.side, wanted.side)
     landmark = name_of(wanted.landmark, table)
     piece = name_of(wanted.piece, table)

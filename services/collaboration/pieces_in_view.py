@@ -1,12 +1,13 @@
-"""What lies where, judged from many frames: a single one may be wrong, and hands cover pieces (thesis 5.4.2).
+"""Places of the pieces, judged from many frames: a single one may be wrong, and hands cover pieces (thesis 5.4.2).
 
-Pure. A piece lies in the middle, over the last second, of where it was seen while it rested and no hand was over it.
-A piece that is not in view lies where it was last, and has no confidence.
+Pure. The place of a piece is the median, over the last second, of where it was seen while it rested and no hand was
+over it. A piece that is not in view keeps its last place, with confidence 0.
 """
 
 import math
 from collections import deque
 from collections.abc import Callable, Iterable
+from itertools import accumulate
 
 from msgspec import Struct
 from msgspec.structs import replace
@@ -16,13 +17,13 @@ from engage_hri.schemas.world import Entity, World
 from engage_hri.services.collaboration.placement import TRUSTED, is_moving
 
 HAND_OVER: Meters = 0.08
-"""How near to a piece's center, seen from above, a hand's center covers some of it: half a hand and half a piece."""
+"""Distance of their centers, seen from above, below which a hand covers a piece: half a hand and half a piece."""
 WINDOW: Seconds = 1.0
-"""Of the frames that are judged."""
+"""Age of the oldest frame that is judged."""
 
 
 class _View(Struct):
-    """A piece in view without interruption. samples: when it was seen how; each holds until the next."""
+    """A piece in view without interruption. samples: what was seen from which time on, each until the next."""
 
     since: Seconds
     samples: deque[tuple[Seconds, Entity]]
@@ -32,15 +33,15 @@ class _View(Struct):
         while len(self.samples) > 1 and self.samples[1][0] <= now - WINDOW:
             self.samples.popleft()
 
-    def middle(self, now: Seconds) -> Entity:
-        """The piece where it was seen on either side of for equally long, in each coordinate."""
+    def median(self, now: Seconds) -> Entity:
+        """The piece at the median of where it was seen in the window, coordinate by coordinate, weighted by time."""
         times = [max(at, now - WINDOW) for at, _ in self.samples]
         held = [end - at for at, end in zip(times, [*times[1:], now], strict=True)]
         pieces = [piece for _, piece in self.samples]
         last = pieces[-1]
 
         def of(value: Callable[[Entity], float]) -> float:
-            return _middle(list(zip(map(value, pieces), held, strict=True)))
+            return _median(list(zip(map(value, pieces), held, strict=True)))
 
         place = (of(lambda it: it.position[0]), of(lambda it: it.position[1]), of(lambda it: it.position[2]))
         turned = of(lambda it: math.remainder(it.yaw - last.yaw, math.tau))
@@ -48,49 +49,49 @@ class _View(Struct):
 
 
 class PiecesInView:
-    """steady: how long a piece must have been in view before its place is believed."""
+    """The pieces and people seen so far. steady: seconds in view before the place of a piece is believed."""
 
     def __init__(self, steady: Seconds) -> None:
         self._steady = steady
         self._views: dict[str, _View] = {}
         self._known: dict[str, Entity] = {}
         self._people: dict[str, Seconds] = {}
-        """When each was seen last."""
+        """Time at which each person was last seen."""
         self._present: tuple[str, ...] = ()
         self._last: Seconds = -math.inf
 
     def see(self, world: World, now: Seconds) -> None:
-        """A frame."""
+        """Take in a frame."""
         self._people |= dict.fromkeys(self._present, now)
         self._present = tuple(person.id for person in world.people)
         self._last = now
         hands = [entity for entity in world.entities if entity.kind == "hand"]
         in_view = {piece.id: piece for piece in world.objects if _is_clear(piece, hands)}
         for id in self._views.keys() - in_view.keys():
-            self._known[id] = self._views.pop(id).middle(now)
+            self._known[id] = self._views.pop(id).median(now)
         for piece in world.objects:
             self._known.setdefault(piece.id, piece)
         for id, piece in in_view.items():
             self._views.setdefault(id, _View(now, deque())).add(piece, now)
 
     def pieces(self, now: Seconds) -> tuple[Entity, ...]:
-        """Every piece ever seen, where it lies as far as one can tell."""
+        """Every piece seen so far, at its last known place; with confidence 0 while that is uncertain."""
         return tuple(
-            self._views[id].middle(now) if self._is_steady(id, now) else replace(known, confidence=0.0)
+            self._views[id].median(now) if self._is_steady(id, now) else replace(known, confidence=0.0)
             for id, known in self._known.items()
         )
 
     def is_steady(self, now: Seconds) -> bool:
-        """Is the place of every piece certain?"""
+        """True if the place of every piece is certain."""
         return all(self._is_steady(id, now) for id in self._known)
 
     def person(self, now: Seconds) -> str | None:
-        """Who is there, or was a moment ago."""
+        """Id of the person who is there, or was a moment ago; None: nobody."""
         recent = (id for id, at in self._people.items() if now < at + self._steady)
         return next(iter(self._present), None) or next(recent, None)
 
     def deadline(self, now: Seconds) -> Seconds | None:
-        """When any of this changes by itself, without another frame."""
+        """Next time at which any of this changes by itself, without another frame; None: never."""
         times = [*(view.since + self._steady for view in self._views.values()), self._last + WINDOW / 2]
         times += [at + self._steady for at in self._people.values()]
         return min((at for at in times if at > now), default=None)
@@ -104,14 +105,11 @@ def _is_clear(piece: Entity, hands: Iterable[Entity]) -> bool:
     return piece.confidence >= TRUSTED and not covered and not is_moving(piece)
 
 
-def _middle(weighted: list[tuple[float, float]]) -> float:
-    """The value with half of the weight on either side; the last one if nothing has weight."""
+def _median(weighted: list[tuple[float, float]]) -> float:
+    """The median of values with weights; the last value if nothing has weight."""
     half = sum(weight for _, weight in weighted) / 2
     if half == 0.0:
         return weighted[-1][0]
-    reached = 0.0
-    for value, weight in sorted(weighted):
-        reached += weight
-        if reached >= half:
-            return value
-    raise AssertionError("half of the whole is reached before its end")
+    ordered = sorted(weighted)
+    reached = accumulate(weight for _, weight in ordered)
+    return next(value for (value, _), share in zip(ordered, reached, strict=True) if share >= half)

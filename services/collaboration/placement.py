@@ -1,4 +1,4 @@
-"""When a piece has been laid down anew. Pure."""
+"""Test of whether a piece has been laid down anew. Pure."""
 
 import math
 from collections.abc import Iterable
@@ -9,9 +9,9 @@ from engage_hri.schemas.world import Entity
 MOVED: Meters = 0.015
 TURNED: Radians = math.radians(10.0)
 RESTING = 0.01
-"""m/s"""
+"""Metres per second: a piece that is faster is moving."""
 TRUSTED = 0.5
-"""Least confidence in a piece that is really seen."""
+"""Least confidence of a piece that counts as seen."""
 
 
 def is_moving(piece: Entity) -> bool:
@@ -19,7 +19,7 @@ def is_moving(piece: Entity) -> bool:
 
 
 def has_been_placed(piece: str, before: Iterable[Entity], now: Iterable[Entity]) -> bool:
-    """Does the piece rest where, or how, it did not lie `before`? False while it is not seen."""
+    """True if the piece rests at another place, or turned otherwise, than `before`. False while it is not seen."""
     old = next((entity for entity in before if entity.id == piece), None)
     new = next((entity for entity in now if entity.id == piece), None)
     if new is None or is_moving(new) or new.confidence < TRUSTED:

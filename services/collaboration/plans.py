@@ -1,6 +1,6 @@
-"""What the manager does, as generators: a plan yields what it wants done and is sent what came of it.
+"""Plans of the collaboration manager, as generators: a plan yields a wish, and is sent the answer to it.
 
-Pure: neither bus nor clock. The service performs the wishes; a test plays the robot and the human by hand.
+Pure: neither bus nor clock. The service grants the wishes; a test plays the robot and the human by hand.
 """
 
 from collections.abc import Generator, Iterable
@@ -26,16 +26,16 @@ class Perform(Struct, frozen=True):
 
 
 class Observe(Struct, frozen=True):
-    """Look until the place of each piece is certain. Answer: the pieces, without confidence where it is not.
+    """Look until the place of each piece is certain. Answer: the pieces, with confidence 0 where it is not.
 
-    patience: at most this long.
+    patience: look at most this long.
     """
 
     patience: Seconds
 
 
 class AwaitPlacement(Struct, frozen=True):
-    """Wait until the piece has been moved from where it was `before`, and rests. Answer: whether it has."""
+    """Wait until the piece has been moved from where it was `before`, and rests. Answer: True if it has."""
 
     piece: str
     before: tuple[Entity, ...]
@@ -47,7 +47,7 @@ class AwaitPerson(Struct, frozen=True):
 
 
 class AwaitDeparture(Struct, frozen=True):
-    """Wait until nobody is there any more. Answer: whether they have gone."""
+    """Wait until nobody is there any more. Answer: True if they have gone."""
 
     timeout: Seconds
 
@@ -66,7 +66,7 @@ Plan = Generator[Wish, Answer, R]
 
 
 class Manager:
-    """The parts that the scripted run and the task have in common."""
+    """Parts that the scripted plan and the plan of the task have in common."""
 
     def __init__(self, config: CollaborationConfig, table: TangramTable) -> None:
         self.config = config
@@ -83,29 +83,28 @@ class Manager:
         yield Pause(self.config.arrival)
 
     def say(self, id: str, sentence: Sentence, *, look: bool = True) -> Plan[None]:
-        """A full turn that asks for nothing."""
+        """Say a full turn that asks for nothing."""
         yield Perform(fragment(id, sentence, addressee=self._person, universe=self._universe, look=look))
         yield Pause(self.config.pause)
 
     def approve(self, id: str) -> Plan[None]:
-        """ "Ummmm, good.": look away as if thinking, then look back. Steps 20 and 23 of Appendix B."""
-        begin, end = f"{id}-a", f"{id}-b"
+        """Say "Ummmm, good.": look away as if thinking, then look back. Steps 20 and 23 of Appendix B."""
         yield Perform(
             fragment(
-                begin, ("Ummmm,",), addressee=self._person, universe=self._universe,
+                f"{id}-a", ("Ummmm,",), addressee=self._person, universe=self._universe,
                 status="beginning", delay_target=self.table.surface.id,
             )
         )  # fmt: skip
         yield Pause(self.config.thinking)
         yield Perform(
-            fragment(end, ("good.",), addressee=self._person, universe=self._universe, status="end", look=False)
+            fragment(f"{id}-b", ("good.",), addressee=self._person, universe=self._universe, status="end", look=False)
         )
         yield Pause(self.config.pause)
 
     def instruct(self, id: str, instruction: Instruction) -> Plan[bool]:
         """Ask for a placement until it is right: again if nothing happens, for a fix if it is wrong.
 
-        Returns whether it was right in the end.
+        Returns True if it was right in the end.
         """
         asked = self._request(id, instruction)
         pieces = yield from self.observe()
@@ -123,7 +122,7 @@ class Manager:
         return False
 
     def observe(self) -> Plan[tuple[Entity, ...]]:
-        """The pieces as they lie."""
+        """Look at the pieces as they lie."""
         pieces = yield Observe(self.config.patience)
         assert isinstance(pieces, tuple)
         return pieces
@@ -143,7 +142,7 @@ class Manager:
         return fragment(id, sentence, addressee=self._person, universe=self._universe, accept=MANIPULATION)
 
     def introduction(self) -> tuple[str | PieceMention, ...]:
-        """Step 3: what lies on the table."""
+        """Sentence that introduces the pieces on the table. Step 3 of Appendix B."""
         return (
             "We are going to use the pieces on the table to make a picture together. "
             "As you can see, on the table we have: squares, triangles,",
@@ -158,7 +157,7 @@ class Manager:
 
 
 class Turn(Struct, frozen=True, kw_only=True):
-    """A row of a script. Exactly one of the three: something said, a placement asked for, or "Ummmm, good."."""
+    """A row of a script: words to `say`, a placement to ask for, or, with neither, "Ummmm, good."."""
 
     step: str
     say: tuple[str | PieceMention, ...] = ()
@@ -180,7 +179,7 @@ def script(manager: Manager, turns: Iterable[Turn]) -> Plan[None]:
 
 
 def task(manager: Manager) -> Plan[None]:
-    """Make the figure with the person: always the next piece that the table as it is asks for."""
+    """Make the figure with the person: ask for one piece after the other, each chosen from the table as it is."""
     yield from manager.welcome()
     yield from manager.say("hello", ("Hello, let's make a tangram.",))
     yield from manager.say("pieces", manager.introduction(), look=False)

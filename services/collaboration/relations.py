@@ -1,4 +1,4 @@
-"""How pieces lie to one another, from their poses: which edge of which piece is on which side of which other.
+"""Relations of pieces that touch, from their poses: which piece is on which side of which other.
 
 Pure. Two pieces touch where edges of theirs are parallel, of equal length and on one another, within a tolerance
 (thesis Appendix A). Sides are named as the human sees them.
@@ -22,7 +22,7 @@ class Relation(Struct, frozen=True):
 
 
 def relation(piece: Entity, landmark: Entity) -> Relation | None:
-    """How `piece` touches `landmark`; None if it does not."""
+    """The relation in which `piece` touches `landmark`; None if it does not."""
     for place in edges(landmark):
         if any(touches(edge, place) for edge in edges(piece)):
             return Relation(piece.id, place.side, landmark.id)

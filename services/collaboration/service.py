@@ -4,6 +4,7 @@ import asyncio
 import math
 from collections.abc import Callable
 from contextlib import suppress
+from functools import partial
 
 from engage_hri.schemas import keys
 from engage_hri.schemas.faults import EngageError
@@ -22,7 +23,7 @@ from engage_hri.services.tangram.table import tangram_table
 
 
 async def collaborate(bus: Bus, ready: Ready, config: CollaborationConfig) -> None:
-    """Play the tangram once, with whoever comes; returns after the goodbye."""
+    """Play the tangram once, with the first person who comes; return after the goodbye."""
     manager = plans.Manager(config, tangram_table())
     plan = plans.script(manager, turns(manager)) if config.mode == "scripted" else plans.task(manager)
     async with Robot.on(bus) as robot, asyncio.TaskGroup() as tasks:
@@ -45,21 +46,21 @@ async def _follow(plan: plans.Plan[None], engine: "_Engine") -> None:
 
 
 class _Engine:
-    """Does what a plan wishes, and watches the table all the while."""
+    """Grants the wishes of a plan, and watches the table all the while."""
 
-    def __init__(self, robot: Robot, bus: Bus, sight: PiecesInView) -> None:
+    def __init__(self, robot: Robot, bus: Bus, view: PiecesInView) -> None:
         self._robot = robot
         self._bus = bus
-        self._sight = sight
+        self._view = view
         self._seen = asyncio.Event()
 
     async def watch(self, worlds: Feed[World]) -> None:
         async for world in worlds:
-            self._sight.see(world, self._robot.now())
+            self._view.see(world, self._robot.now())
             self._seen.set()
 
     async def grant(self, wish: plans.Wish) -> plans.Answer:
-        now, sight = self._robot.now(), self._sight
+        now, view = self._robot.now(), self._view
         match wish:
             case plans.Perform(fragment=fragment):
                 try:
@@ -68,25 +69,26 @@ class _Engine:
                     self._bus.publish(keys.fault(self._bus.name), error.fault)
                     return None
             case plans.Observe(patience=patience):
-                await self._until(sight.is_steady, now + patience)
-                return sight.pieces(self._robot.now())
+                await self._wait_until(view.is_steady, now + patience)
+                return view.pieces(self._robot.now())
             case plans.AwaitPlacement(piece=piece, before=before, timeout=timeout):
-                return await self._until(lambda at: has_been_placed(piece, before, sight.pieces(at)), now + timeout)
+                is_placed = partial(has_been_placed, piece, before)
+                return await self._wait_until(lambda at: is_placed(view.pieces(at)), now + timeout)
             case plans.AwaitPerson():
-                await self._until(lambda at: sight.person(at) is not None, math.inf)
-                return sight.person(self._robot.now())
+                await self._wait_until(lambda at: view.person(at) is not None, math.inf)
+                return view.person(self._robot.now())
             case plans.AwaitDeparture(timeout=timeout):
-                return await self._until(lambda at: sight.person(at) is None, now + timeout)
+                return await self._wait_until(lambda at: view.person(at) is None, now + timeout)
             case plans.Pause(seconds=seconds):
                 await asyncio.sleep(seconds)
                 return None
 
-    async def _until(self, holds: Callable[[Seconds], bool], deadline: Seconds) -> bool:
-        """Wait until the table is seen to be so. False: it was not by `deadline`."""
+    async def _wait_until(self, holds: Callable[[Seconds], bool], deadline: Seconds) -> bool:
+        """Wait until `holds`, asked at loop time, is true of the table. False: it was not by `deadline`."""
         while not holds(now := self._robot.now()):
             if now >= deadline:
                 return False
-            change = self._sight.deadline(now)
+            change = self._view.deadline(now)
             again = deadline if change is None else min(change, deadline)
             self._seen.clear()
             with suppress(TimeoutError):

@@ -1,7 +1,7 @@
 """The tangram task: what belongs where, what comes next, and whether it was done. Thesis 5.2.1.
 
-Pure. The figure is known by its pieces' poses alone: what touches what is computed, for the figure and for the table
-as it is. Pieces are counted as placed from the base outward, so that one beside a misplaced one is not.
+Pure. The figure is known by its pieces' poses alone: which pieces touch is computed, for the figure and for the table
+as it is. Pieces count as placed from the base outward: a piece beside a misplaced one does not.
 """
 
 from collections.abc import Collection, Iterable
@@ -15,9 +15,9 @@ from engage_hri.services.tangram.table import TangramTable
 
 
 class Instruction(Struct, frozen=True, kw_only=True):
-    """What the human is asked to do.
+    """A placement that the human is asked for.
 
-    deictic: a word with which the piece may be pointed out instead of named. also: other placements that will do.
+    deictic: a word with which the piece may be pointed out instead of named. also: other relations that will do.
     """
 
     wanted: Relation
@@ -26,9 +26,9 @@ class Instruction(Struct, frozen=True, kw_only=True):
 
 
 class Placement(Struct, frozen=True):
-    """What became of an instruction. found: how the piece lies to others now, `wanted` among them if it is right.
+    """Result of an instruction. right: the piece lies as wanted. found: its relations to other pieces now.
 
-    seen: the piece is in view. What is right was seen to be so before it was covered.
+    seen: the piece is in view; if not, `right` and `found` are from when it last was.
     """
 
     right: bool
@@ -37,7 +37,7 @@ class Placement(Struct, frozen=True):
 
 
 def check(instruction: Instruction, pieces: Iterable[Entity]) -> Placement:
-    """Does the piece lie where it was to be laid?"""
+    """Check whether the piece lies where it was to be laid."""
     lying = {piece.id: piece for piece in pieces}
     piece = lying.pop(instruction.wanted.piece, None)
     if piece is None:
@@ -68,27 +68,17 @@ class Goal:
 
         Pieces nearest the base come first, then the order of the table's file. given_up: not to be asked for.
         """
-        placed = self.placed(pieces)
-        candidates = [
-            rel
-            for rel in self.relations
-            if rel.landmark in placed and rel.piece not in placed and rel.piece not in given_up
-        ]
-        if not candidates:
-            return None
-        steps = self._steps_from_base()
-        return Instruction(
-            wanted=min(
-                candidates,
-                key=lambda rel: (steps[rel.piece], self.order.index(rel.piece), self.order.index(rel.landmark)),
-            )
-        )
+        placed, steps = self.placed(pieces), self._steps_from_base()
+        done = placed.union(given_up)
+        candidates = [rel for rel in self.relations if rel.landmark in placed and rel.piece not in done]
+
+        def rank(rel: Relation) -> tuple[int, int, int]:
+            return (steps[rel.piece], self.order.index(rel.piece), self.order.index(rel.landmark))
+
+        return Instruction(wanted=min(candidates, key=rank)) if candidates else None
 
     def _steps_from_base(self) -> dict[str, int]:
         steps = {self.base: 0}
-        while grown := {rel.piece: steps[rel.landmark] + 1 for rel in self.relations if rel.landmark in steps}:
-            new = {piece: count for piece, count in grown.items() if piece not in steps}
-            if not new:
-                break
-            steps |= new
+        while next_to := {rel.piece for rel in self.relations if rel.landmark in steps} - steps.keys():
+            steps |= dict.fromkeys(next_to, max(steps.values()) + 1)
         return steps

@@ -1,4 +1,4 @@
-"""What the robot is seen to do, from the sync points its body reports and from what its eyes rest on. Pure."""
+"""Actions that people see the robot do, from the sync points its body reports and what its eyes rest on. Pure."""
 
 from engage_hri.schemas.actions import ActionBegan, ActionEnded
 from engage_hri.schemas.behaviors import Action, BlockBehavior, Head, Pointing, Speech
@@ -9,7 +9,7 @@ ActionMessage = ActionBegan | ActionEnded
 
 
 class ActionReporter:
-    """Turns progress into actions of `actor`. Every action that began ends once."""
+    """Turns the progress of behaviors into actions of `actor`. Every action that began ends once."""
 
     def __init__(self, actor: str, clock: str) -> None:
         self._actor = actor
@@ -18,7 +18,7 @@ class ActionReporter:
         self._open: dict[str, ActionBegan] = {}
 
     def reached(self, id: str, label: str, behavior: BlockBehavior, reached: Reached) -> list[ActionMessage]:
-        """After request `id`, known to people as `label`, has passed a sync point."""
+        """List the actions that begin or end as request `id` passes a sync point. label: `block:behavior`."""
         action: Action
         targets: tuple[str, ...]
         match behavior:
@@ -32,32 +32,28 @@ class ActionReporter:
             case _:
                 return []
         if reached.sync == first:
-            return [self._begin(id, action, targets, label, reached.at)]
+            self._open[id] = began = self._began(action, targets, label, reached.at)
+            return [began]
         return self.ended(id, reached.at) if reached.sync == last else []
 
     def ended(self, id: str, at: Seconds) -> list[ActionMessage]:
-        """Request `id` is over, however it ended."""
+        """End the action of request `id`, if one is open. Call it however the request has ended."""
         return [self._end(began, at)] if (began := self._open.pop(id, None)) else []
 
     def looks_at(self, entity: str, label: str, at: Seconds) -> list[ActionMessage]:
-        """The eyes rest on `entity`, or on nothing. label: the behavior that brought them there, if known."""
+        """List the looks that end and begin as the eyes come to rest on `entity`; empty: on nothing.
+
+        label: `block:behavior` that brought the eyes there; empty: unknown.
+        """
         if entity == (self._look.targets[0] if self._look else ""):
             return []
         messages: list[ActionMessage] = [self._end(self._look, at)] if self._look else []
-        self._look = None
-        if entity:
-            self._look = ActionBegan(
-                actor=self._actor, action="look", at=Stamp(self._clock, at), targets=(entity,), behavior=label
-            )
-            messages.append(self._look)
-        return messages
+        self._look = self._began("look", (entity,), label, at) if entity else None
+        return [*messages, self._look] if self._look else messages
 
-    def _begin(self, id: str, action: Action, targets: tuple[str, ...], label: str, at: Seconds) -> ActionBegan:
-        began = ActionBegan(
-            actor=self._actor, action=action, at=Stamp(self._clock, at), targets=targets, behavior=label
-        )
-        self._open[id] = began
-        return began
+    def _began(self, action: Action, targets: tuple[str, ...], label: str, at: Seconds) -> ActionBegan:
+        stamp = Stamp(self._clock, at)
+        return ActionBegan(actor=self._actor, action=action, at=stamp, targets=targets, behavior=label)
 
     def _end(self, began: ActionBegan, at: Seconds) -> ActionEnded:
         return ActionEnded(

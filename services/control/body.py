@@ -12,15 +12,13 @@ from typing import Literal
 from msgspec import Struct
 
 from engage_hri.schemas.behavior_types import sync_points
-from engage_hri.schemas.behaviors import (
-    BlockBehavior,
-)
+from engage_hri.schemas.behaviors import BlockBehavior
 from engage_hri.schemas.body import BodyPose, Capabilities, Estimate, Ray
 from engage_hri.schemas.faults import EngageError
 from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.world import World
 
-How = Literal["relax", "freeze"]
+AbortMode = Literal["relax", "freeze"]
 
 
 class Arrived(Struct, frozen=True):
@@ -72,22 +70,22 @@ class Revoked(Exception):
 
 
 class MovementAuthority:
-    """How far a behavior may go. It is extended, never shrunk; revoking it is how a behavior is aborted.
+    """Permission for a behavior to move on up to a sync point. It is extended, never shrunk; revoking it aborts.
 
     A simple body awaits `granted(sync)` before it leaves a hold point. One that plans ahead asks `covers` and
     is told of changes through `watch`.
 
     points: the sync points of the behavior, in order.
-    pace: loop times in seconds at which it is asked to come to its points, where its own pace would miss them. A body
-    that can be no faster or slower ignores it; its estimates say how far it can.
-    revoked: how it is to end, once `revoke` was called; None before.
+    pace: loop times in seconds at which the behavior is asked to reach its points, where its natural pace would miss
+    them. A body with one pace only ignores them; the estimates of other bodies say how far they can follow.
+    revoked: how the behavior is to end, once `revoke` was called; None before.
     """
 
     def __init__(self, behavior: BlockBehavior, through: str, pace: Mapping[str, Seconds] | None = None) -> None:
         """Grant a behavior the way up to and including `through`.
 
-        behavior: whose sync points they are.
-        through: the last sync point that may be passed.
+        behavior: the behavior that is permitted.
+        through: the last sync point that it may pass.
         pace: loop times in seconds, by sync point.
 
         Raises:
@@ -95,7 +93,7 @@ class MovementAuthority:
         """
         self.points = sync_points(behavior)
         self.pace: Mapping[str, Seconds] = dict(pace or {})
-        self.revoked: How | None = None
+        self.revoked: AbortMode | None = None
         self._through = self._index(through)
         self._watchers: list[Callable[[], None]] = []
 
@@ -105,7 +103,7 @@ class MovementAuthority:
         return self.points[self._through]
 
     def covers(self, sync: str) -> bool:
-        """Whether `sync` may be passed now.
+        """True if `sync` may be passed now.
 
         sync: a sync point of the behavior.
 
@@ -135,10 +133,10 @@ class MovementAuthority:
             self.pace = dict(pace)
             self._tell()
 
-    def revoke(self, how: How = "relax") -> None:
+    def revoke(self, how: AbortMode = "relax") -> None:
         """End the behavior now. A second call changes nothing.
 
-        how: go to the safe pose at once (`relax`), or stop moving and then go (`freeze`).
+        how: go to the safe pose at once (`relax`), or stand still for a moment and then go (`freeze`).
         """
         if self.revoked is None:
             self.revoked = how
@@ -183,10 +181,10 @@ class MovementAuthority:
 
 
 class BodyState(Struct, frozen=True, kw_only=True):
-    """What a body measures of itself.
+    """Measurements of a body at one instant.
 
     pose: joint angles, radians. gaze: from the eyes. left_arm, right_arm: from the elbow, through the hand.
-    moving: is anything in motion? looking_at: id of the entity on the gaze axis; empty: none.
+    moving: true while anything moves or speaks. looking_at: id of the entity on the gaze axis; empty: none.
     speaking: the text that is being said; empty: none.
     """
 
@@ -200,16 +198,16 @@ class BodyState(Struct, frozen=True, kw_only=True):
 
 
 class Body(ABC):
-    """A robot, or what passes for one. All of it is called on the event loop and none of it may block.
+    """A robot, or a simulation of one. Its methods are called on the event loop and must not block.
 
-    capabilities: what it can do, for those who plan: types of behaviors, joints and their limits.
+    capabilities: what it can do, for planners: types of behaviors, joints and their limits.
     """
 
     capabilities: Capabilities
 
     @abstractmethod
     def estimate(self, behavior: BlockBehavior, pose: BodyPose | None, world: World) -> Estimate:
-        """Estimate what a behavior would take. Quick, and changes nothing: called often while a block is planned.
+        """Estimate whether a behavior can be done and how long its phases take. Quick, since planning calls it often.
 
         behavior: what is to be done.
         pose: joint angles from which it would begin, radians; None: from where the body is.
@@ -218,7 +216,7 @@ class Body(ABC):
 
     @abstractmethod
     def perform(self, behavior: BlockBehavior, authority: MovementAuthority) -> AsyncGenerator[Progress, None]:
-        """Do a behavior: yield every sync point once, in order, at the measured time, and never past the authority.
+        """Perform a behavior: yield every sync point once, in order, when reached, and never past the authority.
 
         Ending after `end` means done; ending earlier means that the authority was revoked. However it ends, the parts
         that it used go on to their safe pose by themselves.
@@ -233,7 +231,7 @@ class Body(ABC):
 
     @abstractmethod
     async def home(self, parts: tuple[str, ...] = ()) -> None:
-        """Move to the safe pose; returns when the body is there. Ends what moves these parts as aborted.
+        """Move to the safe pose, and return when the body is there. Behaviors that move these parts end as aborted.
 
         parts: names of parts, as in `capabilities`; empty: all.
         """

@@ -1,4 +1,4 @@
-"""Configuration of control: the body, its world of forbidden zones, and what goes wrong with it on purpose."""
+"""Configuration of control: how it reports, zones that are never pointed into, and faults of the simulated body."""
 
 from typing import Literal
 
@@ -43,14 +43,14 @@ class Slow(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
 
 
 class Variability(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """How the simulated body deviates from its own estimates, drawn from `seed`; the default is perfect.
+    """Deviations of the simulated body from its own estimates, drawn from `seed`; none by default.
 
     seed: same seed, same deviations, whatever the order in which behaviors come.
     noise: standard deviation of the logarithm of each behavior's duration; 0.1 is about 10 %.
     slow, stall, displaced: see their types.
     overheated: parts whose motor fails half-way through every motion (thesis 4.5.3).
-    mute: `silent`: the voice moves its lips without a sound and reports its words all the same (thesis 5.4.3);
-        `refuse`: it knows, and refuses to speak.
+    mute: `silent`: the voice makes no sound and reports its words all the same (thesis 5.4.3);
+        `refuse`: the voice refuses to speak.
     lost: share of the sync point messages that never reach the bus.
     """
 
@@ -77,10 +77,10 @@ class ControlConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
     """The section `control`.
 
     state_rate: `RobotState` messages per second while anything moves; once a second else.
-    dead_man: seconds after which a behavior ends whose requester neither names a lease (`Request.lease`) nor sends
-        it again, at least every 2 s. After the last one the body goes home by itself. Longer than two repetitions.
+    dead_man: seconds without a message of the requester after which its behaviors end, unless the request names a
+        lease (`Request.lease`). After the last one the body goes home. Longer than two repetitions, one every 2 s.
     no_point_zones: spheres that are never pointed into.
-    variability: of the simulated body.
+    variability: deviations of the simulated body.
     """
 
     state_rate: float = 20.0

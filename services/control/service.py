@@ -1,4 +1,4 @@
-"""The service `control`: puts a body on the bus. It decodes, feeds and publishes; the rest is the body's business."""
+"""The service `control`: takes requests from the bus, has the body perform them, and publishes what it reports."""
 
 import asyncio
 from contextlib import aclosing
@@ -35,11 +35,11 @@ from engage_hri.services.bus.interface import Bus, Received, is_asked_to_stop
 from engage_hri.services.control import variability
 from engage_hri.services.control.actions import ActionMessage, ActionReporter
 from engage_hri.services.control.body import (
+    AbortMode,
     Arrived,
     BehaviorRefused,
     Body,
     BodyFailed,
-    How,
     MovementAuthority,
     Progress,
     Reached,
@@ -51,7 +51,7 @@ from engage_hri.services.runtime.alarm import Timer
 from engage_hri.services.runtime.service import Ready
 
 IDLE: Seconds = 1.0
-"""Between two `RobotState` while nothing moves."""
+"""Interval of `RobotState` messages while nothing moves."""
 
 
 async def embody(
@@ -74,24 +74,24 @@ async def embody(
 
 
 def _simulated(config: ControlConfig) -> Body:
-    """The torso, which a robot with a body of its own never loads."""
+    """Create the simulated torso. Imported here: a robot with a body of its own never loads it."""
     from engage_hri.services.control.torso.body import SimulatedBody
 
     return SimulatedBody(config.no_point_zones, config.variability)
 
 
-class _UnderWay:
+class _LiveBehavior:
     """A `PerformBehavior` that is under way."""
 
     def __init__(self, request: PerformBehavior, id: str, authority: MovementAuthority) -> None:
-        """id: what the requester calls it, unlike `request.id`, which is its name here."""
+        """id: as the requester gave it; `request.id` is unique among the requests of all requesters."""
         self.request = request
         self.id = id
         self.authority = authority
         self.position = 0
         self.status: Literal["done", "aborted", "failed"] = "aborted"
         self.aborts: list[str] = []
-        """Requests that end with it."""
+        """Ids of the abort requests that end with this behavior."""
 
     @property
     def label(self) -> str:
@@ -99,13 +99,13 @@ class _UnderWay:
 
     @property
     def spoken(self) -> str:
-        """What the voice has said of it."""
+        """Text that the voice has said so far; empty for a behavior that is no speech."""
         behavior = self.request.behavior
         return behavior.text[: self.position] if isinstance(behavior, Speech) else ""
 
 
 class _Control:
-    """What the loop of `embody` feeds."""
+    """State of the service, and what it does with each message that `embody` receives."""
 
     def __init__(
         self, bus: Bus, config: ControlConfig, body: Body, tasks: asyncio.TaskGroup, objects: CoveredObjects
@@ -115,12 +115,12 @@ class _Control:
         self._config = config
         self._body = body
         self._tasks = tasks
-        self._deeds = ActionReporter(bus.robot, bus.clock)
+        self._actions = ActionReporter(bus.robot, bus.clock)
         self._world = World(entities=())
         self._objects = objects
-        self._live: dict[str, _UnderWay] = {}
-        self._ways: dict[str, asyncio.Task[None]] = {}
-        """Home, as somebody has asked for."""
+        self._live: dict[str, _LiveBehavior] = {}
+        self._homeward: dict[str, asyncio.Task[None]] = {}
+        """Tasks that take the body home, by the id of the request that asked for it."""
         self._sent = 0
         self._next_state = Timer(self.publish_state)
         self._published: Seconds = -inf
@@ -161,7 +161,7 @@ class _Control:
             self._keep_publishing()
 
     def serve(self, request: Request) -> None:
-        """A request that is new, or that says something new about a live one."""
+        """Serve a request that is new, or that changes a live one."""
         live = self._live.get(request.id)
         match request:
             case PerformBehavior() if live is not None:
@@ -175,10 +175,10 @@ class _Control:
             case GoHome():
                 self.desk.accept(request.id)
                 way = self._tasks.create_task(self._go_home(request), name=f"home {request.id}")
-                self._ways[request.id] = way
-                way.add_done_callback(lambda _: self._ways.pop(request.id, None))
-            case Cancel(id=id) if id in self._ways:
-                self._ways[id].cancel()
+                self._homeward[request.id] = way
+                way.add_done_callback(lambda _: self._homeward.pop(request.id, None))
+            case Cancel(id=id) if id in self._homeward:
+                self._homeward[id].cancel()
                 self.desk.refuse(id, Fault(reason="given up on the way home", where=id, service="control"))
 
     def _begin(self, request: PerformBehavior) -> None:
@@ -192,11 +192,11 @@ class _Control:
             self.desk.refuse(request.id, Fault(reason=str(error), where=request.behavior.id, service="control"))
             return
         id = self.desk.asked(request.id).id
-        live = self._live[request.id] = _UnderWay(request, id, authority)
+        live = self._live[request.id] = _LiveBehavior(request, id, authority)
         self._tasks.create_task(self._perform(live), name=f"behavior {request.id}")
 
     def _abort(self, request: AbortBehavior) -> None:
-        """Whoever has asked for the behavior."""
+        """End every live behavior of that name, whichever requester has asked for it."""
         label = f"{request.block}:{request.behavior}"
         meant = [live for live in self._live.values() if live.label == label]
         if not meant:
@@ -207,15 +207,15 @@ class _Control:
             self._revoke(live, request.how)
             live.aborts.append(request.id)
 
-    def _revoke(self, live: _UnderWay, how: How = "relax") -> None:
-        """What a driver does on hearing of it may go wrong; the authority is gone all the same."""
+    def _revoke(self, live: _LiveBehavior, how: AbortMode = "relax") -> None:
+        """Revoke the authority of a behavior. An error of a driver that watches it is contained."""
         with self._bus.containing(f"the end of behavior {live.label}"):
             live.authority.revoke(how)
 
     def _pace(self, request: PerformBehavior) -> dict[str, Seconds]:
         return {planned.sync: self._bus.local(planned.at) for planned in request.pace}
 
-    def _extend(self, live: _UnderWay, request: PerformBehavior) -> None:
+    def _extend(self, live: _LiveBehavior, request: PerformBehavior) -> None:
         live.authority.set_pace(self._pace(request))
         try:
             live.authority.extend(request.through)
@@ -223,8 +223,8 @@ class _Control:
             where = live.request.behavior.id
             self._bus.publish(keys.fault("control"), Fault(reason=str(error), where=where, service="control"))
 
-    async def _perform(self, live: _UnderWay) -> None:
-        """From the request to its one terminal state."""
+    async def _perform(self, live: _LiveBehavior) -> None:
+        """Perform a behavior, from its request to the one terminal answer."""
         request, fault = live.request, None
         accepted = False
         try:
@@ -244,7 +244,7 @@ class _Control:
         except (Exception, asyncio.CancelledError) as error:
             if is_asked_to_stop():
                 raise
-            # A mistake of the body's driver ends this behavior. Where its parts are nobody knows: all go home.
+            # An error of the driver ends this behavior. Nothing is known of where its parts are, so all go home.
             live.status, fault = "failed", self._bus.failed(error, f"behavior {live.label}")
             self._take_home(f"after {live.label} broke")
         del self._live[request.id]
@@ -252,25 +252,19 @@ class _Control:
             self._end(live, fault)
         self._end_aborts(live)
 
-    def _end(self, live: _UnderWay, fault: Fault | None) -> None:
+    def _end(self, live: _LiveBehavior, fault: Fault | None) -> None:
         request, at = live.request, self._bus.now()
-        self._publish(self._deeds.ended(request.id, at))
+        self._publish(self._actions.ended(request.id, at))
         self.note_look()
         self._keep_publishing()
-        self.desk.end(
-            BehaviorOutcome(
-                id=request.id,
-                block=request.block,
-                behavior=request.behavior.id,
-                status=live.status,
-                at=self._bus.stamp(at),
-                spoken=live.spoken,
-                fault=fault,
-            )
-        )
+        outcome = BehaviorOutcome(
+            id=request.id, block=request.block, behavior=request.behavior.id, status=live.status,
+            at=self._bus.stamp(at), spoken=live.spoken, fault=fault,
+        )  # fmt: skip
+        self.desk.end(outcome)
 
-    def _end_aborts(self, live: _UnderWay) -> None:
-        """Of several behaviors that one request means, the last to end ends it."""
+    def _end_aborts(self, live: _LiveBehavior) -> None:
+        """Answer the abort requests that waited for this behavior and wait for no other one."""
         awaited = {id for other in self._live.values() for id in other.aborts}
         for id in live.aborts:
             if id not in awaited:
@@ -283,7 +277,7 @@ class _Control:
             self.desk.end(HomeReached(id=request.id, at=self._bus.stamp()))
 
     def _take_home(self, name: str) -> None:
-        """The whole body, at nobody's request."""
+        """Move the whole body home without a request."""
 
         async def go() -> None:
             with self._bus.containing(f"way home {name}"):
@@ -294,35 +288,28 @@ class _Control:
 
     # -- reports ------------------------------------------------------------------------------------------------
 
-    def _report(self, live: _UnderWay, progress: Progress) -> None:
+    def _report(self, live: _LiveBehavior, progress: Progress) -> None:
         request = live.request
         id, block, behavior, requester = live.id, request.block, request.behavior.id, request.requester
+        at = self._bus.stamp(progress.at)
         match progress:
-            case Arrived(sync=sync, at=at):
-                stamp = self._bus.stamp(at)
+            case Arrived(sync=sync):
                 self._tell(
-                    SyncPointArrived(id=id, block=block, behavior=behavior, sync=sync, at=stamp, requester=requester)
+                    SyncPointArrived(id=id, block=block, behavior=behavior, sync=sync, at=at, requester=requester)
                 )
-                self.note_look(live, at)
-            case Reached(sync=sync, at=at, arrived=arrived):
-                self._tell(
-                    SyncPointReached(
-                        id=id,
-                        block=block,
-                        behavior=behavior,
-                        sync=sync,
-                        at=self._bus.stamp(at),
-                        arrived=self._bus.stamp(arrived),
-                        requester=requester,
-                    )
+                self.note_look(live, progress.at)
+            case Reached(sync=sync):
+                came = self._bus.stamp(progress.arrived)
+                reached = SyncPointReached(
+                    id=id, block=block, behavior=behavior, sync=sync, at=at, arrived=came, requester=requester
                 )
+                self._tell(reached)
                 live.status = "done" if sync == "end" else live.status
-                self._publish(self._deeds.reached(request.id, live.label, request.behavior, progress))
-                self.note_look(live, at)
-            case Spoke(word=word, position=position, at=at):
+                self._publish(self._actions.reached(request.id, live.label, request.behavior, progress))
+                self.note_look(live, progress.at)
+            case Spoke(word=word, position=position):
                 live.position = int(position)  # a driver's number, of whatever type
-                stamp = self._bus.stamp(at)
-                self._tell(WordSpoken(block=block, behavior=behavior, word=word, position=position, at=stamp))
+                self._tell(WordSpoken(block=block, behavior=behavior, word=word, position=position, at=at))
         self._keep_publishing()
 
     def _tell(self, message: SyncPointArrived | SyncPointReached | WordSpoken) -> None:
@@ -334,23 +321,23 @@ class _Control:
         for action in actions:
             self._bus.publish(keys.ROBOT_ACTION, action)
 
-    def note_look(self, live: _UnderWay | None = None, at: Seconds | None = None) -> None:
+    def note_look(self, live: _LiveBehavior | None = None, at: Seconds | None = None) -> None:
         """Publish what the eyes rest on, if that has changed."""
         of_head = live is not None and isinstance(live.request.behavior, Gaze | GazeShift | HeadDirectionShift)
         label = live.label if live is not None and of_head else ""
         with self._bus.containing("what the body looks at"):
             entity = self._body.state().looking_at
-            self._publish(self._deeds.looks_at(entity, label, self._bus.now() if at is None else at))
+            self._publish(self._actions.looks_at(entity, label, self._bus.now() if at is None else at))
 
     def publish_state(self) -> None:
-        """Tell how the body stands, and once more after a while: soon if it moves."""
+        """Publish the state of the body, and set the timer for the next time: soon if the body moves."""
         self._next_state.set(self._bus.now() + IDLE)
         with self._bus.containing("the state of the body"):
             self._publish_state()
 
     def _publish_state(self) -> None:
         now, state = self._bus.now(), self._body.state()
-        self._publish(self._deeds.looks_at(state.looking_at, "", now))
+        self._publish(self._actions.looks_at(state.looking_at, "", now))
         self._published = now
         self._bus.publish(
             keys.ROBOT_STATE,
@@ -362,7 +349,7 @@ class _Control:
         self._next_state.set(now + (1.0 / self._config.state_rate if state.moving else IDLE))
 
     def _keep_publishing(self) -> None:
-        """Something has begun to move."""
+        """Bring the next `RobotState` forward, as something has begun to move."""
         due = self._published + 1.0 / self._config.state_rate
         if self._next_state.at is None or self._next_state.at > due:
             self._next_state.set(due)
@@ -370,7 +357,7 @@ class _Control:
     # -- dead man -----------------------------------------------------------------------------------------------
 
     def _requester_lost(self, cancel: Cancel) -> None:
-        """Nobody directs this behavior any more. After the last one of its requester the body takes its safe pose."""
+        """Revoke a behavior that has lost its requester. With the last one of that requester the body goes home."""
         live = self._live.get(cancel.id)
         if live is None:
             return

@@ -1,4 +1,4 @@
-"""What goes wrong with the simulated body, drawn from a seed: pure, and independent of the order of asking."""
+"""Deviations of the simulated body, drawn from a seed. Pure, and independent of the order of asking."""
 
 import math
 from hashlib import blake2b
@@ -21,23 +21,23 @@ def normal(seed: int, *what: str) -> float:
 
 
 def rate(variability: Variability, parts: tuple[str, ...], behavior: str, occasion: int) -> float:
-    """How fast `parts` do `behavior` the `occasion`-th time, 1 = as estimated. The slowest part decides."""
+    """Speed at which `parts` do `behavior` the `occasion`-th time, 1 = as estimated. The slowest part decides."""
     noise = math.exp(-variability.noise * normal(variability.seed, behavior, str(occasion)))
     return noise / max((slow.factor for slow in variability.slow if slow.part in parts), default=1.0)
 
 
 def stall(variability: Variability, parts: tuple[str, ...], behavior: BlockBehavior) -> Stall | None:
-    """The stall that is due in `behavior`."""
+    """The stall that is due in `behavior`; None: none."""
     return next(
         (stall for stall in variability.stall if stall.part in parts and stall.behavior in ("", behavior.id)), None
     )
 
 
-def overheats(variability: Variability, parts: tuple[str, ...]) -> str:
-    """The part whose motor fails, or nothing."""
+def overheated_part(variability: Variability, parts: tuple[str, ...]) -> str:
+    """Name of the part whose motor fails; empty: none."""
     return next((part for part in parts if part in variability.overheated), "")
 
 
 def is_lost(variability: Variability, message: int, at: Seconds) -> bool:
-    """Does the `message`-th sync point message get lost?"""
+    """True if the `message`-th sync point message gets lost."""
     return variability.lost > 0.0 and chance(variability.seed, "lost", str(message), f"{at:.6f}") < variability.lost

@@ -6,11 +6,11 @@ from math import inf
 from engage_hri.schemas.units import Seconds
 
 EARLY: Seconds = 1e-9
-"""A loop runs its timers by up to this too early; who then found an instant still to come would wait for ever."""
+"""A loop may run a timer this much too early: a task that then still found its instant ahead would wait for ever."""
 
 
 class Bell:
-    """One task waits with `heard`; anybody may `ring`, before or while it waits. And it knows what time it is."""
+    """Wakes the one task that waits in `wait`; `ring` may come before or during that. Tells the loop time, too."""
 
     def __init__(self) -> None:
         self._loop = asyncio.get_running_loop()
@@ -26,7 +26,7 @@ class Bell:
     def ring(self) -> None:
         self._rung.set()
 
-    async def heard(self, until: Seconds) -> None:
+    async def wait(self, until: Seconds) -> None:
         """Return once the bell has been rung since the last time, or at loop time `until` (inf: never)."""
         if self.is_past(until):
             return

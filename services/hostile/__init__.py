@@ -1,6 +1,6 @@
-"""A peer that means harm, for the tests of services, bodies and clients: in memory and in virtual time only.
+"""Attacks on services, bodies and clients, for their tests: in memory and in virtual time only.
 
-`trial` runs it against services that are given to it, and says what came of it. What it sends is made by pure files:
-random messages of every type (`typed`, `payloads`, `markup`), requests at bad moments (`schemes`), and the reports of
-a body that lies (`lies`). `audit` judges what was answered. docs/hostile.md tells how to use it.
+`trial` runs an attack on the services that it is given, and reports what went wrong. What is sent is made by pure
+files: random messages of every type (`typed`, `payloads`, `markup`), requests at bad moments (`schemes`), and the
+reports of a body that lies (`lies`). `audit` judges the answers. docs/hostile.md tells how to use it.
 """

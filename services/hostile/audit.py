@@ -1,7 +1,7 @@
-"""The book of all requests on a bus: what was asked, what was answered, and what is wrong with that. Pure.
+"""Audit of all requests on a bus: what was asked, what was answered, and what is wrong with that. Pure.
 
-It sees each message once, as it is published, and judges servers by the protocol alone: every request that has
-reached its server ends, and no request ends twice.
+The audit sees each message once, as it is published, and judges servers by the protocol alone: every request that
+has reached its server ends, and no request ends twice.
 """
 
 from collections import Counter
@@ -14,14 +14,14 @@ from engage_hri.schemas.requests import Answer, Cancel, KeepAlive, Outcome, Refu
 from engage_hri.schemas.units import Seconds
 
 PATIENCE: Seconds = 3.0
-"""How long a requester may go on about what has ended: its last words may have been on their way."""
+"""Seconds for which a requester may still mention a request that has ended: the messages may have crossed."""
 
 REFUSED = b"refused"
-"""Stands for every refusal."""
+"""Stands for every refusal among the ends of a request."""
 
 
-class Name(Struct, frozen=True):
-    """By what a request is known."""
+class RequestName(Struct, frozen=True):
+    """Names one request among all on the bus."""
 
     server: str
     requester: str
@@ -31,41 +31,44 @@ class Name(Struct, frozen=True):
 
 
 class Entry(Struct):
-    """One request. is_owed: it has reached a server that still is the same. is_foreign: no service has sent it."""
+    """One request.
 
-    name: Name
+    is_owed: it has reached its server, which has not been restarted since. is_foreign: no service has sent it.
+    """
+
+    name: RequestName
     asked_at: Seconds
     role: str
     is_owed: bool
     is_foreign: bool
     is_cancelled: bool = False
     ends: list[bytes] = field(default_factory=list)
-    """Each different terminal answer of its server, in this life of it."""
+    """Different terminal answers of its server since that was last restarted."""
     ended_at: Seconds | None = None
     mentioned_at: Seconds = 0.0
-    """When it last was sent again, renewed, or cancelled."""
+    """Time at which it was last sent, renewed, or cancelled."""
 
 
-class Book:
-    """All of them."""
+class Audit:
+    """All requests on a bus, with their answers."""
 
     def __init__(self) -> None:
-        self.entries: dict[Name, Entry] = {}
+        self.entries: dict[RequestName, Entry] = {}
         self.commands = 0
         self.answers = 0
 
     def hear(
         self, key: str, message: Message, sender: str, life: str, now: Seconds, *, arrives: bool, is_foreign: bool
     ) -> None:
-        """A message that was published. arrives: a server that stands gets it. is_foreign: sent by no service."""
+        """Record a published message. arrives: its server is alive and gets it. is_foreign: not from a service."""
         match message:
             case Request() | KeepAlive() if key.startswith(f"{keys.PREFIX}/cmd/"):
                 self._ask(key, message, message.life or life, now, arrives, is_foreign)
             case Answer() if sender and key == keys.request_state(sender):
                 self._answer(sender, message, now)
 
-    def restarted(self, server: str) -> None:
-        """It owes nothing any more of what it was asked for in its former life, nor knows what has ended in it."""
+    def note_restart(self, server: str) -> None:
+        """Note that `server` has a new life: it owes nothing from its former one, and may end old requests anew."""
         for entry in self.entries.values():
             if entry.name.server == server:
                 entry.is_owed = False
@@ -78,11 +81,11 @@ class Book:
         server, requester = keys.server_of(key), keys.requester_of(key)
         if isinstance(message, KeepAlive):
             for kept in message.live:
-                if entry := self.entries.get(Name(server, requester, life, kept.kind, kept.id)):
+                if entry := self.entries.get(RequestName(server, requester, life, kept.kind, kept.id)):
                     entry.mentioned_at = now
             return
         requester = requester or message.requester
-        name = Name(server, requester, life, kind_meant(message), message.id)
+        name = RequestName(server, requester, life, kind_meant(message), message.id)
         entry = self.entries.get(name)
         if entry is None and not isinstance(message, Cancel):
             role = key.split("/")[4] if keys.expression_of(key) else "manager"
@@ -94,11 +97,11 @@ class Book:
 
     def _answer(self, server: str, answer: Answer, now: Seconds) -> None:
         self.answers += 1
-        name = Name(server, answer.requester, answer.life, answer.kind, answer.id)
+        name = RequestName(server, answer.requester, answer.life, answer.kind, answer.id)
         entry = self.entries.get(name)
         if entry is None or not isinstance(answer, Refused | Outcome):
             return
-        # Nothing was done, for whatever reason: sent on two wrong keys, it is refused in two ways.
+        # All refusals are one end, since nothing was done: a request sent on two wrong keys is refused in two ways.
         told = REFUSED if isinstance(answer, Refused) else encode(answer)  # type: ignore[arg-type]
         if told not in entry.ends:
             entry.ends.append(told)
@@ -108,14 +111,15 @@ class Book:
 
     @property
     def open(self) -> list[Entry]:
-        """What has reached its server and has not ended."""
+        """Requests that have reached their server and have not ended."""
         return [entry for entry in self.entries.values() if entry.is_owed and entry.ended_at is None]
 
     @property
     def doubled(self) -> list[Entry]:
-        """What has ended in two ways.
+        """Requests that have ended in two ways.
 
-        Nobody can tell for those who name no life, or give one id to several kinds of requests: it is new again.
+        Requests without a life are left out, and ids given to several kinds of requests: there a second end may
+        belong to a new request.
         """
         kinds = Counter((name.server, name.requester, name.life, name.id) for name in self.entries)
         return [
@@ -125,7 +129,7 @@ class Book:
         ]
 
     def lingering(self, since: Seconds) -> list[Entry]:
-        """What a requester that is a service still went on about after `since`, long after its end."""
+        """Requests of services that were still mentioned after `since`, more than `PATIENCE` after their end."""
         return [
             entry
             for entry in self.entries.values()

@@ -1,4 +1,4 @@
-"""Chance as pure code sees it."""
+"""Random numbers for pure code, which is given their source."""
 
 from collections.abc import MutableSequence, Sequence
 from typing import Any, Protocol, TypeVar
@@ -7,7 +7,7 @@ T = TypeVar("T")
 
 
 class Chance(Protocol):
-    """What is used of `random.Random`; the trial makes one from its seed."""
+    """Methods of `random.Random` that pure code uses; the trial makes one from its seed."""
 
     def random(self) -> float: ...
     def uniform(self, a: float, b: float) -> float: ...

@@ -1,4 +1,4 @@
-"""What a body that lies does with a behavior: pure, from chance alone. services/hostile/service.py carries it out."""
+"""Lies of a body about its behaviors. Pure, from chance alone; services/hostile/service.py carries them out."""
 
 from collections.abc import Sequence
 from typing import Literal
@@ -6,15 +6,7 @@ from typing import Literal
 from msgspec import Struct
 
 from engage_hri.schemas.behavior_types import sync_points
-from engage_hri.schemas.behaviors import (
-    BlockBehavior,
-    Face,
-    FaceFacs,
-    FaceLexeme,
-    Gesture,
-    Pointing,
-    Speech,
-)
+from engage_hri.schemas.behaviors import BlockBehavior, Face, FaceFacs, FaceLexeme, Gesture, Pointing, Speech
 from engage_hri.schemas.body import Estimate, Phase
 from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.units import Seconds
@@ -23,13 +15,13 @@ from engage_hri.services.hostile.chance import Chance, happens
 Status = Literal["done", "aborted", "failed"]
 FAR = (1e9, -1e9, 1e308, -1e308, -1.0, 60.0)
 WAITS = {"stroke_start", "stroke_end", "stroke", "relax"}
-"""Points before which an honest body waits for its authority."""
+"""Sync points before which an honest body waits for its authority."""
 
 
 class Step(Struct, frozen=True):
-    """After `delay` seconds something is said. off: what is added to the time that it tells.
+    """A report, `delay` seconds after the one before. off: seconds added to the true time.
 
-    twice: the same message comes once more. stranger: it is about a behavior that nobody has asked for.
+    twice: it is sent twice. unasked: it names a behavior that was never asked for.
     """
 
     say: Literal["reached", "arrived", "word"]
@@ -37,41 +29,41 @@ class Step(Struct, frozen=True):
     delay: Seconds
     off: Seconds = 0.0
     twice: bool = False
-    stranger: bool = False
+    unasked: bool = False
     waits: bool = False
-    """For its authority, as it should."""
+    """True if it waits for its authority, as it should."""
 
 
 class Lie(Struct, frozen=True, kw_only=True):
-    """What becomes of one behavior. end: None if it never ends. ends_after: seconds after the last step.
+    """Course of one behavior. end: None if it never ends. end_delay: seconds after the last step.
 
-    answer: how long the acceptance takes. deaf: to cancellations. mourning: how late one is answered.
-    afterwards: what it says of the behavior once that has ended.
+    accept_delay: seconds until it is accepted or refused. ignores_cancel: it goes on when it is cancelled.
+    cancel_delay: seconds from a cancellation to the end. afterwards: reports after the end.
     """
 
     refuse: bool = False
-    answer: Seconds = 0.0
+    accept_delay: Seconds = 0.0
     steps: tuple[Step, ...] = ()
     end: Status | None = "done"
-    ends_after: Seconds = 0.0
-    deaf: bool = False
-    mourning: Seconds = 0.0
+    end_delay: Seconds = 0.0
+    ignores_cancel: bool = False
+    cancel_delay: Seconds = 0.0
     afterwards: tuple[Step, ...] = ()
 
 
 def lie(chance: Chance, behavior: BlockBehavior) -> Lie:
-    """Half of them are honest."""
+    """Draw what a body does with a behavior. Half of the draws are honest."""
     points = sync_points(behavior)
     if happens(chance, 0.5):
         return Lie(steps=_steps(chance, points, 1.0))
     match chance.randrange(0, 11):
         case 0:
-            return Lie(refuse=True, answer=_pause(chance))
+            return Lie(refuse=True, accept_delay=_pause(chance))
         case 1:  # slow
-            return Lie(steps=_steps(chance, points, chance.uniform(2.0, 10.0)), answer=_pause(chance))
-        case 2:  # stalled, and perhaps deaf
+            return Lie(steps=_steps(chance, points, chance.uniform(2.0, 10.0)), accept_delay=_pause(chance))
+        case 2:  # stalled, perhaps even when it is cancelled
             reached = _steps(chance, points, 1.0)[: chance.randrange(0, len(points))]
-            return Lie(steps=reached, end=None, deaf=happens(chance, 0.5), mourning=_pause(chance))
+            return Lie(steps=reached, end=None, ignores_cancel=happens(chance, 0.5), cancel_delay=_pause(chance))
         case 3:  # out of order
             steps = list(_steps(chance, points, 1.0))
             chance.shuffle(steps)
@@ -84,12 +76,13 @@ def lie(chance: Chance, behavior: BlockBehavior) -> Lie:
             return Lie(steps=_steps(chance, points, 1.0)[: chance.randrange(0, len(points))])
         case 7:
             broken = _steps(chance, points, 1.0)[: chance.randrange(0, len(points))]
-            return Lie(steps=broken, end="failed", ends_after=_pause(chance))
+            return Lie(steps=broken, end="failed", end_delay=_pause(chance))
         case 8:  # aborted by itself
-            return Lie(steps=_steps(chance, points, 1.0)[:1], end="aborted", mourning=_pause(chance))
+            return Lie(steps=_steps(chance, points, 1.0)[:1], end="aborted", cancel_delay=_pause(chance))
         case 9:  # late after a cut, or a cancellation
-            return Lie(steps=_steps(chance, points, 3.0), mourning=chance.uniform(4.0, 40.0))
-    return Lie(steps=tuple(_changed(chance, step) for step in _steps(chance, (*points, *points), 0.5)), deaf=True)
+            return Lie(steps=_steps(chance, points, 3.0), cancel_delay=chance.uniform(4.0, 40.0))
+    twofold = _steps(chance, (*points, *points), 0.5)
+    return Lie(steps=tuple(_changed(chance, step) for step in twofold), ignores_cancel=True)
 
 
 def _steps(chance: Chance, points: Sequence[str], slow: float) -> tuple[Step, ...]:
@@ -108,7 +101,7 @@ def _changed(chance: Chance, step: Step) -> Step:
         step.delay,
         off=chance.choice(FAR) if happens(chance, 0.3) else 0.0,
         twice=happens(chance, 0.5),
-        stranger=happens(chance, 0.2),
+        unasked=happens(chance, 0.2),
         waits=step.waits,
     )
 
@@ -118,7 +111,7 @@ def _pause(chance: Chance) -> Seconds:
 
 
 def estimate(chance: Chance, behavior: BlockBehavior) -> Estimate:
-    """Mostly what it will do."""
+    """Draw an estimate of a behavior. Most are sound, and say no more of what the body then does."""
     points = sync_points(behavior)
     natural = [chance.uniform(0.0, 0.6) for _ in points[1:]]
     what = chance.randrange(0, 40)
@@ -132,7 +125,7 @@ def estimate(chance: Chance, behavior: BlockBehavior) -> Estimate:
     if what == 3:
         points = (*points[1:], *points[:1])
     shortest = longest = natural
-    if what == 5:  # in no order
+    if what == 5:  # shortest and longest in no order
         shortest, longest = ([chance.uniform(0.0, 2.0) for _ in natural] for _ in range(2))
     phases = [
         Phase(since=since, to=to, shortest=least, natural=seconds, longest=most, hold=to in WAITS)

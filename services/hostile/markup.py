@@ -1,4 +1,4 @@
-"""BML and EBML that were good documents until somebody moved their elements about."""
+"""BML and EBML documents that were valid before some of their elements and attributes were changed at random."""
 
 from collections.abc import Callable
 
@@ -29,7 +29,7 @@ DEPTH = 80
 
 
 def document(chance: Chance, entities: tuple[str, ...]) -> bytes:
-    """One document with up to six changes, most of them still well formed."""
+    """Make a document with up to six changes. Most are still well-formed XML."""
     text = chance.choice(SEEDS).format(id=f"m{chance.randrange(0, 9)}", entity=chance.choice(entities))
     root = etree.fromstring(text)
     for _ in range(chance.randrange(0, 7)):
@@ -40,54 +40,54 @@ def document(chance: Chance, entities: tuple[str, ...]) -> bytes:
     return data.replace(b">", b"><!DOCTYPE x>", 1) if happens(chance, 0.02) else data
 
 
-def _any(chance: Chance, root: etree._Element) -> etree._Element:
+def _random_element(chance: Chance, root: etree._Element) -> etree._Element:
     return chance.choice([element for element in root.iter() if isinstance(element.tag, str)])
 
 
 def _remove(chance: Chance, root: etree._Element) -> None:
-    element = _any(chance, root)
+    element = _random_element(chance, root)
     if (parent := element.getparent()) is not None:
         parent.remove(element)
 
 
 def _move(chance: Chance, root: etree._Element) -> None:
-    element, into = _any(chance, root), _any(chance, root)
+    element, into = _random_element(chance, root), _random_element(chance, root)
     if element is not root and element not in (into, *into.iterancestors()):
         into.insert(chance.randrange(0, len(into) + 1), element)
 
 
 def _double(chance: Chance, root: etree._Element) -> None:
-    copy = etree.fromstring(etree.tostring(_any(chance, root), with_tail=False))
-    _any(chance, root).append(copy)
+    copy = etree.fromstring(etree.tostring(_random_element(chance, root), with_tail=False))
+    _random_element(chance, root).append(copy)
 
 
 def _rename(chance: Chance, root: etree._Element) -> None:
-    _any(chance, root).tag = _any(chance, root).tag if happens(chance, 0.7) else "unheardOf"
+    _random_element(chance, root).tag = _random_element(chance, root).tag if happens(chance, 0.7) else "unheardOf"
 
 
-def _set(chance: Chance, root: etree._Element) -> None:
-    names = [str(name) for name in _any(chance, root).attrib] or ["start"]
+def _set_attribute(chance: Chance, root: etree._Element) -> None:
+    names = [str(name) for name in _random_element(chance, root).attrib] or ["start"]
     name = chance.choice((*names, "id", "end", "stroke", "ref", "target", "unheardOf"))
-    _any(chance, root).set(name, chance.choice(VALUES))
+    _random_element(chance, root).set(name, chance.choice(VALUES))
 
 
-def _unset(chance: Chance, root: etree._Element) -> None:
-    element = _any(chance, root)
+def _remove_attribute(chance: Chance, root: etree._Element) -> None:
+    element = _random_element(chance, root)
     if names := list(element.attrib):
         del element.attrib[chance.choice(names)]
 
 
-def _say(chance: Chance, root: etree._Element) -> None:
-    _any(chance, root).text = chance.choice(VALUES)
+def _set_text(chance: Chance, root: etree._Element) -> None:
+    _random_element(chance, root).text = chance.choice(VALUES)
 
 
 def _nest(chance: Chance, root: etree._Element) -> None:
-    """Deeper than the reader goes."""
-    element = _any(chance, root)
+    """Nest elements, at times deeper than the reader goes."""
+    element = _random_element(chance, root)
     for _ in range(DEPTH if happens(chance, 0.3) else 2):
         element = etree.SubElement(element, "required")
 
 
 CHANGES: tuple[Callable[[Chance, etree._Element], None], ...] = (
-    _remove, _move, _double, _rename, _set, _set, _set, _unset, _say, _nest,
+    _remove, _move, _double, _rename, *(_set_attribute,) * 3, _remove_attribute, _set_text, _nest,
 )  # fmt: skip

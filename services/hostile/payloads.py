@@ -20,28 +20,28 @@ from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.world import World
 from engage_hri.services.hostile.chance import Chance, happens
 from engage_hri.services.hostile.markup import document
-from engage_hri.services.hostile.typed import SURROGATE, Typed, distorted
+from engage_hri.services.hostile.typed import SURROGATE, RandomMessages, distorted
 
 BROKEN = 0.05
-"""Of the payloads have bits flipped, or end early."""
+"""Share of the payloads that have bits flipped, or end early."""
 DISTORTED = 0.15
 MARKUP = 0.05
 
-HOME: Mapping[type, str] = {
+SERVER: Mapping[type, str] = {
     FragmentOutcome: "generation", InhibitionEnded: "generation", BlockOutcome: "realizer",
     BehaviorInterrupted: "realizer", EventOutcome: "recognition", TurnOutcome: "recognition",
 }  # fmt: skip
-PLACES: Mapping[type, str] = {
+FIXED_KEYS: Mapping[type, str] = {
     **dict.fromkeys((BlockProgress, SyncPointProgress, PredictionFeedback, WarningFeedback), keys.FEEDBACK),
     **dict.fromkeys((SyncPointArrived, SyncPointReached, WordSpoken), keys.SYNC_POINT),
     **dict.fromkeys((ActorFound, ActorLost), keys.PERCEIVED_ACTION),
     TurnClosed: keys.TURN_CLOSED, World: keys.WORLD, HeadOwner: keys.HEAD_OWNER, RobotState: keys.ROBOT_STATE,
 }  # fmt: skip
-"""Where those go that always go to one key."""
+"""Key of each type of message that always has the same."""
 
 
 class Payload(NamedTuple):
-    """What another program puts on the bus. kind: the message that it was made from."""
+    """Bytes that another program puts on the bus. kind: type of the message that they were made from."""
 
     key: str
     data: bytes
@@ -50,18 +50,18 @@ class Payload(NamedTuple):
 
 
 class Payloads:
-    """An endless row of them. entities: ids of what the world holds, for markup."""
+    """Makes payloads without end. entities: ids of what the world holds, for markup."""
 
-    def __init__(self, chance: Chance, typed: Typed, entities: tuple[str, ...]) -> None:
+    def __init__(self, chance: Chance, messages: RandomMessages, entities: tuple[str, ...]) -> None:
         self._chance = chance
-        self._typed = typed
+        self._messages = messages
         self._entities = entities
 
     def next(self, now: Seconds) -> Payload:
         if happens(self._chance, MARKUP):
             key = self._command(self._chance.choice((keys.BLOCK, keys.FRAGMENT)))
             return Payload(key, document(self._chance, self._entities), "application/xml", "markup")
-        message = self._typed.message(now)
+        message = self._messages.message(now)
         form = self._chance.choice(("msgpack", "json"))
         data = self._encoded(message, form)
         if happens(self._chance, BROKEN):
@@ -76,7 +76,7 @@ class Payloads:
             data = encode(thing)
         except (OverflowError, ValueError):  # an integer that no MessagePack holds
             data = encode(message)
-        # Half a surrogate pair in three bytes, as long as the letter that stands for it.
+        # Half a surrogate pair takes three bytes, as many as the character that stands for it.
         return data.replace(SURROGATE.encode(), b"\xed\xa0\x80")
 
     def _encoding(self, form: str, name: str) -> str:
@@ -92,7 +92,7 @@ class Payloads:
         if where < 0.85:
             return self.right_key(message)
         if where < 0.95:
-            return self.right_key(self._typed.message(0.0))
+            return self.right_key(self._messages.message(0.0))
         server = self._chance.choice((*keys.SERVICES, "nobody"))
         kind = self._chance.choice(("cmd", "evt", "state", "stream", "rpc"))
         tail = self._chance.choice(
@@ -101,8 +101,8 @@ class Payloads:
         return f"{keys.PREFIX}/{kind}/{server}{tail}"
 
     def right_key(self, message: Message) -> str:
-        """Where this message belongs; what is sent to nobody in particular goes to any server."""
-        server = HOME.get(type(message)) or self._chance.choice(keys.SERVICES)
+        """Key on which this message belongs; one that any server may get goes to a random one."""
+        server = SERVER.get(type(message)) or self._chance.choice(keys.SERVICES)
         match message:
             case KeepAlive():
                 return self._command(keys.keep_alive(server))
@@ -122,7 +122,7 @@ class Payloads:
                 return keys.open_events(_chunk(actor))
             case Statistics(actor=actor):
                 return keys.statistics(_chunk(actor))
-        return PLACES.get(type(message)) or keys.request_state(server)
+        return FIXED_KEYS.get(type(message)) or keys.request_state(server)
 
     def _command(self, expression: str) -> str:
         role = self._chance.choice(("manager", "observer", "realizer"))
@@ -135,7 +135,7 @@ def _chunk(actor: str) -> str:
 
 
 def broken(chance: Chance, data: bytes) -> bytes:
-    """With a few bits flipped, or without its end."""
+    """Flip a few bits of the data, or cut off its end."""
     if len(data) < 2:
         return data
     if happens(chance, 0.3):

@@ -1,4 +1,4 @@
-"""Blocks and fragments that a manager might write: what is done to them is the attack."""
+"""Blocks and fragments that a manager might write. They are valid: the attack is what is done to them later."""
 
 from collections.abc import Sequence
 from itertools import pairwise
@@ -21,14 +21,14 @@ from engage_hri.schemas.behaviors import (
     Wait,
 )
 from engage_hri.schemas.blocks import Block
-from engage_hri.schemas.fragments import TurnFragment
+from engage_hri.schemas.fragments import TurnFragment, TurnStatus
 from engage_hri.services.hostile.chance import Chance, happens
 
 TEXT = "Please move the blue piece"
 
 
 def block(chance: Chance, id: str, entities: Sequence[str]) -> Block:
-    """entities: ids of what the world holds."""
+    """Make a block of one to four behaviors. entities: ids of what the world holds."""
     behaviors = tuple(_behavior(chance, f"b{n}", entities) for n in range(1, chance.randrange(2, 6)))
     return Block(
         id=id,
@@ -42,11 +42,8 @@ def fragment(chance: Chance, id: str, entities: Sequence[str]) -> TurnFragment:
     behaviors: list[FragmentBehavior] = [Speech(id="words", text=TEXT)]
     if happens(chance, 0.5):
         behaviors.append(Reference(id="it", target=chance.choice(entities)))
-    return TurnFragment(
-        id=id,
-        turn_status=chance.choice(("full", "full", "beginning", "end", "backchannel")),
-        behaviors=tuple(behaviors),
-    )
+    status: TurnStatus = chance.choice(("full", "full", "beginning", "end", "backchannel"))
+    return TurnFragment(id=id, turn_status=status, behaviors=tuple(behaviors))
 
 
 def _behavior(chance: Chance, id: str, entities: Sequence[str]) -> BlockBehavior:

@@ -1,8 +1,8 @@
-"""Requests at bad moments: what peers do who know the protocol and keep none of its manners. Pure, from chance."""
+"""Requests at bad moments, from peers that know the protocol and break its rules. Pure, from chance."""
 
 from collections import deque
 from collections.abc import Callable, Sequence
-from typing import Literal
+from typing import Literal, cast
 
 from msgspec import Struct
 from msgspec.structs import replace
@@ -16,7 +16,6 @@ from engage_hri.schemas.fragments import FragmentOutcome, PerformFragment
 from engage_hri.schemas.messages import COMMANDS, Message
 from engage_hri.schemas.requests import (
     Accepted,
-    Answer,
     Cancel,
     Heard,
     KeepAlive,
@@ -29,64 +28,66 @@ from engage_hri.schemas.requests import (
 from engage_hri.schemas.units import Seconds, Stamp
 from engage_hri.services.hostile import plausible
 from engage_hri.services.hostile.chance import Chance, happens
-from engage_hri.services.hostile.typed import NASTY_FLOATS, NASTY_INTS, Typed, Words
+from engage_hri.services.hostile.typed import NASTY_FLOATS, NASTY_INTS, RandomMessages, Words
 
 IDS = ("1", "2", "3", "same", "1~2")
-"""Which all peers use."""
-KEPT = 32
+"""Request ids that all peers share."""
+REMEMBERED = 32
 
 
-class Deed(Struct, frozen=True):
-    """Peer number `who` publishes `message` after `delay` seconds; None: it leaves, and comes back as another life.
+class Move(Struct, frozen=True):
+    """Peer number `peer` publishes `message` after `delay` seconds; None: it leaves, and comes back as another life.
 
-    expression: of the key, for a command that of all requesters.
+    expression: the key; for a command the key expression of all requesters.
     """
 
-    who: int
+    peer: int
     message: Message | None = None
     expression: str = ""
     delay: Seconds = 0.0
 
 
 class _Sent(Struct, frozen=True):
-    who: int
+    peer: int
     expression: str
     request: Request
 
 
 class Schemer:
-    """Thinks of one deed after the other. peers: how many take part."""
+    """Draws what a peer does next. peers: number of peers that take part."""
 
-    def __init__(self, chance: Chance, typed: Typed, words: Words, entities: tuple[str, ...], peers: int = 2) -> None:
+    def __init__(
+        self, chance: Chance, messages: RandomMessages, words: Words, entities: tuple[str, ...], peers: int
+    ) -> None:
         self._chance = chance
-        self._typed = typed
+        self._messages = messages
         self._words = words
         self._entities = entities
         self._peers = peers
-        self._sent: deque[_Sent] = deque(maxlen=KEPT)
+        self._sent: deque[_Sent] = deque(maxlen=REMEMBERED)
         self._lives = [""] * peers
 
-    def next(self, now: Seconds) -> Deed:
-        who = self._chance.randrange(0, self._peers)
-        deed = self._chance.choice(DEEDS)(self, who, now)
+    def next(self, now: Seconds) -> Move:
+        peer = self._chance.randrange(0, self._peers)
+        move = self._chance.choice(MOVES)(self, peer, now)
         late = self._chance.choice((0.0, 0.0, 0.0, self._chance.uniform(0.0, 3.0)))
-        return replace(deed, delay=late)
+        return replace(move, delay=late)
 
-    # -- deeds ----------------------------------------------------------------------------------------------------
+    # -- moves ----------------------------------------------------------------------------------------------------
 
-    def _ask(self, who: int, now: Seconds) -> Deed:
+    def _ask(self, peer: int, now: Seconds) -> Move:
         expression = self._chance.choice(tuple(COMMANDS))
         kind = self._chance.choice(COMMANDS[expression])
         lease = self._chance.choice((0.0, 0.0, 1.0, 5.0, *NASTY_FLOATS[:3]))
         request = self._request(kind, now)
-        request = replace(request, id=self._id(), life=self._lives[who], requester="", revision=0, lease=lease)
-        self._sent.append(_Sent(who, expression, request))
-        return Deed(who, _message(request), expression)
+        request = replace(request, id=self._id(), life=self._lives[peer], requester="", revision=0, lease=lease)
+        self._sent.append(_Sent(peer, expression, request))
+        return Move(peer, cast(Message, request), expression)
 
-    def _again(self, who: int, now: Seconds) -> Deed:
-        """The same, perhaps as somebody else, or on another key, with another revision, or after a new life began."""
+    def _repeat(self, peer: int, now: Seconds) -> Move:
+        """Send a request again: perhaps as another peer, on another key, with another revision, or in a new life."""
         if not self._sent:
-            return self._ask(who, now)
+            return self._ask(peer, now)
         sent = self._chance.choice(self._sent)
         request = sent.request
         if happens(self._chance, 0.4):
@@ -95,21 +96,22 @@ class Schemer:
             other = self._request(type(request), now)
             request = replace(other, id=request.id, life=request.life, requester="", revision=request.revision)
         expression = sent.expression if happens(self._chance, 0.9) else self._chance.choice(tuple(COMMANDS))
-        return Deed(sent.who if happens(self._chance, 0.8) else who, _message(request), expression)
+        return Move(sent.peer if happens(self._chance, 0.8) else peer, cast(Message, request), expression)
 
-    def _cancel(self, who: int, now: Seconds) -> Deed:
-        """One's own request, somebody else's, or one that was never made."""
+    def _cancel(self, peer: int, now: Seconds) -> Move:
+        """Cancel a request of any peer, or one that was never made."""
         if self._sent and happens(self._chance, 0.7):
             sent = self._chance.choice(self._sent)
-            server, id, kind, life = keys.server_of(sent.expression), sent.request.id, kind_of(sent.request), ""
-            life, who = sent.request.life, sent.who
+            server, id, kind = keys.server_of(sent.expression), sent.request.id, kind_of(sent.request)
+            life, peer = sent.request.life, sent.peer
         else:
-            server, id, kind, life = self._chance.choice(keys.SERVICES), self._id(), "perform_block", self._lives[who]
+            server, id = self._chance.choice(keys.SERVICES), self._id()
+            kind, life = "perform_block", self._lives[peer]
         of = self._chance.choice((kind, kind, kind, "", "inhibit", "nothing"))
-        return Deed(who, Cancel(id=id, life=life, of=of, reason="why not"), keys.cancel(server))
+        return Move(peer, Cancel(id=id, life=life, of=of, reason="why not"), keys.cancel(server))
 
-    def _keep(self, who: int, now: Seconds) -> Deed:
-        """Alive what is not, with authority that does not exist, in revisions that never were."""
+    def _keep_alive(self, peer: int, now: Seconds) -> Move:
+        """Renew requests, some with a kind, revision or authority that does not exist."""
         requests = [each.request for each in self._sent if happens(self._chance, 0.5)][:4]
         kept = [
             Kept(kind_of(request), request.id, request.revision, request.authority, 5.0)
@@ -125,12 +127,12 @@ class Schemer:
         ]
         clock = self._chance.choice(("loop", "loop", "sundial"))
         at = Stamp(clock, now + self._chance.choice((0.0, -5.0, 1e9, 1e308)))
-        life = self._chance.choice((self._lives[who], *[request.life for request in requests]))
+        life = self._chance.choice((self._lives[peer], *[request.life for request in requests]))
         server = self._chance.choice(keys.SERVICES)
-        return Deed(who, KeepAlive(live=tuple(kept), at=at, life=life), keys.keep_alive(server))
+        return Move(peer, KeepAlive(live=tuple(kept), at=at, life=life), keys.keep_alive(server))
 
-    def _answer(self, who: int, now: Seconds) -> Deed:
-        """For a server that it is not."""
+    def _answer(self, peer: int, now: Seconds) -> Move:
+        """Answer requests in the name of a server."""
         at = Stamp("loop", now)
         fault = Fault(reason="because I say so")
         id, block = self._word("id"), self._word("block")
@@ -146,11 +148,11 @@ class Schemer:
             life=self._word("life"),
             kind=self._chance.choice(("perform_block", "perform_behavior", "perform_fragment", "request_event", "")),
         )
-        return Deed(who, _told(answer), keys.request_state(self._chance.choice((*keys.SERVICES, "nobody"))))
+        return Move(peer, cast(Message, answer), keys.request_state(self._chance.choice((*keys.SERVICES, "nobody"))))
 
-    def _new_life(self, who: int, now: Seconds) -> Deed:
-        self._lives[who] = self._chance.choice(("", "life-1", f"life-{now:.3f}"))
-        return Deed(who)
+    def _new_life(self, peer: int, now: Seconds) -> Move:
+        self._lives[peer] = self._chance.choice(("", "life-1", f"life-{now:.3f}"))
+        return Move(peer)
 
     # -- what is asked for ----------------------------------------------------------------------------------------
 
@@ -179,20 +181,12 @@ class Schemer:
         if kind is Inhibit:
             target = chance.choice(("", *self._entities))
             return Inhibit(id="", mode=chance.choice(("release", "hold", "target")), target=target, ttl=2.0)
-        made = self._typed.message(now, kind.__name__)
+        made = self._messages.message(now, kind.__name__)
         assert isinstance(made, Request)
         return made
 
 
-DEEDS: Sequence[Callable[[Schemer, int, Seconds], Deed]] = (
-    *(Schemer._ask,) * 5, *(Schemer._again,) * 4, *(Schemer._cancel,) * 3, Schemer._keep, *(Schemer._answer,) * 2,
-    Schemer._new_life,
+MOVES: Sequence[Callable[[Schemer, int, Seconds], Move]] = (
+    *(Schemer._ask,) * 5, *(Schemer._repeat,) * 4, *(Schemer._cancel,) * 3, Schemer._keep_alive,
+    *(Schemer._answer,) * 2, Schemer._new_life,
 )  # fmt: skip
-
-
-def _message(request: Request) -> Message:
-    return request  # type: ignore[return-value]
-
-
-def _told(answer: Answer) -> Message:
-    return answer  # type: ignore[return-value]

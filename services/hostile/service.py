@@ -1,4 +1,4 @@
-"""A `control` that lies: it takes behaviors as control does, and then does what services/hostile/lies.py says."""
+"""A service `control` that lies: it takes behaviors as control does, and then follows services/hostile/lies.py."""
 
 import asyncio
 from random import Random
@@ -30,15 +30,15 @@ from engage_hri.services.runtime.service import Ready
 
 NAME = "control"
 TERM: Seconds = 2.0
-"""Movement authority that names no lease lasts this long, as control's own."""
+"""Seconds that movement authority lasts if its request names no lease."""
 
 
 class LyingBody:
-    """chance: of all its lies, which are the same for the same one."""
+    """A body on the bus that lies about its behaviors. chance: source of its lies; the same seed, the same lies."""
 
     def __init__(self, chance: Random) -> None:
         self._chance = chance
-        self._acts: dict[str, _Act] = {}
+        self._acts: dict[str, _LyingBehavior] = {}
 
     async def serve(self, bus: Bus, ready: Ready) -> None:
         """Serve until cancelled."""
@@ -68,7 +68,7 @@ class LyingBody:
             case PerformBehavior() if request.id in self._acts:
                 self._acts[request.id].extend(request)
             case PerformBehavior():
-                act = self._acts[request.id] = _Act(request, lie(self._chance, request.behavior))
+                act = self._acts[request.id] = _LyingBehavior(request, lie(self._chance, request.behavior))
                 act.task = self._tasks.create_task(self._perform(act), name=f"lie {request.id}")
             case AbortBehavior():
                 self._desk.end(BehaviorAborted(id=request.id))
@@ -79,12 +79,12 @@ class LyingBody:
 
     def _cancelled(self, cancel: Cancel) -> None:
         act = self._acts.get(cancel.id)
-        if act is not None and not act.lie.deaf and act.task is not None:
+        if act is not None and not act.lie.ignores_cancel and act.task is not None:
             act.task.cancel()
-            self._tasks.create_task(self._mourn(act), name=f"lie end {cancel.id}")
+            self._tasks.create_task(self._end_cancelled(act), name=f"lie end {cancel.id}")
 
-    async def _mourn(self, act: "_Act") -> None:
-        await asyncio.sleep(act.lie.mourning)
+    async def _end_cancelled(self, act: "_LyingBehavior") -> None:
+        await asyncio.sleep(act.lie.cancel_delay)
         self._end(act, "aborted")
 
     async def _go_home(self, request: GoHome) -> None:
@@ -92,35 +92,35 @@ class LyingBody:
         await asyncio.sleep(self._chance.choice((0.0, 0.5, 8.0)))
         self._desk.end(HomeReached(id=request.id, at=self._bus.stamp()))
 
-    async def _perform(self, act: "_Act") -> None:
+    async def _perform(self, act: "_LyingBehavior") -> None:
         plan = act.lie
-        await asyncio.sleep(plan.answer)
+        await asyncio.sleep(plan.accept_delay)
         if plan.refuse:
             del self._acts[act.request.id]
             self._desk.refuse(act.request.id, Fault(reason="no", where=act.request.behavior.id, service=NAME))
             return
         self._desk.accept(act.request.id)
         for step in plan.steps:
-            await self._take(act, step)
+            await self._report(act, step)
         if plan.end is not None:
-            await asyncio.sleep(plan.ends_after)
+            await asyncio.sleep(plan.end_delay)
             self._end(act, plan.end)
             for step in plan.afterwards:
-                await self._take(act, step)
+                await self._report(act, step)
 
-    async def _take(self, act: "_Act", step: Step) -> None:
+    async def _report(self, act: "_LyingBehavior", step: Step) -> None:
         await asyncio.sleep(step.delay)
         arrived = self._bus.now()
         if step.waits and not act.covers(step.sync):
-            self._say(act, Step("arrived", step.sync, 0.0), arrived)
+            self._publish(act, Step("arrived", step.sync, 0.0), arrived)
             await act.granted(step.sync)
         for _ in range(2 if step.twice else 1):
-            self._say(act, step, arrived)
+            self._publish(act, step, arrived)
 
-    def _say(self, act: "_Act", step: Step, arrived: Seconds) -> None:
+    def _publish(self, act: "_LyingBehavior", step: Step, arrived: Seconds) -> None:
         request = act.request
         id, behavior = self._desk.asked(request.id).id, request.behavior.id
-        if step.stranger:
+        if step.unasked:
             id, behavior = f"{id}-not", self._chance.choice(("b1", "nobody", ""))
         block, at = request.block, self._bus.stamp(self._bus.now() + step.off)
         told: Message
@@ -135,7 +135,7 @@ class LyingBody:
                 told = WordSpoken(block=block, behavior=behavior, word="word", position=position, at=at)
         self._bus.publish(keys.SYNC_POINT, told)
 
-    def _end(self, act: "_Act", status: Status) -> None:
+    def _end(self, act: "_LyingBehavior", status: Status) -> None:
         request = act.request
         if self._acts.pop(request.id, None) is act and self._desk.is_live(request.id):
             behavior, at = request.behavior.id, self._bus.stamp()
@@ -144,8 +144,8 @@ class LyingBody:
             )
 
 
-class _Act:
-    """A behavior under way."""
+class _LyingBehavior:
+    """A behavior that is being performed, and the lie about it."""
 
     def __init__(self, request: PerformBehavior, plan: Lie) -> None:
         self.request = request

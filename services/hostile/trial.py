@@ -1,9 +1,9 @@
-"""One attack on services in this process, and what came of it. On a memory bus and in virtual time, and nowhere else.
+"""Trial of services in this process: one attack, and a report on it. On a memory bus and in virtual time only.
 
     report = run(Attack(seed=7), services)
     assert not report.wrong
 
-What the peer does is chance, from the seed alone: the same seed does the same each time.
+The attack is drawn from its seed alone: the same seed gives the same attack.
 """
 
 import asyncio
@@ -27,14 +27,14 @@ from engage_hri.schemas.world import World
 from engage_hri.services.bus.interface import LOG, Hub, Received
 from engage_hri.services.bus.memory import MemoryBus, MemoryHub
 from engage_hri.services.bus.payloads import read_payload
-from engage_hri.services.hostile.audit import REFUSED, Book, Entry
+from engage_hri.services.hostile.audit import REFUSED, Audit, Entry
 from engage_hri.services.hostile.payloads import Payload, Payloads
-from engage_hri.services.hostile.schemes import Deed, Schemer
+from engage_hri.services.hostile.schemes import Move, Schemer
 from engage_hri.services.hostile.service import NAME as BODY
 from engage_hri.services.hostile.service import LyingBody
-from engage_hri.services.hostile.typed import Typed, Words
+from engage_hri.services.hostile.typed import RandomMessages, Words
 from engage_hri.services.hostile.visitor import NAME as VISITOR
-from engage_hri.services.hostile.visitor import Visitor, guest
+from engage_hri.services.hostile.visitor import Visitor, client_fault
 from engage_hri.services.requests.ends import Requester
 from engage_hri.services.runtime.service import Service, serve
 from engage_hri.services.runtime.virtual_time import Deadlock, TimeRanOut, VirtualTimeLoop
@@ -43,19 +43,19 @@ Kind = Literal["messages", "requests", "body"]
 KINDS: tuple[Kind, ...] = get_args(Kind)
 Client = Callable[[Hub], Awaitable[None]]
 SETTLE: Seconds = 100.0
-"""After the attack: longer than all patience in a row, so that what is still open then is open for ever."""
+"""Time after the attack: longer than all time limits in a row, so that a request still open then never ends."""
 QUIET: Seconds = 10.0
-"""At its end nobody may speak of old requests any more."""
+"""Time at the end of `SETTLE` in which no service may mention old requests any more."""
 LIMIT: Seconds = 3600.0
 PEERS = 2
-TOLD = 5
-"""How many of each kind of mistake a report names."""
+MOST_NAMED = 5
+"""Most mistakes of one kind that a report names."""
 
 
 class Attack(Struct, frozen=True, kw_only=True):
-    """seconds: how long, in virtual time. rate: random messages per second.
+    """An attack to be made. seconds: its length, in virtual time. rate: random messages per second.
 
-    own_body: the body is somebody's own, behind the real control: it is cut off, but nothing takes its place.
+    own_body: the body under test is behind the real control: it is cut off at times, but no lying body replaces it.
     """
 
     seed: int = 0
@@ -66,17 +66,17 @@ class Attack(Struct, frozen=True, kw_only=True):
 
 
 class Report(Struct, kw_only=True):
-    """counts: of all that was sent and done. wrong: what should not have come of it, in words."""
+    """Report on an attack. counts: of all that was sent and done. wrong: mistakes of the services, in words."""
 
     attack: Attack
     counts: Counter[str]
     wrong: list[str]
     failures: list[str]
-    """Tracebacks of exceptions that nobody had foreseen."""
+    """Tracebacks of unexpected exceptions."""
 
 
 def run(attack: Attack, services: Mapping[str, Service], client: Client | None = None) -> Report:
-    """A trial on a virtual loop of its own, for whoever has none."""
+    """Make a trial on a virtual loop of its own, for a caller without one."""
     try:
         with asyncio.Runner(loop_factory=partial(VirtualTimeLoop, LIMIT)) as runner:
             return runner.run(trial(attack, services, client))
@@ -85,7 +85,7 @@ def run(attack: Attack, services: Mapping[str, Service], client: Client | None =
 
 
 async def trial(attack: Attack, services: Mapping[str, Service], client: Client | None = None) -> Report:
-    """Run the services under the attack, let them settle, and judge. client: somebody's own, which is to end by then.
+    """Run the services under the attack, let them settle, and judge. client: one under test, which has to end, too.
 
     Raises InputRefused if time is real: what is sent here is no good for motors.
     """
@@ -95,19 +95,12 @@ async def trial(attack: Attack, services: Mapping[str, Service], client: Client 
     return await _Trial(attack, services, client).judged()
 
 
-def insist_on_memory(hub: Hub) -> None:
-    """Raises InputRefused if the hub reaches further than this process."""
-    if not isinstance(hub, MemoryHub):
-        reason = f"the hostile peer runs on a MemoryHub only, not on a {type(hub).__name__}"
-        raise InputRefused(Fault(reason=reason, advice="motors may be behind it"))
-
-
-class _Tapped(MemoryHub):
-    """A memory bus on which each message is written into the book."""
+class _AuditedHub(MemoryHub):
+    """A memory bus that has each message audited."""
 
     def __init__(self, services: frozenset[str]) -> None:
         super().__init__()
-        self.book = Book()
+        self.audit = Audit()
         self.words = Words()
         self._services = services
 
@@ -118,12 +111,12 @@ class _Tapped(MemoryHub):
         arrives = server in self.alive and not self._is_cut(sender, server)
         is_foreign = sender not in self._services
         now = self._loop.time()
-        self.book.hear(key, message, sender, received.life, now, arrives=arrives, is_foreign=is_foreign)
+        self.audit.hear(key, message, sender, received.life, now, arrives=arrives, is_foreign=is_foreign)
         super()._pass_on(sender, received)
 
 
-class _Log(logging.Handler):
-    """What was contained, with its traceback."""
+class _FailureLog(logging.Handler):
+    """Collects the tracebacks of contained failures."""
 
     def __init__(self) -> None:
         super().__init__(logging.ERROR)
@@ -138,7 +131,7 @@ class _Trial:
         self.attack = attack
         self.client = client
         self.services = dict(services)
-        self.hub = _Tapped(frozenset((*services, BODY, VISITOR)))
+        self.hub = _AuditedHub(frozenset((*services, BODY, VISITOR)))
         self.counts: Counter[str] = Counter()
         self.wrong: list[str] = []
         self.failures: list[str] = []
@@ -147,21 +140,20 @@ class _Trial:
         self.entities: tuple[str, ...] = ("nobody",)
 
     def chance(self, of: str) -> Random:
-        """Each part of the attack has its own, so that one can be left out and the others stay the same."""
+        """Create the random numbers of one part of the attack: without that part the others stay the same."""
         return Random(f"{self.attack.seed}/{of}")
 
     # -- from beginning to end ------------------------------------------------------------------------------------
 
     async def judged(self) -> Report:
-        before, log = asyncio.all_tasks(), _Log()
+        before, log = asyncio.all_tasks(), _FailureLog()
         loop = asyncio.get_running_loop()
         LOG.addHandler(log)
         propagates, LOG.propagate = LOG.propagate, False
         loop.set_exception_handler(self._unhandled)
         try:
-            insist_on_memory(self.hub)
             async with self.hub:
-                await self._play()
+                await self._run()
         finally:
             LOG.removeHandler(log)
             LOG.propagate = propagates
@@ -173,7 +165,7 @@ class _Trial:
         self._note("contained failures", [_last_line(text) for text in self.failures])
         return Report(attack=self.attack, counts=self.counts, wrong=self.wrong, failures=self.failures)
 
-    async def _play(self) -> None:
+    async def _run(self) -> None:
         if "body" in self.attack.kinds and not self.attack.own_body:
             self.services[BODY] = LyingBody(self.chance("lies")).serve
         for name in self.services:
@@ -184,16 +176,15 @@ class _Trial:
         visitor = Visitor(self.chance("visitor"), self.entities, servers)
         async with Requester(bus) as requests:
             bus.declare_alive()
-            guests = [] if self.client is None else [self.client(self.hub)]
-            clients = [asyncio.ensure_future(self._client(each)) for each in guests]
+            clients = [] if self.client is None else [asyncio.ensure_future(self.client(self.hub))]
             async with asyncio.TaskGroup() as group:
-                for deeds in self._deeds(visitor, bus, requests):
-                    group.create_task(deeds)
+                for part in self._parts(visitor, bus, requests):
+                    group.create_task(part)
             await self._end_attack()
             await asyncio.sleep(SETTLE - QUIET)
             quiet_since = bus.now()
             for client in clients:
-                self._note("clients that failed", list(filter(None, [await guest(client, QUIET, SETTLE)])))
+                self._note("clients that failed", list(filter(None, [await client_fault(client, QUIET, SETTLE)])))
             await asyncio.sleep(QUIET)
             await self._judge(bus, visitor, quiet_since)
         await bus.leave()
@@ -202,22 +193,20 @@ class _Trial:
         for name in self.services:
             await self._stop(name)
 
-    async def _client(self, client: Awaitable[None]) -> None:
-        await client
-
-    def _deeds(self, visitor: Visitor, bus: MemoryBus, requests: Requester) -> list[Any]:
+    def _parts(self, visitor: Visitor, bus: MemoryBus, requests: Requester) -> list[Any]:
         attack = self.attack
-        typed = Typed(self.chance("typed"), self.hub.words)
-        deeds: list[Any] = []
+        messages = RandomMessages(self.chance("typed"), self.hub.words)
+        parts: list[Any] = []
         if "realizer" in self.services:
-            deeds.append(visitor.visit(bus, requests, attack.seconds))
+            parts.append(visitor.visit(bus, requests, attack.seconds))
         if "messages" in attack.kinds:
-            deeds.append(self._send_messages(Payloads(self.chance("payloads"), typed, self.entities)))
+            parts.append(self._send_messages(Payloads(self.chance("payloads"), messages, self.entities)))
         if "requests" in attack.kinds:
-            deeds.append(self._scheme(Schemer(self.chance("schemes"), typed, self.hub.words, self.entities, PEERS)))
+            schemer = Schemer(self.chance("schemes"), messages, self.hub.words, self.entities, PEERS)
+            parts.append(self._make_moves(schemer))
         if "body" in attack.kinds:
-            deeds.append(self._cut())
-        return deeds
+            parts.append(self._disrupt())
+        return parts
 
     # -- services -------------------------------------------------------------------------------------------------
 
@@ -266,19 +255,19 @@ class _Trial:
         except EngageError:
             self.counts["messages that were none"] += 1
         except Exception:
-            pass  # told below
+            pass  # reported below
         try:
             self.hub.inject(payload.key, payload.data, payload.encoding)
         except Exception as error:
             self.failures.append(f"{payload.kind} on {payload.key}\n{''.join(traceback.format_exception(error))}")
 
-    async def _scheme(self, schemer: Schemer) -> None:
+    async def _make_moves(self, schemer: Schemer) -> None:
         chance, loop = self.chance("scheming"), asyncio.get_running_loop()
         self.peers = [self._join(number) for number in range(PEERS)]
         until = loop.time() + self.attack.seconds
         async with asyncio.TaskGroup() as late:
             while loop.time() < until:
-                late.create_task(self._do(schemer.next(loop.time())))
+                late.create_task(self._make(schemer.next(loop.time())))
                 await asyncio.sleep(chance.choice((0.0, chance.uniform(0.0, 0.2), chance.uniform(0.0, 2.0))))
 
     def _join(self, number: int) -> MemoryBus:
@@ -287,25 +276,25 @@ class _Trial:
             bus.declare_alive()
         return bus
 
-    async def _do(self, deed: Deed) -> None:
-        await asyncio.sleep(deed.delay)
-        peer = self.peers[deed.who]
-        if deed.message is None:
+    async def _make(self, move: Move) -> None:
+        await asyncio.sleep(move.delay)
+        peer = self.peers[move.peer]
+        if move.message is None:
             self.counts["new lives of peers"] += 1
             await peer.leave()
-            self.peers[deed.who] = self._join(deed.who)
+            self.peers[move.peer] = self._join(move.peer)
             return
-        is_command = deed.expression.startswith(f"{keys.PREFIX}/cmd/")
+        is_command = move.expression.startswith(f"{keys.PREFIX}/cmd/")
         self.counts["bad commands" if is_command else "false answers"] += 1
-        key = keys.command(deed.expression, peer.role, peer.name) if is_command else deed.expression
+        key = keys.command(move.expression, peer.role, peer.name) if is_command else move.expression
         try:
-            encode(deed.message)
+            encode(move.message)
         except (OverflowError, ValueError):
             return
-        peer.publish(key, deed.message)
+        peer.publish(key, move.message)
 
-    async def _cut(self) -> None:
-        """Cuts between anybody and all others, and a body that vanishes and comes back."""
+    async def _disrupt(self) -> None:
+        """Cut one participant off from all others, or have the body vanish and come back; again and again."""
         chance, loop = self.chance("cuts"), asyncio.get_running_loop()
         until = loop.time() + self.attack.seconds
         while True:
@@ -321,15 +310,15 @@ class _Trial:
                 self.counts["vanished bodies"] += 1
                 self.hub.kill(BODY)
                 await self._stop(BODY)
-                self.hub.book.restarted(BODY)
+                self.hub.audit.note_restart(BODY)
                 await asyncio.sleep(chance.choice((0.0, 0.5, chance.uniform(0.0, 8.0))))
                 await self._start(BODY)
 
     async def _end_attack(self) -> None:
-        """All is whole again, and what the peers have asked for they do not want any more."""
+        """Heal the bus, and cancel all that the peers have asked for."""
         self.hub.heal()
         await asyncio.sleep(1.0)
-        for entry in self.hub.book.open:
+        for entry in self.hub.audit.open:
             if entry.is_foreign:
                 self._cancel(entry)
 
@@ -344,22 +333,22 @@ class _Trial:
     # -- the verdict ----------------------------------------------------------------------------------------------
 
     async def _judge(self, bus: MemoryBus, visitor: Visitor, quiet_since: Seconds) -> None:
-        book = self.hub.book
-        self.counts["commands"] += book.commands
-        self.counts["answers"] += book.answers
-        self.counts["requests"] += len(book.entries)
+        audit = self.hub.audit
+        self.counts["commands"] += audit.commands
+        self.counts["answers"] += audit.answers
+        self.counts["requests"] += len(audit.entries)
         self.counts["honest requests"] += len(visitor.asked)
         self.counts.update({f"honest: {end}": count for end, count in visitor.ends().items()})
         lies = "body" in self.attack.kinds and not self.attack.own_body
         judged = set(keys.SERVICES) & set(self.services) - ({BODY} if lies else set())
-        ended = [f"{name}: {_why(task)}" for name, task in self.running.items() if task.done()]
+        ended = [f"{name}: {_end_of(task)}" for name, task in self.running.items() if task.done()]
         self._note("services that ended", ended)
         self._note("requests without outcome", visitor.hung)
-        old = [entry for entry in book.open if entry.asked_at < quiet_since and entry.name.server in judged]
-        self._note("pending afterwards", [_told(entry) for entry in old])
-        doubled = [_told(entry) for entry in book.doubled if entry.name.server in judged]
+        old = [entry for entry in audit.open if entry.asked_at < quiet_since and entry.name.server in judged]
+        self._note("pending afterwards", [_described(entry) for entry in old])
+        doubled = [_described(entry) for entry in audit.doubled if entry.name.server in judged]
         self._note("requests with two outcomes", doubled)
-        self._note("still spoken of", [_told(entry) for entry in book.lingering(quiet_since)])
+        self._note("still spoken of", [_described(entry) for entry in audit.lingering(quiet_since)])
         for name in self.services:
             await self._ask_status(bus, name)
 
@@ -374,10 +363,10 @@ class _Trial:
 
     def _note(self, what: str, found: list[str]) -> None:
         self.counts[what] += len(found)
-        self.wrong += [f"{what}: {each}" for each in found[:TOLD]]
+        self.wrong += [f"{what}: {each}" for each in found[:MOST_NAMED]]
 
 
-def _told(entry: Entry) -> str:
+def _described(entry: Entry) -> str:
     name = entry.name
     ends = ", then ".join(_readable(end) for end in entry.ends)
     return f"{name.kind} {name.id!r} of {name.requester!r} ({name.life!r}) at {name.server} {ends}".strip()
@@ -387,7 +376,7 @@ def _readable(end: bytes) -> str:
     return "refused" if end == REFUSED else encode_json(decode(end)).decode()[:300]
 
 
-def _why(task: "asyncio.Task[None]") -> str:
+def _end_of(task: "asyncio.Task[None]") -> str:
     return "cancelled" if task.cancelled() else repr(task.exception())
 
 

@@ -1,4 +1,4 @@
-"""Random messages from the message union itself: whatever its structs can hold, and some things that they can't.
+"""Random messages from the message union itself: any value that its structs can hold, and some that they can't.
 
 A field that is added to a message is filled from then on, without a change here.
 """
@@ -25,14 +25,14 @@ NASTY_FLOATS = (
     float("nan"), float("inf"), float("-inf"), 1e308, -1e308, 5e-324, -0.0, 0.0, -1.0, -1e-9, 1e-9, 1e9, 1e16,
 )  # fmt: skip
 NASTY_INTS = (0, -1, 1, 2, 255, 2**31, -(2**31), 2**53 + 1, 2**63 - 1, -(2**63))
-KEPT = 24
-"""How many words of each field are remembered."""
+REMEMBERED = 24
+"""Number of words remembered for each field."""
 DEEPEST = 5
 NASTINESS = (0.0, 0.05, 0.3, 0.9)
 
 
 class Words:
-    """What fields of each name have held on this bus: a message that names what is there gets further than noise."""
+    """Strings that fields of each name have held on this bus: a message with known names gets further than noise."""
 
     def __init__(self) -> None:
         self._heard: dict[str, deque[str]] = {}
@@ -52,7 +52,7 @@ class Words:
                     self.hear(value, depth + 1)
 
     def add(self, field: str, word: str) -> None:
-        known = self._heard.setdefault(field, deque(maxlen=KEPT))
+        known = self._heard.setdefault(field, deque(maxlen=REMEMBERED))
         if word not in known:
             known.append(word)
 
@@ -60,18 +60,14 @@ class Words:
         return self._heard.get(field, ())
 
 
-def _struct_types(types: Sequence[shapes.Type]) -> dict[str, shapes.StructType]:
-    return {kind.cls.__name__: kind for kind in types if isinstance(kind, shapes.StructType)}
-
-
 _UNION = shapes.type_info(Message)
 assert isinstance(_UNION, shapes.UnionType)
-KINDS = _struct_types(_UNION.types)
-"""Every message that may travel, by the name of its class."""
+KINDS = {kind.cls.__name__: kind for kind in _UNION.types if isinstance(kind, shapes.StructType)}
+"""Types of all messages that may travel on the bus, by the name of their class."""
 
 
-class Typed:
-    """Makes messages. nastiness: how likely a field holds what only the type allows; drawn anew for each message."""
+class RandomMessages:
+    """Makes random messages. Each has its own share of nasty fields, which hold what only their type allows."""
 
     def __init__(self, chance: Chance, words: Words) -> None:
         self._chance = chance
@@ -80,7 +76,7 @@ class Typed:
         self._now: Seconds = 0.0
 
     def message(self, now: Seconds, kind: str = "") -> Message:
-        """kind: the name of the class; empty: any. It need not decode again: bounds are not kept."""
+        """Make a message. It may break bounds of its fields, and then not decode. kind: its class; empty: any."""
         self._now = now
         self._nastiness = self._chance.choice(NASTINESS)
         name = kind or self._chance.choice(tuple(KINDS))
@@ -141,7 +137,7 @@ class Typed:
                 fields[field.name] = self._value(field.type, field.name, depth + 1)
         try:
             made: Struct = kind.cls(**fields)
-        except ValueError:  # a struct that checks itself: `distorted` brings the others
+        except ValueError:  # a struct that checks itself: what it refuses is left to `distorted`
             self._nastiness, before = 0.0, self._nastiness
             made = self._struct(kind, depth)
             self._nastiness = before
@@ -149,7 +145,7 @@ class Typed:
 
 
 def distorted(chance: Chance, message: Message) -> Any:
-    """The message as plain data with one thing in it of the wrong type, missing, or too much."""
+    """Turn a message into plain data in which one thing has the wrong type, is missing, or is too much."""
     plain = msgspec.to_builtins(message)
     spots: list[tuple[Any, Any]] = []
     _collect(plain, spots)
@@ -170,7 +166,7 @@ def distorted(chance: Chance, message: Message) -> Any:
 
 
 def _collect(plain: Any, spots: list[tuple[Any, Any]]) -> None:
-    """Every place in it that can be changed."""
+    """Collect every place in `plain` that can be changed, as its holder and its key or index."""
     items = plain.items() if isinstance(plain, dict) else enumerate(plain) if isinstance(plain, list) else ()
     for place, value in list(items):
         spots.append((plain, place))

@@ -1,6 +1,7 @@
-"""An honest client in bad company: it asks for blocks and fragments, changes its mind, and counts how each ends."""
+"""An honest client during an attack: it asks for blocks and fragments, cancels some, and counts how each ends."""
 
 import asyncio
+from collections import Counter
 from random import Random
 
 from engage_hri.schemas import keys
@@ -15,11 +16,11 @@ from engage_hri.services.requests.ends import Pending, Requester
 
 NAME = "visitor"
 MOST = 5
-"""Blocks and fragments at a time."""
+"""Most blocks and fragments asked for at a time."""
 
 
 class Visitor:
-    """entities: ids of what the world holds. servers: who is there to be asked."""
+    """A client that keeps to the protocol. entities: ids of what the world holds. servers: services that run."""
 
     def __init__(self, chance: Random, entities: tuple[str, ...], servers: tuple[str, ...]) -> None:
         self._chance = chance
@@ -32,18 +33,14 @@ class Visitor:
         """Ids of requests that have not ended."""
         return [pending.request.id for pending in self.asked if not pending.outcome.done()]
 
-    def ends(self) -> dict[str, int]:
-        """How often it heard what."""
-        counts: dict[str, int] = {}
-        for pending in self.asked:
-            if pending.outcome.done() and not pending.outcome.cancelled():
-                error = pending.outcome.exception()
-                end = type(error).__name__ if error is not None else type(pending.outcome.result()).__name__
-                counts[end] = counts.get(end, 0) + 1
-        return counts
+    def ends(self) -> Counter[str]:
+        """Count the requests that have ended, by the name of the outcome or error."""
+        outcomes = [pending.outcome for pending in self.asked if pending.outcome.done()]
+        ended = [outcome for outcome in outcomes if not outcome.cancelled()]
+        return Counter(type(outcome.exception() or outcome.result()).__name__ for outcome in ended)
 
     async def visit(self, bus: Bus, requests: Requester, seconds: Seconds) -> None:
-        """Ask for a handful of things, again and again, until so many seconds are over."""
+        """Ask for a few blocks and fragments, again and again, for so many seconds."""
         chance, until, number = self._chance, bus.now() + seconds, 0
         while bus.now() < until:
             for _ in range(chance.randrange(1, MOST + 1)):
@@ -75,10 +72,10 @@ class Visitor:
                 self.asked.append(requests.send(keys.BLOCK, interrupt))
 
 
-async def guest(client: asyncio.Task[None], patience: Seconds, since: Seconds) -> str:
-    """What became of somebody's own client; empty: it has ended well, or with an error made for that.
+async def client_fault(client: asyncio.Task[None], patience: Seconds, since: Seconds) -> str:
+    """Say what is wrong with how a client under test ended; empty: it ended well, or with an `EngageError`.
 
-    patience: how long it may still take. since: how long ago the attack will have ended by then.
+    patience: seconds that it may still take. since: seconds from the end of the attack until then.
     """
     done, _ = await asyncio.wait([client], timeout=patience)
     if not done:

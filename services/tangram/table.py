@@ -1,6 +1,6 @@
 """The tangram on the table: its pieces, where they lie, the figure they make, and the geometry of their edges.
 
-Simulation and the collaboration manager both read `tangram_table.toml` through this file, so that there is one table.
+Simulation and the collaboration manager both read `table.toml` through this file, so that there is one table.
 Directions are named as the human sees them, who sits opposite the robot: their right is the robot's left (+y), and
 their top, the far side of the table, is toward the robot (-x).
 """
@@ -29,7 +29,7 @@ ANGLE_TOLERANCE: Radians = math.radians(12.0)
 
 
 class PiecePose(Struct, frozen=True, array_like=True):
-    """Where a piece lies. Degrees because people write this in a file."""
+    """Place and turn of a piece on the table. In degrees, as people write it in a file."""
 
     x: Meters
     y: Meters
@@ -37,7 +37,7 @@ class PiecePose(Struct, frozen=True, array_like=True):
 
 
 class Piece(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """start: on the table when the human comes. goal: in the finished figure. footprint: counterclockwise."""
+    """A piece. start: its pose when the human comes. goal: in the finished figure. footprint: counterclockwise."""
 
     id: str
     color: str
@@ -55,7 +55,7 @@ class TablePerson(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
 
 
 class Surface(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """free: where nothing is ever laid; people who look at the table and at no piece look there."""
+    """The table top. free: where nothing is ever laid; people who look at the table and at no piece look there."""
 
     id: str
     center: Vector
@@ -64,7 +64,7 @@ class Surface(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
 
 
 class TangramTable(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """base: the piece that is never moved; the figure grows around it."""
+    """The table with all its pieces. base: the piece that is never moved; the figure grows around it."""
 
     base: str
     surface: Surface
@@ -72,11 +72,8 @@ class TangramTable(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
     pieces: tuple[Piece, ...]
 
     def piece(self, id: str) -> Piece:
-        """Raises KeyError for an id that is not a piece."""
-        for piece in self.pieces:
-            if piece.id == id:
-                return piece
-        raise KeyError(id)
+        """Find a piece. Raises KeyError if there is none with that id."""
+        return {piece.id: piece for piece in self.pieces}[id]
 
     def lying(self, piece: Piece, pose: PiecePose) -> Entity:
         """The piece as perception reports it when it lies at `pose`."""
@@ -125,7 +122,7 @@ class Edge(NamedTuple):
 
     @property
     def side(self) -> Side:
-        """Which way the edge faces, as the human sees it."""
+        """Side of the piece that the edge is on, as the human sees it."""
         seen = math.atan2(-math.cos(self.facing), math.sin(self.facing))
         return SIDES[round(math.degrees(seen) / 45.0) % 8]
 
@@ -143,7 +140,7 @@ def edges(piece: Entity) -> tuple[Edge, ...]:
 
 
 def touches(edge: Edge, other: Edge) -> bool:
-    """Parallel, of equal length, and edge exactly on edge, within the tolerances. The rule of thesis Appendix A."""
+    """True if the edges lie on one another, parallel and of equal length, within tolerances. Thesis Appendix A."""
     turned = math.remainder(edge.facing - other.facing - math.pi, math.tau)
     return (
         abs(edge.length - other.length) <= LENGTH_TOLERANCE
@@ -168,7 +165,7 @@ def poses_touching(piece: Entity, landmark: Entity, side: Side) -> Iterable[Piec
 
 
 def overlap(piece: Entity, other: Entity, margin: Meters = 0.004) -> bool:
-    """Do two pieces (convex) lie on one another by more than `margin`?"""
+    """True if two pieces (convex) lie on one another by more than `margin`."""
     for edge in (*edges(piece), *edges(other)):
         normal = (math.cos(edge.facing), math.sin(edge.facing))
         low, high = _extent(piece, normal)

@@ -276,6 +276,19 @@ async def test_taking_one_arm_of_two_sends_the_other_home():
     await one.over()
 
 
+async def test_behaviors_that_go_home_together_end_in_the_order_in_which_they_began():
+    body, ended = body_in(), list[str]()
+    behaviors = (Pointing(id="arm", target="far-left"), Gaze(id="eyes", target="human"), Head(id="nod", lexeme="NOD"),
+                 FaceLexeme(id="face", lexeme="SMILE"), Posture(id="torso", lexeme="LEAN_FORWARD"))  # fmt: skip
+    stages = {behavior.id: Stage(body, behavior) for behavior in behaviors}
+    await asyncio.sleep(0.05)
+    for id, stage in stages.items():
+        stage.authority.watch(lambda id=id: ended.append(id))
+    await body.home()
+
+    assert ended == list(stages)
+
+
 async def test_a_frozen_arm_stands_still_before_it_relaxes():
     body = body_in()
     stage = Stage(body, Pointing(id="p", target="far-left"), "end")
@@ -343,14 +356,14 @@ def test_no_story_breaks_a_limit_or_leaves_an_arm_in_the_air(story: list[tuple[B
 
 
 async def test_an_instant_that_rounding_puts_behind_its_timer_is_waited_for_once():
-    """A loop runs its timers a nanosecond early; who looked again would find his instant still to come, for ever."""
+    """A loop runs its timers a nanosecond early; looking again, a task would find its instant ahead for ever."""
     bell = Bell()
     await asyncio.sleep(1.0)
     almost = 1.0 + 2**-52
 
     assert bell.now() < almost
     assert bell.is_past(almost)
-    await bell.heard(almost)
+    await bell.wait(almost)
 
 
 async def test_words_wait_for_the_word_that_an_aborted_utterance_ends_with() -> None:

@@ -18,7 +18,7 @@ from engage_hri.services.bus.interface import Bus
 from engage_hri.services.bus.zenoh.hub import open_hub
 from engage_hri.services.commandline.roster import ROBOT
 from engage_hri.services.hostile.payloads import Payloads
-from engage_hri.services.hostile.typed import Typed, Words
+from engage_hri.services.hostile.typed import RandomMessages, Words
 from tests.bus.places import free_endpoint
 from tests.cli.command import start
 
@@ -80,7 +80,7 @@ async def _status(bus: Bus, name: str) -> Status:
 async def _send(bus: Bus, robot: str, endpoint: str, messages: int, seed: int) -> tuple[int, Counter[str]]:
     """From a plain Zenoh session, as another program would."""
     words, kinds, sent = Words(), Counter[str](), 0
-    payloads = Payloads(Random(seed), Typed(Random(seed + 1), words), ENTITIES)
+    payloads = Payloads(Random(seed), RandomMessages(Random(seed + 1), words), ENTITIES)
     config = zenoh.Config()
     config.insert_json5("mode", '"client"')
     config.insert_json5("connect/endpoints", f'["{endpoint}"]')

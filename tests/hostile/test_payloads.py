@@ -14,14 +14,14 @@ from engage_hri.schemas.requests import Cancel
 from engage_hri.services.bus.payloads import read_payload
 from engage_hri.services.hostile.markup import document
 from engage_hri.services.hostile.payloads import Payloads
-from engage_hri.services.hostile.typed import KINDS, Typed, Words, distorted
+from engage_hri.services.hostile.typed import KINDS, RandomMessages, Words, distorted
 
 ENTITIES = ("cup", "ann")
 
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_every_message_of_the_union_can_be_made_and_most_decode_again(kind: str) -> None:
-    typed, good = Typed(Random(1), Words()), 0
+    typed, good = RandomMessages(Random(1), Words()), 0
     for _ in range(60):
         message = typed.message(1.0, kind)
         assert type(message).__name__ == kind
@@ -37,7 +37,7 @@ def test_every_message_of_the_union_can_be_made_and_most_decode_again(kind: str)
 def test_names_that_were_heard_come_back() -> None:
     words = Words()
     words.hear(Cancel(id="live-1", requester="client", of="perform_block"))
-    typed = Typed(Random(2), words)
+    typed = RandomMessages(Random(2), words)
 
     ids = [getattr(typed.message(0.0, "Cancel"), "id") for _ in range(40)]  # noqa: B009
 
@@ -51,7 +51,7 @@ def test_a_distorted_message_differs_in_one_place() -> None:
 
 
 def test_payloads_are_of_all_kinds_good_and_bad_and_nothing_but_a_refusal_comes_of_the_bad() -> None:
-    payloads, seen = Payloads(Random(3), Typed(Random(4), Words()), ENTITIES), Counter[str]()
+    payloads, seen = Payloads(Random(3), RandomMessages(Random(4), Words()), ENTITIES), Counter[str]()
     for number in range(3000):
         payload = payloads.next(number / 100)
         keys.key_class(payload.key)

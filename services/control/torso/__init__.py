@@ -1,1 +1,1 @@
-"""The simulated torso: a body in closed form, with the faults that are asked of it."""
+"""The simulated torso: a body whose motion is computed in closed form, with configured faults."""

@@ -1,7 +1,7 @@
 """The simulated body: the torso of `kinematics` on loop time, with the deviations of `Variability`.
 
-Where everything is at an instant is a formula (`tracks`, `motion`); a behavior's task only sleeps until its next
-sync point, or until its authority changes. So a part needs no task to go home: it is told the way once.
+The position of each part at an instant is a formula (`tracks`, `motion`); a behavior's task only sleeps until its
+next sync point, or until its authority changes. So a part needs no task to go home: it is given its path once.
 """
 
 import asyncio
@@ -29,8 +29,8 @@ from engage_hri.services.control.body import (
 from engage_hri.services.control.config import Variability
 from engage_hri.services.control.torso import choreography, head, kinematics, tracks
 from engage_hri.services.control.torso.course import Course, CoursePoint, Impossible, Situation
-from engage_hri.services.control.torso.estimates import infeasible, moved, spoken, waited
-from engage_hri.services.control.torso.head import EyeTarget
+from engage_hri.services.control.torso.estimates import infeasible, motion_estimate, speech_estimate, wait_estimate
+from engage_hri.services.control.torso.head import Fixation
 from engage_hri.services.control.torso.motion import Motion, Path, resting
 from engage_hri.services.control.torso.runs import OVERHEAT, STALL, Run
 from engage_hri.services.control.torso.tracks import Track
@@ -39,11 +39,11 @@ from engage_hri.services.control.voice.timeline import utter
 from engage_hri.services.control.waiting import Bell
 
 FREEZE: Seconds = 0.5
-"""How long a part stands still when it is told to freeze, before it relaxes."""
+"""Seconds that a part stands still when it is told to freeze, before it relaxes."""
 
 
 class SimulatedBody(Body):
-    """Behaviors take the time that `estimate` says, unless `deviations` has other plans."""
+    """A simulated torso with a voice. Behaviors take as long as `estimate` says, but for `deviations`."""
 
     def __init__(self, zones: tuple[NoPointZone, ...] = (), deviations: Variability | None = None) -> None:
         self.capabilities = Capabilities(
@@ -57,17 +57,17 @@ class SimulatedBody(Body):
         self._tracks = {part: Track(part, tracks.home_of(part, displaced)) for part in tracks.LIMITS}
         self._runs: dict[str, Run] = {}
         self._world = World(entities=())
-        self._attention = EyeTarget()
+        self._attention = Fixation()
         self._utterance: MovementAuthority | None = None
         self._saying = ""
-        self._hushed = asyncio.Event()
+        self._voice_free = asyncio.Event()
         self._occasions = 0
 
     # -- the contract -------------------------------------------------------------------------------------------
 
     def estimate(self, behavior: BlockBehavior, pose: BodyPose | None, world: World) -> Estimate:
         try:
-            return self._estimate(behavior, self._scene(world, pose), moving=pose is None)
+            return self._estimate(behavior, self._situation(world, pose), moving=pose is None)
         except Impossible as impossible:
             return infeasible(behavior, impossible.kind, _fault(behavior, impossible.reason))
 
@@ -86,7 +86,7 @@ class SimulatedBody(Body):
         going = {part for part in self._tracks if not parts or part.replace("nod", "head") in parts}
         if self._utterance is not None and (not parts or "voice" in parts):
             self._utterance.revoke()
-        for run in {run for part, run in self._runs.items() if part in going}:
+        for run in dict.fromkeys(run for part, run in self._runs.items() if part in going):
             going.update(run.course.parts)
             self._release(run)
             run.authority.revoke()
@@ -95,7 +95,7 @@ class SimulatedBody(Body):
         self._relax(tuple(sorted(going)))
         bell = Bell()
         while not bell.is_past(until := max((self._tracks[part].motion.end for part in going), default=0.0)):
-            await bell.heard(until)
+            await bell.wait(until)
 
     def state(self) -> BodyState:
         now = self._loop.time()
@@ -113,8 +113,8 @@ class SimulatedBody(Body):
 
     # -- planning -----------------------------------------------------------------------------------------------
 
-    def _scene(self, world: World, pose: BodyPose | None = None, *, true: bool = False) -> Situation:
-        """true: with joints where they are, not where the body believes them to be."""
+    def _situation(self, world: World, pose: BodyPose | None = None, *, real: bool = False) -> Situation:
+        """Describe what a course starts from. real: with the true joint angles, not those that the body believes."""
         now = self._loop.time()
         here: dict[str, float] = {}
         for part, track in self._tracks.items():
@@ -122,41 +122,45 @@ class SimulatedBody(Body):
                 # Head and arms aim for where the torso is going to be.
                 at = max(now, track.motion.end) if part == "torso" else now
                 here.update(zip(track.joints, track.angles(at), strict=True))
-        if not true:
+        if not real:
             here.update(self._misbelieved)
         rest = {**kinematics.HOME, **dict(zip(tracks.NECK, self._attention.angles, strict=True))}
         zones = self.capabilities.no_point_zones
         return Situation(tracks.updated(here, pose), rest, world, zones, tuple(self._runs))
 
-    def _path(self, course: Course, scene: Situation | None = None) -> Path:
-        """scene: start from rest there, instead of from where the parts are and move. Raises Impossible."""
-        if scene is not None and course.parts != ("nod",):
-            start = resting([scene.pose[joint] for joint in course.joints])
+    def _path(self, course: Course, situation: Situation | None = None) -> Path:
+        """Lay a path along `course`. Raises Impossible.
+
+        situation: start at rest in its pose; None: start from where the parts are, as they move.
+        """
+        if situation is not None and course.parts != ("nod",):
+            start = resting([situation.pose[joint] for joint in course.joints])
         else:
             now = self._loop.time()
             start = tracks.joined([self._tracks[part].at(now) for part in course.parts])
         path = Path(start, course.legs, tracks.limits_of(course.parts))
-        if course.parts[0].endswith("_arm") and tracks.meets_table(path, course.joints):
+        if tracks.meets_table(path, course.joints):
             raise Impossible("CANNOT_CREATE_BEHAVIOR", "the table is in the way of the arm")
         return path
 
-    def _estimate(self, behavior: BlockBehavior, scene: Situation, *, moving: bool) -> Estimate:
+    def _estimate(self, behavior: BlockBehavior, situation: Situation, *, moving: bool) -> Estimate:
         match behavior:
             case Speech(text=text):
                 if self._deviations.mute == "refuse":
                     raise Impossible("CANNOT_CREATE_BEHAVIOR", "the voice is mute")
-                return spoken(behavior, utter(text), kinematics.pose_message(scene.pose))
+                return speech_estimate(behavior, utter(text), kinematics.pose_message(situation.pose))
             case Wait(duration=duration):
-                return waited(behavior, duration or 0.0, kinematics.pose_message(scene.pose))
-        course = choreography.plan(behavior, scene)
-        path = self._path(course, None if moving and not self._misbelieved else scene)
-        return moved(behavior, course, path, kinematics.pose_message({**scene.pose, **course.on_target}))
+                return wait_estimate(behavior, duration or 0.0, kinematics.pose_message(situation.pose))
+        course = choreography.plan(behavior, situation)
+        path = self._path(course, None if moving and not self._misbelieved else situation)
+        on_target = kinematics.pose_message({**situation.pose, **course.on_target})
+        return motion_estimate(behavior, course, path, on_target)
 
     # -- motion -------------------------------------------------------------------------------------------------
 
     async def _move(self, behavior: BlockBehavior, authority: MovementAuthority) -> AsyncGenerator[Progress, None]:
         try:
-            course = choreography.plan(behavior, self._scene(self._world, true=True))
+            course = choreography.plan(behavior, self._situation(self._world, real=True))
             self._occasions += 1
             run = Run(behavior, course, authority, self._deviations, self._occasions)
             path = self._path(run.course)
@@ -172,18 +176,18 @@ class SimulatedBody(Body):
                 await self._freeze(run)
         finally:
             unwatch()
-            # Whatever remains goes home without us: after an abort, a failure, a task that was cancelled.
+            # After an abort, a failure or a cancelled task the parts go home by themselves.
             if self._owns(run):
                 self._release(run)
                 if run.pending:
                     self._abandon(run)
 
     def _take_over(self, run: Run, path: Path) -> None:
-        """Make `run` the owner of its parts and set it going."""
+        """Make `run` the owner of its parts, cut the runs that had them, and start its motion."""
         now = self._loop.time()
         for joint in run.course.joints:
             self._misbelieved.pop(joint, None)
-        for earlier in {self._runs[part] for part in run.course.parts if part in self._runs}:
+        for earlier in dict.fromkeys(self._runs[part] for part in run.course.parts if part in self._runs):
             self._release(earlier)
             earlier.cut(now)
             self._relax(tuple(part for part in earlier.course.parts if part not in run.course.parts))
@@ -213,7 +217,7 @@ class SimulatedBody(Body):
             point = run.pending[0]
             due = run.due(point)
             if due is None or not run.bell.is_past(due):
-                await run.bell.heard(inf if due is None else due)
+                await run.bell.wait(inf if due is None else due)
             elif point.sync in (STALL, OVERHEAT):
                 await self._fail_or_stall(run, point)
             elif point.held_with and (run.holding or not run.authority.covers(point.held_with)):
@@ -222,7 +226,7 @@ class SimulatedBody(Body):
                     run.holding = True
                     yield Arrived(point.held_with, arrived)
                 while not run.authority.covers(point.held_with) and not run.is_over:
-                    await run.bell.heard(inf)
+                    await run.bell.wait(inf)
                 if not run.is_over:
                     since = self._loop.time()
                     for sync in self._leave_hold(run, point.held_with):
@@ -232,12 +236,12 @@ class SimulatedBody(Body):
                 self._attention.follow_run(run, self._loop.time())
                 yield Reached(point.sync, due, due)
         if run.cut_at is not None:
-            for sync in run.left:
+            for sync in run.unreported:
                 yield Reached(sync, run.cut_at, run.cut_at)
             run.pending.clear()
 
     def _leave_hold(self, run: Run, hold: str) -> list[str]:
-        """Go on: where it stands, what is left is planned afresh from rest. Returns the sync points it leaves."""
+        """Let `run` go on from a hold point, on a new path if it stands still. Returns the sync points it passes."""
         now = self._loop.time()
         stood, passed = run.stands, run.leave(hold, now)
         if stood and not run.holding:
@@ -264,7 +268,7 @@ class SimulatedBody(Body):
         assert run.stall is not None
         until = inf if run.stall.seconds is None else self._loop.time() + run.stall.seconds
         while not run.is_over and not run.bell.is_past(until):
-            await run.bell.heard(until)
+            await run.bell.wait(until)
         run.pending.remove(point)
 
     async def _freeze(self, run: Run) -> None:
@@ -272,7 +276,7 @@ class SimulatedBody(Body):
         self._attention.expect("", 0.0, self._loop.time())
         until = run.motion.end + FREEZE
         while run.cut_at is None and self._owns(run) and not run.bell.is_past(until):
-            await run.bell.heard(until)
+            await run.bell.wait(until)
 
     def _owns(self, run: Run) -> bool:
         return any(owner is run for owner in self._runs.values())
@@ -282,7 +286,7 @@ class SimulatedBody(Body):
             del self._runs[part]
 
     def _abandon(self, run: Run) -> None:
-        """The parts of `run` go to rest. A shift of the head that is broken off stays where it can stop."""
+        """Send the parts of `run` to rest. A shift of the head that is broken off stays where it can stop."""
         if head.is_shift(run.behavior):
             self._attention.stay(head.brake(run.motion, self._loop.time()))
             self._attention.expect("", 0.0, self._loop.time())
@@ -307,9 +311,9 @@ class SimulatedBody(Body):
     async def _shift_beneath(
         self, behavior: BlockBehavior, authority: MovementAuthority
     ) -> AsyncGenerator[Progress, None]:
-        """A new base while a gaze lies over it: nothing moves until that gaze ends. As slow as it is asked to be."""
+        """Change the base gaze while a `Gaze` lies over it: nothing moves until that ends. `end` comes as asked."""
         try:
-            self._attention.shift(behavior, choreography.plan(behavior, self._scene(self._world)))
+            self._attention.shift(behavior, choreography.plan(behavior, self._situation(self._world)))
         except Impossible as impossible:
             raise BehaviorRefused(_fault(behavior, impossible.reason)) from impossible
         now = self._loop.time()
@@ -318,7 +322,7 @@ class SimulatedBody(Body):
         unwatch = authority.watch(bell.ring)
         try:
             while authority.revoked is None and not bell.is_past(due := authority.pace.get("end", now)):
-                await bell.heard(due)
+                await bell.wait(due)
         finally:
             unwatch()
         if authority.revoked is None:
@@ -326,14 +330,14 @@ class SimulatedBody(Body):
             yield Reached("end", now, now)
 
     def _follow(self) -> None:
-        """Turn the head after what it looks at, or is about to look at."""
-        now, scene, track = self._loop.time(), self._scene(self._world, true=True), self._tracks["head"]
-        self._attention.update(scene)
+        """Turn the head to follow the entity that it looks at, or is about to look at."""
+        now, situation, track = self._loop.time(), self._situation(self._world, real=True), self._tracks["head"]
+        self._attention.update(situation)
         if (run := self._runs.get("head")) is None:
             head.turn(track, self._attention.angles, now)
             return
         try:
-            course = choreography.plan(run.behavior, scene)
+            course = choreography.plan(run.behavior, situation)
         except Impossible:
             return
         if run.stands:
@@ -348,7 +352,7 @@ class SimulatedBody(Body):
     async def _speak(self, behavior: Speech, authority: MovementAuthority) -> AsyncGenerator[Progress, None]:
         if self._deviations.mute == "refuse":
             raise BehaviorRefused(_fault(behavior, "the voice is mute"))
-        await self._silence(authority)
+        await self._wait_for_silence(authority)
         if authority.revoked is not None:
             return
         if self._utterance is not None:
@@ -365,15 +369,15 @@ class SimulatedBody(Body):
         finally:
             if self._utterance is authority:
                 self._utterance, self._saying = None, ""
-            self._hushed.set()
+            self._voice_free.set()
 
-    async def _silence(self, authority: MovementAuthority) -> None:
-        """Aborted words end with the word that is being said: wait for that, as long as these are wanted."""
-        unwatch = authority.watch(self._hushed.set)
+    async def _wait_for_silence(self, authority: MovementAuthority) -> None:
+        """Wait until an aborted speech has finished its current word; return at once if `authority` is revoked."""
+        unwatch = authority.watch(self._voice_free.set)
         try:
             while self._utterance is not None and self._utterance.revoked is not None and authority.revoked is None:
-                self._hushed.clear()
-                await self._hushed.wait()
+                self._voice_free.clear()
+                await self._voice_free.wait()
         finally:
             unwatch()
 

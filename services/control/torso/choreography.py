@@ -1,7 +1,7 @@
-"""What each behavior is made of, on the simulated torso: legs of a path, sync points on them, and where it may hold.
+"""Course of each behavior on the simulated torso: legs of a path, sync points on them, and where it may hold.
 
 Motion out and back never retraces itself: at the stroke the joints drift sideways, so that their speed
-passes through no zero and a gesture that nobody holds is one fluid motion.
+passes through no zero and a gesture that is not held is one fluid motion.
 """
 
 import math
@@ -40,62 +40,62 @@ from engage_hri.services.control.torso.motion import Leg
 from engage_hri.services.control.torso.vocabulary import ACTION_UNITS, FACES, GESTURES, POSTURES
 
 NOD_RESERVE = radians(18.0)
-"""Kept free of the neck's range by gaze, so that a nod finds room anywhere."""
-SAME = 0.3
+"""Part of the neck's range that gaze keeps free, so that a nod finds room anywhere."""
+LEAST_TURN = 0.3
 """Degrees: a gaze that would turn less does not move."""
-THERE = 0.8
+LEAST_LEAN = 0.8
 """Degrees: a torso that has less to go stays; twice what it drifts on target."""
-SHAPED = 0.04
-"""The same of a face, as a share of its joints' ranges."""
+LEAST_FACE = 0.04
+"""A face that has less to go stays. A share of its joints' ranges."""
 SETTLE: Seconds = 0.08
 SLIDE: Seconds = 0.2
 TYPES: tuple[type[BlockBehavior], ...] = (
     Gaze, GazeShift, HeadDirectionShift, Pointing, Gesture, Head, Face, FaceLexeme, FaceFacs, FaceShift, Posture,
     PostureShift, Pose, Speech, Wait,
 )  # fmt: skip
-"""What this body performs."""
+"""Types of behaviors that this body performs."""
 
 
-def plan(behavior: BlockBehavior, scene: Situation) -> Course:
-    """The course of `behavior` in `scene`. Not for speech and wait, which move nothing. Raises Impossible."""
+def plan(behavior: BlockBehavior, situation: Situation) -> Course:
+    """Plan the course of `behavior` in `situation`. Speech and wait move nothing and have none. Raises Impossible."""
     match behavior:
         case Gaze(target=target, offset_angle=offset, offset_direction=direction):
-            return _glance(_neck(target, offset, direction, scene), scene)
+            return _glance(_neck_angles(target, offset, direction, situation), situation)
         case GazeShift(target=target, offset_angle=offset, offset_direction=direction):
-            return _shift(("neck_yaw", "neck_pitch"), _neck(target, offset, direction, scene), scene)
+            return _shift(("neck_yaw", "neck_pitch"), _neck_angles(target, offset, direction, situation), situation)
         case HeadDirectionShift(target=target):
-            return _shift(("neck_yaw", "neck_pitch"), _neck(target, 0.0, "", scene), scene)
+            return _shift(("neck_yaw", "neck_pitch"), _neck_angles(target, 0.0, "", situation), situation)
         case Pointing(target=target, mode=mode):
-            return _point(_entity(target, scene.world), mode, scene)
+            return _point(_entity(target, situation.world), mode, situation)
         case Gesture(lexeme=lexeme, mode=mode):
-            return _gesture(lexeme, mode, scene)
+            return _gesture(lexeme, mode, situation)
         case Head(lexeme=lexeme, repetition=repetition, amount=amount):
             return _nod(lexeme.upper(), repetition, amount)
         case Face(amount=amount):
-            return _excursion("face", _face("RAISE_BROWS", amount), scene)
+            return _excursion("face", _face_angles("RAISE_BROWS", amount), situation)
         case FaceLexeme(lexeme=lexeme, amount=amount):
-            return _excursion("face", _face(lexeme, amount), scene)
+            return _excursion("face", _face_angles(lexeme, amount), situation)
         case FaceFacs(au=unit, amount=amount):
-            return _excursion("face", _face(_unit(unit), amount), scene)
+            return _excursion("face", _face_angles(_action_unit(unit), amount), situation)
         case FaceShift(lexeme=lexeme, au=unit, amount=amount):
-            return _shift(kinematics.joints_of("face"), _face(lexeme or _unit(unit), amount), scene)
+            return _shift(kinematics.joints_of("face"), _face_angles(lexeme or _action_unit(unit), amount), situation)
         case Posture(lexeme=lexeme):
-            return _excursion("torso", _torso(lexeme), scene)
+            return _excursion("torso", _torso_angles(lexeme), situation)
         case PostureShift(lexeme=lexeme) | Pose(lexeme=lexeme):
-            return _shift(("torso_turn", "torso_lean"), _torso(lexeme), scene)
+            return _shift(("torso_turn", "torso_lean"), _torso_angles(lexeme), situation)
         case _:
             raise Impossible("BEHAVIOR_TYPE_NOT_SUPPORTED", f"this body has no {type(behavior).__name__.lower()}")
 
 
-def look(target: str, scene: Situation) -> tuple[float, float]:
+def look(target: str, situation: Situation) -> tuple[float, float]:
     """Neck angles that look at an entity, as near as the joints come. Raises Impossible if there is none."""
-    return _neck(target, 0.0, "", scene)
+    return _neck_angles(target, 0.0, "", situation)
 
 
 def turning_time(start: tuple[float, ...], goal: tuple[float, ...]) -> Seconds:
     """Natural duration of a turn of the head: 0.3 s for 30 degrees, 0.5 s for 60, nothing for none."""
     turn = kinematics.degrees_between(start, goal)
-    return 0.0 if turn < SAME else 0.1 + turn / 150.0
+    return 0.0 if turn < LEAST_TURN else 0.1 + turn / 150.0
 
 
 def return_time(start: tuple[float, ...], goal: tuple[float, ...]) -> Seconds:
@@ -110,10 +110,10 @@ def _entity(target: str, world: World) -> Entity:
     return entity
 
 
-def _neck(target: str, offset: Degrees, direction: str, scene: Situation) -> tuple[float, float]:
-    entity = _entity(target, scene.world)
+def _neck_angles(target: str, offset: Degrees, direction: str, situation: Situation) -> tuple[float, float]:
+    entity = _entity(target, situation.world)
     try:
-        yaw, pitch = kinematics.look_at(entity.position, scene.pose, NOD_RESERVE)
+        yaw, pitch = kinematics.look_at(entity.position, situation.pose, NOD_RESERVE)
     except Unreachable as error:
         raise Impossible("CANNOT_CREATE_BEHAVIOR", f"cannot look at {target!r}: {error}") from error
     right, up = {
@@ -121,14 +121,14 @@ def _neck(target: str, offset: Degrees, direction: str, scene: Situation) -> tup
         "UPLEFT": (-1, 1), "DOWNRIGHT": (1, -1), "DOWNLEFT": (-1, -1),
     }.get(direction.upper(), (0, 0))  # fmt: skip
     return (
-        _within("neck_yaw", yaw - right * radians(offset), NOD_RESERVE),
-        _within("neck_pitch", pitch + up * radians(offset), NOD_RESERVE),
+        _clamped("neck_yaw", yaw - right * radians(offset), NOD_RESERVE),
+        _clamped("neck_pitch", pitch + up * radians(offset), NOD_RESERVE),
     )
 
 
-def _glance(goal: tuple[float, float], scene: Situation) -> Course:
+def _glance(goal: tuple[float, float], situation: Situation) -> Course:
     joints = ("neck_yaw", "neck_pitch")
-    here, base = _angles(joints, scene.pose), _angles(joints, scene.rest)
+    here, base = _angles(joints, situation.pose), _angles(joints, situation.rest)
     out, back = turning_time(here, goal), turning_time(goal, base)
     if out == 0.0:
         goal = (here[0], here[1])
@@ -141,46 +141,47 @@ def _glance(goal: tuple[float, float], scene: Situation) -> Course:
     settle = SETTLE if any(drift) else 0.0
     before = tuple(angle - speed * settle for angle, speed in zip(goal, drift, strict=True))
     legs = (
-        Leg(goal=before, velocity=drift, seconds=out, marks=(*_at(0.0, *SYNC_POINTS[:3]), ("stroke", 1.0))),
-        Leg(goal=goal, velocity=drift, seconds=settle, marks=_at(1.0, "stroke_end", "relax")),
-        Leg(goal=base, seconds=back, marks=_at(1.0, "end")),
+        Leg(goal=before, velocity=drift, seconds=out, marks=(*_marks(0.0, *SYNC_POINTS[:3]), ("stroke", 1.0))),
+        Leg(goal=goal, velocity=drift, seconds=settle, marks=_marks(1.0, "stroke_end", "relax")),
+        Leg(goal=base, seconds=back, marks=_marks(1.0, "end")),
     )
-    ray = kinematics.gaze({**scene.pose, **dict(zip(joints, goal, strict=True))})
-    return _course(("head",), joints, legs, _held_on_target("stroke"), goal, scene, ray)
+    ray = kinematics.gaze({**situation.pose, **dict(zip(joints, goal, strict=True))})
+    return _course(("head",), joints, legs, _held_on_target("stroke"), goal, situation, ray)
 
 
-def _shift(joints: tuple[str, ...], goal: tuple[float, ...], scene: Situation) -> Course:
-    here = _angles(joints, scene.pose)
+def _shift(joints: tuple[str, ...], goal: tuple[float, ...], situation: Situation) -> Course:
+    here = _angles(joints, situation.pose)
     part = kinematics.LIMIT[joints[0]].part
     seconds = turning_time(here, goal) if part == "head" else _moving_time(part, here, goal)
     goal = goal if seconds else here
     legs = (Leg(goal=goal, seconds=seconds, marks=(("start", 0.0), ("end", 1.0))),)
-    on_target = {**scene.pose, **dict(zip(joints, goal, strict=True))}
+    on_target = {**situation.pose, **dict(zip(joints, goal, strict=True))}
     points = (CoursePoint("start"), CoursePoint("end"))
-    return _course((part,), joints, legs, points, goal, scene, kinematics.gaze(on_target) if part == "head" else None)
+    ray = kinematics.gaze(on_target) if part == "head" else None
+    return _course((part,), joints, legs, points, goal, situation, ray)
 
 
-def _point(entity: Entity, mode: str | None, scene: Situation) -> Course:
-    for zone in scene.zones:
+def _point(entity: Entity, mode: str | None, situation: Situation) -> Course:
+    for zone in situation.zones:
         if math.dist(zone.center, entity.position) <= zone.radius:
             raise Impossible("CANNOT_CREATE_BEHAVIOR", f"{entity.id!r} is in a no-point zone")
-    sides = _sides(mode, lambda side: math.dist(kinematics.SHOULDER[side], entity.position), scene)
-    if len(sides) == 2 and mode == "BOTH_HANDS":
+    sides = _sides(mode, lambda side: math.dist(kinematics.SHOULDER[side], entity.position), situation)
+    if mode == "BOTH_HANDS":
         raise Impossible("CANNOT_CREATE_BEHAVIOR", "pointing takes one hand")
     reasons = []
     for side in sides:
         try:
-            aim = kinematics.point_at(side, entity.position, entity.radius, scene.pose)
+            aim = kinematics.point_at(side, entity.position, entity.radius, situation.pose)
         except Unreachable as error:
             reasons.append(str(error))
             continue
-        return _point_with(side, aim, scene)
+        return _point_with(side, aim, situation)
     raise Impossible("CANNOT_CREATE_BEHAVIOR", f"cannot point at {entity.id!r}: {'; '.join(reasons)}")
 
 
-def _point_with(side: Side, aim: kinematics.ArmAim, scene: Situation) -> Course:
+def _point_with(side: Side, aim: kinematics.ArmAim, situation: Situation) -> Course:
     joints = kinematics.joints_of(f"{side}_arm")
-    here, home = _angles(joints, scene.pose), _angles(joints, scene.rest)
+    here, home = _angles(joints, situation.pose), _angles(joints, situation.rest)
     yaw, pitch, elbow = aim.stroke
     ready = (
         here[0] + 0.7 * (yaw - here[0]),
@@ -188,8 +189,8 @@ def _point_with(side: Side, aim: kinematics.ArmAim, scene: Situation) -> Course:
         max(elbow + 0.4 * (here[2] - elbow), elbow + radians(18)),
     )
     slide = tuple((b - a) / SLIDE for a, b in zip(aim.stroke, aim.held, strict=True))
-    raising = _time(here, ready, 0.25, 150.0)
-    stroke = _time(ready, aim.stroke, 0.4, 120.0)
+    raising = _arm_time(here, ready, 0.25, 150.0)
+    stroke = _arm_time(ready, aim.stroke, 0.4, 120.0)
     back = max(0.4, return_time(aim.held, home))
     through = tuple(
         0.35 * ((b - a) / raising + (c - b) / stroke) for a, b, c in zip(here, ready, aim.stroke, strict=True)
@@ -197,29 +198,31 @@ def _point_with(side: Side, aim: kinematics.ArmAim, scene: Situation) -> Course:
     legs = (
         Leg(goal=ready, velocity=through, seconds=raising, marks=(("start", 0.0), ("ready", 1.0))),
         Leg(goal=aim.stroke, velocity=slide, seconds=stroke, marks=(("stroke_start", 0.1 / stroke), ("stroke", 1.0))),
-        Leg(goal=aim.held, velocity=slide, seconds=SLIDE, marks=_at(1.0, "stroke_end")),
+        Leg(goal=aim.held, velocity=slide, seconds=SLIDE, marks=_marks(1.0, "stroke_end")),
         Leg(goal=home, seconds=back, marks=(("relax", 0.1 / back), ("end", 1.0))),
     )
-    ray = kinematics.arm({**scene.pose, **dict(zip(joints, aim.held, strict=True))}, side)
-    return _course((f"{side}_arm",), joints, legs, _held_around_stroke(), aim.held, scene, ray)
+    ray = kinematics.arm({**situation.pose, **dict(zip(joints, aim.held, strict=True))}, side)
+    return _course((f"{side}_arm",), joints, legs, _held_around_stroke(), aim.held, situation, ray)
 
 
-def _gesture(lexeme: str, mode: str | None, scene: Situation) -> Course:
+def _gesture(lexeme: str, mode: str | None, situation: Situation) -> Course:
     poses = GESTURES.get(lexeme.upper())
     if poses is None:
         raise Impossible("CANNOT_CREATE_BEHAVIOR", f"no gesture {lexeme!r}: there are {', '.join(GESTURES)}")
-    sides = _sides(mode, lambda side: 0.0 if side == "right" else 1.0, scene)
+    sides = _sides(mode, lambda side: 0.0 if side == "right" else 1.0, situation)
     sides = sides if mode == "BOTH_HANDS" else sides[:1]
     joints = tuple(joint for side in sides for joint in kinematics.joints_of(f"{side}_arm"))
     inward = {"left": -1, "right": 1}
     ready, stroke, after = (
         tuple(radians(angle) for side in sides for angle in (inward[side] * pose[0], *pose[1:])) for pose in poses
     )
-    here, home = _angles(joints, scene.pose), _angles(joints, scene.rest)
+    here, home = _angles(joints, situation.pose), _angles(joints, situation.rest)
     stops = (here, ready, stroke, after, home)
-    # So slow a stroke takes no longer from rest, where it waited for something: estimates hold either way.
-    seconds = (_time(here, ready, 0.3, 130), _time(ready, stroke, 0.36, 100), _time(stroke, after, 0.25, 100),
-               max(0.4, return_time(after, home)))  # fmt: skip
+    # The stroke is slow enough to take no longer from rest, after a hold: estimates are right with and without one.
+    seconds = (
+        _arm_time(here, ready, 0.3, 130), _arm_time(ready, stroke, 0.36, 100), _arm_time(stroke, after, 0.25, 100),
+        max(0.4, return_time(after, home)),
+    )  # fmt: skip
     velocities = [
         tuple(
             0.4 * ((b - a) / before + (c - b) / behind)
@@ -231,16 +234,16 @@ def _gesture(lexeme: str, mode: str | None, scene: Situation) -> Course:
         Leg(goal=ready, velocity=velocities[0], seconds=seconds[0], marks=(("start", 0.0), ("ready", 1.0))),
         Leg(goal=stroke, velocity=velocities[1], seconds=seconds[1],
             marks=(("stroke_start", 0.05 / seconds[1]), ("stroke", 1.0))),
-        Leg(goal=after, velocity=velocities[2], seconds=seconds[2], marks=_at(1.0, "stroke_end")),
+        Leg(goal=after, velocity=velocities[2], seconds=seconds[2], marks=_marks(1.0, "stroke_end")),
         Leg(goal=home, seconds=seconds[3], marks=(("relax", 0.1 / seconds[3]), ("end", 1.0))),
     )  # fmt: skip
     parts = tuple(f"{side}_arm" for side in sides)
-    course = _course(parts, joints, legs, _held_around_stroke(), stroke, scene, None)
+    course = _course(parts, joints, legs, _held_around_stroke(), stroke, situation, None)
     return replace(course, is_resizable=True)
 
 
 def _nod(lexeme: str, repetition: int, amount: float) -> Course:
-    """On top of the gaze: angles are offsets. A narrow ellipse, since a line would stop at both ends."""
+    """Course of a nod or shake, in offsets on top of the gaze. A narrow ellipse: a line would stop at both ends."""
     if lexeme not in ("NOD", "SHAKE"):
         raise Impossible("CANNOT_CREATE_BEHAVIOR", f"no head gesture {lexeme!r}: there are NOD and SHAKE")
     size, aside, half = radians(4 + 10 * amount), radians(5.0), 0.32
@@ -258,107 +261,97 @@ def _nod(lexeme: str, repetition: int, amount: float) -> Course:
     strokes = [f"stroke:{number}" for number in range(2, repetition + 1)]
     for stroke in strokes:
         legs.append(Leg(goal=high, velocity=turned(0.0, aside), seconds=again))
-        legs.append(Leg(goal=low, velocity=turned(0.0, -aside), seconds=again, marks=_at(1.0, stroke)))
+        legs.append(Leg(goal=low, velocity=turned(0.0, -aside), seconds=again, marks=_marks(1.0, stroke)))
     legs.append(Leg(goal=turned(-0.25 * size, 0.0), velocity=turned(2.0 * size, aside / 2), seconds=0.25,
-                    marks=_at(1.0, "stroke_end")))  # fmt: skip
+                    marks=_marks(1.0, "stroke_end")))  # fmt: skip
     legs.append(Leg(goal=(0.0, 0.0), seconds=0.3, marks=(("relax", 0.15), ("end", 1.0))))
     return Course(
         parts=("nod",), joints=("neck_yaw", "neck_pitch"), legs=tuple(legs), points=_held_around_stroke(strokes),
-        on_target={}, degrees=math.degrees(size), is_resizable=True,
+        degrees=math.degrees(size), is_resizable=True,
     )  # fmt: skip
 
 
-def _excursion(part: str, goal: tuple[float, ...], scene: Situation) -> Course:
-    """Out to `goal`, held there, back: a face or a posture."""
+def _excursion(part: str, goal: tuple[float, ...], situation: Situation) -> Course:
+    """Course of a face or a posture: out to `goal`, held there, and back."""
     joints = kinematics.joints_of(part)
     joint, size = _sideways(part, dict(zip(joints, goal, strict=True)))
-    here, rest = _angles(joints, scene.pose), _angles(joints, scene.rest)
+    here, rest = _angles(joints, situation.pose), _angles(joints, situation.rest)
     out, back = _moving_time(part, here, goal), _moving_time(part, goal, rest)
     goal = goal if out else here
     drift = tuple(size / SETTLE if name == joint and out > 0.0 and back > 0.0 else 0.0 for name in joints)
     settle = SETTLE if any(drift) else 0.0
     after = tuple(angle + speed * settle for angle, speed in zip(goal, drift, strict=True))
     legs = (
-        Leg(
-            goal=goal,
-            velocity=drift,
-            seconds=out,
-            marks=(("start", 0.0), *_at(1.0, "ready", "stroke_start", "stroke")),
-        ),
-        Leg(goal=after, velocity=drift, seconds=settle, marks=_at(1.0, "stroke_end", "relax")),
-        Leg(goal=rest, seconds=back, marks=_at(1.0, "end")),
+        Leg(goal=goal, velocity=drift, seconds=out, marks=(("start", 0.0), *_marks(1.0, *SYNC_POINTS[1:4]))),
+        Leg(goal=after, velocity=drift, seconds=settle, marks=_marks(1.0, "stroke_end", "relax")),
+        Leg(goal=rest, seconds=back, marks=_marks(1.0, "end")),
     )
-    return _course((part,), joints, legs, _held_on_target("ready", "stroke_start", "stroke"), goal, scene, None)
+    return _course((part,), joints, legs, _held_on_target("ready", "stroke_start", "stroke"), goal, situation, None)
 
 
 def _course(
     parts: tuple[str, ...], joints: tuple[str, ...], legs: tuple[Leg, ...], points: tuple[CoursePoint, ...],
-    goal: tuple[float, ...], scene: Situation, ray: Ray | None,
+    goal: tuple[float, ...], situation: Situation, ray: Ray | None,
 ) -> Course:  # fmt: skip
     return Course(
         parts=parts, joints=joints, legs=legs, points=points, on_target=dict(zip(joints, goal, strict=True)),
-        degrees=kinematics.degrees_between(_angles(joints, scene.pose), goal), ray=ray,
+        degrees=kinematics.degrees_between(_angles(joints, situation.pose), goal), ray=ray,
     )  # fmt: skip
 
 
 def _sideways(part: str, goal: Mapping[str, float]) -> tuple[str, float]:
-    """A joint that the motion to `goal` hardly uses and that has room on both sides, and how far it drifts."""
+    """Choose a joint that the motion to `goal` hardly uses and that has room on both sides, and how far it drifts."""
     if part == "torso":
         return ("torso_turn", radians(0.4)) if not goal["torso_turn"] else ("torso_lean", radians(0.4))
     return ("mouth_corners" if not goal["mouth_corners"] else "brows", 0.02)
 
 
-def _face(lexeme: str, amount: float) -> tuple[float, ...]:
+def _face_angles(lexeme: str, amount: float) -> tuple[float, ...]:
     if (shape := FACES.get(lexeme.upper())) is None:
         raise Impossible("CANNOT_CREATE_BEHAVIOR", f"no face {lexeme!r}: there are {', '.join(FACES)}")
     return tuple(0.95 * amount * shape.get(joint, 0.0) for joint in kinematics.joints_of("face"))
 
 
-def _unit(number: int) -> str:
+def _action_unit(number: int) -> str:
     if number not in ACTION_UNITS:
         known = ", ".join(map(str, ACTION_UNITS))
         raise Impossible("CANNOT_CREATE_BEHAVIOR", f"no action unit {number}: there are {known}")
     return ACTION_UNITS[number]
 
 
-def _torso(lexeme: str) -> tuple[float, float]:
+def _torso_angles(lexeme: str) -> tuple[float, float]:
     if (angles := POSTURES.get(lexeme.upper())) is None:
         known = ", ".join(filter(None, POSTURES))
         raise Impossible("CANNOT_CREATE_BEHAVIOR", f"no posture {lexeme!r}: there are {known}")
     return (radians(angles[0]), radians(angles[1]))
 
 
-def _sides(mode: str | None, rank: Callable[[Side], float], scene: Situation) -> list[Side]:
-    """Arms to try, best first: the one named, or free ones before busy ones."""
+def _sides(mode: str | None, rank: Callable[[Side], float], situation: Situation) -> list[Side]:
+    """Arms to try, best first: the one that `mode` names, or free ones before busy ones."""
     match mode:
         case "LEFT_HAND":
             return ["left"]
         case "RIGHT_HAND":
             return ["right"]
         case _:
-            return sorted(("left", "right"), key=lambda side: (f"{side}_arm" in scene.busy, rank(side)))
+            return sorted(("left", "right"), key=lambda side: (f"{side}_arm" in situation.busy, rank(side)))
 
 
 def _held_on_target(*arrival: str) -> tuple[CoursePoint, ...]:
-    """arrival: points at which it is first on target."""
+    """Sync points of a course that can hold while it is on target. arrival: points at which it is first there."""
     before = SYNC_POINTS[: SYNC_POINTS.index("stroke_end")]
-    return (
-        *(
-            CoursePoint(sync, "stroke", stands_at="relax") if sync in arrival else CoursePoint(sync)
-            for sync in before
-        ),
-        *(CoursePoint("stroke_end", "relax"), CoursePoint("relax", "relax"), CoursePoint("end")),
-    )
+    points = [CoursePoint(sync, "stroke", "relax") if sync in arrival else CoursePoint(sync) for sync in before]
+    return (*points, CoursePoint("stroke_end", "relax"), CoursePoint("relax", "relax"), CoursePoint("end"))
 
 
 def _held_around_stroke(strokes: Sequence[str] = ()) -> tuple[CoursePoint, ...]:
-    """strokes: the repetitions of the first."""
+    """Sync points of a course that can hold before and after its stroke. strokes: the stroke's repetitions."""
     number = SYNC_POINTS.index("stroke_end")
     syncs = (*SYNC_POINTS[:number], *strokes, *SYNC_POINTS[number:])
     return tuple(CoursePoint(sync, sync if sync in ("stroke_start", "stroke_end") else "") for sync in syncs)
 
 
-def _at(fraction: float, *syncs: str) -> tuple[tuple[str, float], ...]:
+def _marks(fraction: float, *syncs: str) -> tuple[tuple[str, float], ...]:
     return tuple((sync, fraction) for sync in syncs)
 
 
@@ -366,17 +359,17 @@ def _angles(joints: tuple[str, ...], pose: Mapping[str, float]) -> tuple[float, 
     return tuple(pose[joint] for joint in joints)
 
 
-def _within(joint: str, angle: float, reserve: float) -> float:
+def _clamped(joint: str, angle: float, reserve: float) -> float:
     limit = kinematics.LIMIT[joint]
     return min(max(angle, limit.low + reserve), limit.high - reserve)
 
 
-def _time(start: tuple[float, ...], goal: tuple[float, ...], least: Seconds, speed: Degrees) -> Seconds:
+def _arm_time(start: tuple[float, ...], goal: tuple[float, ...], least: Seconds, speed: Degrees) -> Seconds:
     return max(least, 0.15 + max(abs(math.degrees(b - a)) for a, b in zip(start, goal, strict=True)) / speed)
 
 
 def _moving_time(part: str, start: tuple[float, ...], goal: tuple[float, ...]) -> Seconds:
     if part == "face":
         way = max(abs(b - a) for a, b in zip(start, goal, strict=True))
-        return 0.0 if way < SHAPED else 0.15 + 0.25 * way
-    return 0.0 if kinematics.degrees_between(start, goal) < THERE else 2 * return_time(start, goal)
+        return 0.0 if way < LEAST_FACE else 0.15 + 0.25 * way
+    return 0.0 if kinematics.degrees_between(start, goal) < LEAST_LEAN else 2 * return_time(start, goal)

@@ -12,7 +12,7 @@ from engage_hri.services.control.torso.motion import Leg
 
 
 class Impossible(Exception):
-    """The body cannot do a behavior: the warning it deserves and the reason."""
+    """The body cannot do a behavior. kind: of the warning that says so. reason: in words."""
 
     def __init__(self, kind: WarningKind, reason: str) -> None:
         super().__init__(reason)
@@ -21,9 +21,9 @@ class Impossible(Exception):
 
 
 class CoursePoint(Struct, frozen=True):
-    """A sync point. held_with: the hold point at which this one waits; its own name for a hold point itself.
+    """A sync point of a course. held_with: the hold point at which it waits; its own name if it is one itself.
 
-    stands_at: the later point that it may go on to while it waits here, since on target it is in both places.
+    stands_at: the later point up to which the motion may go while it waits here: it is on target at both.
     """
 
     sync: str
@@ -41,18 +41,18 @@ class Course(Struct, frozen=True, kw_only=True):
     on_target: Mapping[str, float] = {}
     """Joint angles at the stroke, or at the end of a shift."""
     degrees: Degrees = 0.0
-    """Of joint motion from the start to there."""
+    """Degrees of joint motion from the start to there."""
     ray: Ray | None = None
     is_resizable: bool = False
-    """May it be smaller, for want of time? Not where it has a target."""
+    """True if it may be made smaller for want of time; false for a motion with a target."""
 
 
 class Situation(Struct, frozen=True):
-    """What a course depends on besides the behavior. pose: where the joints are. rest: where each goes home to."""
+    """Circumstances of a course. pose: joint angles at its start. rest: joint angles that it returns to."""
 
     pose: Mapping[str, float]
     rest: Mapping[str, float]
     world: World
     zones: tuple[NoPointZone, ...] = ()
     busy: tuple[str, ...] = ()
-    """Parts in use: a pointing without mode takes another arm."""
+    """Names of parts in use: a pointing without a mode takes the other arm."""

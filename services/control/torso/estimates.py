@@ -18,8 +18,8 @@ def infeasible(behavior: BlockBehavior, warning: str, fault: Fault) -> Estimate:
     return Estimate(behavior=behavior.id, feasible=False, fault=fault, warning=warning)
 
 
-def spoken(behavior: Speech, utterance: Utterance, pose: BodyPose) -> Estimate:
-    """The voice can wait at the marks between two words."""
+def speech_estimate(behavior: Speech, utterance: Utterance, pose: BodyPose) -> Estimate:
+    """Estimate a speech. The voice can wait at the marks between two words."""
     times = {"start": 0.0, **{mark.id: utterance.said_by(mark.position) for mark in behavior.marks}}
     times["end"] = utterance.seconds
     gaps = {mark.id for mark in behavior.marks if utterance.is_gap(mark.position)}
@@ -27,13 +27,13 @@ def spoken(behavior: Speech, utterance: Utterance, pose: BodyPose) -> Estimate:
     return Estimate(behavior=behavior.id, feasible=True, parts=("voice",), phases=phases, pose_after=pose)
 
 
-def waited(behavior: Wait, duration: Seconds, pose: BodyPose) -> Estimate:
+def wait_estimate(behavior: Wait, duration: Seconds, pose: BodyPose) -> Estimate:
     phases = _phases((CoursePoint("start"), CoursePoint("end", "end")), {"start": 0.0, "end": duration})
     return Estimate(behavior=behavior.id, feasible=True, phases=phases, pose_after=pose)
 
 
-def moved(behavior: BlockBehavior, course: Course, path: Path, pose: BodyPose) -> Estimate:
-    """pose: on target."""
+def motion_estimate(behavior: BlockBehavior, course: Course, path: Path, pose: BodyPose) -> Estimate:
+    """Estimate a behavior that moves along `path`. pose: joint angles on target."""
     is_gaze, is_arm = course.parts == ("head",), course.parts[0].endswith("_arm")
     return Estimate(
         behavior=behavior.id,
@@ -53,7 +53,7 @@ def _phases(
     quickest: Mapping[str, Seconds] | None = None,
     slowest: float = 1.0,
 ) -> tuple[Phase, ...]:
-    """From each sync point to the next. No upper limit: where it ends at a hold point, or has no way to go.
+    """Phases from each sync point to the next. One that ends at a hold point or takes no time has no longest time.
 
     times: of the points, at natural pace. quickest: in the greatest hurry.
     """

@@ -1,7 +1,10 @@
-"""Where the head looks: the base gaze, what the eyes rest on, and following entities that move. Pure."""
+"""Gaze of the simulated torso: the base gaze, the entity the eyes rest on, and following entities that move. Pure."""
 
 from collections.abc import Mapping
+from contextlib import suppress
 from math import inf, radians
+
+from msgspec.structs import replace
 
 from engage_hri.schemas.behaviors import BlockBehavior, Gaze, GazeShift, HeadDirectionShift
 from engage_hri.schemas.units import Seconds
@@ -11,8 +14,8 @@ from engage_hri.services.control.torso.motion import Leg, Motion, Path
 from engage_hri.services.control.torso.runs import Run
 from engage_hri.services.control.torso.tracks import Track
 
-NOTICED = radians(0.5)
-"""A target that moves less does not move the head."""
+NOTICEABLE = radians(0.5)
+"""Radians: a target that moves less does not move the head."""
 SHORTEST: Seconds = 0.1
 """Least time that is given to catch up with a target."""
 
@@ -21,17 +24,17 @@ def is_shift(behavior: BlockBehavior) -> bool:
     return isinstance(behavior, GazeShift | HeadDirectionShift)
 
 
-def eyes_on(behavior: BlockBehavior | None) -> str:
-    """The entity on the gaze axis once the motion is done: none with an offset."""
+def eye_target(behavior: BlockBehavior | None) -> str:
+    """Id of the entity on the gaze axis once the motion is done; empty: none, as with an offset."""
     if isinstance(behavior, Gaze | GazeShift) and behavior.offset_angle and behavior.offset_direction:
         return ""
     return behavior.target if isinstance(behavior, Gaze | GazeShift | HeadDirectionShift) else ""
 
 
-class EyeTarget:
-    """The base gaze and the fixation: what the eyes rest on, and since (or from) when.
+class Fixation:
+    """The base gaze and the fixation: the entity that the eyes rest on, and the instant from which they do.
 
-    The instant of a fixation is known in advance, as the motion that leads to it is.
+    The instant of a fixation is known in advance, since the motion that leads to it is.
     """
 
     def __init__(self) -> None:
@@ -42,77 +45,77 @@ class EyeTarget:
 
     @property
     def entity(self) -> str:
-        """What the base gaze rests on."""
-        return eyes_on(self.base)
+        """Id of the entity of the base gaze; empty: none."""
+        return eye_target(self.base)
 
     def shift(self, behavior: BlockBehavior, course: Course) -> None:
-        self.base, self.angles = behavior, (course.legs[-1].goal[0], course.legs[-1].goal[1])
+        self.base, self.angles = behavior, course.legs[-1].goal
 
     def stay(self, angles: tuple[float, ...]) -> None:
-        """The base is a direction, not an entity."""
+        """Make a direction the base gaze, without an entity."""
         self.base, self.angles = None, angles
 
-    def update(self, scene: Situation) -> None:
+    def update(self, situation: Situation) -> None:
         """Turn the base after its entity; the last direction stays when it is gone or out of view."""
         if self.base is not None:
-            try:
-                goal = choreography.plan(self.base, scene).legs[-1].goal
-            except Impossible:
-                return
-            self.angles = (goal[0], goal[1])
+            with suppress(Impossible):
+                self.angles = choreography.plan(self.base, situation).legs[-1].goal
 
     def fixated(self, now: Seconds) -> str:
-        """The entity on the gaze axis, or nothing."""
+        """Id of the entity that the eyes rest on; empty: none."""
         return self._entity if now >= self._since else ""
 
     def expect(self, entity: str, since: Seconds | None, now: Seconds) -> None:
-        """The eyes will rest on `entity` from `since`; on the same one they just go on."""
+        """Expect the eyes to rest on `entity` from `since` on; None: never. If they do already, nothing changes."""
         if entity and entity == self.fixated(now):
             return
         self._entity, self._since = entity, inf if since is None else since
 
     def follow_run(self, run: Run, now: Seconds) -> None:
-        """Expect what the motion of `run` leads to."""
+        """Expect the fixation that the motion of `run` leads to: its target, or the base again."""
         marks, motion = run.motion.path.marks, run.motion
         if isinstance(run.behavior, Gaze):
             if run.awaits("stroke"):
-                self.expect(eyes_on(run.behavior), motion.crossing(marks["stroke"]), now)
+                self.expect(eye_target(run.behavior), motion.crossing(marks["stroke"]), now)
             elif not run.awaits("relax"):
                 self.expect(self.entity, motion.crossing(marks["end"]), now)
         elif isinstance(run.behavior, GazeShift | HeadDirectionShift) and run.awaits("end"):
-            self.expect(eyes_on(run.behavior), motion.crossing(marks["end"]), now)
+            self.expect(eye_target(run.behavior), motion.crossing(marks["end"]), now)
 
 
 def turn(track: Track, goal: tuple[float, ...], now: Seconds) -> None:
-    """Follow a target that has moved noticeably."""
-    if apart(goal, tuple(track.motion.at(inf).q)):
+    """Turn the head to `goal` if it is noticeably elsewhere than where the head goes now."""
+    if differ(goal, tuple(track.motion.at(inf).q)):
         track.return_to(goal, now)
 
 
 def way_back(here: tuple[float, ...], base: tuple[float, ...]) -> Leg:
-    """From a fixation to the base."""
+    """Leg from a fixation back to the base gaze."""
     seconds = choreography.turning_time(here, base)
     return Leg(goal=base if seconds else here, seconds=seconds, marks=(("end", 1.0),))
 
 
 def retargeted(run: Run, course: Course, track: Track, now: Seconds) -> Path | None:
-    """What is left of a gaze or shift whose target (or base) has moved to where `course` goes; None: the same."""
+    """Path for the rest of a gaze or shift after its target (or base) has moved; None: not noticeably.
+
+    course: to where the target is now.
+    """
     if run.awaits("stroke") or is_shift(run.behavior):
         legs, goal, old = course.legs, _target(course.on_target), _target(run.course.on_target)
     elif run.awaits("relax"):
         return None
     else:
         legs, goal, old = course.legs[-1:], course.legs[-1].goal, run.course.legs[-1].goal
-    if not apart(goal, old):
+    if not differ(goal, old):
         return None
     left = run.motion.path.after(run.motion.s(now))
     seconds = max(left[0].seconds if left else 0.0, SHORTEST)
-    first = Leg(goal=legs[0].goal, velocity=legs[0].velocity, seconds=seconds, marks=legs[0].marks)
-    return Path(track.at(now), run.with_faults((first, *legs[1:])), tracks.LIMITS["head"])
+    legs = (replace(legs[0], seconds=seconds), *legs[1:])
+    return Path(track.at(now), run.with_faults(legs), tracks.LIMITS["head"])
 
 
-def apart(one: tuple[float, ...], other: tuple[float, ...]) -> bool:
-    return any(abs(a - b) > NOTICED for a, b in zip(one, other, strict=True))
+def differ(one: tuple[float, ...], other: tuple[float, ...]) -> bool:
+    return any(abs(a - b) > NOTICEABLE for a, b in zip(one, other, strict=True))
 
 
 def _target(angles: Mapping[str, float]) -> tuple[float, ...]:
@@ -120,6 +123,6 @@ def _target(angles: Mapping[str, float]) -> tuple[float, ...]:
 
 
 def brake(motion: Motion, now: Seconds) -> tuple[float, ...]:
-    """Stop `motion`; the angles where it comes to rest."""
+    """Stop `motion`, and return the angles where it comes to rest."""
     motion.brake(now)
     return tuple(float(angle) for angle in motion.at(inf).q)

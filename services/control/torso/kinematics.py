@@ -32,11 +32,11 @@ TABLE_EDGE: Meters = 0.20
 """x of the edge at the robot's side."""
 CLEARANCE: Meters = 0.01
 REACH: Meters = 1.5
-"""How far from the shoulder something may be that is pointed at: farther, people can't tell."""
+"""Greatest distance from the shoulder to a target of pointing: farther, people can't tell which object is meant."""
 HAND_TO_TARGET: Meters = 0.06
-"""Pointing is not touching."""
+"""Least distance from the hand to the surface of a target: pointing is not touching."""
 SLIDE: Radians = radians(2.0)
-"""Shoulder pitch from stroke to stroke_end, the axis staying on target: what keeps the arm in motion."""
+"""Change of the shoulder pitch from stroke to stroke_end, the axis staying on target: it keeps the arm in motion."""
 
 
 def _joint(
@@ -49,12 +49,12 @@ def _joint(
     return limit, radians(home)
 
 
-def _face(name: str, low: float) -> tuple[JointLimit, float]:
+def _face_joint(name: str, low: float) -> tuple[JointLimit, float]:
     return JointLimit(joint=name, part="face", low=low, high=1.0, speed=8.0, acceleration=120.0), 0.0
 
 
-def _arm(side: Side, inward: int) -> list[tuple[JointLimit, float]]:
-    """inward: sign of a yaw towards the middle."""
+def _arm_joints(side: Side, inward: int) -> list[tuple[JointLimit, float]]:
+    """Joints of one arm with their home angles. inward: sign of a yaw towards the middle."""
     low, high = sorted((-45.0 * inward, 80.0 * inward))
     return [
         _joint(f"{side}_shoulder_yaw", f"{side}_arm", low, high, 200, 2000),
@@ -68,12 +68,12 @@ _TABLE = [
     _joint("torso_lean", "torso", -15, 25, 60, 300),
     _joint("neck_yaw", "head", -85, 85, 400, 6000),
     _joint("neck_pitch", "head", -80, 40, 400, 6000),
-    *_arm("left", inward=-1),
-    *_arm("right", inward=1),
-    _face("brows", -1.0),
-    _face("lids", 0.0),
-    _face("mouth_corners", -1.0),
-    _face("mouth", 0.0),
+    *_arm_joints("left", inward=-1),
+    *_arm_joints("right", inward=1),
+    _face_joint("brows", -1.0),
+    _face_joint("lids", 0.0),
+    _face_joint("mouth_corners", -1.0),
+    _face_joint("mouth", 0.0),
 ]
 JOINTS: tuple[JointLimit, ...] = tuple(limit for limit, _ in _TABLE)
 HOME: Mapping[str, float] = {limit.joint: home for limit, home in _TABLE}
@@ -82,7 +82,7 @@ PARTS: tuple[str, ...] = ("head", "torso", "left_arm", "right_arm", "face")
 
 
 class Unreachable(ValueError):
-    """No joint angles do it; the message says why."""
+    """No joint angles look or point at the target; the message says why."""
 
 
 class ArmAim(Struct, frozen=True):
@@ -90,7 +90,7 @@ class ArmAim(Struct, frozen=True):
 
     stroke: tuple[float, float, float]
     held: tuple[float, float, float]
-    """A little later, still on target."""
+    """Angles a little later, still on target."""
 
 
 def joints_of(part: str) -> tuple[str, ...]:
@@ -102,7 +102,7 @@ def pose_message(pose: Pose) -> BodyPose:
 
 
 def gaze(pose: Pose) -> Ray:
-    """Gaze axis from between the eyes."""
+    """Gaze as a ray: from between the eyes along their axis."""
     yaw, pitch = pose["neck_yaw"], pose["neck_pitch"]
     ahead = (cos(pitch) * cos(yaw), cos(pitch) * sin(yaw), sin(pitch))
     up = (-sin(pitch) * cos(yaw), -sin(pitch) * sin(yaw), cos(pitch))
@@ -111,10 +111,10 @@ def gaze(pose: Pose) -> Ray:
 
 
 def arm(pose: Pose, side: Side) -> Ray:
-    """Forearm: from the elbow, tip at the hand."""
+    """Forearm as a ray: from the elbow, tip at the hand."""
     yaw, pitch = pose[f"{side}_shoulder_yaw"], pose[f"{side}_shoulder_pitch"]
-    elbow = _add(SHOULDER[side], _scale(_hanging(yaw, pitch), UPPER_ARM))
-    axis = _hanging(yaw, pitch + pose[f"{side}_elbow"])
+    elbow = _add(SHOULDER[side], _scale(_arm_direction(yaw, pitch), UPPER_ARM))
+    axis = _arm_direction(yaw, pitch + pose[f"{side}_elbow"])
     hand = _add(elbow, _scale(axis, FOREARM))
     return Ray(origin=_to_world(elbow, pose), axis=_turned(axis, pose), tip=_to_world(hand, pose))
 
@@ -155,14 +155,10 @@ def point_at(side: Side, target: Vector, radius: Meters, pose: Pose) -> ArmAim:
     raise Unreachable(f"the {side} arm finds no way to point at it: {reason}")
 
 
-def touches_table(pose: Pose, sides: Iterable[Side] = ("left", "right")) -> str:
-    """Name of an arm of which elbow or hand is in the table or closer than the clearance, or nothing."""
-    for side in sides:
-        forearm = arm(pose, side)
-        assert forearm.tip is not None
-        if _in_table(forearm.origin) or _in_table(forearm.tip) or _in_table(_edge_crossing(forearm)):
-            return f"{side}_arm"
-    return ""
+def touches_table(pose: Pose, sides: Iterable[Side] = ("left", "right")) -> bool:
+    """True if an elbow, forearm or hand is in the table or closer than the clearance."""
+    forearms = [arm(pose, side) for side in sides]
+    return any(_in_table(point) for ray in forearms for point in (ray.origin, _tip(ray), _edge_crossing(ray)))
 
 
 def degrees_between(one: Iterable[float], other: Iterable[float]) -> float:
@@ -171,7 +167,7 @@ def degrees_between(one: Iterable[float], other: Iterable[float]) -> float:
 
 
 def _pointing(x: float, y: float, z: float, pitch: Radians) -> tuple[float, float, float]:
-    """For a target relative to the shoulder: the arm's plane holds it, and the forearm runs through it."""
+    """Arm angles whose forearm axis runs through (x, y, z), relative to the shoulder. pitch: of the shoulder."""
     ahead = hypot(x, y) - UPPER_ARM * sin(pitch)
     above = z + UPPER_ARM * cos(pitch)
     return atan2(y, x), pitch, atan2(ahead, -above) - pitch
@@ -185,11 +181,16 @@ def _objection(side: Side, angles: tuple[float, float, float], target: Vector, r
     there = {**pose, **dict(zip(names, angles, strict=True))}
     if touches_table(there, (side,)):
         return "the table is in the way"
-    hand = arm(there, side).tip
-    assert hand is not None
-    if math.dist(hand, target) < radius + HAND_TO_TARGET or math.dist(arm(there, side).origin, target) < FOREARM:
-        return "it is too near"
-    return ""
+    forearm = arm(there, side)
+    is_near = (
+        math.dist(_tip(forearm), target) < radius + HAND_TO_TARGET or math.dist(forearm.origin, target) < FOREARM
+    )
+    return "it is too near" if is_near else ""
+
+
+def _tip(forearm: Ray) -> Vector:
+    assert forearm.tip is not None
+    return forearm.tip
 
 
 def _in_table(point: Vector) -> bool:
@@ -197,16 +198,15 @@ def _in_table(point: Vector) -> bool:
 
 
 def _edge_crossing(forearm: Ray) -> Vector:
-    """Where the forearm passes the table's edge; its hand if it does not."""
-    assert forearm.tip is not None
-    (x0, y0, z0), (x1, y1, z1) = forearm.origin, forearm.tip
+    """Point at which the forearm passes the table's edge; the hand if it does not."""
+    (x0, y0, z0), (x1, y1, z1) = forearm.origin, _tip(forearm)
     if not x0 < TABLE_EDGE < x1:
-        return forearm.tip
+        return (x1, y1, z1)
     part = (TABLE_EDGE - x0) / (x1 - x0)
     return (TABLE_EDGE, y0 + part * (y1 - y0), z0 + part * (z1 - z0))
 
 
-def _hanging(yaw: Radians, angle: Radians) -> Vector:
+def _arm_direction(yaw: Radians, angle: Radians) -> Vector:
     """Unit vector at `angle` from straight down, forward in the vertical plane at `yaw`."""
     return (sin(angle) * cos(yaw), sin(angle) * sin(yaw), -cos(angle))
 

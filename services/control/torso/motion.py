@@ -2,7 +2,7 @@
 
 A `Path` is a twice differentiable curve q(s), where s is the time in seconds at natural speed; each sync point lies
 at some s. A `Motion` plays it: s(t) is made of few parabolas, so that the instant at which a sync point is crossed
-is a formula and nobody has to step through the trajectory. It runs at a steady rate, brakes to a stop exactly at
+is a formula, without stepping through the trajectory. It runs at a steady rate, brakes to a stop exactly at
 the authority's limit, and goes on without having stopped if the limit is moved in time.
 
 Speed and acceleration limits: q'' alone stays within `SHARE` of the acceleration, which leaves the rest to changes of
@@ -26,10 +26,10 @@ Array = NDArray[np.float64]
 
 SHARE = 0.6
 MARGIN = 0.97
-"""Peaks are found by sampling; what lies between two samples gets this much room."""
+"""Share of a limit that sampled peaks may reach: between two samples a peak may be higher."""
 AT_REST = 1e-9
 SLOWEST = 0.01
-"""The least steady rate. A time that its author has fixed is kept, however slow that looks."""
+"""The least steady rate: a time that the author of a block has fixed is kept, however slow that looks."""
 SAMPLES = np.linspace(0.0, 1.0, 33)
 _STRETCHES = tuple(1.1**step for step in range(40)) + tuple(0.9**step for step in range(1, 12))
 
@@ -65,10 +65,12 @@ class Leg(Struct, frozen=True, kw_only=True):
 
 
 class _Segment(Struct, frozen=True):
+    """One leg of a path as a polynomial. start: in seconds at natural speed."""
+
     start: Seconds
     seconds: Seconds
     coefficients: Array
-    """6 x joints, of ascending powers of the time since `start`."""
+    """Array of 6 x joints, for ascending powers of the time since `start`."""
 
 
 class Path:
@@ -86,7 +88,7 @@ class Path:
         self._peaks: list[tuple[float, float]] = []
         self._leg_starts: list[Seconds] = []
         self.length = 0.0
-        state = self._limits.soften(start)
+        state = self._limits.softened(start)
         for leg in self.legs:
             state = self._append(leg, state)
 
@@ -108,14 +110,14 @@ class Path:
         return end
 
     def at(self, s: Seconds) -> JointMotion:
-        """q, q' and q'' at s."""
+        """Position q at s, and its derivatives q' and q''."""
         if not self._segments:
             return resting(self.legs[-1].goal if self.legs else self.start.q)
         segment = self._segment(s)
-        return _evaluate(segment.coefficients, min(max(s - segment.start, 0.0), segment.seconds))
+        return JointMotion(*_evaluated(segment.coefficients, min(max(s - segment.start, 0.0), segment.seconds)))
 
-    def after(self, s: Seconds, untold: Collection[str] = ()) -> tuple[Leg, ...]:
-        """What is left at s, as legs, with the sync points beyond s; those `untold` that lie at s come at once."""
+    def after(self, s: Seconds, unreported: Collection[str] = ()) -> tuple[Leg, ...]:
+        """Legs that are left at s, with the sync points beyond s. Those in `unreported` that are not come at once."""
         index = max((i for i, start in enumerate(self._leg_starts) if start <= s + 1e-12), default=0)
         ends = [*self._leg_starts[1:], self.length]
         legs = []
@@ -130,7 +132,7 @@ class Path:
                 if self.marks[sync] > s + 1e-12
             )
             legs.append(Leg(goal=leg.goal, velocity=leg.velocity, seconds=left, marks=marks))
-        missed = tuple([(sync, 0.0) for sync in self.marks if sync in untold and self.marks[sync] <= s + 1e-12])
+        missed = tuple([(sync, 0.0) for sync in self.marks if sync in unreported and self.marks[sync] <= s + 1e-12])
         if missed:
             first = legs[0] if legs else Leg(goal=self.legs[-1].goal, seconds=0.0)
             legs[:1] = [replace(first, marks=(*missed, *first.marks))]
@@ -144,7 +146,7 @@ class Path:
         return max(1.0, min(4.0, MARGIN / max(speed, 0.01), sqrt(MARGIN * SHARE / max(acceleration, 0.01))))
 
     def steepest_brake(self, s: Seconds, rate: float = 1.0) -> float:
-        """How quickly the rate may fall to 0 at s, in 1/s: quickly where the path is slow anyway."""
+        """Speed at which the rate may fall to 0 at s, in 1/s: high where the path is slow anyway."""
         brake = 40.0
         while brake > 0.5:
             window = np.linspace(max(0.0, s - rate * rate / (2 * brake)), s, 9)
@@ -155,7 +157,7 @@ class Path:
 
     @property
     def gentlest_brake(self) -> float:
-        """A change of the rate that the limits permit anywhere on this path, in 1/s."""
+        """Speed at which the rate may change anywhere on this path, in 1/s."""
         return self._limits.brake_anywhere
 
     def _segment(self, s: Seconds) -> _Segment:
@@ -173,7 +175,7 @@ class _Limits:
         self.acceleration = np.array([limit.acceleration for limit in limits])
         self.brake_anywhere = float(np.min((1 - SHARE) * self.acceleration / self.speed)) if len(limits) else 1.0
 
-    def soften(self, state: JointMotion) -> JointMotion:
+    def softened(self, state: JointMotion) -> JointMotion:
         """The state with an acceleration that a path may have."""
         bound = MARGIN * SHARE * self.acceleration
         return JointMotion(state.q, state.v, np.clip(state.a, -bound, bound))
@@ -182,7 +184,7 @@ class _Limits:
         """The quintic between two states that takes `seconds`, or as near to it as keeps the limits."""
         best: _Connection | None = None
         for stretch in _STRETCHES:
-            connection = self._judged(_quintic(start, end, seconds * stretch), seconds * stretch)
+            connection = self._with_peaks(_quintic(start, end, seconds * stretch), seconds * stretch)
             if connection.excess <= 0.0:
                 return connection
             if best is None or connection.excess < best.excess:
@@ -193,8 +195,8 @@ class _Limits:
     def permits_brake(self, state: JointMotion, brake: float) -> bool:
         return bool(np.all(np.abs(state.v) * brake <= (1 - SHARE) * self.acceleration))
 
-    def _judged(self, coefficients: Array, seconds: Seconds) -> "_Connection":
-        position, velocity, change = _sampled(coefficients, seconds)
+    def _with_peaks(self, coefficients: Array, seconds: Seconds) -> "_Connection":
+        position, velocity, change = _evaluated(coefficients, (SAMPLES * seconds)[:, None])
         speed = float(np.max(np.abs(velocity) / self.speed))
         acceleration = float(np.max(np.abs(change) / self.acceleration))
         outside = float(np.max(np.maximum(self.low - position, position - self.high) / (self.high - self.low)))
@@ -203,7 +205,7 @@ class _Limits:
 
 
 class _Connection(Struct, frozen=True):
-    """A quintic with its peaks, as fractions of the joints' limits. excess: of the worst one; <= 0: all are kept."""
+    """A quintic with its peaks, as fractions of the joints' limits. excess: of the worst; <= 0: all are kept."""
 
     coefficients: Array
     seconds: Seconds
@@ -213,6 +215,8 @@ class _Connection(Struct, frozen=True):
 
 
 class _Piece(Struct, frozen=True):
+    """A parabola of s(t), from instant `t` on. slope: change of the rate per second."""
+
     t: Seconds
     s: Seconds
     rate: float
@@ -227,7 +231,7 @@ class _Piece(Struct, frozen=True):
 
 
 class Motion:
-    """A path being played from `start` on. Pure: ask it about any instant from the last change on.
+    """A path that is played from `start` on. Pure: it answers for any instant from its last change on.
 
     cruise: the steady rate, 1 = natural. limit: the s where it has to stop, until `extend` moves it.
     """
@@ -237,7 +241,7 @@ class Motion:
         self.cruise = min(cruise, path.fastest)
         self.limit = limit
         self._rest: JointMotion | None = None
-        """Where it stands once it is over, when somebody has asked."""
+        """State of the joints after the end, once it has been asked for."""
         # From rest the rate may jump: nothing moves yet. A path that starts in motion was built for rate 1.
         self._replan(start, 0.0, self.cruise if path.start.at_rest else 1.0)
 
@@ -255,7 +259,7 @@ class Motion:
         # Where nothing moves yet the rate may jump.
         self._replan(now, s, self.cruise if self.path.at(s).at_rest else rate)
 
-    def come(self, s: Seconds, at: Seconds, now: Seconds, fastest: float) -> None:
+    def reach(self, s: Seconds, at: Seconds, now: Seconds, fastest: float) -> None:
         """Change the rate such that `s` is reached at `at`, or as near to that as between `SLOWEST` and `fastest`."""
         here, rate = self.s(now), self.rate(now)
         left, time, change = s - here, at - now, self.path.gentlest_brake
@@ -287,7 +291,7 @@ class Motion:
         return 0.0 if t >= self.end else self._piece(t).rate_at(t)
 
     def at(self, t: Seconds) -> JointMotion:
-        """Where the joints are, and how they move."""
+        """Position, velocity and acceleration of the joints at t."""
         if t >= self.end:
             if self._rest is None:
                 self._rest = resting(self.path.at(self._stop).q)
@@ -297,7 +301,7 @@ class Motion:
         return JointMotion(state.q, state.v * rate, state.a * rate * rate + state.v * piece.slope)
 
     def crossing(self, s: Seconds) -> Seconds | None:
-        """When s is reached; None if it lies beyond the limit."""
+        """Instant at which s is reached; None if s lies beyond the limit."""
         if s > self._stop + 1e-12:
             return None
         if s >= self._stop - 1e-12:
@@ -320,12 +324,11 @@ class Motion:
             return
         if rate == 0.0 and self.path.at(s).at_rest:
             rate = self.cruise
-        brake = (
-            inf if self.path.at(self._stop).at_rest else self.path.steepest_brake(self._stop, max(rate, self.cruise))
-        )
-        change = self.path.gentlest_brake
-        top, braking = _top_rate(rate, self.cruise, left, change, brake)
-        now, s, rate = self._ramp(now, s, rate, top, change, self._stop)
+        brake = inf
+        if not self.path.at(self._stop).at_rest:
+            brake = self.path.steepest_brake(self._stop, max(rate, self.cruise))
+        top, braking = _top_rate(rate, self.cruise, left, self.path.gentlest_brake, brake)
+        now, s, rate = self._ramp(now, s, rate, top)
         steady = self._stop - s - braking
         if rate > 0.0 and steady > 0.0:
             self._pieces.append(_Piece(now, s, rate, 0.0))
@@ -337,12 +340,10 @@ class Motion:
             self._pieces.append(_Piece(now, s, 0.0, 0.0))
         self.end = now
 
-    def _ramp(
-        self, now: Seconds, s: Seconds, rate: float, to: float, change: float, stop: Seconds
-    ) -> tuple[Seconds, Seconds, float]:
+    def _ramp(self, now: Seconds, s: Seconds, rate: float, to: float) -> tuple[Seconds, Seconds, float]:
         if math.isclose(rate, to, rel_tol=1e-12, abs_tol=1e-12):
             return now, s, to
-        slope = math.copysign(change, to - rate)
+        slope, stop = math.copysign(self.path.gentlest_brake, to - rate), self._stop
         seconds = (to - rate) / slope
         piece = _Piece(now, s, rate, slope)
         self._pieces.append(piece)
@@ -353,7 +354,7 @@ class Motion:
 
 
 def _top_rate(rate: float, cruise: float, left: Seconds, change: float, brake: float) -> tuple[float, Seconds]:
-    """The highest rate from which one can still stop after `left`, and how much of `left` the braking takes."""
+    """The highest rate from which the motion can stop within `left`, and the part of `left` that braking takes."""
     if brake == inf:
         return cruise, 0.0
     ramp = abs(cruise * cruise - rate * rate) / (2 * change)
@@ -386,13 +387,7 @@ _FIRST = np.arange(1, 6)
 _SECOND = np.arange(2, 6) * np.arange(1, 5)
 
 
-def _evaluate(c: Array, t: Seconds) -> JointMotion:
+def _evaluated(c: Array, t: Seconds | Array) -> tuple[Any, Any, Any]:
+    """Value and first two derivatives of the polynomials at t, or at each t of a column."""
     powers = t**_POWERS
-    first = powers[:5] * _FIRST
-    second = powers[:4] * _SECOND
-    return JointMotion(powers @ c, first @ c[1:], second @ c[2:])
-
-
-def _sampled(c: Array, seconds: Seconds) -> tuple[Any, Any, Any]:
-    powers = (SAMPLES * seconds)[:, None] ** _POWERS
-    return powers @ c, (powers[:, :5] * _FIRST) @ c[1:], (powers[:, :4] * _SECOND) @ c[2:]
+    return powers @ c, (powers[..., :5] * _FIRST) @ c[1:], (powers[..., :4] * _SECOND) @ c[2:]

@@ -1,4 +1,4 @@
-"""A behavior in motion: how far it may go, which sync points are still to come, and the faults it is due."""
+"""A behavior in motion: how far it may go, which sync points are still to come, and the faults that are due."""
 
 from math import inf
 
@@ -15,13 +15,14 @@ from engage_hri.services.control.torso.sizing import hurried
 from engage_hri.services.control.waiting import Bell
 
 STALL, OVERHEAT = "(stall)", "(overheat)"
-"""Points of a path that only the simulation knows."""
+"""Marks on a path where a fault happens; they are never reported."""
 
 
 class Run:
-    """`course` under `authority`. Its bell rings when the authority changes or another behavior takes over.
+    """A behavior that is being performed: `course` under `authority`.
 
-    cut_at: when a later behavior took its parts. holding: it waits at a hold point, and stands there soon.
+    bell: rings when the authority changes or another behavior takes over. cut_at: when a later behavior took its
+    parts. holding: it waits at a hold point, standing or still coming to a stop.
     """
 
     def __init__(
@@ -41,24 +42,24 @@ class Run:
         self.cut_at: Seconds | None = None
         self.motion: Motion
         self.size = 1.0
-        """Of its full amplitude."""
+        """Share of the full amplitude, 0 to 1."""
         self._aim: tuple[str, Seconds] | None = None
-        """The sync point for whose sake it is faster or slower than it would be, and its instant."""
-        self._tried: list[tuple[str, Seconds]] = []
-        """The instants for which it has been made as small as it takes."""
+        """The sync point that the rate is set for, with the instant asked for; None: it runs at its own rate."""
+        self._tried_aims: list[tuple[str, Seconds]] = []
+        """Instants asked for when a smaller path was last looked for."""
         real = ("head",) if course.parts == ("nod",) else course.parts
         self.cruise = variability.rate(deviations, real, behavior.id, occasion)
         self.stall: Stall | None = variability.stall(deviations, real, behavior)
         if self.stall is not None:
-            self._expect(STALL, self.stall.before)
-        if variability.overheats(deviations, real):
-            self._expect(OVERHEAT, "stroke" if self.awaits("stroke") else "end")
+            self._insert_fault(STALL, self.stall.before)
+        if variability.overheated_part(deviations, real):
+            self._insert_fault(OVERHEAT, "stroke" if self.awaits("stroke") else "end")
 
     def awaits(self, sync: str) -> bool:
         return any(point.sync == sync for point in self.pending)
 
     @property
-    def left(self) -> list[str]:
+    def unreported(self) -> list[str]:
         """Sync points still to be reported."""
         return [point.sync for point in self.pending if point.sync not in (STALL, OVERHEAT)]
 
@@ -71,20 +72,20 @@ class Run:
         self._aim = None
 
     def hurry(self, now: Seconds) -> Path | None:
-        """A smaller way to go on, if it could not come to its points when it is asked to; None: stay on this one."""
+        """Look for a smaller path if this one would miss the instants asked for; None: stay on this one."""
         aims, here = self._aims(now), self.motion.s(now)
-        # What it is just passing is told first: no other path has it.
+        # The point that it is just passing is reported first: no other path has it.
         is_passing = 0.0 < here >= self.motion.path.marks[self.pending[0].sync] - 1e-9
-        if is_passing or aims == self._tried:
+        if is_passing or aims == self._tried_aims:
             return None
-        self._tried = aims
+        self._tried_aims = aims
         if (reduced := hurried(self.course, self.motion, self.size, aims, now, self.cruise)) is None:
             return None
         self.size = reduced.size
         return reduced.path
 
     def keep_pace(self, now: Seconds) -> bool:
-        """Run such that it comes to its next point when it is asked to; whether that changed anything."""
+        """Set the rate such that it reaches its next point at the instant asked for. True if that is a new aim."""
         aim = next(iter(self._aims(now)), None)
         if aim == self._aim:
             return False
@@ -93,18 +94,21 @@ class Run:
         if aim is None:
             self.motion.run_at(self.cruise, now)
         else:
-            # A motor that is slow is so at its fastest, too; up to there the body sees to it that it is on time.
-            self.motion.come(marks[aim[0]], aim[1], now, self.cruise * self.motion.path.fastest)
+            # A slow motor is slow at its fastest, too; up to that rate the body makes up for it.
+            self.motion.reach(marks[aim[0]], aim[1], now, self.cruise * self.motion.path.fastest)
         return True
 
     def _aims(self, now: Seconds) -> list[tuple[str, Seconds]]:
-        """Sync points ahead for which it has been given an instant."""
+        """Sync points ahead that are asked for at an instant, with that instant."""
         marks, here, planned = self.motion.path.marks, self.motion.s(now), self.authority.pace
         coming = (point.sync for point in self.pending if marks.get(point.sync, 0.0) > here + 1e-9)
         return [(sync, planned[sync]) for sync in coming if sync in planned]
 
     def due(self, point: CoursePoint) -> Seconds | None:
-        """When it comes to `point`; None if it may not go so far. Where it rests it is in no hurry to say so."""
+        """Instant at which it reports `point`; None if it may not go so far.
+
+        A point at which the joints rest is reported at the instant asked for, if that is later than its arrival.
+        """
         mark = self.motion.path.marks[point.sync]
         crossing = self.motion.crossing(mark)
         if crossing is None or not self.motion.path.at(mark).at_rest:
@@ -112,7 +116,7 @@ class Run:
         return max(crossing, self.authority.pace.get(point.sync, crossing))
 
     def limit(self, path: Path) -> Seconds:
-        """How far along `path` it may go now."""
+        """Position on `path`, in its natural seconds, up to which it may go now."""
         for point in self.pending:
             if point.sync in (STALL, OVERHEAT) or (point.held_with and not self.authority.covers(point.held_with)):
                 return path.marks.get(point.stands_at or point.sync, inf)
@@ -120,11 +124,11 @@ class Run:
 
     @property
     def stands(self) -> bool:
-        """Has it come to a stop where it has to wait?"""
+        """True if it has come to a stop where it has to wait."""
         return self.holding and self.bell.is_past(self.motion.end)
 
     def leave(self, hold: str, now: Seconds) -> list[str]:
-        """Wait there no longer; the sync points that it leaves. Where it stands may be another hold point, too."""
+        """Stop waiting at `hold`; return the sync points passed. The same place may be another hold point, too."""
         passed = [point.sync for point in self.pending if point.held_with == hold]
         self.pending = [point for point in self.pending if point.held_with != hold]
         following = next(point for point in self.pending if point.sync not in (STALL, OVERHEAT))
@@ -134,7 +138,7 @@ class Run:
         return passed
 
     def with_faults(self, legs: tuple[Leg, ...]) -> tuple[Leg, ...]:
-        """`legs` that were made anew, with the faults that are still due."""
+        """Mark the faults that are still due on new `legs`."""
         marked = {sync for leg in legs for sync, _ in leg.marks}
         for number, point in enumerate(self.pending):
             if point.sync in (STALL, OVERHEAT) and point.sync not in marked:
@@ -143,11 +147,11 @@ class Run:
         return legs
 
     def cut(self, now: Seconds) -> None:
-        """A later behavior has taken over."""
+        """Note that a later behavior has taken over its parts."""
         self.cut_at = now
         self.bell.ring()
 
-    def _expect(self, fault: str, before: str) -> None:
+    def _insert_fault(self, fault: str, before: str) -> None:
         """Put `fault` half-way to sync point `before`, on the leg that has it."""
         index = next((i for i, point in enumerate(self.pending) if point.sync == before), None)
         if index is None:
@@ -162,5 +166,4 @@ def _marked(leg: Leg, fault: str, before: str) -> Leg:
     if before not in fractions:
         return leg
     earlier = max((fraction for fraction in fractions.values() if fraction < fractions[before]), default=0.0)
-    marks = (*leg.marks, (fault, (earlier + fractions[before]) / 2))
-    return Leg(goal=leg.goal, velocity=leg.velocity, seconds=leg.seconds, marks=marks)
+    return replace(leg, marks=(*leg.marks, (fault, (earlier + fractions[before]) / 2)))

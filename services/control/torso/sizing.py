@@ -1,10 +1,11 @@
-"""Smaller where faster does not do: how large a gesture or a nod can be that is to be somewhere on time. Pure."""
+"""Size of a gesture or a nod that has to be on time: it is made smaller where faster is not enough. Pure."""
 
 from collections.abc import Sequence
 from copy import copy
 from math import inf
 
 from msgspec import Struct
+from msgspec.structs import replace
 
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.control.torso import tracks
@@ -12,31 +13,32 @@ from engage_hri.services.control.torso.course import Course
 from engage_hri.services.control.torso.motion import Leg, Motion, Path
 
 SIZES = (0.9, 0.8, 0.7, 0.6, 0.5, 0.4)
-"""Of its full amplitude, largest first. Smaller than the last, nobody would take it for a gesture."""
-PUNCTUAL: Seconds = 0.001
-"""Who comes later than this is late."""
+"""Shares of the full amplitude, largest first. Anything smaller than the last would not be taken for a gesture."""
+LATE: Seconds = 0.001
+"""A sync point counts as late if it comes more than this after the instant asked for."""
 
 
 class Reduced(Struct, frozen=True):
-    """What is left of a course, at `size` times its amplitude."""
+    """Path for the rest of a course, at `size` times its full amplitude."""
 
     path: Path
     size: float
 
 
 def quickest(course: Course, path: Path) -> dict[str, Seconds]:
-    """When its sync points come in the greatest hurry: as fast as joints permit and, where that helps, as small."""
-    if course.is_resizable and _is_clear(small := _reduced(course, Motion(path, 0.0), 0.0, SIZES[-1]), course):
-        path = small
+    """Earliest times of the sync points: as fast as the joints permit and, where allowed, at the least size."""
+    if course.is_resizable:
+        small = _reduced(course, Motion(path, 0.0), 0.0, SIZES[-1])
+        path = path if tracks.meets_table(small, course.joints) else small
     return {sync: s / path.fastest for sync, s in path.marks.items()}
 
 
 def hurried(
     course: Course, motion: Motion, size: float, aims: Sequence[tuple[str, Seconds]], now: Seconds, cruise: float
 ) -> Reduced | None:
-    """As large as still comes to its points when it is asked to, or is least late; None: as it is, at `size`.
+    """Reduce a course to the largest size that is on time, or else to the least late; None: leave it at `size`.
 
-    aims: sync points to come and their instants. cruise: how fast its motors are, 1 = as believed.
+    aims: sync points to come and the instants asked for. cruise: speed of its motors, 1 = as believed.
     """
     least = lateness(motion, aims, now, cruise) if course.is_resizable else 0.0
     best: Reduced | None = None
@@ -44,26 +46,26 @@ def hurried(
         if each < size and least > 0.0:
             path = _reduced(course, motion, now, each / size)
             late = lateness(Motion(path, now, cruise=cruise), aims, now, cruise)
-            if late < least and _is_clear(path, course):
+            if late < least and not tracks.meets_table(path, course.joints):
                 least, best = late, Reduced(path, each)
     return best
 
 
 def lateness(motion: Motion, aims: Sequence[tuple[str, Seconds]], now: Seconds, cruise: float) -> Seconds:
-    """By how much `motion` misses the worst of `aims` if nothing stops it; 0: none of them."""
+    """Seconds by which `motion` misses the worst of `aims` if nothing stops it; 0: all are met."""
     trial, worst = copy(motion), 0.0
     trial.extend(inf, now)
     for sync, at in aims:
         s = trial.path.marks[sync]
-        trial.come(s, at, now, cruise * trial.path.fastest)
+        trial.reach(s, at, now, cruise * trial.path.fastest)
         crossing = trial.crossing(s)
         assert crossing is not None, "nothing limits the trial"
         worst, now = max(worst, crossing - at), max(now, crossing)
-    return worst if worst > PUNCTUAL else 0.0
+    return worst if worst > LATE else 0.0
 
 
 def _reduced(course: Course, motion: Motion, now: Seconds, by: float) -> Path:
-    """From where it is now; goals come nearer to where the course ends, which is the safe pose."""
+    """Path from the current state of `motion`, its goals `by` times as far from the course's end, the safe pose."""
     s = motion.s(now)
     legs = motion.path.after(s) if s > 0.0 else motion.path.legs
     home = legs[-1].goal
@@ -72,9 +74,4 @@ def _reduced(course: Course, motion: Motion, now: Seconds, by: float) -> Path:
 
 def _nearer(leg: Leg, home: tuple[float, ...], by: float) -> Leg:
     goal = tuple(rest + by * (angle - rest) for angle, rest in zip(leg.goal, home, strict=True))
-    velocity = tuple(by * speed for speed in leg.velocity)
-    return Leg(goal=goal, velocity=velocity, seconds=leg.seconds, marks=leg.marks)
-
-
-def _is_clear(path: Path, course: Course) -> bool:
-    return not course.parts[0].endswith("_arm") or not tracks.meets_table(path, course.joints)
+    return replace(leg, goal=goal, velocity=tuple(by * speed for speed in leg.velocity))

@@ -1,4 +1,4 @@
-"""What moves each part of the simulated torso, and how the parts add up to a pose. Pure: time is an argument.
+"""Tracks: the motion of each part of the simulated torso, and the pose they add up to. Pure: time is an argument.
 
 The head has two tracks: gaze, and a nod on top of it. They share the neck's limits, so that their sum keeps them.
 """
@@ -15,11 +15,14 @@ from engage_hri.services.control.torso.motion import JointMotion, Leg, Motion, P
 
 NECK = ("neck_yaw", "neck_pitch")
 GAZE_SHARE = 0.7
-"""Of the neck's speed and acceleration; the rest is for nods."""
+"""Share of the neck's speed and acceleration for gaze; the rest is for nods."""
 
 
-def _neck(share: float, reserve: float | None) -> tuple[JointLimit, ...]:
-    """reserve: kept free of the range; None: the range is that reserve, around 0."""
+def _neck_limits(share: float, reserve: float | None) -> tuple[JointLimit, ...]:
+    """Limits of the neck's joints for one track, with a share of speed and acceleration.
+
+    reserve: kept free at both ends of the range; None: the range is `NOD_RESERVE` around 0.
+    """
     limits = []
     for limit in (kinematics.LIMIT[joint] for joint in NECK):
         low, high = -choreography.NOD_RESERVE, choreography.NOD_RESERVE
@@ -34,8 +37,8 @@ def _neck(share: float, reserve: float | None) -> tuple[JointLimit, ...]:
 
 
 LIMITS: Mapping[str, tuple[JointLimit, ...]] = {
-    "head": _neck(GAZE_SHARE, choreography.NOD_RESERVE),
-    "nod": _neck(1.0 - GAZE_SHARE, None),
+    "head": _neck_limits(GAZE_SHARE, choreography.NOD_RESERVE),
+    "nod": _neck_limits(1.0 - GAZE_SHARE, None),
     **{
         part: tuple(kinematics.LIMIT[joint] for joint in kinematics.joints_of(part))
         for part in ("torso", "left_arm", "right_arm", "face")
@@ -77,12 +80,12 @@ class Track:
         return t < self.motion.end
 
     def return_to(self, goal: tuple[float, ...], now: Seconds) -> None:
-        """Leave whatever it does and go to rest at `goal`, by a way that is clear of the table."""
+        """Leave the current motion and go to rest at `goal`, by a path that is clear of the table."""
         start = self.at(now)
         time = choreography.turning_time if self.part in ("head", "nod") else choreography.return_time
         seconds = time(self.angles(now), goal)
         direct = Path(start, (Leg(goal=goal, seconds=seconds),), LIMITS[self.part])
-        if not self.part.endswith("_arm") or not meets_table(direct, self.joints):
+        if not meets_table(direct, self.joints):
             self.play(Motion(direct, now))
             return
         # Up first: the elbow bends and the upper arm lifts, which takes elbow and hand away from the table.
@@ -107,10 +110,10 @@ def joined(states: Sequence[JointMotion]) -> JointMotion:
 
 
 def meets_table(path: Path, joints: Sequence[str]) -> bool:
-    """Does an elbow or hand come into the table anywhere on `path`?"""
-    if not path.length:
-        return False
+    """True if an elbow or hand comes into the table anywhere on `path`."""
     sides = [side for side in kinematics.SHOULDER if f"{side}_elbow" in joints]
+    if not path.length or not sides:
+        return False
     for step in range(17):
         angles = dict(zip(joints, path.at(path.length * step / 16).q.tolist(), strict=True))
         if kinematics.touches_table({**kinematics.HOME, **angles}, sides):
@@ -128,6 +131,6 @@ def pose_at(tracks: Mapping[str, Track], t: Seconds) -> dict[str, float]:
 
 
 def updated(pose: Mapping[str, float], by: BodyPose | None) -> dict[str, float]:
-    """The pose with the angles of a message; joints that this body lacks are ignored."""
+    """The pose with the angles of a message in place of its own; joints that this body lacks are ignored."""
     angles = {angle.joint: angle.angle for angle in by.joints if angle.joint in pose} if by is not None else {}
     return {**pose, **angles}

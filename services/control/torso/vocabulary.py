@@ -1,4 +1,4 @@
-"""What the simulated torso knows: gestures, faces and postures."""
+"""Gestures, faces and postures of the simulated torso."""
 
 from collections.abc import Mapping
 

@@ -1,1 +1,1 @@
-"""When words are said: a model of a voice, and speech under an authority."""
+"""The voice of the simulated body: a time line of words, and speech under a movement authority."""

@@ -3,6 +3,8 @@
 from collections.abc import AsyncGenerator
 from math import inf
 
+from msgspec.structs import replace
+
 from engage_hri.schemas.behaviors import Speech, Wait
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.control.body import Arrived, MovementAuthority, Progress, Reached, Spoke
@@ -11,9 +13,9 @@ from engage_hri.services.control.waiting import Bell
 
 
 async def speak(behavior: Speech, authority: MovementAuthority, pace: float = 1.0) -> AsyncGenerator[Progress, None]:
-    """Say it word by word, with a pause at a mark between two words that it may not pass yet.
+    """Say a text word by word. At a mark between two words the voice pauses until it may pass the mark.
 
-    Revoked, it finishes the word that it is in. pace: 2 takes twice as long.
+    If the authority is revoked, the voice finishes the current word. pace: 2 takes twice as long.
     """
     bell = Bell()
     begin = bell.now()
@@ -23,35 +25,29 @@ async def speak(behavior: Speech, authority: MovementAuthority, pace: float = 1.
     try:
         for progress in _score(behavior, utterance):
             while not bell.is_past(begin + progress.at) and authority.revoked is None:
-                await bell.heard(begin + progress.at)
+                await bell.wait(begin + progress.at)
             arrived = at = begin + progress.at
             if isinstance(progress, Reached) and progress.sync in gaps and not authority.covers(progress.sync):
                 yield Arrived(progress.sync, arrived)
                 while authority.revoked is None and not authority.covers(progress.sync):
-                    await bell.heard(inf)
+                    await bell.wait(inf)
                 at = bell.now()
                 begin += at - arrived
             if authority.revoked is not None:
                 break
-            yield _at(progress, at, arrived)
+            yield Reached(progress.sync, at, arrived) if isinstance(progress, Reached) else replace(progress, at=at)
         since = bell.now() - begin
         for word in utterance.words:
             if authority.revoked is not None and word.start < since < word.end:
                 while not bell.is_past(begin + word.end):
-                    await bell.heard(begin + word.end)
+                    await bell.wait(begin + word.end)
                 yield Spoke(word.text, word.position, begin + word.end)
     finally:
         unwatch()
 
 
-def _at(progress: Reached | Spoke, at: Seconds, arrived: Seconds) -> Progress:
-    if isinstance(progress, Reached):
-        return Reached(progress.sync, at, arrived)
-    return Spoke(progress.word, progress.position, at)
-
-
 async def wait(behavior: Wait, authority: MovementAuthority) -> AsyncGenerator[Progress, None]:
-    """Let its duration pass, and then hold until its end may be passed."""
+    """Let the duration of the behavior pass, and then hold until its end may be passed."""
     bell = Bell()
     begin = bell.now()
     due = begin + (behavior.duration or 0.0)
@@ -59,12 +55,12 @@ async def wait(behavior: Wait, authority: MovementAuthority) -> AsyncGenerator[P
     try:
         yield Reached("start", begin, begin)
         while not bell.is_past(due) and authority.revoked is None:
-            await bell.heard(due)
+            await bell.wait(due)
         left = due
         if authority.revoked is None and not authority.covers("end"):
             yield Arrived("end", due)
             while authority.revoked is None and not authority.covers("end"):
-                await bell.heard(inf)
+                await bell.wait(inf)
             left = bell.now()
         if authority.revoked is None:
             yield Reached("end", left, due)
@@ -73,8 +69,10 @@ async def wait(behavior: Wait, authority: MovementAuthority) -> AsyncGenerator[P
 
 
 def _score(behavior: Speech, utterance: Utterance) -> list[Reached | Spoke]:
-    """Everything the voice is going to report, in time order, seconds from its start; at one instant in the order of
-    the text, a word before the mark after it."""
+    """List all that the voice is going to report in time order, seconds from its start.
+
+    Reports of one instant are in the order of the text, a word before the mark after it.
+    """
     last = len(behavior.text)
     score: list[tuple[Seconds, int, Reached | Spoke]] = [(0.0, -1, Reached("start", 0.0, 0.0))]
     score += [(word.end, word.position, Spoke(word.text, word.position, word.end)) for word in utterance.words]

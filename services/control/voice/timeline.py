@@ -1,4 +1,4 @@
-"""When the voice says what: words and marks of a text on a time line, known before it speaks."""
+"""Time line of an utterance: the seconds at which words and marks of a text are said, known before it begins."""
 
 from msgspec import Struct
 
@@ -7,10 +7,10 @@ from engage_hri.schemas.units import Seconds
 
 BEFORE_WORD: Seconds = 0.12
 PER_LETTER: Seconds = 0.05
-"""A word of 4.6 letters takes 0.35 s."""
+"""Seconds for each letter, besides `BEFORE_WORD` for the word: a word of 4.6 letters takes 0.35 s."""
 PER_TOKEN: dict[Script, Seconds] = {"ideographs": 0.22, "kana": 0.15, "clusters": 0.14}
-"""Of scripts without spaces. Mandarin has 5.2 syllables a second, Japanese 7.8 (Pellegrino, Coupé and Marsico,
-Language 87, 2011), each without pauses; a syllable of Thai is about one and a half clusters."""
+"""Seconds for a token of a script without spaces. Mandarin has 5.2 syllables a second, Japanese 7.8 (Pellegrino,
+Coupé and Marsico, Language 87, 2011), each without pauses; a syllable of Thai is about one and a half clusters."""
 PAUSE = {
     ",": 0.2, ";": 0.25, ":": 0.25, ".": 0.35, "!": 0.35, "?": 0.35, "…": 0.5, "—": 0.25, "–": 0.25,
     "，": 0.2, "、": 0.2, "､": 0.2, "；": 0.25, "：": 0.25, "。": 0.35, "｡": 0.35, "．": 0.35, "！": 0.35, "？": 0.35,
@@ -20,9 +20,10 @@ PAUSE = {
 
 
 class Word(Struct, frozen=True):
-    """Said from `start` to `end`, seconds from the utterance's start. position: of its end, punctuation included.
+    """A word said from `start` to `end`, seconds from the utterance's start.
 
-    Of a script without spaces a character; what cannot be said, such as an emoji, takes no time.
+    position: characters of the text up to its end. In a script without spaces each character is a word. A token
+    that cannot be said, such as an emoji, takes no time.
     """
 
     text: str
@@ -36,7 +37,7 @@ class Utterance(Struct, frozen=True):
     seconds: Seconds
 
     def said_by(self, position: int) -> Seconds:
-        """When `position` characters of the text have been said; between two words: as the next begins."""
+        """Seconds until `position` characters of the text are said; between two words: until the next begins."""
         previous = Word("", 0.0, 0.0, 0)
         for word in self.words:
             first = word.position - len(word.text)
@@ -48,14 +49,14 @@ class Utterance(Struct, frozen=True):
         return self.seconds
 
     def is_gap(self, position: int) -> bool:
-        """Is no word being said when `position` characters of the text have been?"""
+        """True if `position` characters into the text the voice is within no word, and could pause."""
         return not any(
             word.position - len(word.text) < position < word.position for word in self.words if word.end > word.start
         )
 
 
 def utter(text: str, pace: float = 1.0) -> Utterance:
-    """The time line of `text`; prosody is ignored. pace: 2 takes twice as long."""
+    """Lay `text` out in time; prosody is ignored. pace: 2 takes twice as long."""
     words: list[Word] = []
     now = pause = 0.0
     is_speaking = False
