@@ -66,9 +66,12 @@ class Options(Written, Connected):
         typer.Option(metavar="FILE", help="Write what became of each fragment, for a language model; - as above."),
     ] = None
     human: Annotated[
-        Literal["attentive", "none"],
-        typer.Option(help="With --embedded: one who follows the robot's gaze and answers, or nobody who does."),
-    ] = "attentive"
+        Literal["attentive", "none"] | None,
+        typer.Option(
+            help="With --embedded: one who follows the robot's gaze and answers, or nobody who does.",
+            show_default="attentive",
+        ),
+    ] = None
     strict: Strict = False
     verbose: Annotated[bool, typer.Option("--verbose", "-v", help="Print each sync point, too.")] = False
 
@@ -97,7 +100,8 @@ class Job(NamedTuple):
 
 
 def main(options: Options) -> int:
-    for given, option in ((options.world, "--world"), (options.virtual_time, "--virtual-time")):
+    private = {"--world": options.world, "--human": options.human, "--virtual-time": options.virtual_time}
+    for option, given in private.items():
         if given and not options.embedded:
             raise InputRefused(Fault(reason=f"{option} is for a private system", advice="add --embedded"))
     if options.connect and options.embedded:
@@ -150,7 +154,7 @@ async def _private(job: Job, config: Config, world: World) -> AsyncIterator[Hub]
     if job.has_fragments:
         names.append("generation")
     services: dict[str, Service] = {name: roster.service(name, config) for name in names}
-    perception = still(world, is_attentive=job.options.human == "attentive")
+    perception = still(world, is_attentive=job.options.human != "none")
     async with MemoryHub(config.robot) as hub, running(hub, {"simulation": perception, **services}):
         yield hub
 
