@@ -23,6 +23,10 @@ _BY: dict[GestureChoice, str] = {
 }  # fmt: skip
 
 
+_STOPS = tuple(".!?…।؟۔။。！？｡")
+_CLOSING = "\"'”’»)]」』）】》〉］｝〕"
+
+
 class Referred(Struct, frozen=True, kw_only=True, omit_defaults=True):
     """How an object was referred to. looked: did the person look there? Absent: the robot did not wait for it."""
 
@@ -171,7 +175,8 @@ def _sentences(it: Summary) -> Iterable[str]:
     elif it.status != "done":
         yield f"The fragment {'failed' if it.status == 'failed' else 'was interrupted'}."
     if it.said:
-        yield f'{"Only said" if it.cut_short else "Said"}: "{it.said}"'
+        stop = "" if it.said.rstrip(_CLOSING).endswith(_STOPS) else "."
+        yield f'{"Only said" if it.cut_short else "Said"}: "{it.said}"{stop}'
     elif it.status != "refused":
         yield "Nothing was said."
     for each in it.references:
