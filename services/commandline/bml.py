@@ -10,7 +10,7 @@ from typing import Annotated
 import typer
 
 from engage_hri.schemas.blocks import Block, Dialect
-from engage_hri.schemas.documents.dialects import core, spelled
+from engage_hri.schemas.documents.dialects import core, in_dialect
 from engage_hri.schemas.documents.xml_decode import encode_xml
 from engage_hri.services.commandline.generating import generated
 from engage_hri.services.commandline.options import Configured, WorldFile
@@ -41,7 +41,7 @@ def main(options: Options) -> int:
         plans = generated(source.things, around, config, str(options.file))
         blocks = {plan.block.id: plan.block for plan in plans}
         for plan in plans:
-            block = spelled(core(plan.block) if options.core else plan.block, options.dialect, blocks)
+            block = in_dialect(core(plan.block) if options.core else plan.block, options.dialect, blocks)
             documents.append(encode_xml(block).decode())
             warnings += [*plan.warnings, *(each.message for each in block.unread), *_unusual_ids(block)]
     print("\n".join(documents), end="")

@@ -7,7 +7,7 @@ from functools import lru_cache
 from itertools import pairwise
 from typing import Literal, NamedTuple
 
-from engage_hri.schemas.behavior_types import TYPES, Performer, named, sync_points
+from engage_hri.schemas.behavior_types import TYPES, Performer, sync_points, types_with
 from engage_hri.schemas.behaviors import Behavior, Event, Speech, Wait
 from engage_hri.schemas.body import Estimate
 from engage_hri.schemas.references import type_name
@@ -33,10 +33,10 @@ Gate = Literal["start", "hold", "prompt", "passive"]
 prompt: holding there too, but it sets out so late that it need not. Who looks too early misleads.
 """
 
-WITH_STROKE = named(has_stroke=True)
-ON_TARGET = named(lasts=True, performer="body")
+WITH_STROKE = types_with(has_stroke=True)
+ON_TARGET = types_with(lasts=True, performer="body")
 """They last: having arrived, they stay until something ends them."""
-BENEATH = named(turns_base=True)
+BENEATH = types_with(turns_base=True)
 """They turn what a gaze returns to: one that starts during a gaze moves nothing, and ends at once."""
 
 NOMINAL_PER_CHARACTER: Seconds = 0.07
