@@ -247,7 +247,7 @@ def test_what_people_do_is_drawn(scene: view.Scene) -> None:
         scene = view.feed(scene, message, 13.0)
     text = " ".join(drawn(scene, width=240).split())
 
-    assert "points trapezoid" in text
+    assert "points at trapezoid" in text
     assert "moves blue-square" in text
     assert "nods" in text
     assert "has left" in drawn(view.feed(scene, ActorLost(actor="human", at=at(14.0)), 20.0))
