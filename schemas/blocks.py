@@ -102,7 +102,7 @@ class BlockOutcome(Outcome, frozen=True, kw_only=True, tag="block_outcome", omit
     dropped: tuple[str, ...] = ()
     """Ids of behaviors that were dropped, each with its warning on the feedback stream."""
     reasons: tuple[str, ...] = ()
-    """For each of the dropped behaviors, in the same order: why, in the words of the warning."""
+    """Reasons for the dropped behaviors, in the same order, in the words of the warnings."""
     interrupted: tuple[str, ...] = ()
     """Ids of behaviors that were ended by `InterruptBehavior`, each with a warning as well."""
     replaced_by: str = ""

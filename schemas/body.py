@@ -191,8 +191,9 @@ class Estimate(Struct, frozen=True, kw_only=True, omit_defaults=True):
     ..."""
     parts: tuple[str, ...] = ()
     phases: tuple[Phase, ...] = ()
-    """From `start` to `end`, without gaps, in the drafts' spelling. Of a repeated movement also `stroke:2` and on, if
-    the body reports them; strokes that it does not report are expected at equal distances up to `stroke_end`."""
+    """Phases from `start` to `end`, without gaps, in the drafts' spelling. Of a repeated movement also `stroke:2` and
+    on, if the body reports them; strokes that it does not report are expected at equal distances up to
+    `stroke_end`."""
     head_degrees: Degrees = 0.0
     """Rotations of the head's joints from the starting pose to the target, added up. Cg of thesis 3.3.2."""
     arm_degrees: Degrees = 0.0

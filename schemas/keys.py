@@ -181,7 +181,7 @@ def alive(participant: str) -> str:
     return f"{PREFIX}/alive/{participant}"
 
 
-# Keys of the bus itself. No wildcard includes a chunk that begins with `@`, so nobody hears these by accident.
+# Keys of the bus itself. No wildcard includes a chunk that begins with `@`, so no subscriber gets these by accident.
 ANY_TOKEN = f"{PREFIX}/@bus/*/**"
 ANY_PULSE = f"{PREFIX}/@bus/*/pulse"
 ANY_FLUSH = f"{PREFIX}/@bus/*/flush"

@@ -44,7 +44,7 @@ class ConnectionEvent(Struct, frozen=True, kw_only=True, tag="connection_event",
     responder: str
     state: EventState
     at: Stamp
-    """When this change happened."""
+    """Instant of this change."""
     started: Stamp
     objects: tuple[str, ...] = ()
     cause: Cause = "human"

@@ -84,7 +84,7 @@ class KeepAlive(Struct, frozen=True, kw_only=True, tag="keep_alive", omit_defaul
     live: tuple[Kept, ...]
     at: Stamp
     requester: str = ""
-    """As in `Request`."""
+    """Requester and life as in `Request`."""
     life: str = ""
 
 

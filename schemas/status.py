@@ -46,7 +46,7 @@ class Status(Struct, frozen=True, kw_only=True, tag="status", omit_defaults=True
     """Version of Engage."""
     at: Stamp
     joined: Stamp
-    """When it came onto the bus."""
+    """Instant at which it came onto the bus."""
     stands: Stamp | None = None
-    """Since when it serves; absent: it does not serve yet."""
+    """Instant from which it serves; absent: it does not serve yet."""
     bus: BusHealth = BusHealth()

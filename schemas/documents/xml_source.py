@@ -45,7 +45,7 @@ _ADVICE = {
 """Advice by libxml2's name of the error."""
 _DECLARED = re.compile(rb"(?:\xef\xbb\xbf)?<\?xml[^>?]*?\sencoding\s*=\s*[\"']([A-Za-z0-9._-]+)[\"']")
 _ENCODINGS = re.compile(r"utf-?8|(?:us-)?ascii|iso-?8859-\d+|latin-?\d|windows-125\d|cp125\d", re.IGNORECASE)
-"""In all of them a `<` is a byte 0x3C: no tag can hide from `_start_lines`."""
+"""Encodings in which a `<` is a byte 0x3C: no tag can hide from `_start_lines`."""
 _DOCTYPE = re.compile(r"\A\ufeff?(?>\s+|<\?.*?\?>|<!--.*?-->)*+<!DOCTYPE", re.DOTALL)
 _TAGS = re.compile(r"<!--.*?-->|<!\[CDATA\[.*?\]\]>|<\?.*?\?>|<([^\s/>!?][^\s/>]*)", re.DOTALL)
 
