@@ -40,7 +40,7 @@ class HeadOwner(Struct, frozen=True, kw_only=True, tag="head_owner", omit_defaul
 
 
 class Inhibit(Request, frozen=True, kw_only=True, tag="inhibit", omit_defaults=True):
-    """cmd: anyone -> generation: a lease by which the robot does not gaze or point. Ends in `InhibitionEnded`.
+    """cmd: anyone -> generation: a lease that inhibits gaze or pointing. Ends in `InhibitionEnded`.
 
     A gaze or a pointing of the running fragment is aborted, those of later fragments are left out. The newest lease
     on a part counts. It ends when `ttl` has passed without a `KeepAlive` or being sent again, and with its owner's

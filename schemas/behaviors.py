@@ -134,7 +134,10 @@ class FaceShift(Behavior, frozen=True, kw_only=True, tag="faceShift", omit_defau
 
 
 class Posture(Behavior, frozen=True, kw_only=True, tag="posture", omit_defaults=True):
-    """Take a posture until it relaxes. stance: of the whole body. lexeme, part: a pose by name, and of which part."""
+    """Take a posture until it relaxes.
+
+    stance: of the whole body. lexeme: a pose by name. part: its part of the body.
+    """
 
     stance: str = ""
     lexeme: str = ""

@@ -153,8 +153,8 @@ class Phase(Struct, frozen=True, kw_only=True, omit_defaults=True):
 
     An estimate in which a duration is no number, negative, or longer than a day is refused.
 
-    since, to: the two sync points. shortest, natural: at full speed, and as the body likes to move.
-    longest: at its slowest; None: no limit.
+    since: the first of the two sync points. to: the second.
+    shortest: at full speed. natural: as the body likes to move. longest: at its slowest; None: no limit.
     hold: true if the body can wait at `to` for as long as it must.
     """
 

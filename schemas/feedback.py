@@ -33,8 +33,9 @@ class SyncPointProgress(Struct, frozen=True, kw_only=True, tag="sync_point_progr
     """evt: a sync point was realised. Each default point of each behavior exactly once, in order.
 
     sync: in the spelling of the block's dialect.
-    at, time: when, and seconds since the block's start; as measured, but never before an earlier message about it.
-    predicted, arrived: seconds since the block's start at which it was planned, and at which the body came to it.
+    at: instant as measured, but never before that of an earlier message about the block.
+    time: the same in seconds since the block's start.
+    predicted: time at which it was planned. arrived: time at which the body came to it.
     skew: seconds after the first of the sync points that should be the same instant.
     source: `body`: the body reported it; `clock`: the realizer itself realised it.
     """

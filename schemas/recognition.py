@@ -27,7 +27,7 @@ class ConnectionEvent(Struct, frozen=True, kw_only=True, tag="connection_event",
     """evt: one change in the life of a connection event; the same id from `started` to the end.
 
     id: made by recognition. kind: which of the four. state: the one that it has now.
-    initiator, responder: actor ids of the one that began it and the one that is to answer; one of them is the robot.
+    initiator: actor id of the one that began it. responder: actor id of the one that is to answer.
     started: when it began. objects: ids of the objects that it is about.
     cause: what it was begun for; `human`: a person began it. optional: its failure does not count.
     delay: seconds from the initiator's start to the responder's start; of an adjacency pair from the end of the turn,
