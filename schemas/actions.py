@@ -1,4 +1,4 @@
-"""What actors are seen to do: the robot (from its sync points as realised) and people (from perception), alike."""
+"""Actions that are seen: those of the robot (from its sync points as realised) and of people (from perception)."""
 
 from msgspec import Struct
 
@@ -7,10 +7,10 @@ from engage_hri.schemas.units import Probability, Stamp
 
 
 class ActionBegan(Struct, frozen=True, kw_only=True, tag="action_began", omit_defaults=True):
-    """evt: an actor has begun to do something. A new `look` ends the actor's previous one.
+    """evt: an actor has begun an action. A new `look` ends the actor's previous one.
 
-    targets: entity ids; an actor's id stands for its face; empty with `look`: away.
-    behavior: for the robot `block:behavior`.
+    targets: entity ids; an actor's id means the face; empty: `look` goes away from everything, others have no target.
+    behavior: of the robot, `block:behavior`; empty for people.
     """
 
     actor: str
@@ -22,7 +22,7 @@ class ActionBegan(Struct, frozen=True, kw_only=True, tag="action_began", omit_de
 
 
 class ActionEnded(Struct, frozen=True, kw_only=True, tag="action_ended", omit_defaults=True):
-    """evt: the end of what `ActionBegan` of the same actor, action and targets began."""
+    """evt: the action that `ActionBegan` told of, with the same actor, action and targets, has ended."""
 
     actor: str
     action: Action
@@ -33,12 +33,14 @@ class ActionEnded(Struct, frozen=True, kw_only=True, tag="action_ended", omit_de
 
 
 class ActorFound(Struct, frozen=True, kw_only=True, tag="actor_found", omit_defaults=True):
+    """evt: perception sees this person, for the first time or again."""
+
     actor: str
     at: Stamp
 
 
 class ActorLost(Struct, frozen=True, kw_only=True, tag="actor_lost", omit_defaults=True):
-    """evt: perception no longer sees this person. Whatever was open with them closes."""
+    """evt: perception no longer sees this person. Connection events that are open with them end."""
 
     actor: str
     at: Stamp

@@ -1,4 +1,4 @@
-"""Who owns the robot's head and why; leases that inhibit gaze or pointing. Design: generation, maintenance policy."""
+"""Claims on the robot's head, the one that owns it, and leases that inhibit gaze or pointing."""
 
 from typing import ClassVar, Literal
 
@@ -11,7 +11,12 @@ ClaimKind = Literal["inhibition", "fragment", "glance", "response", "hands", "fa
 
 
 class Claim(Struct, frozen=True, kw_only=True, omit_defaults=True):
-    """priority: 1 (inhibition) .. 6 (face); 0 with kind `none`. target: entity id, empty to hold the direction."""
+    """A wish for the robot's gaze, by which the arbiter decides about the head.
+
+    priority: 1 (inhibition, the strongest) to 6 (face); 0 with kind `none`.
+    target: entity id; empty: hold the direction.
+    reason: why, in words, for people.
+    """
 
     kind: ClaimKind
     priority: int
@@ -20,9 +25,13 @@ class Claim(Struct, frozen=True, kw_only=True, omit_defaults=True):
 
 
 class HeadOwner(Struct, frozen=True, kw_only=True, tag="head_owner", omit_defaults=True):
-    """state: generation. Who has the head, since when and why, and which claims wait, the highest first.
+    """state: generation. The claim that owns the head, and the claims that wait.
 
-    Published at every change of owner, of its target or reason, or of what waits; who joins late gets the last.
+    Published at every change of the owner, of its target or reason, or of the waiting claims; a late subscriber gets
+    the last one.
+
+    since: when this owner got the head.
+    waiting: the strongest first.
     """
 
     owner: Claim
@@ -31,11 +40,17 @@ class HeadOwner(Struct, frozen=True, kw_only=True, tag="head_owner", omit_defaul
 
 
 class Inhibit(Request, frozen=True, kw_only=True, tag="inhibit", omit_defaults=True):
-    """cmd: anyone -> generation. Ends after `ttl` without `KeepAlive` or being sent again, or with its owner's life.
+    """cmd: anyone -> generation: a lease that inhibits gaze or pointing. Ends in `InhibitionEnded`.
 
-    Ends in `InhibitionEnded`. A gaze or point of a fragment that runs is aborted, others are left out. mode, of gaze:
-    release: the head is free and goes back to the base gaze; hold: it stays on what it is on; target: it keeps to
-    `target`. Of an arm every mode is the same: it does not point. The newest lease on a part counts.
+    A gaze or a pointing of the running fragment is aborted, those of later fragments are left out. The newest lease
+    on a part counts. It ends when `ttl` has passed without a `KeepAlive` or being sent again, and with its owner's
+    life.
+
+    part: what is inhibited: the gaze, or pointing with one arm.
+    mode: of the gaze: `release` lets the head go back to the base gaze, `hold` keeps the direction, `target` looks at
+    `target`. Without meaning for an arm.
+    ttl: how long the lease lasts without renewal.
+    target: entity id, with mode `target`.
     """
 
     is_updatable: ClassVar[bool] = True
@@ -51,4 +66,9 @@ class Inhibit(Request, frozen=True, kw_only=True, tag="inhibit", omit_defaults=T
 
 
 class InhibitionEnded(Outcome, frozen=True, kw_only=True, tag="inhibition_ended", omit_defaults=True):
+    """evt: generation -> requester: the lease has ended.
+
+    reason: `lapsed`: not renewed; `released`: cancelled; `owner_lost`: its owner has gone from the bus.
+    """
+
     reason: Literal["lapsed", "released", "owner_lost"] = "lapsed"

@@ -1,4 +1,4 @@
-"""What each type of behavior is: one row for each, from which everything is derived that depends on the type.
+"""A table of the behavior types, one row for each; everything that depends on the type is derived from it.
 
 A new type is a struct in behaviors.py and a row here. Its sync points, where it can wait, which of its points are one
 instant, who performs it, what it takes the place of, its XML namespace and its spelling in BML 1.0 follow from that;
@@ -25,20 +25,20 @@ _CAMEL = {"stroke_start": "strokeStart", "stroke_end": "strokeEnd"}
 class BehaviorType(Struct, frozen=True, kw_only=True):
     """One type of behavior.
 
-    kind: its struct. points: the sync points that a body reports, in order, but for the marks of speech. holds: those
-    at which it can wait for as long as it must; `start` of everything can wait, too: it is not sent until then.
-    one_instant: points that always coincide. spelled: what BML 1.0 calls the points that it has a name for.
-    has_stroke: a movement with a meaningful middle. lasts: having arrived, it stays until something ends it.
-    performer: who carries it out. family: types of one family take each other's place. takes_over: of a part that
-    another behavior uses. turns_base: it turns what a gaze returns to. is_standard: an element of BML 1.0, in its
-    namespace; else in ours. nominal: seconds of each phase where no body says better.
+    kind: the struct. points: the sync points that a body reports, in order, without the marks of speech.
+    holds: the points at which a body can wait as long as it must (`start` can always wait: the body is not asked
+    before). one_instant: groups of points that always coincide. bml_1_0_names: BML 1.0's names of the points that it
+    knows. has_stroke: a movement with a meaningful middle. lasts: once on target it stays until something ends it.
+    performer: what carries it out. family: a behavior replaces another of its family. takes_over: it gets a body part
+    that another behavior uses. turns_base: it turns the direction to which a gaze returns. is_standard: its element
+    is in BML's namespace; otherwise in ours. nominal: seconds of each phase, for a body that gives no estimate.
     """
 
     kind: type[of.Behavior]
     points: tuple[str, ...] = _ENDS
     holds: tuple[str, ...] = ()
     one_instant: tuple[tuple[str, ...], ...] = ()
-    spelled: Mapping[str, str] = field(default_factory=lambda: {"start": "start", "end": "end"})
+    bml_1_0_names: Mapping[str, str] = field(default_factory=lambda: {"start": "start", "end": "end"})
     has_stroke: bool = False
     lasts: bool = False
     performer: Performer = "body"
@@ -50,7 +50,7 @@ class BehaviorType(Struct, frozen=True, kw_only=True):
 
     @property
     def name(self) -> str:
-        """As an XML element, and as `type` of the JSON form: `gazeShift`."""
+        """Name of the XML element, and `type` of the JSON form: `gazeShift`."""
         return str(self.kind.__struct_config__.tag)
 
 
@@ -58,26 +58,26 @@ _STROKE = BehaviorType(
     kind=of.Gesture,
     points=SYNC_POINTS,
     holds=("stroke_start", "stroke_end"),
-    spelled={sync: _CAMEL.get(sync, sync) for sync in SYNC_POINTS},
+    bml_1_0_names={sync: _CAMEL.get(sync, sync) for sync in SYNC_POINTS},
     has_stroke=True,
     is_standard=True,
     nominal=(0.5, 0.1, 0.3, 0.2, 0.1, 0.6),
 )
-"""What has a stroke: prepared, held back before and after it, retracted."""
+"""Template of the types with a stroke: prepared, held before and after the stroke, retracted."""
 _ARRIVAL = BehaviorType(
     kind=of.Posture,
     points=SYNC_POINTS,
     holds=("stroke", "relax"),
     one_instant=(("ready", "stroke_start", "stroke"), ("stroke_end", "relax")),
-    spelled={"start": "start", "stroke": "ready", "relax": "relax", "end": "end"},
+    bml_1_0_names={"start": "start", "stroke": "ready", "relax": "relax", "end": "end"},
     lasts=True,
     is_standard=True,
     nominal=(0.4, 0.0, 0.0, 0.0, 0.0, 0.4),
 )
-"""What arrives somewhere and stays: on target at its stroke."""
+"""Template of the types that arrive somewhere and stay: on target at `stroke`."""
 _EXPRESSION = replace(
     _ARRIVAL, kind=of.Face, family="face",
-    spelled={"start": "start", "ready": "attackPeak", "relax": "relax", "end": "end"},
+    bml_1_0_names={"start": "start", "ready": "attackPeak", "relax": "relax", "end": "end"},
 )  # fmt: skip
 _OURS = BehaviorType(kind=of.Unknown, performer="clock", takes_over=False)
 
@@ -107,19 +107,19 @@ ROWS = (
     replace(_OURS, kind=of.Reference),
     replace(_OURS, kind=of.Unknown),
 )  # fmt: skip
-"""In the order in which they are told."""
+"""All types, in the order of the table in docs/control.md."""
 TYPES: Mapping[str, BehaviorType] = {row.name: row for row in ROWS}
 
 
-def named(**features: object) -> frozenset[str]:
-    """The names of all types with these features: `named(has_stroke=True)`."""
+def types_with(**features: object) -> frozenset[str]:
+    """Names of all types with these features: `types_with(has_stroke=True)`."""
     return frozenset(
         row.name for row in ROWS if all(getattr(row, feature) == value for feature, value in features.items())
     )
 
 
 def sync_points(behavior: of.Behavior) -> tuple[str, ...]:
-    """The sync points of a behavior, in their order and in the draft's spelling; the marks of speech among them."""
+    """List the sync points of a behavior in order, in the drafts' spelling, with the marks of speech."""
     if isinstance(behavior, of.Speech):
         return ("start", *(mark.id for mark in sorted(behavior.marks, key=lambda mark: mark.position)), "end")
     return TYPES[str(behavior.__struct_config__.tag)].points
@@ -131,40 +131,43 @@ _FROM_CAMEL = {"strokeStart": "stroke_start", "strokeEnd": "stroke_end", "attack
 
 
 def canonical_sync(name: str, type: str = "", dialect: Literal["draft", "bml-1.0"] = "draft") -> str:
-    """The system's own (draft, snake_case) spelling of a sync point; marks and unknown names stay as they are.
+    """Translate the name of a sync point to the drafts' spelling, used by all code: `strokeStart` -> `stroke_start`.
 
-    type: the behavior's element name. It matters in BML 1.0, where `ready` of a gaze or posture is what the
-    drafts call `stroke`, and in speech, whose marks are nobody's to rename.
+    Marks and unknown names stay as they are. type: the behavior's element name. In BML 1.0 `ready` of a gaze or a
+    posture is what the drafts call `stroke`; all names of a speech but `start` and `end` are marks.
     """
     if type == "speech":
         return name
-    if dialect == "bml-1.0" and name in (known := _canonical(type)):
+    if dialect == "bml-1.0" and name in (known := _from_bml_1_0(type)):
         return known[name]
     return _FROM_CAMEL.get(name, name)
 
 
 @cache
-def _canonical(type: str) -> Mapping[str, str]:
-    return {theirs: ours for ours, theirs in TYPES[type].spelled.items()} if type in TYPES else {}
+def _from_bml_1_0(type: str) -> Mapping[str, str]:
+    return {theirs: ours for ours, theirs in TYPES[type].bml_1_0_names.items()} if type in TYPES else {}
 
 
 def dialect_sync(name: str, type: str = "", dialect: Literal["draft", "bml-1.0"] = "draft") -> str | None:
-    """The spelling that feedback uses for canonical `name`; None where the dialect does not report the point.
+    """Translate a sync point from the drafts' spelling to that of a dialect; None if the dialect lacks the point.
 
-    The drafts report all of `SYNC_POINTS`. BML 1.0 has four for gaze and posture (start ready relax end) and
-    for faces (start attackPeak relax end); all seven, in camelCase, for what has a stroke.
+    The drafts have all of `SYNC_POINTS`. BML 1.0 has four for gaze and posture (start ready relax end) and for faces
+    (start attackPeak relax end), and all seven, in camelCase, for types with a stroke.
     """
     if dialect == "draft" or name not in SYNC_POINTS or type == "speech":
         return name
     if not type:
         return _CAMEL.get(name, name)
-    return (TYPES[type].spelled if type in TYPES else _OURS.spelled).get(name)
+    return TYPES.get(type, _OURS).bml_1_0_names.get(name)
 
 
 def same_instant(name: str, type: str) -> str:
-    """A point of the drafts that BML 1.0 has no name for as the one of the same instant that it has."""
+    """Find a point with a name in BML 1.0 that always coincides with `name`: `stroke_start` of a gaze is its `start`.
+
+    `name` itself if it has a name there, or no such point exists.
+    """
     row = TYPES.get(type)
-    if row is None or name in row.spelled:
+    if row is None or name in row.bml_1_0_names:
         return name
     together = next((group for group in row.one_instant if name in group), ())
-    return next((sync for sync in together if sync in row.spelled), name)
+    return next((sync for sync in together if sync in row.bml_1_0_names), name)

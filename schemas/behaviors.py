@@ -1,4 +1,4 @@
-"""Behaviors: what a block or a turn fragment is made of, one struct per element of BML and its extension.
+"""Behaviors, of which blocks and turn fragments are made: one struct for each element of BML and its extension.
 
 The dialects of BML (thesis draft, draft without namespace, BML 1.0) decode to these same structs. A sync
 reference stays the string its author wrote (`speech-1:end+0.5`); `schemas/syncref.py` parses it.
@@ -11,7 +11,7 @@ from msgspec import Struct
 from engage_hri.schemas.units import Degrees, Probability, Seconds
 
 Action = Literal["look", "point", "nod", "shake", "speak", "act"]
-"""What an actor can be seen to do; `act` is the manipulation of an object."""
+"""Kinds of actions that an actor can be seen to do; `act` is the manipulation of an object."""
 EventKind = Literal["directed_gaze", "mutual_facial_gaze", "adjacency_pair", "backchannel"]
 Cause = Literal["turn", "reference", "response", "maintenance", "human"]
 Hand = Literal["LEFT_HAND", "RIGHT_HAND", "BOTH_HANDS"]
@@ -25,10 +25,10 @@ class Timing(Struct, frozen=True, omit_defaults=True):
 
 
 class Behavior(Struct, frozen=True, kw_only=True, tag_field="type", omit_defaults=True):
-    """What every behavior has.
+    """Fields that every behavior has.
 
     id: unique in its block or fragment; sync references name it.
-    required: without it, the block fails instead of going on.
+    required: if it cannot be performed, the whole block fails instead of going on without it.
     timing: sync references written at the behavior itself.
     line: of its XML source, from 1; 0 when there is none.
     """
@@ -54,7 +54,10 @@ class Gaze(Behavior, frozen=True, kw_only=True, tag="gaze", omit_defaults=True):
 
 
 class GazeShift(Behavior, frozen=True, kw_only=True, tag="gazeShift", omit_defaults=True):
-    """Change the base gaze. Ends on arrival."""
+    """Change the base gaze, to which the eyes return after each gaze. Ends on arrival.
+
+    target, influence, offset_angle, offset_direction: as in `Gaze`.
+    """
 
     target: str
     influence: str = ""
@@ -73,12 +76,20 @@ class Pointing(Behavior, frozen=True, kw_only=True, tag="pointing", omit_default
 
 
 class Gesture(Behavior, frozen=True, kw_only=True, tag="gesture", omit_defaults=True):
+    """Make a gesture that the body knows by name.
+
+    lexeme: the name. mode: which hand; None: the body chooses.
+    """
+
     lexeme: str
     mode: Hand | None = None
 
 
 class Head(Behavior, frozen=True, kw_only=True, tag="head", omit_defaults=True):
-    """A nod or a shake, on top of whatever the head looks at."""
+    """Nod or shake the head; it keeps its direction.
+
+    lexeme: `NOD` or `SHAKE`. repetition: how many times. amount: how large, of the largest.
+    """
 
     lexeme: str
     repetition: int = 1
@@ -86,26 +97,36 @@ class Head(Behavior, frozen=True, kw_only=True, tag="head", omit_defaults=True):
 
 
 class HeadDirectionShift(Behavior, frozen=True, kw_only=True, tag="headDirectionShift", omit_defaults=True):
+    """Turn the base direction of the head to a target. Ends on arrival."""
+
     target: str
 
 
 class Face(Behavior, frozen=True, kw_only=True, tag="face", omit_defaults=True):
+    """Show an expression of the face, until it relaxes. The element holds a `FaceLexeme` or a `FaceFacs`."""
+
     amount: Probability = 0.5
     overshoot: float = 0.0
 
 
 class FaceLexeme(Behavior, frozen=True, kw_only=True, tag="faceLexeme", omit_defaults=True):
+    """Show an expression of the face that has a name, until it relaxes."""
+
     lexeme: str
     amount: Probability = 0.5
 
 
 class FaceFacs(Behavior, frozen=True, kw_only=True, tag="faceFacs", omit_defaults=True):
+    """Move one action unit of the face (Facial Action Coding System), until it relaxes. au: its number."""
+
     au: int
     side: Literal["LEFT", "RIGHT", "BOTH"] = "BOTH"
     amount: Probability = 0.5
 
 
 class FaceShift(Behavior, frozen=True, kw_only=True, tag="faceShift", omit_defaults=True):
+    """Change the expression to which the face returns, by name or by action unit. Ends on arrival."""
+
     lexeme: str = ""
     au: int = 0
     side: Literal["LEFT", "RIGHT", "BOTH"] = "BOTH"
@@ -113,23 +134,34 @@ class FaceShift(Behavior, frozen=True, kw_only=True, tag="faceShift", omit_defau
 
 
 class Posture(Behavior, frozen=True, kw_only=True, tag="posture", omit_defaults=True):
+    """Take a posture until it relaxes.
+
+    stance: of the whole body. lexeme: a pose by name. part: its part of the body.
+    """
+
     stance: str = ""
     lexeme: str = ""
     part: str = ""
 
 
 class PostureShift(Behavior, frozen=True, kw_only=True, tag="postureShift", omit_defaults=True):
+    """Change the posture to which the body returns. Ends on arrival. stance, lexeme, part: as in `Posture`."""
+
     stance: str = ""
     lexeme: str = ""
     part: str = ""
 
 
 class Pose(Behavior, frozen=True, kw_only=True, tag="pose", omit_defaults=True):
+    """Take a pose that has a name, with one part of the body."""
+
     lexeme: str = ""
     part: str = ""
 
 
 class Locomotion(Behavior, frozen=True, kw_only=True, tag="locomotion", omit_defaults=True):
+    """Move to a target. manner: how, for example `walk`."""
+
     target: str
     manner: str = ""
 
@@ -155,6 +187,8 @@ class Speech(Behavior, frozen=True, kw_only=True, tag="speech", omit_defaults=Tr
 
 
 class Wait(Behavior, frozen=True, kw_only=True, tag="wait", omit_defaults=True):
+    """Let time pass. duration: None: until a constraint to its `end` is met."""
+
     duration: Seconds | None = None
 
 
@@ -165,11 +199,16 @@ class Emit(Behavior, frozen=True, kw_only=True, tag="emit", omit_defaults=True):
 
 
 class Event(Behavior, frozen=True, kw_only=True, tag="event", omit_defaults=True):
-    """A robot-initiated connection event; recognition realizes it. Start = the request, end = its decision.
+    """A connection event that the robot begins; recognition performs it. Start: its request; end: its decision.
 
-    anchors: sync references of the same block (`phrase-1:start`). The time limit runs from the latest of the
-    event's start and these, so it is not armed before all of them were realised (or their block ended).
-    An adjacency pair has no anchors: its clock runs from the `ended` signal of its `turn`.
+    responder: actor id of the person.
+    objects: ids of what it is about.
+    cause: what the robot begins it for. optional: its failure does not count.
+    limit: time within which the person has to respond; None: recognition's default.
+    anchors: sync references of the same block (`phrase-1:start`). The limit runs from the latest of these and the
+    start of the event, so not before all of them are realised or their block has ended. An adjacency pair has none:
+    its limit runs from the `ended` signal of its turn.
+    turn: of an adjacency pair, the turn that opens it.
     """
 
     kind: EventKind
@@ -178,18 +217,18 @@ class Event(Behavior, frozen=True, kw_only=True, tag="event", omit_defaults=True
     cause: Cause = "turn"
     optional: bool = False
     accept: tuple[Action, ...] = ()
-    """Adjacency pair: which actions answer it. Empty: recognition's default."""
+    """Adjacency pair: the actions that answer it. Empty: recognition's default."""
     limit: Seconds | None = None
     anchors: tuple[str, ...] = ()
     turn: str = ""
 
 
 class TurnSignal(Behavior, frozen=True, kw_only=True, tag="turn", omit_defaults=True):
-    """Tells recognition what became of a turn; realized by recognition in no time.
+    """Tell recognition what became of a turn. Takes no time.
 
-    ended: the robot's turn `turn` is over (start = end of its last speech): adjacency-pair clocks run from here.
-    answered / repaired: this fragment is the second / third turn of the human's pending pair.
-    aborted: barge-in, fault, cancellation or silence closed the turn.
+    signal: `ended`: the robot's turn is over with its last speech, and the limits of adjacency pairs run from now;
+    `answered`, `repaired`: this fragment is the second or third turn of the pair that the person opened;
+    `aborted`: a barge-in, fault, cancellation or silence closed the turn.
     """
 
     turn: str
@@ -199,17 +238,18 @@ class TurnSignal(Behavior, frozen=True, kw_only=True, tag="turn", omit_defaults=
 
 
 class Unknown(Behavior, frozen=True, kw_only=True, tag="unknown", omit_defaults=True):
-    """What a block calls `element`, which nobody here knows: dropped with a warning, unless it is required."""
+    """A behavior of a type that is not known here: dropped with a warning; if it is required, the block fails."""
 
     element: str
+    """Name of its element."""
 
 
 class SpeechOption(Struct, frozen=True, kw_only=True, omit_defaults=True):
     """One phrase for a reference.
 
-    text: the words. cost: how many words they are, or what the manager thinks they cost; >= 0.
-    distractors: ids of objects besides the target that the phrase could mean, too.
-    deictic: does it need a gesture to be understood, as `this` does?
+    text: the words. cost: number of words, or another measure that the manager chooses; >= 0.
+    distractors: ids of the other objects that the phrase could mean as well.
+    deictic: true if it needs a gesture to be understood, as `this` does.
     line: of its XML source, from 1; 0 when there is none.
     """
 
@@ -221,10 +261,10 @@ class SpeechOption(Struct, frozen=True, kw_only=True, omit_defaults=True):
 
 
 class Reference(Behavior, frozen=True, kw_only=True, tag="reference", omit_defaults=True):
-    """An object reference: generation replaces it by a phrase and perhaps a gaze, a directed gaze, a point.
+    """An object reference. Generation replaces it by a phrase, perhaps with a gaze, a directed gaze or pointing.
 
     target: id of the object.
-    minimum_reliability: in (0, 1), of the target being understood; None: generation's default.
+    minimum_reliability: least probability, in (0, 1), that the target is understood; None: generation's default.
     options: the phrases to choose from; None: generation proposes some, from what the world knows of the target.
     """
 
@@ -238,13 +278,13 @@ _Spelled = (
     | Posture | PostureShift | Pose | Locomotion | Speech | Wait | Emit | Event | TurnSignal
 )  # fmt: skip
 BlockBehavior = _Spelled | Unknown
-"""What a BML block may hold."""
+"""Behaviors that a BML block may hold."""
 FragmentBehavior = _Spelled | Reference
-"""What a turn fragment may hold."""
+"""Behaviors that a turn fragment may hold."""
 
 
 class Synchronize(Struct, frozen=True, kw_only=True, tag="synchronize", omit_defaults=True):
-    """All of `ref` (if any) and `syncs`, each with its offset, are one instant."""
+    """Operator: `ref` (if given) and all of `syncs`, each with its offset, are the same instant."""
 
     ref: str = ""
     syncs: tuple[str, ...] = ()
@@ -252,7 +292,7 @@ class Synchronize(Struct, frozen=True, kw_only=True, tag="synchronize", omit_def
 
 
 class Before(Struct, frozen=True, kw_only=True, tag="before", omit_defaults=True):
-    """Every sync of `syncs` is no later than `ref`."""
+    """Operator: each of `syncs` comes before `ref` or with it."""
 
     ref: str
     syncs: tuple[str, ...] = ()
@@ -260,7 +300,7 @@ class Before(Struct, frozen=True, kw_only=True, tag="before", omit_defaults=True
 
 
 class After(Struct, frozen=True, kw_only=True, tag="after", omit_defaults=True):
-    """Every sync of `syncs` is no earlier than `ref`."""
+    """Operator: each of `syncs` comes after `ref` or with it."""
 
     ref: str
     syncs: tuple[str, ...] = ()
@@ -268,6 +308,11 @@ class After(Struct, frozen=True, kw_only=True, tag="after", omit_defaults=True):
 
 
 class Constraint(Struct, frozen=True, kw_only=True, omit_defaults=True):
+    """Conditions between sync points, all of which must hold.
+
+    required: if they cannot be met, the whole block fails instead of going on without them.
+    """
+
     operators: tuple[Synchronize | Before | After, ...]
     id: str = ""
     required: bool = False

@@ -1,4 +1,4 @@
-"""BML blocks and what became of them."""
+"""BML blocks, the commands about them, and their outcomes."""
 
 from typing import Literal
 
@@ -14,7 +14,10 @@ Dialect = Literal["draft", "bml-1.0"]
 
 
 class Unread(Struct, frozen=True, kw_only=True, omit_defaults=True):
-    """Something in a block that its reader did not understand and left out. behavior empty: of the block itself."""
+    """Something in a block that its reader did not understand and left out.
+
+    behavior: id of the behavior that held it; empty: the block itself.
+    """
 
     message: str
     behavior: str = ""
@@ -37,16 +40,16 @@ class Block(Struct, frozen=True, kw_only=True, tag="block", omit_defaults=True):
     composition: Composition = "MERGE"
     dialect: Dialect = "draft"
     character_id: str = ""
-    """Whom its author means to perform it. Feedback repeats it; the robot on the bus performs it in any case."""
+    """Character that its author wants to perform it. Feedback repeats the name; the robot performs any block."""
     unread: tuple[Unread, ...] = ()
-    """The realizer warns of each when the block begins."""
+    """Parts of the document that were left out. The realizer warns of each when the block begins."""
 
 
 class PerformBlock(Request, frozen=True, kw_only=True, tag="perform_block", omit_defaults=True):
     """cmd: collaboration or generation -> realizer. Terminal state: `BlockOutcome`.
 
-    follows: ids of live blocks whose turn it goes on with. If one of them fails, is refused or is interrupted, this
-    one is interrupted in the same instant, and says so after it. Refused if one of them is not live.
+    follows: ids of the live blocks before it in the same turn. When one of them fails, is refused or is interrupted,
+    this block is interrupted in the same instant; its outcome comes after that one. Refused if one is not live.
     """
 
     block: Block
@@ -56,8 +59,9 @@ class PerformBlock(Request, frozen=True, kw_only=True, tag="perform_block", omit
 class InterruptBehavior(Request, frozen=True, kw_only=True, tag="interrupt_behavior", omit_defaults=True):
     """cmd: anyone -> realizer: end one behavior of a live block now. Terminal state: `BehaviorInterrupted`.
 
-    The others go on. Gestures relax, speech ends at a word. What it has not reached is as if it had not been written,
-    even of a required behavior: who asks for its end does not miss it. To end a whole block, cancel its request.
+    The other behaviors go on. A gesture relaxes, a speech ends after a word. Sync points that the behavior has not
+    reached count as if they had not been written, and its block does not fail, even if it is required. To end a whole
+    block, cancel its request.
     """
 
     block: str
@@ -65,9 +69,10 @@ class InterruptBehavior(Request, frozen=True, kw_only=True, tag="interrupt_behav
 
 
 class BehaviorInterrupted(Outcome, frozen=True, kw_only=True, tag="behavior_interrupted", omit_defaults=True):
-    """evt: realizer -> requester. spoken: of a speech, the words that were said.
+    """evt: realizer -> requester: the behavior has ended.
 
-    was_done: it came to its end before it could be ended.
+    spoken: of a speech, the words that were said.
+    was_done: it had ended by itself before.
     """
 
     block: str
@@ -77,7 +82,7 @@ class BehaviorInterrupted(Outcome, frozen=True, kw_only=True, tag="behavior_inte
 
 
 class SpokenText(Struct, frozen=True, kw_only=True, omit_defaults=True):
-    """What was said of a speech: all of it, or the words before the interruption."""
+    """Words of a speech that were said: all of them, or those before the interruption."""
 
     behavior: str
     text: str
@@ -85,9 +90,10 @@ class SpokenText(Struct, frozen=True, kw_only=True, omit_defaults=True):
 
 
 class BlockOutcome(Outcome, frozen=True, kw_only=True, tag="block_outcome", omit_defaults=True):
-    """evt: realizer -> requester. Exactly one per accepted block.
+    """evt: realizer -> requester: the end of a block. Exactly one for each accepted block.
 
-    interrupted with `replaced_by` set: another block's REPLACE ended it.
+    replaced_by: the block whose `REPLACE` ended it, if its status is `interrupted` for that reason.
+    fault: why it failed.
     """
 
     block: str
@@ -96,8 +102,8 @@ class BlockOutcome(Outcome, frozen=True, kw_only=True, tag="block_outcome", omit
     dropped: tuple[str, ...] = ()
     """Ids of behaviors that were dropped, each with its warning on the feedback stream."""
     reasons: tuple[str, ...] = ()
-    """Of each of them in turn, why, as the warning has it."""
+    """Reasons for the dropped behaviors, in the same order, in the words of the warnings."""
     interrupted: tuple[str, ...] = ()
-    """Ids of behaviors that somebody asked to end (`InterruptBehavior`), each with a warning as well."""
+    """Ids of behaviors that were ended by `InterruptBehavior`, each with a warning as well."""
     replaced_by: str = ""
     fault: Fault | None = None

@@ -1,10 +1,10 @@
 """The contract between the realizer and a body: behaviors out, sync points back.
 
-Movement authority. `PerformBehavior.through` names the last sync point the body may pass without asking; it
-holds at the hold point before the next one and says so (`SyncPointArrived`). The realizer extends the authority
-by sending the request again, same id, with a later `through`; it lasts as long as `KeepAlive` renews it (decision
-0001). Authority never shrinks. Where each type can hold is in
-docs/control.md: before and after the stroke of an arm or a nod, on target (`stroke` and `relax`) what lasts there.
+Movement authority. `PerformBehavior.through` names the last sync point that the body may pass without asking; it
+holds at the hold point before the next one and says so (`SyncPointArrived`). The realizer extends the authority by
+sending the request again, same id, with a later `through`; it lasts as long as `KeepAlive` renews it (decision 0001).
+Authority never shrinks. The hold points of each type are in docs/control.md: before and after the stroke of an arm or
+a nod; on target (`stroke` and `relax`) for a gaze, a face or a posture.
 """
 
 from typing import ClassVar, Literal, Self
@@ -19,16 +19,16 @@ from engage_hri.schemas.units import Degrees, Duration, Meters, Radians, Stamp, 
 
 
 class PlannedInstant(Struct, frozen=True, kw_only=True, omit_defaults=True):
-    """When the body is to come to a sync point."""
+    """Instant at which the body is to come to a sync point."""
 
     sync: str
     at: Stamp
 
 
 class PerformBehavior(Request, frozen=True, kw_only=True, tag="perform_behavior", omit_defaults=True):
-    """cmd: realizer -> control. Terminal state: `BehaviorOutcome`.
+    """cmd: realizer -> control: perform a behavior. Terminal state: `BehaviorOutcome`.
 
-    through: sync point in the body's own (draft, snake_case) spelling; at least `start`.
+    through: the last sync point that the body may pass without asking, in the drafts' spelling; at least `start`.
     """
 
     is_updatable: ClassVar[bool] = True
@@ -37,8 +37,8 @@ class PerformBehavior(Request, frozen=True, kw_only=True, tag="perform_behavior"
     behavior: BlockBehavior
     through: str
     pace: tuple[PlannedInstant, ...] = ()
-    """Where its own pace would miss them, instants of its coming points: it is to be slower, or faster, or smaller,
-    as near to them as it can. The newest says all; empty: as is natural."""
+    """Instants for coming sync points which the natural pace would miss. The body comes as near to them as it can, by
+    moving faster, slower or less far. The newest request replaces all earlier instants; empty: natural pace."""
 
     @property
     def authority(self) -> str:
@@ -49,9 +49,11 @@ class PerformBehavior(Request, frozen=True, kw_only=True, tag="perform_behavior"
 
 
 class AbortBehavior(Request, frozen=True, kw_only=True, tag="abort_behavior", omit_defaults=True):
-    """cmd: generation -> control: end a behavior of a block, whoever asked for it. Ends in `BehaviorAborted`.
+    """cmd: generation -> control: end a behavior that the realizer asked for. Ends in `BehaviorAborted`.
 
-    how: relaxing, or freezing and then relaxing. Who asked for the behavior itself sends a `Cancel`.
+    The requester of the behavior sends a `Cancel` instead.
+
+    how: relax at once, or freeze and then relax.
     """
 
     block: str
@@ -60,7 +62,7 @@ class AbortBehavior(Request, frozen=True, kw_only=True, tag="abort_behavior", om
 
 
 class BehaviorAborted(Outcome, frozen=True, kw_only=True, tag="behavior_aborted", omit_defaults=True):
-    """evt: terminal state of `AbortBehavior`: the behavior has ended, one way or another."""
+    """evt: terminal state of `AbortBehavior`: the behavior has ended, by this or by itself."""
 
 
 class GoHome(Request, frozen=True, kw_only=True, tag="go_home", omit_defaults=True):
@@ -70,6 +72,8 @@ class GoHome(Request, frozen=True, kw_only=True, tag="go_home", omit_defaults=Tr
 
 
 class HomeReached(Outcome, frozen=True, kw_only=True, tag="home_reached", omit_defaults=True):
+    """evt: terminal state of `GoHome`: the parts are in the safe pose."""
+
     at: Stamp
 
 
@@ -77,20 +81,21 @@ class SyncPointArrived(Struct, frozen=True, kw_only=True, tag="sync_point_arrive
     """evt: the body has come to a hold point it may not pass yet, and waits there."""
 
     id: str
-    """Of the `PerformBehavior` request."""
+    """Id of the `PerformBehavior` request."""
     block: str
     behavior: str
     sync: str
     at: Stamp
     requester: str = ""
-    """Of that request; empty where the body does not say."""
+    """Requester of that request; empty if the body does not say."""
 
 
 class SyncPointReached(Struct, frozen=True, kw_only=True, tag="sync_point_reached", omit_defaults=True):
-    """evt: the body has passed a sync point, at `at`. Each point of a behavior once, in order.
+    """evt: the body has passed a sync point. Each point of a behavior once, in order.
 
     sync: of a repeated movement also `stroke:2`, `stroke:3` ... if the estimate has phases to them.
-    arrived: when it came to the point; earlier than `at` if it had to hold there.
+    at: when the body passed the point.
+    arrived: when the body came to the point; earlier than `at` if it had to hold there.
     """
 
     id: str
@@ -103,7 +108,10 @@ class SyncPointReached(Struct, frozen=True, kw_only=True, tag="sync_point_reache
 
 
 class WordSpoken(Struct, frozen=True, kw_only=True, tag="word_spoken", omit_defaults=True):
-    """evt: the voice has finished a word. `position`: characters of the text said so far."""
+    """evt: the voice has finished a word.
+
+    position: characters of the text said so far.
+    """
 
     block: str
     behavior: str
@@ -113,7 +121,11 @@ class WordSpoken(Struct, frozen=True, kw_only=True, tag="word_spoken", omit_defa
 
 
 class BehaviorOutcome(Outcome, frozen=True, kw_only=True, tag="behavior_outcome", omit_defaults=True):
-    """evt: terminal state of `PerformBehavior`. done: after its `end`. spoken: what the voice said of it."""
+    """evt: terminal state of `PerformBehavior`.
+
+    status: `done`: its `end` was passed; `aborted`: it was ended before; `failed`: see `fault`.
+    spoken: of a speech, the words that the voice has said.
+    """
 
     block: str
     behavior: str
@@ -124,21 +136,26 @@ class BehaviorOutcome(Outcome, frozen=True, kw_only=True, tag="behavior_outcome"
 
 
 class JointAngle(Struct, frozen=True, omit_defaults=True):
+    """Angle of one joint."""
+
     joint: str
     angle: Radians
 
 
 class BodyPose(Struct, frozen=True, kw_only=True, omit_defaults=True):
-    """Joint angles of a body: where it is, or where a behavior would leave it."""
+    """Joint angles of a body, at some instant or at the end of a behavior."""
 
     joints: tuple[JointAngle, ...] = ()
 
 
 class Phase(Struct, frozen=True, kw_only=True, omit_defaults=True):
-    """From one sync point of a behavior to its next: how long it takes.
+    """Time that the body needs from one sync point of a behavior to the next.
 
-    hold: the body can wait at `to` for as long as it must. longest None: no upper limit.
-    An estimate with a phase that is no number, negative, or longer than a day is refused: nothing is planned with it.
+    An estimate in which a duration is no number, negative, or longer than a day is refused.
+
+    since: the first of the two sync points. to: the second.
+    shortest: at full speed. natural: as the body likes to move. longest: at its slowest; None: no limit.
+    hold: true if the body can wait at `to` for as long as it must.
     """
 
     since: str
@@ -150,7 +167,10 @@ class Phase(Struct, frozen=True, kw_only=True, omit_defaults=True):
 
 
 class Ray(Struct, frozen=True, kw_only=True, omit_defaults=True):
-    """A gaze axis (origin: the eyes) or a forearm (origin: the elbow, tip: the hand). `axis` is a unit vector."""
+    """A gaze axis or a forearm.
+
+    origin: the eyes, or the elbow. axis: the direction, a unit vector. tip: of a forearm, the hand.
+    """
 
     origin: Vector
     axis: Vector
@@ -158,19 +178,24 @@ class Ray(Struct, frozen=True, kw_only=True, omit_defaults=True):
 
 
 class Estimate(Struct, frozen=True, kw_only=True, omit_defaults=True):
-    """What a body expects of a behavior. Not feasible: `fault` says why, with the type of warning it deserves."""
+    """Prediction of a body for one behavior: feasible or not, body parts, times, and where it would end.
+
+    fault: why it is not feasible.
+    """
 
     behavior: str
     feasible: bool
     fault: Fault | None = None
     warning: str = ""
-    """NO_SUCH_TARGET, BEHAVIOR_TYPE_NOT_SUPPORTED, CANNOT_CREATE_BEHAVIOR ... when not feasible."""
+    """Type of the warning when not feasible: NO_SUCH_TARGET, BEHAVIOR_TYPE_NOT_SUPPORTED, CANNOT_CREATE_BEHAVIOR
+    ..."""
     parts: tuple[str, ...] = ()
     phases: tuple[Phase, ...] = ()
-    """From `start` to `end`, without gaps; sync points in the draft's spelling, and `stroke:2` and on of a repeated
-    movement if the body reports them: what it does not, is expected in equal parts from `stroke` to `stroke_end`."""
+    """Phases from `start` to `end`, without gaps, in the drafts' spelling. Of a repeated movement also `stroke:2` and
+    on, if the body reports them; strokes that it does not report are expected at equal distances up to
+    `stroke_end`."""
     head_degrees: Degrees = 0.0
-    """Sum over the head's joints of the rotation from the starting pose to the target. Cg of thesis 3.3.2."""
+    """Rotations of the head's joints from the starting pose to the target, added up. Cg of thesis 3.3.2."""
     arm_degrees: Degrees = 0.0
     """The same for the arm used. Cp of thesis 3.3.2."""
     ray: Ray | None = None
@@ -180,9 +205,11 @@ class Estimate(Struct, frozen=True, kw_only=True, omit_defaults=True):
 
 
 class EstimateItem(Struct, frozen=True, kw_only=True, omit_defaults=True):
+    """A behavior to be estimated."""
+
     behavior: BlockBehavior
     pose: BodyPose | None = None
-    """Start from here; None: from where the body is now."""
+    """Pose to start from; None: the present one."""
 
 
 class EstimateBehaviors(Struct, frozen=True, kw_only=True, tag="estimate_behaviors", omit_defaults=True):
@@ -192,6 +219,8 @@ class EstimateBehaviors(Struct, frozen=True, kw_only=True, tag="estimate_behavio
 
 
 class Estimates(Struct, frozen=True, kw_only=True, tag="estimates", omit_defaults=True):
+    """Answer to `EstimateBehaviors`, in its order."""
+
     items: tuple[Estimate, ...]
 
 
@@ -200,11 +229,15 @@ class DescribeBody(Struct, frozen=True, kw_only=True, tag="describe_body", omit_
 
 
 class NoPointZone(Struct, frozen=True, kw_only=True, omit_defaults=True):
+    """A ball in space at which the robot must not point, in the robot's frame."""
+
     center: Vector
     radius: Meters
 
 
 class JointLimit(Struct, frozen=True, kw_only=True, omit_defaults=True):
+    """Range and greatest speed and acceleration of a joint. part: the body part that it belongs to."""
+
     joint: str
     part: str
     low: Radians
@@ -216,7 +249,10 @@ class JointLimit(Struct, frozen=True, kw_only=True, omit_defaults=True):
 
 
 class Capabilities(Struct, frozen=True, kw_only=True, tag="capabilities", omit_defaults=True):
-    """What a body can do: behavior types (BML names), its parts and joints, reach and forbidden zones."""
+    """Abilities of a body. Answer to `DescribeBody`.
+
+    body: its name. types: the behavior types that it performs, by their BML names. reach: of the arms.
+    """
 
     body: str
     types: tuple[str, ...]
@@ -231,7 +267,11 @@ class Capabilities(Struct, frozen=True, kw_only=True, tag="capabilities", omit_d
 
 
 class RobotState(Struct, frozen=True, kw_only=True, tag="robot_state", omit_defaults=True):
-    """stream: control, at a fixed rate: pose, gaze axis, arms, what is being said."""
+    """stream: control, at a fixed rate: the present state of the body.
+
+    left_arm, right_arm: the forearms. looking_at: entity id; empty: nothing.
+    speaking: the words that are being said; empty: silence.
+    """
 
     at: Stamp
     pose: BodyPose

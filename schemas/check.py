@@ -1,7 +1,7 @@
-"""What is wrong with a block or fragment by itself, without knowing the world: the checks that XML and JSON share.
+"""Checks of a block or fragment by itself, for XML and JSON alike: ids, numbers, references.
 
-Ids, numbers, and references. Whether targets exist, what the body can do and whether the constraints can be
-met is for generation and the realizer to say.
+Targets, the body and contradictions between constraints are checked by generation and the realizer, which know the
+world.
 """
 
 import math
@@ -24,7 +24,7 @@ _SYNC_ADVICE = "write behavior:sync, behavior:sync+seconds, or seconds from the 
 
 
 class Problem(Struct, frozen=True):
-    """path: JSON path. name: of the behavior or constraint. line: of the XML, 0 when there is none."""
+    """An error in a document. path: JSON path. name: id of the behavior or constraint. line: of the XML, or 0."""
 
     reason: str
     path: str
@@ -33,30 +33,30 @@ class Problem(Struct, frozen=True):
     advice: str = ""
 
 
-def sound(thing: AnyInput, source: str = "", *, prefix: str = "$", paths: bool = False, line: int = 0) -> AnyInput:
-    """The same, with marks that look like offsets made explicit: the gate for whatever did not come as XML.
+def validated(thing: AnyInput, source: str = "", *, prefix: str = "$", paths: bool = False) -> AnyInput:
+    """Check a block or fragment that did not come as XML. The same is returned, after `disambiguated`.
 
     Raises InputRefused as `check` does.
     """
     thing = disambiguated(thing)
-    check(thing, source, prefix=prefix, paths=paths, line=line)
+    check(thing, source, prefix=prefix, paths=paths)
     return thing
 
 
 def check(thing: Input, source: str = "", *, prefix: str = "$", paths: bool = False, line: int = 0) -> None:
-    """Raises InputRefused for the first problem: where, on which line, why, and what to do.
+    """Refuse a block or fragment for its first problem. Raises InputRefused with place, line, reason and advice.
 
-    source: file or sender. paths: say where by JSON path, which starts with `prefix`, even if lines are known.
-    line: of the root element, for what is wrong with the whole.
+    source: file or sender. paths: tell the place as a JSON path, which begins with `prefix`, even if lines are known.
+    line: of the root element, for problems of the whole document.
     """
-    for problem in problems(thing):
+    if problem := next(problems(thing), None):
         problem = problem if problem.line else replace(problem, line=line)
         raise InputRefused(_fault(thing, problem, source, prefix, paths), thing.id or None)
 
 
 def check_behavior(behavior: Behavior) -> None:
-    """One behavior by itself, without what it refers to. Raises InputRefused for its first problem."""
-    for problem in _behavior(behavior, "$.behavior"):
+    """Check one behavior by itself, without its references. Raises InputRefused for its first problem."""
+    if problem := next(_behavior(behavior, "$.behavior"), None):
         raise InputRefused(Fault(reason=problem.reason, where=problem.path, line=problem.line, advice=problem.advice))
 
 
@@ -72,7 +72,7 @@ def _fault(thing: Input, problem: Problem, source: str, prefix: str, paths: bool
 
 
 def problems(thing: Input) -> Iterator[Problem]:
-    """Everything that is wrong: ids first, then each behavior, then references."""
+    """Find all problems: of ids first, then of each behavior, then of references."""
     yield from _ids(thing)
     for index, behavior in enumerate(thing.behaviors):
         yield from _behavior(behavior, f"$.behaviors[{index}]")
@@ -84,8 +84,7 @@ def _ids(thing: Input) -> Iterator[Problem]:
         yield Problem(fault, "$.id", advice="a block's or fragment's id is part of every reference")
     seen: dict[str, int] = {}
     for index, behavior in enumerate(thing.behaviors):
-        path = f"$.behaviors[{index}].id"
-        yield from _id(behavior.id, path, behavior.line, seen, required=True)
+        yield from _id(behavior.id, f"$.behaviors[{index}].id", behavior.line, seen, required=True)
     for index, constraint in enumerate(thing.constraints):
         yield from _id(constraint.id, f"$.constraints[{index}].id", constraint.line, seen, required=False)
 
@@ -121,7 +120,7 @@ def _behavior(behavior: Behavior, path: str) -> Iterator[Problem]:
 
 
 def _values(behavior: Behavior) -> Iterator[tuple[str, str, str]]:
-    """Reason, field and advice."""
+    """Problems with the values of a behavior's fields: reason, field, advice."""
     for field in behavior.__struct_fields__:
         value = getattr(behavior, field)
         if isinstance(value, float) and not math.isfinite(value):
@@ -192,7 +191,10 @@ def _references(thing: Input) -> Iterator[Problem]:
 
 
 def _inline(fragment: TurnFragment, points: Mapping[str, Set[str]]) -> Iterator[Problem]:
-    """Of a block the realizer drops a behavior that is timed at a point it lacks; a fragment is refused whole."""
+    """Problems with inline timing at a point that the behavior lacks: `<gaze id="g" middle="...">`.
+
+    Only of fragments, which are refused as a whole; in a block the realizer drops just such a behavior.
+    """
     for index, behavior in enumerate(fragment.behaviors):
         for number, timing in enumerate(behavior.timing):
             known = points[behavior.id]
@@ -203,17 +205,14 @@ def _inline(fragment: TurnFragment, points: Mapping[str, Set[str]]) -> Iterator[
 
 
 def _points(thing: Input) -> dict[str, Set[str]]:
-    """The sync points of each behavior, in the drafts' spelling."""
-    known: dict[str, Set[str]] = {}
+    """Sync points of each behavior, in the drafts' spelling, by the behavior's id."""
     spoken = marks(thing)
-    for behavior in thing.behaviors:
-        if isinstance(behavior, Speech):
-            known[behavior.id] = spoken[behavior.id] | {"start", "end"}
-        elif isinstance(behavior, Reference):
-            known[behavior.id] = {"start", "end"}
-        else:
-            known[behavior.id] = frozenset(SYNC_POINTS)
-    return known
+    return {
+        behavior.id: {"start", "end"} | spoken.get(behavior.id, frozenset())
+        if isinstance(behavior, Speech | Reference)
+        else frozenset(SYNC_POINTS)
+        for behavior in thing.behaviors
+    }
 
 
 def _nearest(name: str, known: Set[str]) -> str:

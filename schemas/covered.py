@@ -1,5 +1,7 @@
-"""A thing that a report of the world leaves out is covered, as a rule, and has not gone: people's hands hide pieces
-when nobody expects it (thesis 5.4.2). For those who act on the world, and would refuse what is plainly there.
+"""Memory of objects that are hidden for a moment, so that services go on to speak of them and to look at them.
+
+An object that a report of the world leaves out has rarely gone: people's hands hide pieces all the time (thesis
+5.4.2).
 """
 
 from msgspec.structs import replace
@@ -8,13 +10,13 @@ from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.world import Entity, World
 
 COVERED_FOR: Seconds = 10.0
-"""How long one stays missing until it is taken to be gone, unless the configuration says otherwise."""
+"""Time after which a missing object is taken to be gone, unless the configuration says otherwise."""
 
 
 class CoveredObjects:
     """Adds to reports of the world the objects that they leave out, where they were seen last.
 
-    patience: as `COVERED_FOR`.
+    patience: seconds after which a missing object is taken to be gone.
     """
 
     def __init__(self, patience: Seconds) -> None:
@@ -22,10 +24,10 @@ class CoveredObjects:
         self._world: World | None = None
         self._objects: dict[str, Entity] = {}
         self._missing: dict[str, Seconds] = {}
-        """Since when, by id; in `_objects` as last seen."""
+        """Since when an object is missing, by id; `_objects` holds it as last seen."""
 
     def see(self, world: World, now: Seconds) -> World:
-        """Take a report. The world as it probably is now."""
+        """Take a report. Returns the world as it probably is now: the report with the covered objects."""
         reported = {entity.id for entity in world.entities}
         self._forget(now)
         self._missing = {id: self._missing.get(id, now) for id in self._objects if id not in reported}
@@ -34,7 +36,7 @@ class CoveredObjects:
         return self._whole(world)
 
     def at(self, now: Seconds) -> World | None:
-        """The world as it probably is; None before the first report."""
+        """Return the world as it probably is; None before the first report."""
         self._forget(now)
         return None if self._world is None else self._whole(self._world)
 

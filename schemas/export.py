@@ -1,12 +1,12 @@
 """JSON Schemas of everything that travels, for other languages: `python -m engage_hri.schemas.export`.
 
 `exported/engage.json` is one bundle, draft 2020-12, with a definition for each struct under `$defs`: all messages of
-the bus, blocks and turn fragments, and the lines of `engage watch` (`Line`). As a whole it describes any message.
-A definition is named by `engage.json#/$defs/PerformFragment`, or in a validator that has loaded the bundle by
-`urn:engage:1#PerformFragment`. Each has an `$anchor` and none an `$id`, for under an `$id` of its own `#/$defs/...`
-would mean another place. Quantities carry their unit as `description`.
+the bus, blocks and turn fragments, and the lines of `engage watch` (`Line`). The bundle as a whole describes any
+message. A definition is named by `engage.json#/$defs/PerformFragment`, or in a validator that has loaded the bundle
+by `urn:engage:1#PerformFragment`. Each definition has an `$anchor`, but no `$id`: in a definition with its own `$id`,
+`#/$defs/...` would mean another place. Quantities have their unit as `description`.
 
-Beside it stands the tool by which language models speak, as an API takes it (`schemas/tool.py`).
+Beside the bundle stands the tool by which language models speak, as an API takes it (`schemas/tool.py`).
 """
 
 import inspect
@@ -23,7 +23,7 @@ from engage_hri.schemas.units import Stamp
 
 EXPORTED = Path(__file__).parent / "exported"
 BUNDLE = "engage.json"
-"""In the folder of exported schemas."""
+"""Name of the file in the folder of exported schemas."""
 ID = f"urn:engage:{MAJOR}"
 
 
@@ -46,8 +46,8 @@ def bundle() -> dict[str, Any]:
 
 
 def _lines() -> dict[str, Any]:
-    """`Line`, and what it holds: as the messages, but every key is there, and an instant is a number."""
-    (line,), components = msgspec.json.schema_components((lines.Told,), ref_template="#/$defs/{name}Line")
+    """Definitions of `Line`: like the messages, but every key is required, and an instant is a number."""
+    (line,), components = msgspec.json.schema_components((lines.LineMessage,), ref_template="#/$defs/{name}Line")
     for component in components.values():
         if "properties" in component:
             component["required"] = list(component["properties"])
@@ -57,7 +57,7 @@ def _lines() -> dict[str, Any]:
 
 
 def files() -> dict[str, bytes]:
-    """What the folder should hold: name to content."""
+    """Contents that the folder should have, by file name."""
     return {
         BUNDLE: _written(bundle(), 4).encode() + b"\n",
         tool.FILE: _written(tool.tool_definition(), 9).encode() + b"\n",
@@ -65,7 +65,7 @@ def files() -> dict[str, bytes]:
 
 
 def _written(node: Any, depth: int, indent: str = "\n") -> str:
-    """As JSON, with a line for each member down to `depth`: in the bundle each field is one line."""
+    """JSON with a line for each member down to `depth`, so that each field is one line of the bundle."""
     if depth == 0 or not isinstance(node, dict):
         return msgspec.json.encode(node).decode()
     inner = f"{indent}  "
@@ -74,14 +74,14 @@ def _written(node: Any, depth: int, indent: str = "\n") -> str:
 
 
 def stale(folder: Path = EXPORTED) -> list[str]:
-    """Names of files that are missing, differ from the code, or belong to nothing any more."""
+    """Names of the files that are missing, differ from the code, or are left over."""
     expected = files()
     present = {path.name: path.read_bytes() for path in folder.glob("*.json")}
     return sorted(name for name in expected.keys() | present.keys() if expected.get(name) != present.get(name))
 
 
 def write(folder: Path = EXPORTED) -> list[str]:
-    """Make the folder hold exactly `files()`. Returns the names that changed."""
+    """Make the folder hold exactly `files()`. Returns the names of the changed files."""
     changed, expected = stale(folder), files()
     for name in changed:
         if name in expected:

@@ -1,4 +1,4 @@
-"""What went wrong, where, and what to do about it: one message and one small hierarchy of exceptions."""
+"""Faults (reason, place, advice) as a message, and the small hierarchy of exceptions that carry them."""
 
 from msgspec import Struct
 from msgspec.structs import force_setattr
@@ -7,7 +7,7 @@ from msgspec.structs import force_setattr
 class Fault(Struct, frozen=True, kw_only=True, tag="fault", omit_defaults=True):
     """A refusal or failure, as it crosses the bus and as people read it.
 
-    reason: what is wrong. advice: what to do about it. service: who says so.
+    reason: what is wrong. advice: what to do about it. service: the one that reports it.
     """
 
     reason: str
@@ -19,9 +19,9 @@ class Fault(Struct, frozen=True, kw_only=True, tag="fault", omit_defaults=True):
     service: str = ""
 
     def __post_init__(self) -> None:
-        """What is no Unicode is written with backslashes: a fault must always get through.
+        """Write half characters with backslashes, so that a fault can always be encoded.
 
-        Python itself makes such text, of the names of files for instance.
+        Python itself makes such text, for example of file names that are not UTF-8.
         """
         for name in ("reason", "where", "advice", "service"):
             text = getattr(self, name)
@@ -35,7 +35,7 @@ class Fault(Struct, frozen=True, kw_only=True, tag="fault", omit_defaults=True):
 
 
 class EngageError(Exception):
-    """Anything Engage raises on purpose. Carries the fault that the bus would carry."""
+    """Base of all exceptions that Engage raises on purpose. `fault` is what the bus would carry."""
 
     def __init__(self, fault: Fault | str) -> None:
         self.fault = Fault(reason=fault) if isinstance(fault, str) else fault
@@ -43,9 +43,9 @@ class EngageError(Exception):
 
 
 class InputRefused(EngageError):
-    """The input is wrong. Nothing has moved; the fault says where and what to do.
+    """The input is wrong. Nothing has moved; the fault has the place and an advice.
 
-    block: id of the block or fragment, as far as it could be read.
+    block: id of the block or fragment; None if it could not be read.
     """
 
     def __init__(self, fault: Fault | str, block: str | None = None) -> None:
@@ -66,8 +66,8 @@ class RequestRefused(EngageError):
 
 
 class ServerRestarted(RunFailed):
-    """The server that had accepted the request is there as another life, which knows nothing of it."""
+    """The server that had accepted the request has started again and knows nothing of it."""
 
 
 class NeverEnded(RunFailed):
-    """The server has not ended the request, though it was asked to."""
+    """The server was asked to end the request, and has not."""

@@ -1,4 +1,4 @@
-"""What the realizer tells about a block while it runs: the feedback of BML 1.0."""
+"""Feedback of BML 1.0: the realizer's messages about a block while it runs."""
 
 from typing import Literal
 
@@ -11,12 +11,15 @@ WarningKind = Literal[
     "CANNOT_CREATE_BEHAVIOR", "EXECUTION_FAILURE", "LATE", "POLICY",
     "INTERRUPTED",
 ]  # fmt: skip
-"""INTERRUPTED: somebody asked for the end of a behavior.
+"""INTERRUPTED: a behavior was ended on request.
 POLICY: generation performs a fragment otherwise than it asks, for example with a less reliable reference."""
 
 
 class BlockProgress(Struct, frozen=True, kw_only=True, tag="block_progress", omit_defaults=True):
-    """evt: a block has started, or ended with a status. time: since the block's start."""
+    """evt: a block has started, or ended with a status.
+
+    block: its id. time: seconds since the block's start. status: empty at its start.
+    """
 
     block: str | None
     progress: Literal["start", "end"]
@@ -27,11 +30,14 @@ class BlockProgress(Struct, frozen=True, kw_only=True, tag="block_progress", omi
 
 
 class SyncPointProgress(Struct, frozen=True, kw_only=True, tag="sync_point_progress", omit_defaults=True):
-    """evt: a sync point as realised. Each default point of each behavior exactly once, in order.
+    """evt: a sync point was realised. Each default point of each behavior exactly once, in order.
 
-    at, time: as measured, but never before those of an earlier message about the block.
-    sync: in the spelling of the block's dialect. predicted: where the plan had it, from the block's start.
-    skew: from the first to this point of its class. source: who says so.
+    sync: in the spelling of the block's dialect.
+    at: instant as measured, but never before that of an earlier message about the block.
+    time: the same in seconds since the block's start.
+    predicted: time at which it was planned. arrived: time at which the body came to it.
+    skew: seconds after the first of the sync points that should be the same instant.
+    source: `body`: the body reported it; `clock`: the realizer itself realised it.
     """
 
     block: str
@@ -47,7 +53,10 @@ class SyncPointProgress(Struct, frozen=True, kw_only=True, tag="sync_point_progr
 
 
 class PlannedPoint(Struct, frozen=True, kw_only=True, omit_defaults=True):
-    """type: the BML element of its behavior."""
+    """A sync point with the time at which it is expected.
+
+    time: seconds since the block's start. type: the BML element of its behavior.
+    """
 
     behavior: str
     sync: str
@@ -56,9 +65,11 @@ class PlannedPoint(Struct, frozen=True, kw_only=True, omit_defaults=True):
 
 
 class PredictionFeedback(Struct, frozen=True, kw_only=True, tag="prediction", omit_defaults=True):
-    """evt: when the points that are still to come are expected, from the block's start, which was `at`.
+    """evt: the expected times of a block's coming sync points.
 
-    Once at the start, and again when an expectation has moved noticeably.
+    Sent when the block starts, and again when an expectation has moved noticeably.
+
+    at: when the block started.
     """
 
     block: str
@@ -68,7 +79,10 @@ class PredictionFeedback(Struct, frozen=True, kw_only=True, tag="prediction", om
 
 
 class WarningFeedback(Struct, frozen=True, kw_only=True, tag="warning", omit_defaults=True):
-    """evt: something was refused, dropped or done otherwise than asked. behavior empty: the whole block."""
+    """evt: something was refused, dropped or done otherwise than asked.
+
+    block: its id; null if it could not be read. behavior: id; empty: the warning is about the whole block.
+    """
 
     block: str | None
     kind: WarningKind

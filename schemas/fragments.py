@@ -1,4 +1,4 @@
-"""Turn fragments: what a collaboration manager hands to generation, and the outcome it gets back."""
+"""Turn fragments, which a collaboration manager sends to generation, and their outcomes."""
 
 from typing import Literal
 
@@ -16,18 +16,18 @@ GestureChoice = Literal["none", "gaze", "directed_gaze", "directed_gaze_with_poi
 
 
 class TurnFragment(Struct, frozen=True, kw_only=True, tag="fragment", omit_defaults=True):
-    """Part or whole of a turn. Thesis 3.2.
+    """A turn or a part of one, to be spoken and acted. Thesis 3.2.
 
     id: the manager's name for it; no other live fragment has it.
     turn_index: first, second or third turn of an adjacency pair.
-    turn_status: a whole turn (`full`), a piece of one (`beginning`, `middle`, `end`), or a `backchannel`
-    while another speaks.
-    behaviors: speech and references one after the other as written, others as their timing says.
+    turn_status: a whole turn (`full`), a piece of one (`beginning`, `middle`, `end`), or a `backchannel` while the
+    person speaks.
+    behaviors: speech and references are performed in the order in which they are written, others by their timing.
     constraints: between sync points of these behaviors.
-    addressee: id of the person spoken to; empty: the only person the world knows.
-    delay: hold the turn after this fragment while the manager thinks, eyes on `delay_target`.
+    addressee: id of the person spoken to; empty: the only person in the world.
+    delay: hold the turn after this fragment while the manager thinks, with the eyes on `delay_target`.
     delay_target: id of an entity; empty: a surface, away from the face.
-    accept: which actions answer the adjacency pair this turn starts; empty: recognition's default.
+    accept: the actions that answer the adjacency pair of this turn; empty: recognition's default.
     line: of its XML source, from 1; 0 when there is none.
     """
 
@@ -41,20 +41,26 @@ class TurnFragment(Struct, frozen=True, kw_only=True, tag="fragment", omit_defau
     delay_target: str = ""
     accept: tuple[Action, ...] = ()
     unread: tuple[Unread, ...] = ()
-    """Warned of when the block that it becomes begins."""
+    """Parts of the document that were left out. The realizer warns of each when the block of the fragment begins."""
     from_parts: bool = False
-    """Of a language model's tool call, each behavior of one part: refusals name the part (`schemas/tool_call.py`)."""
+    """True for a language model's tool call: each behavior is one part, and refusals name it
+    (schemas/tool_call.py)."""
     line: int = 0
 
 
 class PerformFragment(Request, frozen=True, kw_only=True, tag="perform_fragment", omit_defaults=True):
-    """cmd: collaboration -> generation. Terminal state: `FragmentOutcome`."""
+    """cmd: collaboration -> generation: perform a fragment. Terminal state: `FragmentOutcome`."""
 
     fragment: TurnFragment
 
 
 class PairConsidered(Struct, frozen=True, kw_only=True, omit_defaults=True):
-    """One row of the table behind a choice: a gesture-speech pair with its numbers and its verdict."""
+    """A gesture with a phrase, as one row of the table from which a reference was chosen.
+
+    distractors: ids of the objects that the pair leaves possible besides the target.
+    channel: reliability of the gesture alone. reliability: of the pair; minimum: the least allowed.
+    cost: seconds that the pair takes. feasible: it can be performed and is reliable enough. reason: why, in words.
+    """
 
     gesture: GestureChoice
     phrase: str
@@ -69,9 +75,13 @@ class PairConsidered(Struct, frozen=True, kw_only=True, omit_defaults=True):
 
 
 class ReferenceChoice(Struct, frozen=True, kw_only=True, omit_defaults=True):
-    """How a reference was made, and every pair that was considered. Thesis 3.3.2.
+    """The gesture and the phrase chosen for a reference. Thesis 3.3.2.
 
-    Where no pair can be performed none is chosen, and the fragment has failed.
+    If no pair can be performed, none is chosen, and the fragment fails.
+
+    reference: id of the behavior. target: id of the object.
+    cost: seconds that the pair takes.
+    pairs: all that were considered.
     """
 
     reference: str
@@ -84,11 +94,11 @@ class ReferenceChoice(Struct, frozen=True, kw_only=True, omit_defaults=True):
 
 
 class FragmentOutcome(Outcome, frozen=True, kw_only=True, tag="fragment_outcome", omit_defaults=True):
-    """evt: generation -> requester. What became of a fragment, when its block has ended and its gazes are decided.
+    """evt: generation -> requester: the end of a fragment: its block has ended and its gazes are decided.
 
-    fragment: its id. status: done, failed while it ran, or ended by somebody.
+    fragment: its id. status: `interrupted`: it was ended by another, or on request.
     spoken: the words that were really said.
-    replaced_by: the block whose `REPLACE` ended it, if interrupted so.
+    replaced_by: the block whose `REPLACE` ended it, if it was interrupted for that reason.
     choices: how each reference was made. warnings: what was done otherwise than asked.
     fault: why it failed.
     """
@@ -105,9 +115,11 @@ class FragmentOutcome(Outcome, frozen=True, kw_only=True, tag="fragment_outcome"
 
 
 class TurnClosed(Struct, frozen=True, kw_only=True, tag="turn_closed", omit_defaults=True):
-    """evt: generation. Once for each turn of the robot, when all its fragments have ended and its pair is decided.
+    """evt: generation: a turn of the robot is over: its fragments have ended and its adjacency pair is decided.
 
-    turn: id of the fragment that opened it. aborted: barge-in, fault, cancellation or silence ended it; `reason`.
+    turn: id of the fragment that opened it. addressee: id of the person.
+    status: `aborted`: a barge-in, fault, cancellation or silence ended it; `reason` says which.
+    fragments: their ids, in order.
     """
 
     turn: str
@@ -116,6 +128,6 @@ class TurnClosed(Struct, frozen=True, kw_only=True, tag="turn_closed", omit_defa
     reason: str = ""
     fragments: tuple[str, ...] = ()
     spoken: tuple[SpokenText, ...] = ()
-    """Of all its fragments, in their order; speeches named `fragment:behavior`."""
+    """The words said in all its fragments, in order; speeches are named `fragment:behavior`."""
     events: tuple[ConnectionEvent, ...] = ()
     """Each connection event of the turn in its last known state, by start."""

@@ -1,7 +1,8 @@
-"""Key expressions, spelled once. Relative to the robot's namespace: on the wire `<robot>/engage/v1/...`.
+"""Keys of the bus, relative to the robot's namespace: on the wire `<robot>/engage/v1/...`.
 
-`engage/v1/<class>/<producer or server>/<subject>`; of a command `cmd/<server>/<role>/<requester>/<subject>`,
-in which rules for access can see who asks. The class decides how a key travels:
+The form is `engage/v1/<class>/<producer or server>/<subject>`, for commands
+`engage/v1/cmd/<server>/<role>/<requester>/<subject>`, so that rules for access can see who asks. The class decides
+how a message travels:
 
 | class  | for | how |
 |--------|-----|-----|
@@ -10,7 +11,7 @@ in which rules for access can see who asks. The class decides how a key travels:
 | state  | world, statistics, open events, claims | last value, also for a late subscriber |
 | stream | joints, raw perception | newest only, may be dropped |
 | rpc    | short reads | query, short timeout, no reply = failure |
-| alive  | who is there | liveliness; delivered as `PeerAlive` and `PeerGone` |
+| alive  | presence of participants | liveliness; delivered as `PeerAlive` and `PeerGone` |
 """
 
 from collections.abc import Iterable
@@ -22,7 +23,7 @@ KeyClass = Literal["cmd", "evt", "state", "stream", "rpc", "alive"]
 HISTORY_MAX_AGE = 2.0
 """Seconds: how old a command or event may be when a late subscriber still gets it."""
 
-# Of a command: the expression for all who may send it. `command` makes the key of one requester.
+# The expression for the commands of all requesters. `command` makes the key of one requester.
 FRAGMENT = f"{PREFIX}/cmd/generation/*/*/fragment"
 INHIBIT = f"{PREFIX}/cmd/generation/*/*/inhibit"
 BLOCK = f"{PREFIX}/cmd/realizer/*/*/block"
@@ -37,7 +38,7 @@ SYNC_POINT = f"{PREFIX}/evt/control/sync_point"
 ROBOT_ACTION = f"{PREFIX}/evt/control/action"
 PERCEIVED_ACTION = f"{PREFIX}/evt/perception/action"
 RECOGNIZED_ACTION = f"{PREFIX}/evt/recognition/action"
-"""What recognition makes of raw perception; the same messages as `PERCEIVED_ACTION`."""
+"""Actions that recognition finds in raw perception; the same messages as on `PERCEIVED_ACTION`."""
 ANY_CONNECTION_EVENT = f"{PREFIX}/evt/recognition/connection_event/*/*"
 
 WORLD = f"{PREFIX}/state/perception/world"
@@ -61,34 +62,34 @@ EVERYTHING = f"{PREFIX}/**"
 
 
 def of_class(kind: KeyClass) -> str:
-    """Every key of a class."""
+    """Expression for every key of a class."""
     return f"{PREFIX}/{kind}/**"
 
 
 SERVICES = ("generation", "realizer", "recognition", "control")
-"""What a robot is made of."""
+"""Services that make up a robot."""
 ROLES = ("manager", *SERVICES, "perception", "observer")
-"""What a participant may be to the others. Rules for access are given by role, not by name."""
+"""Roles of participants. Rules for access are given by role, not by name."""
 
 
 def commands(server: str) -> str:
-    """Every command for `server`; cancellations too, and whatever is sent there that is no command's key."""
+    """Expression for every key below the commands of `server`, cancellations and unknown keys among them."""
     return f"{PREFIX}/cmd/{server}/**"
 
 
 def cancel(server: str) -> str:
-    """Of all requesters, as `BLOCK` and its like."""
+    """Expression for the cancellations of all requesters."""
     return f"{PREFIX}/cmd/{server}/*/*/cancel"
 
 
 def keep_alive(server: str) -> str:
-    """Of all requesters, as `BLOCK` and its like."""
+    """Expression for `KeepAlive` of all requesters."""
     return f"{PREFIX}/cmd/{server}/*/*/keep_alive"
 
 
 @lru_cache(4096)  # asked for every command
 def command(expression: str, role: str, requester: str) -> str:
-    """The key on which one requester sends this command. Raises ValueError for a name that can't be in a key."""
+    """Make the key on which one requester sends this command. Raises ValueError for a name that can't be in a key."""
     *before, _, _, subject = expression.split("/")
     for name in (role, requester):
         if not is_chunk(name):
@@ -97,26 +98,26 @@ def command(expression: str, role: str, requester: str) -> str:
 
 
 def is_command_of(server: str, key: str) -> bool:
-    """Does `commands(server)` include the key?"""
+    """Tell whether `commands(server)` includes the key."""
     return f"{key}/".startswith(f"{PREFIX}/cmd/{server}/")
 
 
 @lru_cache(4096)  # asked for every command
 def expression_of(key: str) -> str:
-    """Of a command's key, the expression for all requesters; empty for one that has no role and requester in it."""
+    """Turn a command's key into the expression for all requesters; empty if it lacks a role or a requester."""
     chunks = key.split("/")
     return "/".join((*chunks[:4], "*", "*", chunks[6])) if len(chunks) == 7 else ""
 
 
 @lru_cache(4096)  # asked for every command
 def requester_of(key: str) -> str:
-    """`cmd/<server>/<role>/<requester>/...` -> requester; empty where there is none."""
+    """Requester in `engage/v1/cmd/<server>/<role>/<requester>/<subject>`; empty if there is none."""
     chunks = key.split("/")
     return chunks[5] if len(chunks) == 7 else ""
 
 
 def request_state(server: str) -> str:
-    """Where `server` answers requests: `Accepted`, `Refused`, outcomes."""
+    """Key on which `server` answers requests: `Accepted`, `Refused`, outcomes."""
     return f"{PREFIX}/evt/{server}/request"
 
 
@@ -129,19 +130,19 @@ def status(participant: str) -> str:
 
 
 def statistics(actor: str) -> str:
-    """actor: a person's id, or `all`."""
+    """Key of the statistics of one person. actor: the person's id, or `all`."""
     return f"{PREFIX}/state/recognition/statistics/{actor}"
 
 
 def connection_event(actor: str, kind: str) -> str:
-    """actor: the person's id, whoever began; kind: an `EventKind`. Either may be `*`."""
+    """Key of connection events with a person (`actor`) of one kind, an `EventKind`; each may be `*`."""
     return f"{PREFIX}/evt/recognition/connection_event/{actor}/{kind}"
 
 
 def event_stream(actor: str = "", kinds: Iterable[str] = ()) -> tuple[str, ...]:
-    """What a reader of connection events subscribes to: the events themselves, which are open, and who tells them.
+    """Expressions for a reader of connection events: the events, the open ones, and the presence of recognition.
 
-    actor: a person's id. Empty stands for all, of kinds too. Raises ValueError for an id that can't be in a key.
+    actor: a person's id; empty: all. kinds: empty: all. Raises ValueError for an id that can't be in a key.
     """
     person = chunk(actor)
     events = [connection_event(person, chunk(kind)) for kind in kinds] or [connection_event(person, "*")]
@@ -152,19 +153,19 @@ CHUNK = "no '/', '*', '$', '?', '#', and no '@' at its beginning"
 
 
 def chunk(name: str) -> str:
-    """The name as one chunk of a key expression; `*` for an empty one. Raises ValueError if it can't be one."""
+    """Turn a name into one chunk of a key expression; an empty one into `*`. Raises ValueError for bad letters."""
     if not is_chunk(name or "all"):
         raise ValueError(f"{name!r} can't be in a key: {CHUNK}")
     return name or "*"
 
 
 def is_chunk(name: str) -> bool:
-    """Can a name stand in a key, and do wildcards reach it there?"""
+    """Tell whether a name can stand in a key, where wildcards reach it."""
     return bool(name) and name[0] != "@" and not any(letter in "/*$?#" for letter in name)
 
 
 def open_events(actor: str) -> str:
-    """actor: the person's id."""
+    """Key of the open connection events with one person."""
     return f"{PREFIX}/state/recognition/open_events/{actor}"
 
 
@@ -180,25 +181,25 @@ def alive(participant: str) -> str:
     return f"{PREFIX}/alive/{participant}"
 
 
-# The bus' own. `@` chunks are verbatim: no wildcard includes them, so nobody hears these by accident.
+# Keys of the bus itself. No wildcard includes a chunk that begins with `@`, so no subscriber gets these by accident.
 ANY_TOKEN = f"{PREFIX}/@bus/*/**"
 ANY_PULSE = f"{PREFIX}/@bus/*/pulse"
 ANY_FLUSH = f"{PREFIX}/@bus/*/flush"
 
 
 def own(run: str, subject: str) -> str:
-    """Of the process with id `run`: tokens `process`, `alive/<name>`; `pulse`; answers `past`, `clock`, `flush`."""
+    """Key of the process with id `run`. subject: `process`, `alive/<name>`, `pulse`, `past`, `clock` or `flush`."""
     return f"{PREFIX}/@bus/{run}/{subject}"
 
 
 def run_of(key: str) -> str:
-    """`@bus/<run>/...` -> run."""
+    """Id of the process in `engage/v1/@bus/<run>/...`."""
     return key.split("/")[3]
 
 
 @lru_cache(4096)  # asked several times for every message
 def key_class(key: str) -> KeyClass:
-    """Raises ValueError for a key outside the table, or one whose class is a wildcard."""
+    """Class of a key. Raises ValueError for a key outside the table, and for one whose class is a wildcard."""
     chunks = key.split("/")
     name = chunks[2] if key.startswith(f"{PREFIX}/") and len(chunks) > 2 else ""
     if name not in get_args(KeyClass):
@@ -208,12 +209,12 @@ def key_class(key: str) -> KeyClass:
 
 @lru_cache(4096)  # asked for every command and answer
 def server_of(key: str) -> str:
-    """`cmd/<server>/...` or `evt/<server>/...` -> server."""
+    """Server in `engage/v1/cmd/<server>/...` or `engage/v1/evt/<server>/...`."""
     return key.split("/")[3]
 
 
 def matches(pattern: str, key: str) -> bool:
-    """Does key expression `pattern` (`*` one chunk, `**` any number) include the concrete `key`?"""
+    """Tell whether the key expression `pattern` (`*`: one chunk, `**`: any number) includes the concrete `key`."""
     return _matches(pattern.split("/"), key.split("/"))
 
 
@@ -223,5 +224,7 @@ def _matches(pattern: list[str], key: list[str]) -> bool:
     if pattern[0] == "**":
         more = bool(key) and not key[0].startswith("@")
         return _matches(pattern[1:], key) or (more and _matches(pattern, key[1:]))
-    wild = pattern[0] == "*" and not key[0].startswith("@") if key else False
-    return bool(key) and (wild or pattern[0] == key[0]) and _matches(pattern[1:], key[1:])
+    if not key:
+        return False
+    is_same = pattern[0] == key[0] or (pattern[0] == "*" and not key[0].startswith("@"))
+    return is_same and _matches(pattern[1:], key[1:])

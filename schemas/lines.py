@@ -1,8 +1,8 @@
-"""The public JSON lines of `--feedback`, `--events` and `engage watch`: one message per line.
+"""Public JSON lines of `--feedback`, `--events` and `engage watch`: one message per line.
 
-A line is the JSON form of its message (docs/protocol.md; `Line` in exported/engage.json), but easier to read for a
-program that knows nothing else of the bus: every key is always there, also those at their default, and an instant is
-a number, the seconds of the bus clock. Seconds are rounded to microseconds.
+A line is the JSON form of its message (docs/protocol.md; `Line` in exported/engage.json), made easier for a program
+that knows nothing else of the bus: every key is always there, even at its default, and an instant is a number, the
+seconds of the bus clock. Seconds are rounded to microseconds.
 """
 
 from typing import Any, get_args
@@ -17,17 +17,17 @@ from engage_hri.schemas.messages import Message
 from engage_hri.schemas.recognition import ConnectionEvent, Statistics
 from engage_hri.schemas.units import Stamp
 
-Told = ConnectionEvent | Statistics | Feedback | HeadOwner | Fault
-"""What there are lines for."""
-_TOLD = get_args(Told)
+LineMessage = ConnectionEvent | Statistics | Feedback | HeadOwner | Fault
+"""Messages that have a line."""
+_KINDS = get_args(LineMessage)
 _DECIMALS = 6
 INSTANT = {"type": "number", "description": "seconds of the bus clock"}
 """JSON Schema of an instant in a line."""
 
 
 def line(message: Message) -> str | None:
-    """The message as one line, without the line end; None for a message that has none."""
-    return msgspec.json.encode(_plain(message)).decode() if isinstance(message, _TOLD) else None
+    """Write a message as one line, without the line end; None for a message that has no line."""
+    return msgspec.json.encode(_plain(message)).decode() if isinstance(message, _KINDS) else None
 
 
 def _plain(value: Any) -> Any:

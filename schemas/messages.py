@@ -1,4 +1,4 @@
-"""Every message of the bus in one tagged union, and its two encodings."""
+"""All messages of the bus as one tagged union, and their two encodings."""
 
 from collections.abc import Mapping
 from functools import cache, lru_cache
@@ -58,7 +58,7 @@ Message = (
     | RequestEvent | EventOutcome | SignalTurn | TurnOutcome | ConnectionEvent | OpenEvents | Statistics
     | AskStatus | Status | PeerAlive | PeerGone
 )  # fmt: skip
-"""What may travel. A union of tagged structs: the `type` field of the encoded form says which."""
+"""Union of all messages. The field `type` of the encoded form says which one it is."""
 
 COMMANDS: Mapping[str, tuple[type[Request], ...]] = {
     keys.FRAGMENT: (PerformFragment,),
@@ -68,11 +68,11 @@ COMMANDS: Mapping[str, tuple[type[Request], ...]] = {
     keys.TURN: (SignalTurn,),
     keys.BEHAVIOR: (PerformBehavior, AbortBehavior, GoHome),
 }
-"""What each command key is for; besides, `keys.cancel` takes `Cancel`, `keys.keep_alive` takes `KeepAlive`."""
+"""Commands on each key; besides, `keys.cancel` takes `Cancel`, and `keys.keep_alive` takes `KeepAlive`."""
 
 OUTWARD = (ConnectionEvent, OpenEvents, Statistics)
-"""What recognition tells programs of others, a few times a second at most: published as JSON, which all can read.
-Everything else is MessagePack."""
+"""Messages for programs of others, a few a second at most: published as JSON, which every language reads. All others
+are MessagePack."""
 
 _msgpack_encoder = msgspec.msgpack.Encoder()
 _json_encoder = msgspec.json.Encoder()
@@ -81,7 +81,7 @@ _json_decoder: msgspec.json.Decoder[Any] = msgspec.json.Decoder(Message)
 
 
 def encoding_of(message: Message, form: str = "msgpack") -> str:
-    """`application/msgpack;engage.SyncPointReached/1`."""
+    """Name the encoding of a message: `application/msgpack;engage.SyncPointReached/1`."""
     return _encoding_of(type(message), form)
 
 
@@ -99,14 +99,14 @@ def encode_json(message: Message) -> bytes:
 
 
 def published(message: Message) -> tuple[bytes, str]:
-    """Payload and encoding in the form in which this message is published."""
+    """Encode a message as it is published. Returns payload and encoding."""
     if isinstance(message, OUTWARD):
         return encode_json(message), encoding_of(message, "json")
     return encode(message), encoding_of(message)
 
 
 def decode(payload: bytes, encoding: str = "application/msgpack") -> Message:
-    """The message in `payload`. Raises InputRefused: another major version, an unknown form, or bad content."""
+    """Decode a payload. Raises InputRefused: another major version, an unknown form, or bad content."""
     decoder = _decoder_of(encoding)
     try:
         return decoder.decode(payload)  # type: ignore[no-any-return]
@@ -116,7 +116,7 @@ def decode(payload: bytes, encoding: str = "application/msgpack") -> Message:
         raise InputRefused(Fault(reason=reason, where=schema or form)) from error
 
 
-@lru_cache(1024)  # asked for every message; who it comes from may write what it likes
+@lru_cache(1024)  # asked for every message; a bound, because foreign programs may send any text
 def _decoder_of(encoding: str) -> "msgspec.msgpack.Decoder[Any] | msgspec.json.Decoder[Any]":
     form, _, schema = encoding.partition(";")
     if schema and schema.rpartition("/")[2] not in ("", str(MAJOR)):

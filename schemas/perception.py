@@ -1,6 +1,7 @@
-"""Raw perception, for cameras and microphones that do not say themselves who looks at what or who speaks.
+"""Raw perception, from cameras and microphones that do not themselves report looks and speech.
 
-Sent several times a second, newest only: a lost one costs nothing. Hands come with `World`, as entities of their own.
+Sent several times a second; only the newest counts, so a lost one costs nothing. Hands come with `World`, as
+entities.
 """
 
 from msgspec import Struct
@@ -9,10 +10,10 @@ from engage_hri.schemas.units import Probability, Stamp, Vector
 
 
 class HeadPose(Struct, frozen=True, kw_only=True, tag="head_pose", omit_defaults=True):
-    """stream: perception. Where a person's head is, and which way it faces.
+    """stream: perception. Position and direction of a person's head.
 
-    position: between the eyes, in the robot's frame, metres. direction: any length but 0, its parts at most 1e6; of
-    the eyes, if the tracker sees those, else of the nose.
+    position: between the eyes, in the robot's frame, metres.
+    direction: of the eyes if the tracker sees them, else of the nose; of any length but 0, its parts at most 1e6.
     """
 
     actor: str
@@ -23,7 +24,7 @@ class HeadPose(Struct, frozen=True, kw_only=True, tag="head_pose", omit_defaults
 
 
 class VoiceActivity(Struct, frozen=True, kw_only=True, tag="voice_activity", omit_defaults=True):
-    """stream: perception. Whether a person's voice is heard."""
+    """stream: perception. Voice of a person, heard or not."""
 
     actor: str
     active: bool

@@ -9,16 +9,16 @@ from engage_hri.schemas.requests import Outcome, Request
 from engage_hri.schemas.units import Probability, Seconds, Stamp
 
 EventState = Literal["started", "succeeded", "failed", "preempted", "withdrawn", "superseded", "completed", "lost"]
-"""`lost`: nobody knows what became of the event. Readers end so what was open when recognition died, of which
-`PeerGone` tells them; recognition itself does when it has lost track of the person by a mistake of its own."""
+"""`lost`: the end of the event is unknown. Readers end all open events so when recognition has died (`PeerGone`);
+recognition does so when it has lost track of the person by a mistake of its own."""
 ENDINGS: frozenset[EventState] = frozenset({"failed", "preempted", "withdrawn", "superseded", "completed", "lost"})
-"""The last state of an event: nothing follows it."""
+"""Last states of an event: nothing follows them."""
 
 
 def session_of(run: str) -> str:
-    """What the ids of events begin with, up to the first `-`: from which life of recognition they are.
+    """First part of the ids of events, up to the `-`: it names the life of recognition that they are from.
 
-    run: as on its liveliness token.
+    run: id of that life, as on its liveliness token.
     """
     return run[:8]
 
@@ -26,15 +26,16 @@ def session_of(run: str) -> str:
 class ConnectionEvent(Struct, frozen=True, kw_only=True, tag="connection_event", omit_defaults=True):
     """evt: one change in the life of a connection event; the same id from `started` to the end.
 
-    id: made up by recognition. kind: which of the four. state: what has just become of it.
-    initiator, responder: who began it, and who is to answer: actor ids, one of them the robot's.
-    started: when it began. objects: ids of what it is about.
-    cause: what it was begun for; `human`: a person began it. optional: does its failure count?
-    delay: responder's start - initiator's start (adjacency pair: from the end of the turn, may be negative), seconds;
-    of a failed event the time from its start to its failure; None while undecided and for backchannels.
-    duration: of the shared phase, seconds, when `completed`.
-    block: of an event that the robot began, the block that asked for it.
-    turn: of an adjacency pair, the robot's turn that opened it.
+    id: made by recognition. kind: which of the four. state: the one that it has now.
+    initiator: actor id of the one that began it. responder: actor id of the one that is to answer.
+    started: when it began. objects: ids of the objects that it is about.
+    cause: what it was begun for; `human`: a person began it. optional: its failure does not count.
+    delay: seconds from the initiator's start to the responder's start; of an adjacency pair from the end of the turn,
+    and negative for an early answer; of a failed event from its start to its failure; None while undecided and for
+    backchannels.
+    duration: seconds of the shared phase, when `completed`.
+    block: the block that asked for the event, if the robot began it.
+    turn: the robot's turn that opened it, for an adjacency pair.
     """
 
     id: str
@@ -43,7 +44,7 @@ class ConnectionEvent(Struct, frozen=True, kw_only=True, tag="connection_event",
     responder: str
     state: EventState
     at: Stamp
-    """When this change happened."""
+    """Instant of this change."""
     started: Stamp
     objects: tuple[str, ...] = ()
     cause: Cause = "human"
@@ -51,34 +52,32 @@ class ConnectionEvent(Struct, frozen=True, kw_only=True, tag="connection_event",
     delay: Seconds | None = None
     duration: Seconds | None = None
     limit: Seconds | None = None
-    """How long the responder has, when `started`."""
+    """Time that the responder has, when `started`."""
     response: Action | None = None
-    """Adjacency pair: which action answered."""
+    """Adjacency pair: the action that answered."""
     confidence: Probability = 1.0
-    """The least of the observations of the person that began and answered it; so far, when `started`."""
+    """Least confidence of the observations by which it began and was answered; so far, when `started`."""
     block: str = ""
     behavior: str = ""
     """The event behavior of that block."""
     turn: str = ""
 
     def person(self, robot: str) -> str:
-        """Who takes part in it with the robot: an actor's id.
-
-        robot: the robot's own actor id.
-        """
+        """Actor id of the person who takes part in it. robot: the robot's own actor id."""
         return self.responder if self.initiator == robot else self.initiator
 
     @property
     def session(self) -> str:
-        """Which life of recognition the event is from: what its id begins with."""
+        """Life of recognition that the event is from: the first part of its id."""
         return self.id.partition("-")[0]
 
 
 class OpenEvents(Struct, frozen=True, kw_only=True, tag="open_events", omit_defaults=True):
-    """state: recognition. All events with a person that have not ended, each with its last change, oldest first.
+    """state: recognition. All open events with a person, each with its last change, the oldest first.
 
-    Follows each change on the stream of events, in the same moment: whoever has read it knows every change that came
-    before it. session: what the ids begin with.
+    Published after each change of an event, at the same instant, so that its reader knows all earlier changes.
+
+    session: first part of the events' ids: the life of recognition that they are from.
     """
 
     actor: str
@@ -88,9 +87,11 @@ class OpenEvents(Struct, frozen=True, kw_only=True, tag="open_events", omit_defa
 
 
 class RequestEvent(Request, frozen=True, kw_only=True, tag="request_event", omit_defaults=True):
-    """cmd: realizer -> recognition (thesis Fig. 5.2). Refused when invalid (unknown actor, no objects).
+    """cmd: realizer -> recognition: begin a connection event (thesis Fig. 5.2). Terminal state: `EventOutcome`.
 
-    at: when the event began, that is when the realizer released it.
+    Refused if it is invalid (unknown actor, no objects).
+
+    at: when the event began: the realizer released it then.
     """
 
     block: str
@@ -99,7 +100,7 @@ class RequestEvent(Request, frozen=True, kw_only=True, tag="request_event", omit
 
 
 class SignalTurn(Request, frozen=True, kw_only=True, tag="signal_turn", omit_defaults=True):
-    """cmd: realizer or generation -> recognition. Ends at once."""
+    """cmd: realizer or generation -> recognition: what became of a turn. Ends at once, in `TurnOutcome`."""
 
     signal: TurnSignal
     at: Stamp
@@ -107,7 +108,7 @@ class SignalTurn(Request, frozen=True, kw_only=True, tag="signal_turn", omit_def
 
 
 class EventOutcome(Outcome, frozen=True, kw_only=True, tag="event_outcome", omit_defaults=True):
-    """evt: recognition -> requester: the decision. Terminal state of `RequestEvent`."""
+    """evt: recognition -> requester: how the event was decided. Terminal state of `RequestEvent`."""
 
     event: str
     """Id of the connection event."""
@@ -124,9 +125,11 @@ class TurnOutcome(Outcome, frozen=True, kw_only=True, tag="turn_outcome", omit_d
 
 
 class KindStatistics(Struct, frozen=True, kw_only=True, omit_defaults=True):
-    """Table 2.1, one kind. Optional, preempted and withdrawn events never count as failures.
+    """Numbers of one kind of event, as in thesis Table 2.1. Optional, preempted and withdrawn events do not fail.
 
-    delay: of the succeeded; failed_delay: of the failed, from start to failure. failure_rate: of both together.
+    delay_min, delay_mean, delay_max: of the events that succeeded.
+    failure_rate: share of the failed among the succeeded and failed.
+    failed_delay_min, failed_delay_mean, failed_delay_max: of the failed, from start to failure.
     """
 
     kind: EventKind
@@ -143,13 +146,13 @@ class KindStatistics(Struct, frozen=True, kw_only=True, omit_defaults=True):
 
 
 class WindowStatistics(Struct, frozen=True, kw_only=True, omit_defaults=True):
-    """Whole session or recent window. Times between events are differences of successive starts."""
+    """Numbers of a whole session or a recent window. Times between events are differences of successive starts."""
 
     kinds: tuple[KindStatistics, ...] = ()
     mtbce: Seconds | None = None
     """Mean time between connection events."""
     mtbce_without_maintenance: Seconds | None = None
-    """The same without the glances the maintenance policy caused itself."""
+    """MTBCE without the events that the maintenance policy caused."""
     max_gap: Seconds | None = None
     events: int = 0
     last_start: Stamp | None = None
@@ -157,12 +160,12 @@ class WindowStatistics(Struct, frozen=True, kw_only=True, omit_defaults=True):
 
 
 class Statistics(Struct, frozen=True, kw_only=True, tag="statistics", omit_defaults=True):
-    """state: recognition. How the connection events with one person, or all, come and go.
+    """state: recognition. Statistics of the connection events with one person, or with all, and their engagement.
 
-    actor: id of the person; empty: all together. at: when this was true.
+    actor: id of the person; empty: all together. at: the instant that the numbers are for.
     session: since the beginning. recent: of the last seconds, `window` of the configuration.
     engagement: estimate in 0..1; None: too little is known. level: the same in a word. reasons: why, in words.
-    busy: are they busy with a task? Then nothing is concluded from silence.
+    busy: the person is busy with a task, so that silence is no sign of less engagement.
     """
 
     actor: str

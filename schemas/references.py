@@ -1,4 +1,4 @@
-"""The sync references inside a block or turn fragment: where each stands, and rewriting them all."""
+"""Sync references inside a block or turn fragment: find them all, and rewrite them all."""
 
 from collections.abc import Callable, Iterator, Mapping
 from typing import Literal, NamedTuple, TypeVar
@@ -6,7 +6,7 @@ from typing import Literal, NamedTuple, TypeVar
 from msgspec.structs import replace
 
 from engage_hri.schemas.behavior_types import canonical_sync
-from engage_hri.schemas.behaviors import Behavior, Constraint, Event, Reference, Speech, Synchronize, Timing
+from engage_hri.schemas.behaviors import Behavior, Constraint, Event, Speech, Synchronize, Timing
 from engage_hri.schemas.blocks import Block
 from engage_hri.schemas.fragments import TurnFragment
 from engage_hri.schemas.syncref import SyncRef
@@ -17,7 +17,7 @@ AnyBehavior = TypeVar("AnyBehavior", bound=Behavior)
 
 
 class Site(NamedTuple):
-    """One reference. path: JSON path. name: of the behavior or constraint that holds it. line: of the XML."""
+    """One reference in a document. path: JSON path. name: id of the behavior or constraint that holds it."""
 
     text: str
     path: str
@@ -26,12 +26,12 @@ class Site(NamedTuple):
 
 
 def type_name(behavior: Behavior | type[Behavior]) -> str:
-    """The BML element name: `gazeShift`. The `type` of the JSON form."""
+    """Name of a behavior's BML element, and `type` of its JSON form: `gazeShift`."""
     return str(behavior.__struct_config__.tag)
 
 
 def marks(thing: Input) -> dict[str, frozenset[str]]:
-    """The marks of each speech, by the speech's id."""
+    """Names of the marks of each speech, by the speech's id."""
     return {
         behavior.id: frozenset(mark.id for mark in behavior.marks)
         for behavior in thing.behaviors
@@ -40,7 +40,7 @@ def marks(thing: Input) -> dict[str, frozenset[str]]:
 
 
 def sites(thing: Input) -> Iterator[Site]:
-    """Every reference in document order: behaviors, then constraints."""
+    """Find all references, in document order: behaviors, then constraints."""
     for index, behavior in enumerate(thing.behaviors):
         path = f"$.behaviors[{index}]"
         for number, timing in enumerate(behavior.timing):
@@ -59,7 +59,7 @@ def sites(thing: Input) -> Iterator[Site]:
 
 
 def rewritten(thing: AnyInput, change: Callable[[str], str]) -> AnyInput:
-    """The same with `change` applied to every reference."""
+    """Apply `change` to every reference of a block or fragment."""
     behaviors = tuple(_with_references(behavior, change) for behavior in thing.behaviors)
     constraints = tuple(_constraint(constraint, change) for constraint in thing.constraints)
     return replace(thing, behaviors=behaviors, constraints=constraints)
@@ -86,7 +86,7 @@ def _constraint(constraint: Constraint, change: Callable[[str], str]) -> Constra
 
 
 def disambiguated(thing: AnyInput) -> AnyInput:
-    """The same, where a reference to a mark that looks like an offset (`word-2`) is given an explicit offset."""
+    """Give an explicit offset to references to marks that look like an offset: `s:word-2` -> `s:word-2+0`."""
     known = marks(thing)
     if not any(known.values()):
         return thing
@@ -96,18 +96,18 @@ def disambiguated(thing: AnyInput) -> AnyInput:
 def _explicit(text: str, known: Mapping[str, frozenset[str]]) -> str:
     try:
         plain = SyncRef.parse(text)
-        told = SyncRef.parse(text, known.get(plain.behavior, ()))
+        meant = SyncRef.parse(text, known.get(plain.behavior, ()))
     except ValueError:
         return text  # schemas.check says what is wrong, and where
-    return text if told == plain else str(told)
+    return text if meant == plain else str(meant)
 
 
 def respelled(
     thing: AnyInput, name: Callable[[str, str], str], elsewhere: Mapping[str, Block] | None = None
 ) -> AnyInput:
-    """The same with every sync point called `name(sync, type)`. type: of its behavior, "" where nobody knows it.
+    """Rename every sync point to `name(sync, type)`. type: of its behavior; "" if that is unknown.
 
-    elsewhere: other blocks that it may refer to, by id.
+    elsewhere: other blocks that the references may name, by id.
     """
     known: list[Input] = [*(elsewhere or {}).values(), thing]
     types = {(each.id, behavior.id): type_name(behavior) for each in known for behavior in each.behaviors}
@@ -130,30 +130,5 @@ def respelled(
 def in_draft_spelling(
     thing: AnyInput, dialect: Literal["draft", "bml-1.0"], elsewhere: Mapping[str, Block] | None = None
 ) -> AnyInput:
-    """The same with every sync point spelled as the drafts do (`canonical_sync` of `schemas/syncref.py`)."""
+    """Translate every sync point to the drafts' spelling (`canonical_sync`)."""
     return respelled(thing, lambda sync, type: canonical_sync(sync, type, dialect), elsewhere)
-
-
-def without_lines(thing: AnyInput) -> AnyInput:
-    """The same as if it had not come from XML: every `line` 0."""
-    if isinstance(thing, TurnFragment):
-        thing = replace(thing, line=0)
-    return replace(
-        thing,
-        behaviors=tuple(_behavior_without_lines(behavior) for behavior in thing.behaviors),
-        constraints=tuple(
-            Constraint(
-                id=each.id,
-                required=each.required,
-                operators=tuple(replace(operator, line=0) for operator in each.operators),
-            )
-            for each in thing.constraints
-        ),
-    )
-
-
-def _behavior_without_lines(behavior: AnyBehavior) -> AnyBehavior:
-    behavior = replace(behavior, line=0)
-    if isinstance(behavior, Reference) and behavior.options is not None:
-        return replace(behavior, options=tuple(replace(option, line=0) for option in behavior.options))
-    return behavior

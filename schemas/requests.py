@@ -1,8 +1,8 @@
-"""How a long request lives: command with an id -> accepted or refused -> exactly one terminal state.
+"""Requests and their answers: a command with an id is accepted or refused, and has exactly one terminal state.
 
-A request is known by its requester, the requester's life, its kind and its id; an answer names all four. It is sent
-again until it is accepted, refused or ended; the server repeats its last state. What is accepted is kept alive by
-`KeepAlive`. The states and what moves them are the tables in services/requests/asking_table.py and
+A request is known by its requester, the requester's life, its kind and its id; an answer names all four. A request is
+sent again until it is accepted, refused or ended; the server repeats its last answer. `KeepAlive` keeps accepted
+requests alive. The states with their transitions are the tables in services/requests/asking_table.py and
 services/requests/serving_table.py.
 """
 
@@ -16,19 +16,19 @@ from engage_hri.schemas.units import Seconds, Stamp
 
 
 class Request(Struct, frozen=True, kw_only=True, omit_defaults=True):
-    """What every command has.
+    """Fields that every command has.
 
-    id: made up by the requester; among its live requests no other has it, of whatever kind.
-    requester: on arrival the participant that the key names, whatever stands here.
-    life: which life of the requester asks, so that a restarted one does not get the answers to the one before. A
-    program that has none may leave it out; its ended requests are remembered for 10 s, then an id is new again.
-    revision: how often the content was changed; the server ignores an older one.
-    lease: seconds that the request stays alive at its server without being sent again or named by a `KeepAlive`.
-    0: until it ends; control does not allow that, and takes its `dead_man`.
+    id: made by the requester; unique among its live requests of all kinds.
+    requester: on arrival the participant that the key names; what the sender writes here is ignored.
+    life: the life of the requester, so that a restarted one does not get the answers meant for the one before. A
+    program without lives leaves it out; its ended requests are remembered for 10 s, then an id is new again.
+    revision: number of changes of the content; the server ignores older content.
+    lease: seconds that the request stays alive at its server without being sent again or named by a `KeepAlive`;
+    0: until it ends, which control replaces by its `dead_man`.
     """
 
     is_updatable: ClassVar[bool] = False
-    """May other content under the same id replace it while it is live?"""
+    """True if other content under the same id may replace it while it is live."""
 
     id: str
     requester: str = ""
@@ -38,23 +38,23 @@ class Request(Struct, frozen=True, kw_only=True, omit_defaults=True):
 
     @property
     def term(self) -> Seconds:
-        """Seconds without renewal after which it lapses; 0: it does not say."""
+        """Seconds without renewal after which the request lapses; 0: not given."""
         return self.lease
 
     @property
     def authority(self) -> str:
-        """How far it may be carried out without asking; empty: it has no such limit."""
+        """Limit up to which the request may be carried out without asking; empty: no limit."""
         return ""
 
     def with_authority(self, authority: str) -> Self:
-        """The same with more authority."""
+        """Extend the authority of the request."""
         return self
 
 
 class Cancel(Request, frozen=True, kw_only=True, tag="cancel", omit_defaults=True):
-    """End the requester's own request `id` as interrupted.
+    """cmd: end one's own request `id`, as interrupted.
 
-    of: the kind of that request, its `type`; empty: whichever it is.
+    of: the kind of that request, its `type`; empty: any kind.
     """
 
     of: str = ""
@@ -62,7 +62,10 @@ class Cancel(Request, frozen=True, kw_only=True, tag="cancel", omit_defaults=Tru
 
 
 class Kept(Struct, frozen=True, array_like=True):
-    """A request that is to stay alive for another `valid` seconds. revision, authority: of its newest content."""
+    """Entry of a `KeepAlive`: a request that stays alive for another `valid` seconds.
+
+    kind: its `type`. revision, authority: those of its newest content.
+    """
 
     kind: str
     id: str
@@ -74,19 +77,19 @@ class Kept(Struct, frozen=True, array_like=True):
 class KeepAlive(Struct, frozen=True, kw_only=True, tag="keep_alive", omit_defaults=True):
     """cmd: requester -> server: these requests are still wanted, each for `valid` seconds from `at`.
 
-    A server that does not know one of them refuses it; one that has older content grants the authority, and answers
+    A server refuses a request that it does not know; if it has older content, it grants the authority and answers
     with `Outdated`.
     """
 
     live: tuple[Kept, ...]
     at: Stamp
     requester: str = ""
-    """As in `Request`."""
+    """Requester and life as in `Request`."""
     life: str = ""
 
 
 class Answer(Struct, frozen=True, kw_only=True, omit_defaults=True):
-    """What every answer has: whose request it is about.
+    """Fields that every answer has: they name the request that is answered.
 
     id: of the request. requester, life: copied from it. kind: its `type`.
     """
@@ -98,15 +101,15 @@ class Answer(Struct, frozen=True, kw_only=True, omit_defaults=True):
 
 
 class Heard(Answer, frozen=True, kw_only=True, tag="heard", omit_defaults=True):
-    """The request has come more than once, and is not decided yet."""
+    """The request has come more than once and is not decided yet."""
 
 
 class Accepted(Answer, frozen=True, kw_only=True, tag="accepted", omit_defaults=True):
-    """It is being carried out, or will be."""
+    """The request is being carried out, or will be."""
 
 
 class Outdated(Answer, frozen=True, kw_only=True, tag="outdated", omit_defaults=True):
-    """To a `KeepAlive`: the content that the server has is older than it says. The requester sends the newest."""
+    """The server has older content than a `KeepAlive` names. The requester then sends the newest."""
 
 
 class Refused(Answer, frozen=True, kw_only=True, tag="refused", omit_defaults=True):
@@ -116,9 +119,9 @@ class Refused(Answer, frozen=True, kw_only=True, tag="refused", omit_defaults=Tr
 
 
 class Unreadable(Struct, frozen=True, kw_only=True, tag="unreadable", omit_defaults=True):
-    """local: bus -> server of the key. What came there as a command is none: made on arrival, never sent.
+    """local: bus -> server of the key: a payload that came as a command could not be read. Never travels.
 
-    id, life, kind: of the request, as far as they could be read.
+    id, life, kind: those of the request, as far as they could be read.
     """
 
     fault: Fault
@@ -128,34 +131,34 @@ class Unreadable(Struct, frozen=True, kw_only=True, tag="unreadable", omit_defau
 
 
 class Outcome(Answer, frozen=True, kw_only=True, omit_defaults=True):
-    """The base of the other terminal states; each domain has its own."""
+    """Base of the other terminal states; each kind of command has its own."""
 
 
 A = TypeVar("A", bound=Answer)
 
 
 def kind_of(request: Request) -> str:
-    """The `type` of its encoded form."""
+    """Kind of a request: the `type` of its encoded form."""
     return str(request.__struct_config__.tag)
 
 
 def life_of(run: str, number: int) -> str:
-    """The life of one requester, of any number in this run of a participant."""
+    """Id of one requester's life. number: of the requester, in this run of a participant."""
     return f"{run[:16]}.{number}"
 
 
 def is_life_of(life: str, run: str) -> bool:
-    """May it be one of that run? False only if it is of this form, and another run's."""
+    """Tell whether a life can belong to a run. False only for a life made by `life_of` in another run."""
     before, _, number = life.rpartition(".")
     return not (before and number.isdecimal()) or before == run[:16]
 
 
 def kind_meant(request: Request) -> str:
-    """Of a cancellation the kind of what it ends; empty if it does not say."""
+    """Kind of the request that is meant: of a cancellation that of the request to be ended, empty if not given."""
     return request.of if isinstance(request, Cancel) else kind_of(request)
 
 
 def answering(request: Request, answer: A) -> A:
-    """`answer`, addressed to whoever has sent `request`. To a `Cancel` it is about the request that it ends."""
+    """Address an answer to the sender of `request`. The answer to a `Cancel` is about the request to be ended."""
     id, kind = request.id, kind_meant(request)
     return replace(answer, id=id, requester=request.requester, life=request.life, kind=kind)

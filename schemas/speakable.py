@@ -1,8 +1,8 @@
-"""What a voice says one after the other: words, and characters of the scripts that write no space between words.
+"""Tokens of a text that a voice says one by one: words, and characters of scripts without spaces between words.
 
-`Hello, 世界！` is three tokens: `Hello,`, `世`, `界！`. Punctuation and symbols belong to what they stand at; alone
-between spaces they are a token in which there is nothing to say. No dictionary: where a word of Chinese or Thai ends
-is not known, only between which characters nothing spoken is cut in two.
+`Hello, 世界！` is three tokens: `Hello,`, `世`, `界！`. Punctuation and symbols belong to the token beside them;
+alone between spaces they are a token without anything to say. There is no dictionary: words of Chinese or Thai are
+not found, only places at which a text can be cut without cutting a syllable in two.
 """
 
 import re
@@ -11,10 +11,10 @@ from collections.abc import Iterable, Iterator
 from typing import Literal, NamedTuple
 
 Script = Literal["spaced", "ideographs", "kana", "clusters"]
-"""clusters: a consonant of Thai, Lao, Burmese or Khmer with the vowels and marks that belong to it."""
+"""Scripts by their tokens. clusters: a consonant of Thai, Lao, Burmese or Khmer with its vowels and marks."""
 
 CHARACTERS_PER_WORD = 2
-"""So many characters of a script without spaces take about as long to say as a word of one with spaces."""
+"""Characters of a script without spaces that take about as long to say as one word of a script with spaces."""
 
 _IDEOGRAPHS = "\u3005-\u3007\u3105-\u312f\u3400-\u4dbf\u4e00-\u9fff\ua000-\ua48c\uf900-\ufaff\U00020000-\U0003ffff"
 _KANA = "\u3041-\u3096\u309d-\u309f\u30a1-\u30fa\u30fc-\u30ff\u31f0-\u31ff\uff66-\uff9f"
@@ -47,7 +47,7 @@ _UNSPACED_ENDS = re.compile(rf"[{UNSPACED}{_STOPS_WIDE}{_OPENING_WIDE}」』）�
 
 
 class Token(NamedTuple):
-    """end: in characters of the text."""
+    """A piece of text with its script. end: characters of the text up to its end."""
 
     text: str
     end: int
@@ -55,7 +55,7 @@ class Token(NamedTuple):
 
     @property
     def letters(self) -> int:
-        """Letters and digits, those of a Korean syllable one by one; 0: there is nothing to say."""
+        """Number of letters and digits, the letters of a Korean syllable one by one; 0: there is nothing to say."""
         text = self.text if self.text.isascii() else unicodedata.normalize("NFD", self.text)
         return sum(map(str.isalnum, text))
 
@@ -67,25 +67,25 @@ class Token(NamedTuple):
 
 
 def tokens(text: str) -> Iterator[Token]:
-    """All of the text but white space, in order."""
+    """Split a text into tokens, in order; together they are all of it but the white space."""
     for match in _TOKEN.finditer(text):
         script: Script = match.lastgroup or "spaced"  # type: ignore[assignment]
         yield Token(match.group(), match.end(), script)
 
 
 def has_words(text: str) -> bool:
-    """Is there anything to say, and not only punctuation and symbols?"""
+    """Tell whether a text has something to say, not only punctuation and symbols."""
     return any(map(str.isalnum, text))
 
 
 def word_count(text: str) -> float:
-    """How long it is, in words of a script with spaces."""
+    """Length of a text, in words of a script with spaces."""
     said = [token for token in tokens(text) if token.letters]
     return sum(1.0 if token.script == "spaced" else 1.0 / CHARACTERS_PER_WORD for token in said)
 
 
 def joined(texts: Iterable[str]) -> str:
-    """One text after the other, with single spaces between words and none where the script writes none."""
+    """Join texts with single spaces between words, and without where the script has no spaces."""
     whole = ""
     for text in texts:
         text = " ".join(text.split())

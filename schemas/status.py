@@ -1,4 +1,4 @@
-"""How a participant and its connection to the bus are doing: asked for, never sent by itself."""
+"""Status of a participant and of its connection to the bus: sent only when asked for."""
 
 from msgspec import Struct
 
@@ -10,43 +10,43 @@ class AskStatus(Struct, frozen=True, kw_only=True, tag="ask_status"):
 
 
 class BusHealth(Struct, frozen=True, kw_only=True, omit_defaults=True):
-    """Counts since the process opened the bus. The last four are the participant's own, all others its process'."""
+    """Counts since the process opened the bus. The last four are of the participant, the others of its process."""
 
     peers: tuple[str, ...] = ()
-    """Names of the participants that are there, this one included."""
+    """Names of all participants on the bus, this one included."""
     passed: int = 0
     """Messages, tokens and replies that have come in."""
     dropped: int = 0
-    """Stream messages, and in a flood others, that were dropped before the loop got to them."""
+    """Messages dropped before the loop got to them: of streams, and in a flood of others."""
     waiting: int = 0
-    """How many wait for the loop now."""
+    """Messages that wait for the loop now."""
     depth: int = 0
-    """The most that ever waited."""
+    """Greatest number of messages that ever waited."""
     lag: Seconds = 0.0
-    """The longest that anything waited for the loop."""
+    """Longest time that a message waited for the loop."""
     refused: int = 0
-    """Payloads that were none."""
+    """Payloads that could not be read."""
     overflowed: int = 0
     """Messages dropped from this participant's full queues."""
     gaps: int = 0
-    """How often one of its subscriptions missed something, and asked for it."""
+    """Times that one of its subscriptions missed messages and asked for them."""
     lost: int = 0
-    """Messages that were gone for good by then."""
+    """Missed messages that could not be had any more."""
     failures: int = 0
-    """How often something went wrong here that no message should be able to cause: each a fault, and in the log."""
+    """Bugs of Engage that came up here: each was published as a fault, and stands in the log."""
 
 
 class Status(Struct, frozen=True, kw_only=True, tag="status", omit_defaults=True):
-    """Of one participant, now."""
+    """Present state of one participant."""
 
     participant: str
     run: str
-    """Which life of it this is, as in `PeerAlive`."""
+    """Id of its life, as in `PeerAlive`."""
     version: str
-    """Of Engage."""
+    """Version of Engage."""
     at: Stamp
     joined: Stamp
-    """When it came onto the bus."""
+    """Instant at which it came onto the bus."""
     stands: Stamp | None = None
-    """Since when it serves; absent: not yet."""
+    """Instant from which it serves; absent: it does not serve yet."""
     bus: BusHealth = BusHealth()

@@ -1,13 +1,12 @@
-"""What became of fragments in a few hundred characters, for a language model to read: `json` or `text`."""
+"""Summary of performed fragments in a few hundred characters, for a language model: as `json` or `text`."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from typing import Literal
 
 import msgspec
 from msgspec import Struct
 
 from engage_hri.schemas.behaviors import Action
-from engage_hri.schemas.blocks import SpokenText
 from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.fragments import FragmentOutcome, GestureChoice, ReferenceChoice
 from engage_hri.schemas.recognition import ConnectionEvent
@@ -23,8 +22,12 @@ _BY: dict[GestureChoice, str] = {
 }  # fmt: skip
 
 
+_STOPS = tuple(".!?…।؟۔။。！？｡")
+_CLOSING = "\"'”’»)]」』）】》〉］｝〕"
+
+
 class Referred(Struct, frozen=True, kw_only=True, omit_defaults=True):
-    """How an object was referred to. looked: did the person look there? Absent: the robot did not wait for it."""
+    """A reference as it was made. looked: the person looked there; absent: the robot did not wait for that."""
 
     object: str
     phrase: str
@@ -32,29 +35,29 @@ class Referred(Struct, frozen=True, kw_only=True, omit_defaults=True):
     """`words alone`, `a look` or `pointing`."""
     looked: bool | None = None
     delay: Seconds | None = None
-    """How long it took them."""
+    """Time until the person looked there."""
 
 
 class Summary(Struct, frozen=True, kw_only=True, omit_defaults=True):
-    """What became of a fragment or a turn, short enough for a language model.
+    """Result of a fragment or a turn, short enough for a language model.
 
     status: the worst of all fragments. said: the words that were really spoken.
     references: each object that was referred to, in order.
-    eye_contact: did the person return the look at the end of the turn? Absent: the turn goes on.
+    eye_contact: the person returned the look at the end of the turn; absent: the turn goes on.
     answer: the action that answered the turn, `none` if none came in time, `pending` while there is time;
-    absent: it expects none.
+    absent: the turn expects none.
     problems: what went wrong, in words.
     """
 
     status: Literal["done", "interrupted", "failed", "refused"]
     said: str = ""
     cut_short: bool = False
-    """Were words left unsaid?"""
+    """True if words were left unsaid."""
     references: tuple[Referred, ...] = ()
     eye_contact: bool | None = None
     answer: Action | Literal["none", "pending"] | None = None
     answer_delay: Seconds | None = None
-    """From the end of the turn; negative if it came earlier."""
+    """Time from the end of the turn to the answer; negative for an earlier answer."""
     problems: tuple[str, ...] = ()
 
     @property
@@ -86,7 +89,7 @@ def summary(*outcomes: FragmentOutcome) -> Summary:
     )
     return Summary(
         status=status,
-        said=_said(spoken),
+        said=joined(each.text for each in spoken),
         cut_short=bool(statuses - {"done"}) or not all(each.complete for each in spoken),
         references=tuple(
             _referred(outcome, choice, events.values())
@@ -106,16 +109,12 @@ def summary(*outcomes: FragmentOutcome) -> Summary:
 
 
 def refusal(fault: Fault) -> Summary:
-    """Of a fragment that was refused: nothing was said or done, and why."""
+    """Summary of a refused fragment: nothing was said or done, and why."""
     return Summary(status="refused", problems=_problems([str(fault)]))
 
 
-def _said(spoken: Sequence[SpokenText]) -> str:
-    return joined(each.text for each in spoken)
-
-
 def _was_made(outcome: FragmentOutcome, choice: ReferenceChoice) -> bool:
-    """Of a fragment that came to its end all are; else those of whose phrase something was said."""
+    """Tell whether a reference was made: all are in a fragment that is done, else those with a phrase partly said."""
     phrase = f"{choice.reference}-phrase"
     return outcome.status == "done" or any(each.behavior.startswith(phrase) for each in outcome.spoken)
 
@@ -136,14 +135,14 @@ def _last(events: Iterable[ConnectionEvent]) -> ConnectionEvent | None:
 
 
 def _decision(event: ConnectionEvent | None) -> bool | None:
-    """Did the person do their part? None: it came to nothing, or nobody waited."""
+    """True if the person responded, False if not; None if the event was not decided."""
     if event is None or event.state not in ("succeeded", "completed", "failed"):
         return None
     return event.state != "failed"
 
 
 def _answer(pair: ConnectionEvent | None, *, is_over: bool) -> Action | Literal["none", "pending"] | None:
-    """is_over: the turn ended early, so nobody waits for an answer any more."""
+    """Answer to the turn, as in `Summary`. is_over: the turn ended early, so no answer is waited for any more."""
     if pair is None or (is_over and pair.state == "started"):
         return None
     if pair.state == "started":
@@ -171,7 +170,8 @@ def _sentences(it: Summary) -> Iterable[str]:
     elif it.status != "done":
         yield f"The fragment {'failed' if it.status == 'failed' else 'was interrupted'}."
     if it.said:
-        yield f'{"Only said" if it.cut_short else "Said"}: "{it.said}"'
+        stop = "" if it.said.rstrip(_CLOSING).endswith(_STOPS) else "."
+        yield f'{"Only said" if it.cut_short else "Said"}: "{it.said}"{stop}'
     elif it.status != "refused":
         yield "Nothing was said."
     for each in it.references:

@@ -4,11 +4,12 @@
     [block:]number                          seconds after the block's start
     bml:start, bml:end                      the block itself; `bml` is reserved
 
-Spaces around `:` and the sign mean nothing. Ids and names are case-sensitive and may hold hyphens, so only the
-tail of a reference can hold an offset: `gaze-1:stroke-2` is two seconds before `gaze-1:stroke`. A sync name may
-end in hyphen and number too (a mark `word-2`). Then the text alone does not say which is meant: it is read as an
-offset, unless `parse` is told that such a name exists. The codecs know the marks of what they read and write such
-a reference with an explicit offset (`speech-1:word-2+0`), which everyone reads alike.
+Spaces around `:` and the sign mean nothing. Ids and names are case-sensitive and may hold hyphens, so only the end of
+a
+reference can be an offset: `gaze-1:stroke-2` is two seconds before `gaze-1:stroke`. The name of a mark may end in a
+hyphen and a number as well (`word-2`): it is read as an offset, unless `parse` is told that such a name exists. The
+codecs know the marks of their documents and write such a reference with an explicit offset (`speech-1:word-2+0`),
+which everyone reads alike.
 """
 
 import math
@@ -24,17 +25,17 @@ from engage_hri.schemas.utf8 import is_utf8
 
 BLOCK_ITSELF = "bml"
 SYNC_POINTS = ("start", "ready", "stroke_start", "stroke", "stroke_end", "relax", "end")
-"""What the drafts give every behavior but speech, in order. The system's own spelling."""
+"""Sync points of every behavior but speech, in order, in the drafts' spelling, which all code uses."""
 LONGEST_ID = 250
 LONGEST = 4 * LONGEST_ID
-"""Characters; nobody's reference is longer, and no input gets to keep a regular expression busy."""
+"""Greatest length of a reference in characters, so that no input keeps a regular expression busy."""
 
 _NUMBER = r"(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)"
 _SIGNED = re.compile(rf"([+-]?)\s*({_NUMBER})")
 _WITH_OFFSET = re.compile(rf"(.*?)\s*([+-])\s*({_NUMBER})")
 _NAMED = r"[^\s:+\x00-\x1f\x7f-\x9f-][^\s:+\x00-\x1f\x7f-\x9f]*"
 _PLAIN = re.compile(rf"({_NAMED}):([A-Za-z_]+)")
-"""Most references: what else can be read need not be looked for."""
+"""Form of most references, which are read faster so."""
 _NAME = re.compile(_NAMED)
 
 
@@ -99,12 +100,12 @@ class SyncRef(Struct, frozen=True, omit_defaults=True):
 
 
 def is_id(text: str) -> bool:
-    """May this be the id of a block or behavior?"""
+    """Tell whether a text can be the id of a block or behavior."""
     return len(text) <= LONGEST_ID and _NAME.fullmatch(text) is not None and is_utf8(text)
 
 
 def is_sync_point(text: str) -> bool:
-    """May this be the name of a sync point or mark? A number may not: `s:2` is two seconds into block `s`."""
+    """Tell whether a text can name a sync point or mark. A number cannot: `s:2` is two seconds into block `s`."""
     return is_id(text) and not _SIGNED.fullmatch(text)
 
 
@@ -127,7 +128,7 @@ def _finite(text: str, number: float) -> float:
 
 
 def _plain(number: float) -> str:
-    """Exact, without exponent and without a needless fraction."""
+    """Write a number exactly, without exponent and without a needless fraction."""
     text = format(Decimal(repr(number)), "f")
     return text.removesuffix(".0")
 

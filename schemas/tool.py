@@ -1,9 +1,10 @@
-"""What a language model is given to talk with: one tool, `perform_turn_fragment`, and the form of its input.
+"""Tool for language models, `perform_turn_fragment`: its description and the form of its input.
 
-The form is smaller than a turn fragment: parts in the order in which they are to be said and done. Neither gestures
-nor timing nor ids; Engage finds those. `schemas/tool_call.py` makes the fragment of it. The JSON Schema is made from
-the structs below and keeps to what both APIs constrain sampling by: objects are closed, no `$ref`, no bounds, no
-defaults, and the alternatives of a part differ in their first key.
+The form is smaller than a turn fragment: parts in the order in which they are to be said and done, without gestures,
+timing and ids, which Engage finds. `schemas/tool_call.py` makes the fragment. The JSON Schema is made from the
+structs
+below and uses only what both APIs constrain sampling by: closed objects, no `$ref`, no bounds, no defaults, and
+alternatives of a part that differ in their first key.
 """
 
 from typing import Annotated, Any, Literal, get_args
@@ -16,7 +17,7 @@ from engage_hri.schemas.world import Entity, World
 
 NAME = "perform_turn_fragment"
 FILE = f"{NAME}.tool.json"
-"""In the folder of exported schemas."""
+"""Name of the file in the folder of exported schemas."""
 DESCRIPTION = """\
 Speak as the robot, to the person in front of it. Say what is to be said and name the objects you mean by their ids; \
 the robot finds the words for them, where to look, when to point, and the timing. It returns once this has been \
@@ -24,7 +25,7 @@ performed, with what was really said, whether the person looked where you referr
 what went wrong. If they did not look at an object that matters, refer to it again with certainty `high`."""
 
 Format = Literal["anthropic", "openai", "openai-chat"]
-"""Of Anthropic's Messages API, OpenAI's Responses API, or the Chat Completions API, which many others speak, too."""
+"""Forms for Anthropic's Messages API, OpenAI's Responses API, and the Chat Completions API of many others."""
 Expects = Literal["reply", "action"]
 Certainty = Literal["normal", "high"]
 
@@ -71,12 +72,15 @@ class Gesture(Struct, frozen=True, kw_only=True, omit_defaults=True, forbid_unkn
 
 
 Part = Say | Refer | Look | Gesture
-"""Which it is, its first key says."""
+"""Part of a turn. Its first key says which kind it is."""
 PARTS: tuple[type[Part], ...] = get_args(Part)
 
 
 class ToolInput(Struct, frozen=True, kw_only=True, omit_defaults=True, forbid_unknown_fields=True):
-    """What the model writes. parts: each is a `Part`, which a tagless union cannot say."""
+    """Input of the tool, as the model writes it.
+
+    parts: each is a `Part`, which msgspec can't express without tags.
+    """
 
     turn_status: Annotated[
         TurnStatus,
@@ -126,8 +130,8 @@ def tool_definition(format: Format = "anthropic", world: World | None = None) ->
     OpenAI's are strict (every field required, null where it may be left out); to have Anthropic's so, add
     `"strict": true`.
 
-    format: of Anthropic's Messages API, OpenAI's Responses API, or the Chat Completions API, which others speak, too.
-    world: its objects and people are the only ids allowed; None: any.
+    format: for Anthropic's Messages API, OpenAI's Responses API, or the Chat Completions API of many others.
+    world: only the ids of its objects and people are allowed; None: any.
     """
     if format == "anthropic":
         return {"name": NAME, "description": DESCRIPTION, "input_schema": input_schema(world)}
@@ -138,7 +142,7 @@ def tool_definition(format: Format = "anthropic", world: World | None = None) ->
 
 
 def input_schema(world: World | None = None) -> Schema:
-    """The JSON Schema of `ToolInput`. Whatever it allows, `schemas/tool_call.py` decodes."""
+    """JSON Schema of `ToolInput`. Every input that it allows is decoded by `schemas/tool_call.py`."""
     parts = [_schema_of(kind) for kind in PARTS]
     whole = _schema_of(ToolInput)
     whole["properties"]["parts"]["items"] = {"anyOf": parts}
@@ -152,7 +156,7 @@ def input_schema(world: World | None = None) -> Schema:
 
 
 def _schema_of(kind: type[Struct]) -> Schema:
-    """Of one struct: closed, without titles and defaults; what a description says need not be said twice."""
+    """Schema of one struct: closed, without titles and defaults, which the descriptions tell."""
     _, components = msgspec.json.schema_components((kind,))
     (component,) = components.values()
     properties = {name: _stripped(each) for name, each in component["properties"].items()}
@@ -184,7 +188,7 @@ def _inventory(world: World) -> str:
 
 
 def _looks(thing: Entity) -> str:
-    """What perception knows of it, unless its id says so already."""
+    """Looks of an object in words, as perception knows them; empty if its id says all of it."""
     noun = thing.category or ("" if thing.shape else thing.name)
     words = [thing.size, thing.color, *thing.features, thing.shape, noun]
     said = thing.id.lower()
@@ -192,7 +196,7 @@ def _looks(thing: Entity) -> str:
 
 
 def _all_required(schema: Schema) -> Schema:
-    """The same for OpenAI's strict functions: what may be left out is null instead."""
+    """Change a schema for OpenAI's strict functions: an optional key is required, and may be null."""
     if "anyOf" in schema:
         return {**schema, "anyOf": [_all_required(each) for each in schema["anyOf"]]}
     if "items" in schema:

@@ -1,6 +1,6 @@
-"""From the input of the tool `perform_turn_fragment` (schemas/tool.py) to the turn fragment that it means.
+"""Reading of the tool `perform_turn_fragment` (schemas/tool.py): from its input to a turn fragment.
 
-Whatever is wrong is refused with its JSON path, so that the model can correct itself.
+Bad input is refused with its JSON path, so that the model can correct itself.
 """
 
 import re
@@ -28,30 +28,31 @@ from engage_hri.schemas.tool import PARTS, Certainty, Expects, Gesture, Look, Pa
 from engage_hri.schemas.units import Probability
 
 RELIABILITY: dict[Certainty, Probability | None] = {"normal": None, "high": 0.95}
-"""The minimum for a reference: generation's default, or that of the pieces to be moved in the thesis' Appendix B."""
+"""Minimum reliability of a reference: generation's default, or that of the pieces to be moved in thesis Appendix
+B."""
 ANSWERS: dict[Expects, tuple[Action, ...]] = {"reply": (), "action": ("act", "speak", "nod", "shake")}
-"""What answers the turn; empty: recognition's default."""
+"""Actions that answer the turn; empty: recognition's default."""
 DEMONSTRATIVES = ("this", "that")
-"""A phrase that begins so means nothing without a point."""
+"""First words of phrases that need a pointing gesture."""
 
 _BEHAVIOR = re.compile(r"\$\.behaviors\[(?P<index>\d+)\](?:\.options\[(?P<option>\d+)\])?[\w.\[\]]*")
 _KINDS = {kind.__struct_fields__[0]: kind for kind in PARTS}
 
 
 def is_tool_input(parsed: dict[str, Any]) -> bool:
-    """Rather than a turn fragment or a block?"""
+    """Tell whether decoded JSON is a tool input, and no turn fragment or block."""
     return "parts" in parsed and "behaviors" not in parsed
 
 
 def from_tool(parsed: dict[str, Any], id: str, source: str = "", path: str = "$") -> TurnFragment:
-    """The fragment, called `id`, of a decoded tool input. Raises InputRefused with source, JSON path and advice."""
+    """Make a fragment from a decoded tool input. Raises InputRefused with source, JSON path and advice."""
     call = _converted(parsed, ToolInput, source, path)
     parts = [_part(raw, source, f"{path}.parts[{index}]") for index, raw in enumerate(call.parts)]
     return replace(fragment_of(parts, replace(call, parts=()), id), from_parts=True)
 
 
 def in_call(where: str, fragment: TurnFragment) -> str:
-    """A place in a fragment as whoever wrote it knows it: of a tool call the part instead of the behavior."""
+    """Translate a JSON path in a fragment to that of the author: in a tool call the part instead of the behavior."""
     return _BEHAVIOR.sub(lambda found: _part_of(found, fragment), where) if fragment.from_parts else where
 
 
@@ -63,20 +64,20 @@ def _part_of(found: re.Match[str], fragment: TurnFragment) -> str:
 
 
 def fragment_of(parts: Iterable[Part], turn: ToolInput, id: str) -> TurnFragment:
-    """Says and does the parts in this order. turn: everything but its own parts.
+    """Make a fragment that says and does `parts` in this order. turn: gives everything else; its parts are ignored.
 
-    A behavior is called after its part: `say-1`, `refer-2`.
+    A behavior is named after its part: `say-1`, `refer-2`.
     """
     behaviors: list[FragmentBehavior] = []
     order: list[Constraint] = []
     before = ""
     for number, part in enumerate(parts, start=1):
-        behavior, over = _behavior(part, number)
+        behavior, resume = _behavior(part, number)
         if before:
             after = After(ref=before, syncs=(f"{behavior.id}:start",))
             order.append(Constraint(id=f"order-{number}", operators=(after,)))
         behaviors.append(behavior)
-        before = f"{behavior.id}:{over}" if over else before
+        before = f"{behavior.id}:{resume}" if resume else before
     return TurnFragment(
         id=id,
         turn_status=turn.turn_status,
@@ -90,7 +91,7 @@ def fragment_of(parts: Iterable[Part], turn: ToolInput, id: str) -> TurnFragment
 
 
 def _behavior(part: Part, number: int) -> tuple[FragmentBehavior, str]:
-    """And the sync point from which on the next one may start; empty: at once."""
+    """Behavior of a part, and its sync point at which the next behavior may start; empty: at once."""
     match part:
         case Say(say=text):
             return Speech(id=f"say-{number}", text=" ".join(text.split())), "end"
@@ -125,7 +126,7 @@ def _part(raw: dict[str, Any], source: str, path: str) -> Part:
 
 
 def _converted(raw: dict[str, Any], kind: type[Any], source: str, path: str) -> Any:
-    """Null stands for what is left out."""
+    """Decode a struct; a key with null counts as left out. Raises InputRefused with the JSON path and an advice."""
     given = {key: value for key, value in raw.items() if value is not None}
     try:
         return msgspec.convert(given, kind)
@@ -138,7 +139,7 @@ def _converted(raw: dict[str, Any], kind: type[Any], source: str, path: str) -> 
 
 
 def _allowed(field: str, kind: type[Any]) -> str:
-    """The values of a field that has only a few."""
+    """Advice that lists the values of a field, if it has only a few."""
     values = [str(value) for value in get_args(get_type_hints(kind).get(field)) if isinstance(value, str | int)]
     return f"one of {', '.join(values)}" if values else "see `engage tool`"
 

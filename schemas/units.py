@@ -1,4 +1,4 @@
-"""Quantities with their units in the type, and instants that say whose clock they were read from."""
+"""Quantities with their units in the type, and instants that name their clock."""
 
 from typing import Annotated
 
@@ -7,14 +7,14 @@ from msgspec import Meta, Struct
 Seconds = Annotated[float, Meta(description="seconds")]
 A_DAY = 86_400.0
 Duration = Annotated[float, Meta(ge=0, le=A_DAY, description="seconds")]
-"""Of what takes its time in the world."""
+"""Seconds that something takes: 0 to one day."""
 Radians = Annotated[float, Meta(description="radians")]
 Degrees = Annotated[float, Meta(description="degrees")]
 Meters = Annotated[float, Meta(description="metres")]
 Probability = Annotated[float, Meta(ge=0, le=1, description="0..1")]
 
 FARTHEST = 1e6
-"""No place is farther off: with larger numbers, and with what is no number, no geometry can be done."""
+"""Metres to the farthest place; geometry fails with larger numbers, and with nan."""
 Coordinate = Annotated[float, Meta(ge=-FARTHEST, le=FARTHEST)]
 Extent = Annotated[float, Meta(ge=0, le=FARTHEST, description="metres")]
 Heading = Annotated[float, Meta(ge=-FARTHEST, le=FARTHEST, description="radians")]
@@ -27,14 +27,14 @@ A message whose vector has a part beyond `FARTHEST`, or one that is no number, i
 
 
 LATEST = 1e12
-"""Seconds: no clock tells a later instant, in some 30 000 years."""
+"""Seconds: the latest instant of any clock, in some 30 000 years."""
 
 
 class Stamp(Struct, frozen=True, array_like=True):
-    """An instant, on a named clock. Instants of different clocks compare only through `Bus.local`.
+    """An instant on a named clock. Instants of different clocks compare only through `Bus.local`.
 
-    A message with one that is not finite is refused where it is decoded: it is neither before nor after any other, so
-    whoever waits for its turn waits for ever.
+    A message with an instant that is not finite is refused where it is decoded: such an instant is neither before nor
+    after another, and waiting for it would never end.
     """
 
     clock: str

@@ -1,4 +1,4 @@
-"""Text that comes as bytes: UTF-8, or refused with the line."""
+"""Decoding of UTF-8; other bytes are refused with their line."""
 
 from engage_hri.schemas.faults import Fault, InputRefused
 
@@ -6,7 +6,7 @@ BYTE_ORDER_MARK = b"\xef\xbb\xbf"
 
 
 def utf8(data: bytes, source: str = "") -> str:
-    """The text in a file, without its byte order mark. Raises InputRefused."""
+    """Decode the bytes of a file, without their byte order mark. Raises InputRefused with the line."""
     try:
         return data.removeprefix(BYTE_ORDER_MARK).decode()
     except UnicodeDecodeError as error:
@@ -16,7 +16,7 @@ def utf8(data: bytes, source: str = "") -> str:
 
 
 def is_utf8(text: str) -> bool:
-    """Can it be written? Half a character cannot: so comes a command line that was not UTF-8."""
+    """Tell whether a text can be encoded. Half a character cannot: a command line that is not UTF-8 has such."""
     try:
         text.encode()
     except UnicodeEncodeError:

@@ -1,4 +1,4 @@
-"""The world as perception reports it: entities with places, and what they look like."""
+"""World as perception reports it: entities with their places and looks."""
 
 from typing import Literal
 
@@ -12,12 +12,12 @@ EntityKind = Literal["object", "person", "hand", "surface"]
 class Entity(Struct, frozen=True, kw_only=True, omit_defaults=True):
     """A thing or a person.
 
-    id: by which behaviors and messages name it. kind: only an `object` can be referred to, or be a distractor.
-    position: metres; of a person the face, of an object its center. yaw: radians about z.
+    id: its name in behaviors and messages. kind: only an `object` can be referred to, or be a distractor.
+    position: metres; of a person the face, of an object the center. yaw: radians about z.
     footprint: corners in the entity's own frame, metres (x, y), before turning by `yaw` about z.
-    radius: metres around `position`; 0: as the footprint says, or unknown.
-    category, size, color, shape, name, features: what phrases for it are made of; empty: unknown. Without a category,
-    its shape, its name or what its id says is the noun.
+    radius: metres around `position`; 0: that of the footprint, or unknown.
+    category, size, color, shape, name, features: words for phrases about it; empty: unknown. Without a category the
+    noun is its shape, its name, or a part of its id.
     confidence: of perception, 0..1.
     """
 
@@ -28,16 +28,16 @@ class Entity(Struct, frozen=True, kw_only=True, omit_defaults=True):
     footprint: tuple[tuple[Coordinate, Coordinate], ...] = ()
     radius: Extent = 0.0
     category: str = ""
-    """What it is, a noun: `cup`. Without one its shape is the noun: `square`."""
+    """A noun: `cup`. Without one its shape is the noun: `square`."""
     color: str = ""
     shape: str = ""
     size: str = ""
-    """`big`, `small`. Empty: as its footprint or radius compares with others of its kind."""
+    """`big`, `small`. Empty: found by comparing its footprint or radius with others of its kind."""
     features: tuple[str, ...] = ()
-    """All else that sets it apart, as adjectives: `striped`, `wooden`. What is not listed does not hold."""
+    """Other adjectives: `striped`, `wooden`. An adjective that is not listed is not true of it."""
     name: str = ""
     owner: str = ""
-    """Of a hand: the person."""
+    """Id of the person, if it is a hand."""
     velocity: Vector = (0.0, 0.0, 0.0)
     """m/s"""
     confidence: Probability = 1.0
@@ -46,14 +46,14 @@ class Entity(Struct, frozen=True, kw_only=True, omit_defaults=True):
 class World(Struct, frozen=True, kw_only=True, tag="world", omit_defaults=True):
     """state: perception. The whole world each time it changes.
 
-    entities: all that is there. at: when it was so; None in a file.
+    entities: everything that is there. at: the instant of the report; None in a file.
     """
 
     entities: tuple[Entity, ...]
     at: Stamp | None = None
 
     def entity(self, id: str) -> Entity | None:
-        """Find the entity of this id; None if there is none.
+        """Find the entity with this id; None if there is none.
 
         id: of an object, a person, a hand or a surface.
         """
@@ -66,5 +66,5 @@ class World(Struct, frozen=True, kw_only=True, tag="world", omit_defaults=True):
 
     @property
     def people(self) -> tuple[Entity, ...]:
-        """The people who are there."""
+        """The people in the world."""
         return tuple(entity for entity in self.entities if entity.kind == "person")

@@ -1,4 +1,4 @@
-"""`engage`, and `python -m engage_hri`: the way in. It loads next to nothing before it has seen to signals."""
+"""Entry of `engage` and `python -m engage_hri`. It sees to signals before it loads anything large."""
 
 import os
 import signal
@@ -7,7 +7,7 @@ import sys
 
 def main(arguments: list[str] | None = None) -> None:
     """Run a command of `services/commandline/app.py`."""
-    # Loading takes half a second. A KeyboardInterrupt in it is a traceback, or lost in somebody's callback; nothing
+    # Loading takes half a second. A KeyboardInterrupt during it would be a traceback, or lost in a callback. Nothing
     # has begun yet, so leaving at once is orderly. `services/commandline/process.py` takes over when something runs.
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda number, frame: os._exit(128 + number))

@@ -1,1 +1,1 @@
-"""What people write and read: blocks, fragments and feedback, as XML in three dialects and as JSON."""
+"""Documents of people: blocks, fragments and feedback, as XML in three dialects and as JSON."""

@@ -1,6 +1,6 @@
-"""A block in another dialect, and without our extension: for realizers that know BML 1.0 and nothing else.
+"""Translation of a block to another dialect, with or without our extension: for realizers that know only BML 1.0.
 
-What is respelled means the same, point for point: `tests/conformance` plans both to the same net.
+The translated block means the same, point for point: `tests/conformance` plans both to the same net.
 """
 
 from collections.abc import Callable, Collection, Iterator, Mapping
@@ -14,12 +14,12 @@ from engage_hri.schemas.references import in_draft_spelling, respelled, sites
 from engage_hri.schemas.syncref import BLOCK_ITSELF, SYNC_POINTS, SyncRef
 
 EXTENSIONS = tuple([row.kind for row in ROWS if not row.is_standard])
-"""What no other realizer knows."""
+"""Behaviors that no other realizer knows."""
 Operator = Synchronize | Before | After
 
 
 def core(block: Block) -> Block:
-    """Without connection events, turn signals and what else is not BML's: what was tied to them no longer is."""
+    """Remove connection events, turn signals and all else that is not BML, with every constraint to them."""
     removed = {behavior.id for behavior in block.behaviors if isinstance(behavior, EXTENSIONS)}
 
     def stays(reference: str) -> bool:
@@ -34,7 +34,8 @@ def core(block: Block) -> Block:
     remaining = (replace(each, operators=tuple(_remaining(each.operators, stays))) for each in block.constraints)
     constraints = tuple(each for each in remaining if each.operators)
     made = replace(block, behaviors=behaviors, constraints=constraints)
-    # What nobody mentions waits for the one before it of its type; what only an event mentioned must not.
+    # A behavior without any constraint waits for the one before it of its type. One that had constraints, but only to
+    # removed behaviors, must not: it is tied to the block's start.
     before, after = _mentioned(block), _mentioned(made)
     freed = [behavior.id for behavior in behaviors if behavior.id in before - after]
     if not freed:
@@ -44,7 +45,7 @@ def core(block: Block) -> Block:
 
 
 def _mentioned(block: Block) -> set[str]:
-    """Behaviors of which a point is timed or named."""
+    """Ids of the behaviors with inline timing, and of those that a reference names."""
     timed = {behavior.id for behavior in block.behaviors if behavior.timing}
     named = (SyncRef.parse(site.text) for site in sites(block))
     return timed | {reference.behavior for reference in named if reference.block in ("", block.id)}
@@ -62,11 +63,11 @@ def _remaining(operators: Collection[Operator], stays: Callable[[str], bool]) ->
             yield replace(operator, syncs=left[1:])
 
 
-def spelled(block: Block, dialect: Dialect, elsewhere: Mapping[str, Block] | None = None) -> Block:
-    """The block as `dialect` writes it. elsewhere: other blocks that it refers to, by id, however they are spelled.
+def in_dialect(block: Block, dialect: Dialect, elsewhere: Mapping[str, Block] | None = None) -> Block:
+    """Translate a block to `dialect`. elsewhere: other blocks that it refers to, by id, in any dialect.
 
-    In BML 1.0 a gaze knows no `stroke_start`, and a synchronize has no `ref`: points are called by the name of their
-    instant, and what is then timed twice becomes a constraint.
+    In BML 1.0 a gaze has no `stroke_start`, and a synchronize has no `ref`: a missing point gets the name of another
+    of the same instant, and if that is timed already, a constraint takes the place of the inline timing.
     """
     draft = replace(in_draft_spelling(block, block.dialect, elsewhere), dialect="draft")
     if dialect == "draft":
@@ -90,7 +91,7 @@ def _bml_1_0(sync: str, type: str) -> str:
 
 
 def _inline(behavior: Behavior) -> tuple[Timing, ...]:
-    """The timing that can stand in the behavior, each point once; that of marks last, as it is written there."""
+    """Timing that can stand in the behavior itself: each point once, marks last, in their written order."""
     once = {timing.sync: timing for timing in reversed(behavior.timing)}
     order = [mark.id for mark in behavior.marks] if isinstance(behavior, Speech) else []
     kept = (timing for timing in behavior.timing if once[timing.sync] is timing)
@@ -98,7 +99,7 @@ def _inline(behavior: Behavior) -> tuple[Timing, ...]:
 
 
 def _ties(behavior: Behavior) -> Iterator[Constraint]:
-    """The rest of the timing: a point that BML 1.0 calls by the name of another is timed twice."""
+    """Constraints for the rest of the timing, of points that are timed twice under one name of BML 1.0."""
     inline = _inline(behavior)
     for timing in behavior.timing:
         if not any(timing is each for each in inline):

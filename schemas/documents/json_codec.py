@@ -1,6 +1,7 @@
-"""Blocks and fragments from JSON, and back; and `read`, which takes XML, too. Errors carry the JSON path.
+"""Blocks and fragments from JSON, and back; `read` takes XML as well. Errors carry the JSON path.
 
-The form is that of the structs, as in the exported schemas, or what a language model writes (schemas/tool.py).
+The form is that of the structs, as in the exported schemas, or that of a language model's tool call
+(schemas/tool.py).
 Unknown keys are refused: a misspelled `turn_status` must not silently become a full turn.
 """
 
@@ -12,7 +13,7 @@ import msgspec
 from msgspec import Struct
 
 from engage_hri.schemas.blocks import Block
-from engage_hri.schemas.check import sound
+from engage_hri.schemas.check import validated
 from engage_hri.schemas.documents.xml_decode import decode_xml
 from engage_hri.schemas.documents.xml_grammar import snake
 from engage_hri.schemas.documents.xml_source import LARGEST
@@ -33,18 +34,18 @@ def encode_json(thing: Block | TurnFragment) -> bytes:
 
 
 def decode_json(data: bytes | str, source: str = "", unnamed: str = UNNAMED) -> Block | TurnFragment:
-    """One block or fragment. Raises InputRefused with source, JSON path, reason and advice.
+    """Read one block or fragment. Raises InputRefused with source, JSON path, reason and advice.
 
     Without `type` it is a fragment if it has a field that only fragments have, or holds a reference.
-    unnamed: the id of a language model's, which has none.
+    unnamed: the id for a language model's tool call, which has none.
     """
     return _thing(_parsed(data, source), source, "$", unnamed)
 
 
 def read(data: bytes, source: str = "", unnamed: str = UNNAMED) -> tuple[Block | TurnFragment, ...]:
-    """Everything in a file: one XML document, one JSON object, or a JSON array of several. Raises InputRefused.
+    """Read a file: one XML document, one JSON object, or a JSON array of several. Raises InputRefused.
 
-    unnamed: the id of a language model's fragment, which has none; of several `<unnamed>-1`, `<unnamed>-2`...
+    unnamed: the id for a language model's tool call, which has none; of several `<unnamed>-1`, `<unnamed>-2`...
     """
     start = data[:64].removeprefix(BYTE_ORDER_MARK).lstrip()
     if start.startswith((b"<", b"\0<", *_UTF_16)):
@@ -62,14 +63,14 @@ def _parsed(data: bytes | str, source: str) -> Any:
     if len(data) > LARGEST:
         reason = f"{len(data)} bytes; at most {LARGEST} are read"
         raise InputRefused(Fault(reason=reason, where=source, advice="split it into several blocks"))
-    # msgspec, too, refuses what is not UTF-8, but as another error, and it does not say where.
+    # msgspec refuses text that is not UTF-8 as well, but as another error, and without the place.
     text = utf8(data, source) if isinstance(data, bytes) else data.removeprefix("\ufeff")
     if not is_utf8(text):
         raise InputRefused(Fault(reason="half a character (a surrogate without its other half)", where=source))
     raw = text.encode()
     try:
         parsed = msgspec.json.decode(raw)
-        # Of a key that stands twice msgspec silently keeps the last: half of what was meant would be performed.
+        # msgspec silently keeps the last of two equal keys: half of the document would be performed.
         json.loads(raw, object_pairs_hook=_each_once, parse_int=str, parse_float=str)
         return parsed
     except RecursionError as error:
@@ -92,15 +93,9 @@ def _each_once(pairs: list[tuple[str, Any]]) -> None:
 
 
 def _line(raw: bytes, error: msgspec.DecodeError) -> int:
-    """Where it is: by its byte, or at the end where the document just stops; 0 where msgspec doesn't say."""
-    if "truncated" in str(error):
-        end = len(raw)
-    else:
-        byte = str(error).rpartition("(byte ")[2].rstrip(")")
-        if not byte.isdigit():
-            return 0
-        end = int(byte)
-    return raw.count(b"\n", 0, end) + 1
+    """Line of an error: that of the byte which msgspec names, or the last one of a truncated document; else 0."""
+    byte = str(len(raw)) if "truncated" in str(error) else str(error).rpartition("(byte ")[2].rstrip(")")
+    return raw.count(b"\n", 0, int(byte)) + 1 if byte.isdigit() else 0
 
 
 def _thing(parsed: Any, source: str, path: str, unnamed: str) -> Block | TurnFragment:
@@ -110,9 +105,9 @@ def _thing(parsed: Any, source: str, path: str, unnamed: str) -> Block | TurnFra
         return from_tool(parsed, unnamed, source, path)
     kind = parsed.get("type") or ("fragment" if _looks_like_fragment(parsed) else "block")
     if kind == "fragment":
-        return _blamed(parsed, TurnFragment, source, path)
+        return _converted(parsed, TurnFragment, source, path)
     if kind == "block":
-        return _blamed(parsed, Block, source, path)
+        return _converted(parsed, Block, source, path)
     raise _refusal(f"unknown type {kind!r}", f"{path}.type", source, 'use "fragment" or "block"')
 
 
@@ -124,16 +119,16 @@ def _looks_like_fragment(parsed: dict[str, Any]) -> bool:
     return refers or not _FRAGMENT_ONLY.isdisjoint(map(snake, parsed))
 
 
-def _blamed(parsed: dict[str, Any], kind: type[T], source: str, path: str) -> T:
-    """A refusal knows whose it is."""
+def _converted(parsed: dict[str, Any], kind: type[T], source: str, path: str) -> T:
+    """Make the struct. Raises InputRefused that names the block or fragment, if its id can be read."""
     try:
-        return _converted(parsed, kind, source, path)
+        return _struct(parsed, kind, source, path)
     except InputRefused as error:
         id = parsed.get("id")
         raise InputRefused(error.fault, id if isinstance(id, str) and id else None) from error
 
 
-def _converted(parsed: dict[str, Any], kind: type[T], source: str, path: str) -> T:
+def _struct(parsed: dict[str, Any], kind: type[T], source: str, path: str) -> T:
     try:
         thing = msgspec.convert({**parsed, "type": kind.__struct_config__.tag}, kind)
     except msgspec.ValidationError as error:
@@ -142,7 +137,7 @@ def _converted(parsed: dict[str, Any], kind: type[T], source: str, path: str) ->
     except RecursionError as error:
         raise _refusal("nested too deep", path, source) from error
     _refuse_unknown_keys(parsed, thing, path, source)
-    return sound(thing, source, prefix=path, paths=True)
+    return validated(thing, source, prefix=path, paths=True)
 
 
 def _refuse_unknown_keys(parsed: Any, decoded: Any, path: str, source: str) -> None:

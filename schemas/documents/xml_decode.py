@@ -1,14 +1,13 @@
-"""BML blocks and EBML turn fragments from XML, in every dialect, and back. Errors say which line and what to do.
+"""Reading of BML blocks and EBML turn fragments in XML, in every dialect. Errors have the line and an advice.
 
-Dialects: the thesis' draft (namespace `org.mindmakers.bml`), the same without a namespace, BML 1.0. Turn
-fragments are an `ebml:ebml` (namespace `edu.wpi.ebml`) around the elements of any of these. What other
-namespaces hold is ignored. Two spellings of one block decode to equal structs, but for their `dialect` and the
-names of sync points, which stay as written (`canonical_sync` of schemas/syncref.py); in fragments they are those
-of the draft.
+Dialects: the thesis' draft (namespace `org.mindmakers.bml`), the same without a namespace, BML 1.0. A turn fragment
+is an `ebml:ebml` (namespace `edu.wpi.ebml`) around the elements of any of these. Elements of other namespaces are
+ignored. One block in two dialects is decoded to equal structs, but for `dialect` and the names of sync points, which
+stay as written (see `canonical_sync` of schemas/behavior_types.py); in fragments they are those of the draft.
 
-A block is read leniently: what is unknown in it is left out and noted in `Block.unread`, an unknown behavior
-becomes `Unknown`; the realizer warns of both. A fragment is read strictly: it is a program's, not an author's. What
-stands behind a reference in it is speech: `<ebml:reference .../>, and then`.
+Blocks are written by people, and read leniently: an unknown part is left out and noted in `Block.unread`, an unknown
+behavior becomes `Unknown`; the realizer warns of both. Fragments are written by programs, and read strictly. Text
+behind a reference in a fragment is speech: `<ebml:reference .../>, and then`.
 """
 
 import re
@@ -33,9 +32,9 @@ from engage_hri.schemas.documents.xml_source import (
     EBML,
     Source,
     attributes,
+    bml_children,
+    children_named,
     local_name,
-    named,
-    ours,
     split,
 )  # fmt: skip
 from engage_hri.schemas.documents.xml_speech import MARKS, spoken
@@ -47,11 +46,11 @@ from engage_hri.schemas.syncref import SyncRef
 __all__ = ["decode_xml", "encode_xml"]
 
 _STRAY = "{urn:engage}stray"
-"""The tag of elements that are about to be taken out."""
+"""Tag of the elements that are about to be removed."""
 
 
 def decode_xml(data: bytes | str, source: str = "") -> Block | TurnFragment:
-    """The block or fragment in `data`. Raises InputRefused with `source`, line, reason and advice."""
+    """Read a block or fragment. Raises InputRefused with `source`, line, reason and advice."""
     document = _Document(Source(data, source))
     thing = document.read()
     check(thing, source, line=document.line)
@@ -59,6 +58,8 @@ def decode_xml(data: bytes | str, source: str = "") -> Block | TurnFragment:
 
 
 class _Document:
+    """Reader of one document, with the behaviors, constraints and notes that it has found so far."""
+
     def __init__(self, source: Source) -> None:
         self._source = source
         self._speaks_1_0 = False
@@ -104,12 +105,19 @@ class _Document:
         raise self._source.refusal(f"<{local_name(element)}> has no id", element, advice='add id="..."')
 
     def _leave_out(
-        self, reason: str, element: etree._Element, behavior: str = "", *, required: bool = False, advice: str = ""
+        self,
+        reason: str,
+        element: etree._Element,
+        behavior: str = "",
+        *,
+        required: bool = False,
+        advice: str = "",
+        kind: WarningKind = "PARSING_FAILURE",
     ) -> None:
-        """Note what is not understood. Raises InputRefused where nothing may be left out."""
+        """Note a part that is not understood. Raises InputRefused in a fragment, and for a required part."""
         if self._is_strict or required:
             raise self._source.refusal(reason, element, advice=advice)
-        self._note(reason, element, behavior)
+        self._note(reason, element, behavior, kind)
 
     def _note(
         self, reason: str, element: etree._Element, behavior: str = "", kind: WarningKind = "PARSING_FAILURE"
@@ -120,7 +128,7 @@ class _Document:
     def _note_attributes(
         self, element: etree._Element, behavior: str = "", kind: type[of.Behavior] | None = None
     ) -> list[of.Timing]:
-        """Note the attributes that nobody reads. kind: of a behavior; there what names a sync point is timing."""
+        """Note unknown attributes. kind: of a behavior, in which an attribute that names a sync point is timing."""
         plain, local = attributes(element), local_name(element)
         timing = []
         for name in grammar.unknown_attributes(plain, local, kind):
@@ -131,11 +139,11 @@ class _Document:
         return timing
 
     def _walk(self, parent: etree._Element, *, required: bool) -> None:
-        """Read what a document, or a <required> in it, holds."""
+        """Read the content of a document, or of a <required> in it."""
         texts = [parent.text, *(child.tail for child in parent if not self._speaks_on(child))]
         if words := " ".join(text.strip() for text in texts if text and text.strip()):
             self._note(f"text {words[:40]!r} outside of speech", parent)
-        for element, namespace, local in ours(parent):
+        for element, namespace, local in bml_children(parent):
             self._speaks_1_0 |= namespace == BML_1_0
             if local in ("description", "participant"):
                 continue
@@ -152,16 +160,14 @@ class _Document:
                 if self._speaks_on(element) and (words := " ".join((element.tail or "").split())):
                     self._behaviors.append(self._after_reference(element, words, required))
             elif self._is_strict or not element.get("id"):
-                reason = f"unknown element <{local}>"
-                if self._is_strict or required:
-                    advice = f"known: {', '.join(grammar.STANDARD)}, constraint"
-                    raise self._source.refusal(reason, element, advice=advice)
-                self._note(reason, element, kind="BEHAVIOR_TYPE_NOT_SUPPORTED")
+                advice = f"known: {', '.join(grammar.STANDARD)}, constraint"
+                kind: WarningKind = "BEHAVIOR_TYPE_NOT_SUPPORTED"
+                self._leave_out(f"unknown element <{local}>", element, required=required, advice=advice, kind=kind)
             else:
                 self._behaviors.append(self._unknown(element, local, required))
 
     def _speaks_on(self, element: etree._Element) -> bool:
-        """Is the text behind it said? A comma or a full stop belongs to the phrase; it is no speech by itself."""
+        """Tell whether the text behind an element is speech, as it is behind a reference in a fragment."""
         namespace, local = split(str(element.tag))
         return self._is_strict and local == "reference" and namespace in ("", EBML)
 
@@ -193,7 +199,7 @@ class _Document:
             if name in plain and not raw.get(field) and (local, plain[name].upper()) != ("head", "ROTATION"):
                 raw[field] = plain[name].upper()
         if local == "emit":
-            said = ((child.text or child.get("id") or "").strip() for child in named(element, "event"))
+            said = ((child.text or child.get("id") or "").strip() for child in children_named(element, "event"))
             raw.setdefault("event", next(said, None))
         if local == "reference":
             raw["options"] = self._options(element, raw)
@@ -207,7 +213,7 @@ class _Document:
         said = spoken(self._source, element, raw["id"])
         raw["text"], raw["marks"] = said.text, said.marks
         raw["markup"] = said.markup or raw.get("markup", "")
-        children = list(ours(element))
+        children = list(bml_children(element))
         has_text = any(name == "text" for _, _, name in children)
         for child, _, name in children:
             if name == "text":
@@ -217,7 +223,7 @@ class _Document:
         return [*_ties(element), *said.timing]
 
     def _leave_out_strays(self, speech: etree._Element, id: str) -> None:
-        """Behaviors are neither words nor markup for the voice, and marks are empty."""
+        """Leave out elements that a <speech> cannot hold: other behaviors, and anything inside a mark."""
         for stray in list(grammar.behaviors_inside(speech, is_strict=self._is_strict)):
             local = local_name(stray)
             advice = f'put it beside the speech; a mark says when: start="{id}:m1"'
@@ -229,9 +235,9 @@ class _Document:
                 self._only(each, id)
 
     def _parts(self, element: etree._Element, local: str, raw: dict[str, Any]) -> None:
-        """Read what stands inside a face, which is one expression, or a posture, which has one of each."""
+        """Read the elements inside a face (one expression) or a posture (one element of each kind)."""
         family, seen = TYPES[local].family, set()
-        for child, _, name in ours(element):
+        for child, _, name in bml_children(element):
             if name not in grammar.PARTS.keys() & grammar.CHILDREN.get(local, ()):
                 continue
             sort = "expression" if family == "face" else f"<{name}>"
@@ -246,10 +252,10 @@ class _Document:
                     raw[field] = child.get(each, "")
 
     def _options(self, element: etree._Element, raw: dict[str, Any]) -> list[of.SpeechOption] | None:
-        """None where the author leaves the phrases to generation."""
+        """Phrases of a reference; None if the author leaves them to generation."""
         options = [
             self._converted(child, self._own_fields(child, of.SpeechOption), of.SpeechOption)
-            for child in named(element, "speechOption")
+            for child in children_named(element, "speechOption")
         ]
         if not _says_yes(raw.pop("propose", "")):
             return options
@@ -261,7 +267,7 @@ class _Document:
         self._note_attributes(element)
         required = required or _says_yes(fields(attributes(element)).get("required"))
         operators = []
-        for child, _, local in ours(element):
+        for child, _, local in bml_children(element):
             if local == "description":
                 continue
             if local not in grammar.OPERATORS:
@@ -271,7 +277,7 @@ class _Document:
                 continue
             self._only(child)
             self._note_attributes(child)
-            for sync in named(child, "sync"):
+            for sync in children_named(child, "sync"):
                 if "ref" not in sync.attrib:
                     raise self._source.refusal("<sync> without ref", sync, advice='<sync ref="behavior:sync"/>')
                 self._note_attributes(sync)
@@ -280,7 +286,7 @@ class _Document:
         return self._converted(element, raw, of.Constraint)
 
     def _own_fields(self, element: etree._Element, kind: type[msgspec.Struct]) -> dict[str, Any]:
-        """Of an EBML element, whose every attribute we know. Raises InputRefused for one that we don't."""
+        """Read the attributes of an EBML element as fields. Raises InputRefused for an unknown attribute."""
         plain = attributes(element)
         raw = fields({name: value for name, value in plain.items() if name not in grammar.SYNC_ATTRIBUTES})
         known = {*kind.__struct_fields__, "character_id", "propose" if kind is of.Reference else "id"}
@@ -291,14 +297,14 @@ class _Document:
         return raw
 
     def _only(self, element: etree._Element, behavior: str = "") -> None:
-        """Note what the element, or one in it, can't hold. Raises InputRefused in a fragment."""
+        """Note the elements inside this one that stand in the wrong place. Raises InputRefused in a fragment."""
         for child, name, holder in grammar.misplaced(element):
             known = ", ".join(sorted(grammar.CHILDREN.get(holder, ()))) or "nothing"
             advice = f"<{holder}> holds {known}: put <{name}> beside it"
             self._leave_out(f"unknown element <{name}> in <{holder}>", child, behavior, advice=advice)
 
     def _converted(self, element: etree._Element, raw: Mapping[str, Any], kind: type[AnyStruct]) -> AnyStruct:
-        """The struct of an element. Raises InputRefused with the attribute that is wrong. raw: None is not given."""
+        """Make the struct of an element. Raises InputRefused with the bad attribute. raw: None: not given."""
         try:
             lines = {"line": self._source.line(element)}
             return grammar.converted({**raw, **grammar.lists(element, kind), **lines}, kind)
@@ -318,7 +324,7 @@ def _ties(element: etree._Element) -> list[of.Timing]:
 
 
 def _is_reference(value: str) -> bool:
-    """Does the value of an attribute name a sync point of a behavior, so that it can only be meant as timing?"""
+    """Tell whether an attribute's value names a sync point of a behavior, and so is meant as timing."""
     with suppress(ValueError):
         return SyncRef.parse(value).behavior != ""
     return False

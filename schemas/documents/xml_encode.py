@@ -1,6 +1,6 @@
-"""Blocks and fragments as XML: the thesis' dialect, or BML 1.0 for a block written in it.
+"""Writing of blocks and fragments as XML: in the thesis' dialect, or in BML 1.0 for a block of that dialect.
 
-What is written decodes to the equal struct, but for `line`.
+Reading the document gives an equal struct again, but for `line`.
 """
 
 from collections.abc import Sequence
@@ -20,13 +20,13 @@ from engage_hri.schemas.fragments import TurnFragment
 from engage_hri.schemas.references import type_name
 
 _ELSEWHERE = ("id", "required", "markup")
-"""Attributes that are written by themselves: `required` is an element around the others."""
+"""Fields that are written apart: `required`, for example, is an element around the others."""
 _ALWAYS = ("turn_index", "turn_status")
-"""Attributes that are written even at their default."""
+"""Fields that are written even at their default."""
 
 
 def encode_xml(thing: Block | TurnFragment) -> bytes:
-    """The XML document, UTF-8. Raises InputRefused for text that XML can't hold (control characters)."""
+    """Write the XML document, in UTF-8. Raises InputRefused for text that XML can't hold (control characters)."""
     try:
         root = _document(thing)
     except ValueError as error:
@@ -83,7 +83,7 @@ def _behavior(root: etree._Element, namespace: str, behavior: of.Behavior) -> No
 
 
 def _nest(element: etree._Element, namespace: str, parts: Sequence[str]) -> None:
-    """Move what the parts of a face or posture say from attributes into elements; an amount is that of the whole."""
+    """Move attributes of a face or posture into the elements of its parts; the amount stays with the whole."""
     for part in parts:
         fields = {name: field for name, field in grammar.PARTS[part].items() if field != "amount"}
         said = {name: str(element.attrib.pop(field, "")) for name, field in fields.items()}
@@ -103,7 +103,7 @@ def _set_timing(element: etree._Element, timings: Sequence[of.Timing]) -> None:
 
 
 def _set_fields(element: etree._Element, thing: Struct, namespace: str) -> None:
-    """Every field that differs from its default: as an attribute, or as elements of the namespace."""
+    """Write every field that differs from its default, as an attribute or as elements of the namespace."""
     attributes = grammar.attribute_fields(type(thing))
     for field in structs.fields(thing):
         value = getattr(thing, field.name)
@@ -122,7 +122,7 @@ def _text(value: object) -> str:
 
 
 def _indent(element: etree._Element, level: int) -> None:
-    """Line breaks between elements, but none inside <text> and <description>, where white space is speech."""
+    """Put line breaks between elements, but not inside <text> and <description>, where white space is speech."""
     if len(element) == 0 or str(element.tag).endswith(("}text", "}description")):
         return
     for child in element:

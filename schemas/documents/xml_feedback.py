@@ -6,9 +6,9 @@
         <gaze id="block-1:gaze-1" start="0.0" ready="0.5"/></predictionFeedback>
     <warningFeedback id="block-1:gaze-9" type="NO_SUCH_TARGET">nobody knows it</warningFeedback>
 
-What BML has no word for (skew, source, status, who stamped the time, when a warning was given) stands in attributes
-of our own namespace. Marks of a speech are in its text: `<text><sync id="m1" ref="1.2"/></text>`. A point whose name
-can't be that of an attribute is an `ebml:point`. A stream of feedback is one `<ebml:feedback>`.
+Values without a word in BML (skew, source, status, the clock of an instant, the time of a warning) stand in
+attributes of our own namespace. Marks of a speech are in its text: `<text><sync id="m1" ref="1.2"/></text>`. A point
+with a name that no attribute can have is an `ebml:point`. A stream of feedback is one `<ebml:feedback>`.
 """
 
 import re
@@ -33,45 +33,45 @@ from engage_hri.schemas.units import Seconds, Stamp
 
 HEAD = f'<?xml version="1.0" encoding="UTF-8"?>\n<ebml:feedback xmlns:ebml="{EBML}" xmlns="{BML_1_0}">\n'
 TAIL = "</ebml:feedback>\n"
-"""What stands before and behind the elements of a stream."""
+"""Texts before and behind the elements of a stream."""
 _ATTRIBUTE = re.compile(r"(?!xml|id$|type$)[A-Za-z_][A-Za-z0-9_.-]*", re.IGNORECASE)
-_OURS = ("event", "turn", "unknown")
+_EBML_TYPES = ("event", "turn", "unknown")
 _PREFIXES: Any = {None: BML_1_0, "ebml": EBML}
 _UNWRITABLE = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 
 
-def _ours(*names: str) -> dict[str, str]:
-    """Fields whose attributes are of our namespace."""
+def _ebml(*names: str) -> dict[str, str]:
+    """Fields with their attributes, of the same name in our namespace."""
     return {name: f"{{{EBML}}}{name}" for name in names}
 
 
 class _Form(NamedTuple):
-    """How a message is one element. id: the fields that make up its id. attributes: of its other fields."""
+    """Form of a message as one element. id: fields that make up its id. attributes: of its other fields, by field."""
 
     kind: type[BlockProgress | SyncPointProgress | WarningFeedback]
     id: tuple[str, ...]
     attributes: Mapping[str, str]
 
 
-_GLOBAL_TIME = _ours("globalTime")["globalTime"]
-"""Of a warning: there BML knows no time."""
-_CLOCK = _ours("clock")["clock"]
+_GLOBAL_TIME = f"{{{EBML}}}globalTime"
+"""Attribute for the time of a warning, which BML does not know."""
+_CLOCK = f"{{{EBML}}}clock"
 _FORMS = {
     "blockProgress": _Form(
-        BlockProgress, ("block", "progress"), {"at": "globalTime", **_ours("time", "status")},
+        BlockProgress, ("block", "progress"), {"at": "globalTime", **_ebml("time", "status")},
     ),
     "syncPointProgress": _Form(
         SyncPointProgress, ("block", "behavior", "sync"),
-        {"time": "time", "at": "globalTime", **_ours("predicted", "arrived", "skew", "source")},
+        {"time": "time", "at": "globalTime", **_ebml("predicted", "arrived", "skew", "source")},
     ),
     "warningFeedback": _Form(WarningFeedback, ("block", "behavior"), {"kind": "type", "at": _GLOBAL_TIME}),
 }  # fmt: skip
-"""All but predictions."""
+"""Forms of all messages but predictions, by element."""
 _NAMES = {form.kind: name for name, form in _FORMS.items()}
 
 
 def encode_feedback(message: Feedback, *, in_stream: bool = False) -> str:
-    """One element, without the line end. in_stream: between HEAD and TAIL, which declare the namespaces."""
+    """Write a message as one element, without the line end. in_stream: HEAD declares the namespaces."""
     element = _prediction(message) if isinstance(message, PredictionFeedback) else _element(message)
     if message.character_id:
         element.set("characterId", _clean(message.character_id))
@@ -97,7 +97,7 @@ def _element(message: BlockProgress | SyncPointProgress | WarningFeedback) -> et
 
 
 def _set(element: etree._Element, name: str, value: Seconds | Stamp | str | None) -> None:
-    """An attribute, unless it is empty; of an instant also its clock."""
+    """Set an attribute, unless its value is empty; of an instant the clock as well."""
     if isinstance(value, Stamp):
         _set(element, name, float(value.seconds))
         _set(element, _CLOCK, value.clock)
@@ -115,7 +115,7 @@ def _prediction(message: PredictionFeedback) -> etree._Element:
         _set(block, _CLOCK, message.at.clock)
     for (behavior, type), points in groupby(message.points, lambda point: (point.behavior, point.type)):
         is_known = _ATTRIBUTE.fullmatch(type) is not None
-        tag = f"{{{EBML if type in _OURS else BML_1_0}}}{type}" if is_known else f"{{{EBML}}}behavior"
+        tag = f"{{{EBML if type in _EBML_TYPES else BML_1_0}}}{type}" if is_known else f"{{{EBML}}}behavior"
         child = etree.SubElement(element, tag, {"id": _clean(f"{message.block}:{behavior}")})
         for point in points:
             if type == "speech" and point.sync not in ("start", "end"):
@@ -133,12 +133,12 @@ def _number(seconds: Seconds) -> str:
 
 
 def _clean(text: str) -> str:
-    """Without what XML can't hold (control characters)."""
+    """Replace the characters that XML can't hold (control characters)."""
     return _UNWRITABLE.sub("\ufffd", text)
 
 
 def decode_feedback(data: bytes | str, source: str = "") -> tuple[Feedback, ...]:
-    """The messages of one element, or of a stream in its `<ebml:feedback>`. Raises InputRefused with the line."""
+    """Read the messages of one element, or of a stream in `<ebml:feedback>`. Raises InputRefused with the line."""
     document = Source(data, source)
     root = document.root
     elements: Iterable[etree._Element] = root if split(str(root.tag)) == (EBML, "feedback") else (root,)
@@ -189,6 +189,6 @@ def _read_prediction(element: etree._Element) -> PredictionFeedback:
 
 
 def _named(point: etree._Element) -> tuple[str, str]:
-    """A mark of a speech, or a point of our own."""
+    """Name and time of a point that is an element of its own: a mark of a speech, or an `ebml:point`."""
     name, time = ("id", "ref") if local_name(point) == "sync" else ("sync", "time")
     return str(point.attrib[name]), str(point.attrib[time])

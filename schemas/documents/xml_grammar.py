@@ -1,7 +1,7 @@
-"""The grammar of BML and EBML that the reader and the writer share: which attributes and elements each element has.
+"""Grammar of BML and EBML, shared by the reader and the writer: the attributes and elements that each element has.
 
-An attribute is called like the field of the struct that it becomes, in camelCase. So the structs of behaviors.py say
-most of the grammar, their rows in behavior_types.py the namespaces, and the tables here only the rest.
+An attribute has the name of the field that it becomes, in camelCase. So most of the grammar is in the structs of
+behaviors.py, the namespaces are in the rows of behavior_types.py, and the tables here hold only the rest.
 """
 
 import re
@@ -15,12 +15,12 @@ from lxml import etree
 
 from engage_hri.schemas import behaviors as of
 from engage_hri.schemas.behavior_types import TYPES, BehaviorType
-from engage_hri.schemas.documents.xml_source import CORE, EBML, local_name, named, ours, split
+from engage_hri.schemas.documents.xml_source import CORE, EBML, bml_children, children_named, local_name, split
 from engage_hri.schemas.syncref import SYNC_POINTS
 
 AnyStruct = TypeVar("AnyStruct", bound=msgspec.Struct)
 SYNC_ATTRIBUTES = frozenset({*SYNC_POINTS, "strokeStart", "strokeEnd", "attackPeak"})
-"""Inline sync points."""
+"""Attributes for inline timing."""
 OPERATORS: Mapping[str, type[of.Synchronize | of.Before | of.After]] = {
     "synchronize": of.Synchronize, "before": of.Before, "after": of.After,
 }  # fmt: skip
@@ -29,31 +29,31 @@ STANDARD = sorted(row.name for row in TYPES.values() if row.is_standard)
 # -- attributes ----------------------------------------------------------------------------------------------------
 
 _NAMES = {"minimum_reliability": "minReliability"}
-"""Fields whose attribute is not called like them."""
+"""Fields with an attribute of another name."""
 _CONTENT = frozenset({
     "line", "timing", "marks", "options", "objects", "anchors", "distractors", "syncs", "operators", "behaviors",
     "constraints", "dialect", "unread",
 })  # fmt: skip
-"""Fields that are no attributes: they are elements, or not the author's to say."""
+"""Fields that are no attributes: they are elements, or not set by the author."""
 DRAFTS: Mapping[str, Mapping[str, str]] = {
     "gesture": {"hand": "mode", "type": "lexeme"},
     "pointing": {"hand": "mode"},
     "head": {"rotation": "lexeme", "type": "lexeme", "action": "lexeme", "repeats": "repetition"},
     "face": {"type": "lexeme"},
 }
-"""By element: attributes of the drafts, and the field of each. They are read where the field is not given."""
+"""Further attributes of the drafts, by element, and the field of each. They count if the field is not given."""
 PARTS: Mapping[str, Mapping[str, str]] = {
     "lexeme": {"lexeme": "lexeme", "amount": "amount"},
     "facs": {"au": "au", "side": "side", "amount": "amount"},
     "stance": {"type": "stance"},
     "pose": {"part": "part", "lexeme": "lexeme"},
 }
-"""Elements inside a face or posture: their attributes, and the field of the behavior that each becomes."""
+"""Elements inside a face or posture: their attributes, and the field of the behavior for each."""
 LISTS = {
     "objects": ("object", "id"), "anchors": ("anchor", "ref"), "distractors": ("distractor", "object"),
     "syncs": ("sync", "ref"),
 }  # fmt: skip
-"""Fields that are a list of elements, and the attribute of these that is an item."""
+"""Fields that are a list of elements: the element of an item, and the attribute with its value."""
 _OTHER_ATTRIBUTES = {
     "bml": ("composition", "characterId"), "face": ("overshoot",), "sync": ("ref",),
     **dict.fromkeys(OPERATORS, ("ref",)),
@@ -62,29 +62,29 @@ _OTHER_ATTRIBUTES = {
 
 @cache
 def attribute_fields(kind: type[msgspec.Struct]) -> tuple[str, ...]:
-    """The fields of a struct that are attributes of its element."""
+    """Fields of a struct that are attributes of its element."""
     without = _CONTENT | {"text"} if kind is of.Speech else _CONTENT
     return tuple(field for field in kind.__struct_fields__ if field not in without)
 
 
 def attribute(field: str) -> str:
-    """offset_angle -> offsetAngle."""
+    """Attribute of a field: offset_angle -> offsetAngle."""
     return _NAMES.get(field) or re.sub("_([a-z])", lambda match: match[1].upper(), field)
 
 
 def snake(name: str) -> str:
-    """offsetAngle, offset-angle -> offset_angle."""
+    """Spell a name in snake case: offsetAngle, offset-angle -> offset_angle."""
     return re.sub("(?<=[a-z])([A-Z])", r"_\1", name).replace("-", "_").lower()
 
 
 @lru_cache(1024)  # authors may write what they like
 def field_of(name: str) -> str:
-    """The field that an attribute becomes."""
+    """Field that an attribute becomes."""
     return next((field for field, written in _NAMES.items() if snake(written) == snake(name)), snake(name))
 
 
 def unknown_attributes(plain: Mapping[str, str], local: str, kind: type[msgspec.Struct] | None) -> Iterator[str]:
-    """Of an element's own attributes those that nobody will read. kind: of a behavior."""
+    """Find the attributes of an element that no reader knows. kind: of the behavior, if it is one."""
     read = {"id", "type", "required", *DRAFTS.get(local, ()), *_OTHER_ATTRIBUTES.get(local, ())}
     read |= SYNC_ATTRIBUTES if kind else PARTS.get(local, {}).keys()
     for name in sorted(plain.keys() - read):
@@ -100,14 +100,14 @@ CHILDREN: Mapping[str, tuple[str, ...]] = {
     "reference": ("speechOption",), "event": ("object", "anchor"), "speechOption": ("distractor",),
     **dict.fromkeys(OPERATORS, ("sync",)),
 }  # fmt: skip
-"""What else stands in them is misplaced; in those that are not listed, everything is."""
+"""Elements that each element may hold; an element that is not listed may hold none."""
 _ANYWHERE = ("description", "timing")
 _FREE = ("description", "event")
-"""Their content is their author's affair."""
+"""Elements with any content."""
 
 
 def behavior_type(namespace: str, local: str, *, is_strict: bool) -> BehaviorType | None:
-    """The type of an element that is a behavior. is_strict: in a fragment, where our elements need no namespace."""
+    """Type of an element that is a behavior, else None. is_strict: in a fragment our elements need no namespace."""
     row = TYPES.get(local)
     if row is None or (row.is_standard and namespace in CORE):
         return row
@@ -116,9 +116,9 @@ def behavior_type(namespace: str, local: str, *, is_strict: bool) -> BehaviorTyp
 
 
 def misplaced(element: etree._Element) -> Iterator[tuple[etree._Element, str, str]]:
-    """Elements below this one that their parent cannot hold, with their own and the parent's name."""
+    """Find elements below this one that their parent cannot hold, with their own and the parent's name."""
     holder = local_name(element)
-    for child, _, name in ours(element):
+    for child, _, name in bml_children(element):
         if name not in CHILDREN.get(holder, ()) and name not in _ANYWHERE:
             yield child, name, holder
         elif name not in _FREE:
@@ -126,7 +126,7 @@ def misplaced(element: etree._Element) -> Iterator[tuple[etree._Element, str, st
 
 
 def behaviors_inside(speech: etree._Element, *, is_strict: bool) -> Iterator[etree._Element]:
-    """Behaviors and constraints below a speech, which is no place for them. is_strict: in a fragment."""
+    """Find behaviors and constraints below a speech, which is no place for them. is_strict: in a fragment."""
     for child in speech:
         namespace, local = split(str(child.tag))
         is_grouping = namespace in CORE and local in ("constraint", "required")
@@ -145,28 +145,28 @@ _SPELLED: Mapping[str, Callable[[str], Any]] = {
     "mode": lambda text: _HANDS.get(text.upper(), text.upper()),
     "side": str.upper,
 }
-"""Fields whose attribute is spelled more freely than the field."""
-_OURS_TO_SAY = ("line", "timing", "marks", "unread")
-"""Fields that no attribute sets."""
+"""Readers of attributes that may be spelled more freely than the field."""
+_NEVER_SET = ("line", "timing", "marks", "unread")
+"""Fields that no attribute can set."""
 
 
 def fields(plain: Mapping[str, str]) -> dict[str, Any]:
-    """Attributes by the names of their fields."""
+    """Rename attributes to their fields."""
     named = {field_of(name): value for name, value in plain.items()}
-    return {name: value for name, value in named.items() if name not in _OURS_TO_SAY}
+    return {name: value for name, value in named.items() if name not in _NEVER_SET}
 
 
 def lists(element: etree._Element, kind: type[msgspec.Struct]) -> dict[str, list[str]]:
-    """The fields that are elements inside the element."""
+    """Values of the fields that are lists of elements inside this one."""
     return {
-        field: [str(child.get(item, "")) for child in named(element, local)]
+        field: [str(child.get(item, "")) for child in children_named(element, local)]
         for field, (local, item) in LISTS.items()
         if field in kind.__struct_fields__
     }
 
 
 def kind_of(local: str, type: str, raw: Mapping[str, Any]) -> type[of.Behavior]:
-    """The struct of a behavior: some elements are several, by their `type` or their content."""
+    """Struct of a behavior. Some elements have several, chosen by their `type` or their content."""
     match local, type:
         case "gesture" | "pointing", "POINT":
             return of.Pointing
@@ -178,7 +178,7 @@ def kind_of(local: str, type: str, raw: Mapping[str, Any]) -> type[of.Behavior]:
 
 
 def converted(raw: Mapping[str, Any], kind: type[AnyStruct]) -> AnyStruct:
-    """The struct. Raises msgspec.ValidationError. raw: by field, texts as in XML; None is not given."""
+    """Make a struct. Raises msgspec.ValidationError. raw: texts of XML by field; None counts as not given."""
     given = {name: read for name, value in raw.items() if (read := _value(kind, name, value)) is not None}
     # BML has attributes called `type`; the struct's own says which element it is.
     return msgspec.convert({**given, "type": kind.__struct_config__.tag}, kind, strict=False)
@@ -195,7 +195,7 @@ def _decimals(kind: type[msgspec.Struct]) -> frozenset[str]:
 
 
 def _value(kind: type[msgspec.Struct], field: str, value: Any) -> Any:
-    """What an attribute says. Numbers may be written as in XML (`.5`, `+2`), which JSON does not allow."""
+    """Value of an attribute. Numbers may be written as in XML (`.5`, `+2`), which JSON does not allow."""
     if not isinstance(value, str):
         return value
     if field in _SPELLED:
@@ -207,6 +207,6 @@ def _value(kind: type[msgspec.Struct], field: str, value: Any) -> Any:
 
 
 def choices(kind: type[msgspec.Struct], field: str) -> str:
-    """The values of a field that has only a few, as advice."""
+    """Advice that lists the values of a field, if it has only a few."""
     values = [str(value) for value in get_args(_hints(kind).get(field)) if isinstance(value, str | int)]
     return f"one of {', '.join(values)}" if values else ""

@@ -1,6 +1,6 @@
-"""XML from strangers: parsed without entities, DTD, network or size surprises, each element with its line.
+"""Parsing of XML from strangers: no entities, DTD, network or surprises of size; each element with its line.
 
-lxml reports the line on which a start tag ends; people look for the line on which it begins, so tags are counted.
+lxml reports the line on which a start tag ends; people look for the one on which it begins, so tags are counted.
 """
 
 import re
@@ -16,12 +16,11 @@ DRAFT = "org.mindmakers.bml"
 BML_1_0 = "http://www.bml-initiative.org/bml/bml-1.0"
 EBML = "edu.wpi.ebml"
 BML_1_0_EXTENSIONS = "http://www.bml-initiative.org/bml/coreextensions-1.0"
-"""The standard's own: `faceFacs` stands there, though many write it in the core."""
+"""Namespace of the standard's own extensions: `faceFacs` is in it, though many write that in the core."""
 CORE = frozenset({"", DRAFT, BML_1_0, BML_1_0_EXTENSIONS})
-"""Namespaces of BML proper; elements of any other but ours are somebody else's and are left alone."""
-
-OURS = CORE | {EBML}
-
+"""Namespaces of BML proper."""
+READ = CORE | {EBML}
+"""Namespaces that are read; elements of all others are left alone."""
 LARGEST = 4 * 1024 * 1024
 """Bytes. A block of a thousand behaviors has about 200 kB."""
 DEEPEST = 64
@@ -30,32 +29,32 @@ DEEPEST = 64
 MOST_ELEMENTS = 120_000
 MOST_BEHAVIORS = 20_000
 MOST_ATTRIBUTES = 100
-"""Of one element. Nobody's has twenty, and lxml takes time quadratic in their number."""
+"""Attributes of one element. None in use has twenty, and lxml takes time quadratic in their number."""
 MOST_PREFIXES = 100
-"""That may be used without being declared."""
+"""Prefixes that may be used without being declared."""
 
 _UNDECLARED_PREFIX = "NS_ERR_UNDEFINED_NAMESPACE"
 _UNDECLARED = re.compile(r"Namespace prefix ([^\s\"'<>&=/]+) (?:for|on) ")
-_NOBODYS = "urn:undeclared:"
+_UNKNOWN_PREFIX = "urn:undeclared:"
 _ADVICE = {
     "ERR_UNDECLARED_ENTITY": "write the character itself; only &amp; &lt; &gt; &quot; &apos; are known",
     "ERR_INVALID_CHAR": "remove it: XML holds no control characters",
     "ERR_DOCUMENT_END": "a document is one <bml> or one <ebml>",
     "ERR_ATTRIBUTE_REDEFINED": "name each attribute once",
 }
-"""By libxml2's name for what is wrong."""
+"""Advice by libxml2's name of the error."""
 _DECLARED = re.compile(rb"(?:\xef\xbb\xbf)?<\?xml[^>?]*?\sencoding\s*=\s*[\"']([A-Za-z0-9._-]+)[\"']")
 _ENCODINGS = re.compile(r"utf-?8|(?:us-)?ascii|iso-?8859-\d+|latin-?\d|windows-125\d|cp125\d", re.IGNORECASE)
-"""In all of them a `<` is a byte 0x3C: no tag can hide from `_start_lines`."""
+"""Encodings in which a `<` is a byte 0x3C: no tag can hide from `_start_lines`."""
 _DOCTYPE = re.compile(r"\A\ufeff?(?>\s+|<\?.*?\?>|<!--.*?-->)*+<!DOCTYPE", re.DOTALL)
 _TAGS = re.compile(r"<!--.*?-->|<!\[CDATA\[.*?\]\]>|<\?.*?\?>|<([^\s/>!?][^\s/>]*)", re.DOTALL)
 
 
 class Source:
-    """A parsed document. `root`, its id (`block`), the name of its source, and the line of each element."""
+    """A parsed document: its `root`, the id of that (`block`), its source's name, and the line of each element."""
 
     def __init__(self, data: bytes | str, name: str = "") -> None:
-        """Raises InputRefused: too large, too deep, not well-formed, or with a document type."""
+        """Parse a document. Raises InputRefused if it is too large or too deep, malformed, or has a document type."""
         self.name = name
         self.block: str | None = None
         if len(data) > LARGEST:
@@ -81,7 +80,7 @@ class Source:
         self._require_shallow()
 
     def line(self, element: etree._Element) -> int:
-        """Where the element begins, from 1."""
+        """Line on which the element begins, from 1."""
         return self._lines.get(element, 0) or cast(int, element.sourceline or 0)
 
     def refusal(
@@ -92,7 +91,7 @@ class Source:
         return InputRefused(Fault(reason=reason, where=self.name, line=line, advice=advice), self.block)
 
     def _decoded(self, data: bytes) -> str:
-        """Raises InputRefused for an encoding other than its declaration says, or one in which tags could hide."""
+        """Decode the bytes. Raises InputRefused for another encoding than declared, and for one that hides tags."""
         if data[:2] in (b"\xff\xfe", b"\xfe\xff"):
             encoding = "utf-16"
         elif data[1:4:2] == b"\0\0" or data[:3:2] == b"\0\0":
@@ -114,9 +113,10 @@ class Source:
             raise self.refusal(reason, line=1, advice="save it as UTF-8") from error
 
     def _parse(self, text: str) -> etree._Element:
-        """An attribute whose prefix nobody declared is somebody else's; every other error refuses the document.
+        """Parse the text strictly, but for undeclared prefixes: attributes with those are ignored.
 
-        Such prefixes are declared here and the text is read again, as strictly: so nothing else can slip through.
+        They are declared here, and the text is parsed again, as strictly as before, so that no other error slips
+        through.
         """
         declared: set[str] = set()
         while True:
@@ -136,7 +136,7 @@ class Source:
         return self.refusal(reason, line=line, advice="remove it: no entities, no DTD")
 
     def _undeclared(self, parser: etree.XMLParser, error: etree.XMLSyntaxError, known: Set[str]) -> set[str]:
-        """Prefixes to declare, at least one. Raises InputRefused if anything else is wrong."""
+        """Find the prefixes to declare, at least one. Raises InputRefused for any other error."""
         bad = [entry for entry in parser.error_log if entry.level_name != "WARNING"]
         found = {match[1] for entry in bad if (match := _UNDECLARED.match(entry.message))} - known
         wrong = next((entry for entry in bad if entry.type_name != _UNDECLARED_PREFIX), None)
@@ -150,11 +150,11 @@ class Source:
         raise self.refusal(f"malformed XML: {reason}", line=line, advice=advice) from error
 
     def _require_plain(self, elements: Iterable[etree._Element]) -> None:
-        """Raises InputRefused for an element of an undeclared prefix, or with more attributes than anyone needs."""
+        """Refuse elements with an undeclared prefix or too many attributes. Raises InputRefused."""
         for element in elements:
             namespace, local = split(str(element.tag))
-            if namespace.startswith(_NOBODYS):
-                name = f"<{namespace.removeprefix(_NOBODYS)}:{local}>"
+            if namespace.startswith(_UNKNOWN_PREFIX):
+                name = f"<{namespace.removeprefix(_UNKNOWN_PREFIX)}:{local}>"
                 advice = f'declare the prefix, for example xmlns:ebml="{EBML}"'
                 raise self.refusal(f"malformed XML: prefix of {name} is not declared", element, advice=advice)
             if (count := len(element.attrib)) > MOST_ATTRIBUTES:
@@ -176,16 +176,16 @@ def _parser() -> etree.XMLParser:
 
 
 def _declaring(text: str, prefixes: Set[str]) -> str:
-    """The text with `prefixes` declared at its root, on the same lines."""
+    """Declare `prefixes` at the root of a document, without changing its lines."""
     if not prefixes:
         return text
     end = next(tag.end(1) for tag in _TAGS.finditer(text) if tag[1])
-    declarations = "".join(f' xmlns:{prefix}="{_NOBODYS}{prefix}"' for prefix in sorted(prefixes))
+    declarations = "".join(f' xmlns:{prefix}="{_UNKNOWN_PREFIX}{prefix}"' for prefix in sorted(prefixes))
     return f"{text[:end]}{declarations}{text[end:]}"
 
 
 def _start_lines(text: str) -> Iterator[int]:
-    """The line of each start tag, in document order."""
+    """Lines of all start tags, in document order."""
     line, position = 1, 0
     for tag in _TAGS.finditer(text):
         line += text.count("\n", position, tag.start())
@@ -200,17 +200,17 @@ def split(tag: str) -> tuple[str, str]:
     return namespace.removeprefix("{"), local
 
 
-def ours(parent: etree._Element) -> Iterator[tuple[etree._Element, str, str]]:
-    """The children that are BML or EBML, with namespace and local name."""
+def bml_children(parent: etree._Element) -> Iterator[tuple[etree._Element, str, str]]:
+    """Children that are BML or EBML, with namespace and local name."""
     for child in parent:
         namespace, local = split(str(child.tag))
-        if namespace in OURS:
+        if namespace in READ:
             yield child, namespace, local
 
 
-def named(parent: etree._Element, local: str) -> list[etree._Element]:
-    """The children of that name that are BML or EBML."""
-    return [child for child, _, name in ours(parent) if name == local]
+def children_named(parent: etree._Element, local: str) -> list[etree._Element]:
+    """Children with this name that are BML or EBML."""
+    return [child for child, _, name in bml_children(parent) if name == local]
 
 
 def local_name(element: etree._Element) -> str:
@@ -218,6 +218,6 @@ def local_name(element: etree._Element) -> str:
 
 
 def attributes(element: etree._Element) -> dict[str, str]:
-    """The attributes that are BML's or EBML's, by local name. One with an undeclared prefix is neither's."""
+    """Attributes of BML and EBML, by local name. An attribute with an undeclared prefix is of neither."""
     split_names = ((*split(str(name)), str(value)) for name, value in element.items())
-    return {local: value for space, local, value in split_names if space in OURS and ":" not in local}
+    return {local: value for space, local, value in split_names if space in READ and ":" not in local}

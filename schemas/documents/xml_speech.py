@@ -21,15 +21,17 @@ _WHITE = re.compile("[ \t\r\n]+")
 
 
 class Spoken(NamedTuple):
+    """Content of a <speech>."""
+
     text: str
     marks: tuple[Mark, ...]
     markup: str
     timing: tuple[Timing, ...]
-    """Of marks that are tied to another sync point where they stand: `<sync ref="gaze-1:stroke"/>`."""
+    """Timing of marks that name another sync point where they stand: `<sync ref="gaze-1:stroke"/>`."""
 
 
 def spoken(source: Source, speech: etree._Element, id: str) -> Spoken:
-    """What a <speech> says. Raises InputRefused for speech without text."""
+    """Read the content of a <speech>. Raises InputRefused for speech without text."""
     texts = [child for child in speech if _kind(child) == "text"]
     if len(texts) > 1:
         raise source.refusal("more than one <text>", texts[1], advice="one <speech> for each")
@@ -47,7 +49,7 @@ def spoken(source: Source, speech: etree._Element, id: str) -> Spoken:
 
 
 def _ssml(speech: etree._Element) -> etree._Element | None:
-    """Prosodic markup from a BML 1.0 `<description type="application/ssml+xml">`."""
+    """Find the prosodic markup, in a `<description type="application/ssml+xml">` of BML 1.0."""
     for child in speech:
         if _kind(child) == "description" and child.get("type") == "application/ssml+xml":
             return child[0] if len(child) and split(str(child[0].tag))[1] == "speak" else child
@@ -55,13 +57,13 @@ def _ssml(speech: etree._Element) -> etree._Element | None:
 
 
 def _kind(element: etree._Element) -> str:
-    """Local name of a core element; empty for anybody else's."""
+    """Local name of a core element; empty for elements of other namespaces."""
     namespace, local = split(str(element.tag))
     return local if namespace in CORE else ""
 
 
 class _Reading:
-    """Collects text and marks in one walk."""
+    """Collector of text and marks, in one walk through a speech."""
 
     def __init__(self, source: Source, id: str, *, preserve: bool) -> None:
         self._said: list[str] = []
@@ -118,7 +120,7 @@ class _Reading:
 
 
 def serialized(element: etree._Element) -> str:
-    """The inner XML without namespaces, as a voice takes it; marks as SSML's `<mark name>`."""
+    """Write the inner XML without namespaces, as a voice takes it; marks as SSML's `<mark name>`."""
     parts = [escape(element.text or "")]
     for child in element:
         local = local_name(child)
@@ -141,7 +143,8 @@ def _attribute(name: str, value: str) -> str:
 def fill(element: etree._Element, speech: Speech, namespace: str) -> None:
     """Write text, marks and markup into an empty <speech>, so that `spoken` reads the same.
 
-    BML 1.0 has markup in a description beside the text, the drafts in it. What is not XML is an attribute of ours.
+    Markup stands in a description beside the text in BML 1.0, in the text itself in the drafts; markup that is no XML
+    is an attribute of our namespace.
     """
     markup = _read_back(speech, namespace) if speech.markup else None
     if markup is not None and namespace != BML_1_0:
@@ -163,7 +166,7 @@ def fill(element: etree._Element, speech: Speech, namespace: str) -> None:
 
 
 def ties(speech: Speech, namespace: str) -> dict[str, dict[str, str]]:
-    """The timing of marks that can stand where they do, so that it is read again in the same order."""
+    """Timing of marks that can be written at the marks, because it is read again in the same order."""
     order = [mark.id for mark in speech.marks]
     timed = [timing.sync for timing in speech.timing if timing.sync in order]
     ahead = [timing.sync for timing in speech.timing[: len(speech.timing) - len(timed)]]
@@ -174,9 +177,9 @@ def ties(speech: Speech, namespace: str) -> dict[str, dict[str, str]]:
 
 
 def _read_back(speech: Speech, namespace: str) -> etree._Element | None:
-    """The markup as an element: in BML 1.0 a description beside the text, in the drafts the text itself.
+    """Make an element of the markup: in BML 1.0 a description beside the text, in the drafts the text itself.
 
-    None for what is read as something else: it is not XML, or has not the words of the text.
+    None if reading it would not give the same speech: it is no XML, or has other words than the text.
     """
     if namespace == BML_1_0:
         ssml = f'<speak xmlns="{SSML}">{speech.markup}</speak>'

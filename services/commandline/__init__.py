@@ -1,4 +1,4 @@
-"""The commands of `engage`, one file each. They put services together; what those do is decided in the services."""
+"""The commands of `engage`, one file each. They put services together; the work is done in the services."""
 
 import os
 

@@ -1,6 +1,6 @@
-"""The command line: a command `X` is the file `X.py` beside this one, with its `Options` and its `main`.
+"""Command line: a command `X` is the file `X.py` beside this one, with its `Options` and its `main`.
 
-A file is loaded when its command is called. For the list of all commands the table here is enough.
+The file is loaded when its command is called. The list of all commands needs only the table here.
 """
 
 import inspect
@@ -31,11 +31,11 @@ COMMANDS = {
     "Exit 1 if anything came of it that should not have.",
     "session": "",
 }
-"""What each command does. One without a word is for our own child processes."""
+"""Commands with their help. One without help is for our own child processes."""
 
 
 def command(name: str) -> Any:
-    """The command, from its file: its own options first, then those that it shares."""
+    """Load a command from its file. Its own options come first, then the shared ones."""
     module = import_module(f"engage_hri.services.commandline.{name}")
     taken = inspect.signature(module.Options).parameters
     names = [option for kind in module.Options.__mro__ for option in inspect.get_annotations(kind)]
@@ -51,13 +51,15 @@ def command(name: str) -> Any:
 
 
 class Commands(TyperGroup):
+    """Group of commands that loads a command when it is called."""
+
     def resolve_command(self, context: Any, arguments: list[str]) -> Any:
         name, listed, rest = super().resolve_command(context, arguments)
         return name, listed and command(str(listed.name)), rest
 
 
 def _listed() -> None:
-    """Stand for a command in the list of all."""
+    """Stand for a command in the list of all commands."""
 
 
 app = typer.Typer(
@@ -68,8 +70,8 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-for _name, _told in COMMANDS.items():
-    app.command(_name, help=_told, hidden=not _told)(_listed)
+for _name, _help in COMMANDS.items():
+    app.command(_name, help=_help, hidden=not _help)(_listed)
 
 
 def _print_version(asked: bool) -> None:

@@ -1,4 +1,4 @@
-"""`engage bml FILE`: turn fragments as the BML they become, blocks in another dialect. Nothing moves."""
+"""Command `engage bml FILE`: print the BML that turn fragments become, or blocks in another dialect."""
 
 import re
 import sys
@@ -10,7 +10,7 @@ from typing import Annotated
 import typer
 
 from engage_hri.schemas.blocks import Block, Dialect
-from engage_hri.schemas.documents.dialects import core, spelled
+from engage_hri.schemas.documents.dialects import core, in_dialect
 from engage_hri.schemas.documents.xml_decode import encode_xml
 from engage_hri.services.commandline.generating import generated
 from engage_hri.services.commandline.options import Configured, WorldFile
@@ -37,11 +37,11 @@ def main(options: Options) -> int:
     source = read_source(options.file)
     around = read_world(options.world)
     documents, warnings = [], []
-    with source.blamed():
+    with source.naming_file():
         plans = generated(source.things, around, config, str(options.file))
         blocks = {plan.block.id: plan.block for plan in plans}
         for plan in plans:
-            block = spelled(core(plan.block) if options.core else plan.block, options.dialect, blocks)
+            block = in_dialect(core(plan.block) if options.core else plan.block, options.dialect, blocks)
             documents.append(encode_xml(block).decode())
             warnings += [*plan.warnings, *(each.message for each in block.unread), *_unusual_ids(block)]
     print("\n".join(documents), end="")
@@ -51,6 +51,7 @@ def main(options: Options) -> int:
 
 
 def _unusual_ids(block: Block) -> Iterator[str]:
+    """Warnings of ids that other readers of BML 1.0 may refuse."""
     if block.dialect == "bml-1.0":
         for id in (block.id, *(behavior.id for behavior in block.behaviors)):
             if not _XML_NAME.fullmatch(id):

@@ -1,4 +1,4 @@
-"""Is everything that is to be played good? Known before any of it moves, and told as the realizer would tell it."""
+"""Checks of all files before anything moves. A problem is told as a warning, as the realizer would do."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -15,7 +15,7 @@ from engage_hri.services.commandline.sources import InputFile, read_source
 
 
 def read_all(files: Sequence[Path], outputs: Outputs) -> tuple[InputFile, ...]:
-    """All files. Raises InputRefused for the first bad one, its warning among the feedback."""
+    """Read all files. Raises InputRefused for the first bad one, after its warning has gone to the feedback."""
     sources = []
     for path in files:
         try:
@@ -27,7 +27,7 @@ def read_all(files: Sequence[Path], outputs: Outputs) -> tuple[InputFile, ...]:
 
 
 def check(sources: Sequence[InputFile], world: World | None, robot: str, outputs: Outputs) -> None:
-    """Contradictions in blocks; in fragments what the world does not know, if it is known. Raises InputRefused."""
+    """Check blocks for contradictions, and fragments for unknown ids, if the world is known. Raises InputRefused."""
     from engage_hri.services.generation.fragment_check import checked
     from engage_hri.services.realizer.plan.planner import plan_block
     from engage_hri.services.realizer.plan.relations import BlockRefused
@@ -35,9 +35,9 @@ def check(sources: Sequence[InputFile], world: World | None, robot: str, outputs
     for source in sources:
         for thing in source.things:
             try:
-                with source.blamed():
+                with source.naming_file():
                     if isinstance(thing, Block):
-                        # Whether other blocks will be alive when this one comes is for the realizer to say.
+                        # The realizer will check that the other blocks are alive when this one comes.
                         plan_block(thing, elsewhere=dict.fromkeys(_others(thing)))
                     elif world is not None:
                         checked(thing, world, robot)
@@ -49,7 +49,7 @@ def check(sources: Sequence[InputFile], world: World | None, robot: str, outputs
 
 
 def _others(block: Block) -> set[str]:
-    """The blocks whose points it names."""
+    """Ids of the other blocks to whose points a block refers."""
     return {SyncRef.parse(site.text).block for site in sites(block)} - {"", block.id}
 
 

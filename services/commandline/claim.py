@@ -1,8 +1,8 @@
-"""Which of several `engage up` of one robot goes on, when they start at once and see one another late.
+"""Election of one `engage up` for a robot, when several start at once and see one another late.
 
-Each shows a token before it looks: first that it is starting, and once its services are there that it is up.
-One that is starting gives way to one that is up, and to one that is starting whose id comes earlier; one that is up
-gives way to none. So of two that meet, whenever that is, exactly one goes on.
+Each `engage up` shows a token before it looks for others: first that it is starting, and once its services run that
+it is up. One that is starting gives way to one that is up, and to one that is starting with an id earlier in the
+alphabet; one that is up gives way to none. So exactly one of any two goes on.
 """
 
 import asyncio
@@ -19,18 +19,18 @@ from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.interface import Bus, Hub, Subscription
 
 PATIENCE: Seconds = 4.0
-"""How long one that was killed may still seem to be there."""
+"""Time for which a killed `engage up` may still seem to be there."""
 _TOKEN = re.compile(r"(?P<starting>starting-)?up-(?P<id>[0-9a-f]{8})")
 
 
 class StartClaim:
-    """Of one that is starting, on a robot's services."""
+    """Claim of a starting `engage up` to be the only one of its robot."""
 
     def __init__(self, robot: str, id: str) -> None:
         self._robot = robot
         self._id = id
         self._others: dict[str, bool] = {}
-        """By token, those that are there: may they stay beside us?"""
+        """Tokens of the others; True: that one has to give way to us."""
         self.is_up = False
 
     def feed(self, message: Message) -> None:
@@ -42,7 +42,7 @@ class StartClaim:
 
     @property
     def is_good(self) -> bool:
-        """May it go on?"""
+        """True if no other has precedence."""
         return self.is_up or all(self._others.values())
 
     @property
@@ -53,16 +53,16 @@ class StartClaim:
 
 
 class Claiming:
-    """A claim, the tokens that show it, and what is heard of others."""
+    """A claim with the tokens that show it and the subscription to those of others."""
 
     def __init__(self, claim: StartClaim, presence: Subscription, up: Bus) -> None:
         self._claim = claim
         self._presence = presence
         self.bus = up
-        """The bus of the one that goes on."""
+        """Bus for the use of the winner."""
 
     async def granted(self) -> None:
-        """Return when nobody is in the way. Raises InputRefused for one that stays."""
+        """Wait until no other has precedence. Raises InputRefused if one stays."""
         deadline = self.bus.now() + PATIENCE
         while len(self._presence) or not self._claim.is_good:
             received = await self._presence.next(deadline)
@@ -71,12 +71,12 @@ class Claiming:
             self._claim.feed(received.message)
 
     async def held_until(self, ready: asyncio.Event) -> None:
-        """Watch until its services are there; from then on it gives way to none. Raises InputRefused when it must."""
+        """Hold the claim until the services run; then it gives way to none. Raises InputRefused if it must before."""
         watching = asyncio.create_task(self._watch(), name="claim")
         waiting = asyncio.create_task(ready.wait(), name="services")
         try:
             await asyncio.wait((watching, waiting), return_when=asyncio.FIRST_COMPLETED)
-            await asyncio.sleep(0)  # what has arrived by now counts
+            await asyncio.sleep(0)  # tokens that have arrived by now count
             if watching.done():
                 watching.result()
             self._claim.is_up = True
@@ -95,13 +95,13 @@ class Claiming:
 
 @asynccontextmanager
 async def claiming(hub: Hub, id: str = "") -> AsyncIterator[Claiming]:
-    """id: what decides between two that are starting; by chance if none is given."""
+    """Claim a robot while the body of `async with` runs. id: decides between two that are starting; empty: random."""
     id = id or uuid.uuid4().hex[:8]
     starting, up = hub.join(f"starting-up-{id}"), hub.join(f"up-{id}")
     try:
         with starting.subscribe(keys.ANY_ALIVE) as presence:
             starting.declare_alive()
-            await hub.wait_until_free()  # until all are known who are there
+            await hub.wait_until_free()  # until all participants are known
             yield Claiming(StartClaim(hub.robot, id), presence, up)
     finally:
         await starting.leave()

@@ -1,4 +1,4 @@
-"""One configuration for all services, also for what stands in for the person, the table and the task.
+"""Configuration of all services, with those that play the person, the table and the task.
 
 Each service documents its own section in its `config.py`; docs/configuration.md is made from those.
 """
@@ -12,10 +12,12 @@ from engage_hri.services.simulation.config import SimulationConfig
 
 
 class Config(RobotConfig, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """Sections for the robot, the simulation and the collaboration."""
+
     simulation: SimulationConfig = SimulationConfig()
     collaboration: CollaborationConfig = CollaborationConfig()
 
 
 def load(path: Path | None = None, *, settings: Iterable[str] = (), defaults: Iterable[str] = ()) -> Config:
-    """As `read`."""
+    """Read the whole configuration, as `settings.read` does."""
     return read(Config, path, settings=settings, defaults=defaults)

@@ -1,4 +1,4 @@
-"""`engage demo`: the whole system in this process, playing the anchor tangram with a simulated person."""
+"""Command `engage demo`: the whole system in this process plays the anchor tangram with a simulated person."""
 
 import asyncio
 from dataclasses import dataclass
@@ -18,7 +18,7 @@ from engage_hri.services.console.live import LiveView, Log
 from engage_hri.services.console.log import Telling
 
 DEFAULTS = ("recognition.gaze_resolution=table",)
-"""The transcript was annotated by people who saw that a look went to the table, rarely to which piece."""
+"""Settings for the transcript: its annotators saw that a look went to the table, but rarely to which piece."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -47,14 +47,14 @@ def main(options: Options) -> int:
 
 
 async def demonstrate(config: Config, outputs: Sink, console: Console, live: bool) -> tally.Tally:
-    """Run everything until the task is over; the tally of what happened."""
+    """Run everything until the task is over. Returns the tally of the events."""
     began = asyncio.get_running_loop().time()
     tallying = Tallying(began)
-    with shown(console, config.robot, began, live) as show:
+    with scene_view(console, config.robot, began, live) as show:
         await play_tangram(config, (show, tallying, outputs))
     return tallying.tally
 
 
-def shown(console: Console, robot: str, began: Seconds, live: bool) -> LiveView | Log:
-    """A live view on a terminal, a line for each thing that matters anywhere else."""
+def scene_view(console: Console, robot: str, began: Seconds, live: bool) -> LiveView | Log:
+    """Choose the sink that shows the scene: a live view on a terminal, log lines anywhere else."""
     return LiveView(console, robot, began) if live else Log(console, robot, began, Telling(points=False, head=False))

@@ -1,4 +1,4 @@
-"""How a command ends: what went wrong in one line on standard error, and the exit code that says so."""
+"""End of a command: errors as one line on standard error, and the exit code."""
 
 import errno
 import sys
@@ -12,22 +12,20 @@ from engage_hri.schemas.faults import EngageError, Fault, InputRefused, RunFaile
 from engage_hri.services.commandline.process import DONE, FAILED, REFUSED, UNREAD, interrupted, silence
 
 UsageError: type[Exception] = next(kind for kind in typer.BadParameter.__mro__ if kind.__name__ == "UsageError")
-"""Typer carries its own copy of click and does not show this class."""
-
-
+"""Class of Typer's errors of usage, which it does not export."""
 TYPERS_OWN = 130
-"""What Typer makes of a KeyboardInterrupt, by whatever signal."""
+"""Exit code that Typer gives after a KeyboardInterrupt, by whatever signal."""
 NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 
 
 def exit_code(app: typer.Typer, arguments: Sequence[str] | None) -> int:
-    """Run a command to its end, and tell on standard error what is wrong. Raises what is a bug of ours."""
+    """Run a command and print its errors on standard error. An exception that is a bug of ours is raised."""
     try:
         code = _run(app, arguments)
         if sys.stdout is not None:
             sys.stdout.flush()
     except BrokenPipeError:
-        silence()  # whoever read our output (`| head`) has had enough
+        silence()  # the reader of our output (`| head`) has had enough
         code = UNREAD
     except OSError as error:
         if error.errno not in NO_ROOM:
@@ -38,13 +36,13 @@ def exit_code(app: typer.Typer, arguments: Sequence[str] | None) -> int:
 
 
 def _run(app: typer.Typer, arguments: Sequence[str] | None) -> int:
-    """The exit code. Raises BrokenPipeError when nobody reads on, while it tells of something else, too."""
+    """Run a command to its exit code. Raises BrokenPipeError if the reader of the output is gone."""
     try:
         code = int(app(arguments, standalone_mode=False) or DONE)
         return interrupted() if code == TYPERS_OWN else code
     except SystemExit as exit:
         if isinstance(exit.__context__, BrokenPipeError):
-            raise exit.__context__ from None  # which Typer makes exit code 1
+            raise exit.__context__ from None  # Typer makes exit code 1 of it
         raise
     except UsageError as error:
         return _misused(error)
@@ -60,7 +58,7 @@ def _run(app: typer.Typer, arguments: Sequence[str] | None) -> int:
 
 
 def _misused(error: Any) -> int:
-    """One line instead of Typer's box. Without any argument the help has been printed and there is nothing to add."""
+    """Print an error of usage in one line. The message is empty if Typer has printed the help."""
     if message := error.format_message().replace("\n", " ").replace("Value error, ", ""):
         command = error.ctx.command_path if error.ctx else "engage"
         print(f"{command}: {message} (see {command} --help)", file=sys.stderr)
@@ -68,7 +66,10 @@ def _misused(error: Any) -> int:
 
 
 def readable(fault: Fault, source: Path | str = "") -> str:
-    """`turn.xml:14: block-1: gaze-9: reason (advice)`. source: the file it is about, if known."""
+    """Write a fault as `turn.xml:14: block-1: gaze-9: reason (advice)`.
+
+    source: the file that it is about, if known.
+    """
     file, rest = _split(fault.where, str(source))
     place = f"{file}:{fault.line}" if fault.line else file
     text = ": ".join(part for part in (place, rest, fault.reason) if part)
@@ -77,7 +78,7 @@ def readable(fault: Fault, source: Path | str = "") -> str:
 
 
 def _split(where: str, source: str) -> tuple[str, str]:
-    """The file and what stands behind it. The line number goes between the two."""
+    """Split the place of a fault into the file and the rest; the line number goes between the two."""
     if source:
         return source, where.removeprefix(source).removeprefix(": ")
     file, _, rest = where.partition(": ")
@@ -92,10 +93,10 @@ def _leaves(group: BaseExceptionGroup[Any]) -> list[BaseException]:
 
 
 def _ended(errors: Sequence[BaseException]) -> int:
-    """The exit code for what somebody else is to blame for, told if there is anything to tell."""
-    told = [error for error in errors if isinstance(error, EngageError)]
-    for error in told:
+    """Print the faults of expected errors. Returns the exit code; raises a BrokenPipeError that comes alone."""
+    expected = [error for error in errors if isinstance(error, EngageError)]
+    for error in expected:
         print(readable(error.fault), file=sys.stderr)
-    if not told:
+    if not expected:
         raise errors[0]
-    return FAILED if any(not isinstance(error, InputRefused) for error in told) else REFUSED
+    return FAILED if any(not isinstance(error, InputRefused) for error in expected) else REFUSED

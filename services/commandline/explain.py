@@ -1,4 +1,4 @@
-"""`engage explain FILE`: for each reference every gesture with every phrase, and why one is chosen. Nothing moves."""
+"""Command `engage explain FILE`: all gestures with all phrases for each reference, and why one is chosen."""
 
 import sys
 from collections.abc import Sequence
@@ -23,15 +23,12 @@ from engage_hri.services.commandline.sources import read_source, read_world
 from engage_hri.services.generation.block.emission import FragmentPlan
 
 GESTURES: dict[GestureChoice, str] = {
-    "none": "none",
-    "gaze": "gaze",
-    "directed_gaze": "directed gaze",
-    "directed_gaze_with_pointing": "DG + pointing",
-}
+    "none": "none", "gaze": "gaze", "directed_gaze": "directed gaze", "directed_gaze_with_pointing": "DG + pointing",
+}  # fmt: skip
 WIDE = 110
-"""Columns from which distractors are named, not only counted."""
+"""Width of the terminal, in columns, from which distractors are named and not only counted."""
 NAMED = 4
-"""Distractors in a row; of more the rest is counted."""
+"""Distractors named in a row; the rest is counted."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -52,7 +49,7 @@ def main(options: Options) -> int:
         advice = "only turn fragments refer to objects; for a block: engage plan"
         raise InputRefused(Fault(reason="holds no turn fragment", where=str(options.file), advice=advice))
     failure: Unplanned | None = None
-    with source.blamed():
+    with source.naming_file():
         try:
             plans = generated(fragments, around, config, str(options.file))
         except Unplanned as error:
@@ -72,12 +69,13 @@ def main(options: Options) -> int:
 
 
 def as_json(choices: Sequence[ReferenceChoice]) -> str:
-    """A list of every pair of every reference, each with all its keys."""
+    """Write all pairs of all references as a JSON list, each with all its keys."""
     rows = [{"reference": choice.reference, **asdict(pair)} for choice in choices for pair in choice.pairs]
     return msgspec.json.format(msgspec.json.encode(rows), indent=2).decode()
 
 
 def show(plans: Sequence[FragmentPlan], console: Console) -> None:
+    """Print the tables of each fragment, a line with its cost, and its warnings."""
     for plan in plans:
         show_tables(plan.choices, console)
         total = sum(choice.cost for choice in plan.choices)

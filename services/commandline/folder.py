@@ -1,4 +1,4 @@
-"""A directory of results: refused before anything is done for them, each file written whole or not at all."""
+"""Directory for results: checked before any work is done for them; each file is written whole or not at all."""
 
 import os
 from collections.abc import Collection
@@ -8,9 +8,9 @@ from engage_hri.schemas.faults import Fault, InputRefused, RunFailed
 
 
 class Folder:
-    """names: of all files that may be written. overwrite: whatever of those is there is replaced, or removed.
+    """Directory for results. names: of all files that may be written. overwrite: old ones are replaced or removed.
 
-    Raises InputRefused if the directory cannot be written to, or holds one of the files and must not lose it.
+    Raises InputRefused if the directory cannot be written to, or, without `overwrite`, holds one of the files.
     """
 
     def __init__(self, path: Path, names: Collection[str], *, overwrite: bool) -> None:
@@ -29,7 +29,7 @@ class Folder:
             )
 
     def write(self, files: dict[str, bytes]) -> None:
-        """All of these; of the other names nothing stays. Raises RunFailed."""
+        """Write these files, and remove the others of `names`. Raises RunFailed."""
         for name in self._names:
             try:
                 if name in files:

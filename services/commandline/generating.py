@@ -1,4 +1,4 @@
-"""What generation makes of the fragments of a file, worked out here and now: no bus, nothing moves."""
+"""Planning of the fragments of a file as generation would do it, without a bus and without moving."""
 
 from collections.abc import Sequence
 
@@ -16,7 +16,7 @@ from engage_hri.services.runtime.virtual_time import run_virtual
 
 
 class Unplanned(RunFailed):
-    """A fragment that cannot be performed. plans: of those before it. choices: the tables of its references."""
+    """A fragment cannot be performed. plans: of the fragments before it. choices: the tables of its references."""
 
     def __init__(self, fault: Fault, plans: list[FragmentPlan], choices: tuple[ReferenceChoice, ...]) -> None:
         super().__init__(fault)
@@ -25,9 +25,9 @@ class Unplanned(RunFailed):
 
 
 def generated(things: Sequence[Thing], world: World, config: Config, source: str) -> list[FragmentPlan]:
-    """As generation would plan them one after the other, the simulated body at home before each.
+    """Plan fragments one after the other, with the simulated body at home before each. A block is its own plan.
 
-    A block is its own plan. Raises InputRefused or Unplanned, as performing them would.
+    Raises InputRefused or Unplanned, as performing them would.
     """
     return run_virtual(_generated(things, world, config, source))
 

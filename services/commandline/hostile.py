@@ -1,8 +1,8 @@
-"""`engage hostile`: seeded attacks on the whole robot in this process, in virtual time, and what came of them."""
+"""Command `engage hostile`: seeded attacks on the whole robot, in this process and in virtual time."""
 
 import sys
 from collections import Counter
-from collections.abc import Callable, Collection, Iterator, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 from functools import partial
 from importlib import import_module
@@ -27,13 +27,13 @@ from engage_hri.services.runtime.service import Ready, Service
 from engage_hri.services.simulation.still import tangram_world
 
 WRONG = 1
-"""Exit code: something came of it that should not have."""
-Making = Callable[[], Body]
+"""Exit code after an attack with a consequence that must not be."""
+BodyMaker = Callable[[], Body]
 
 
 @dataclass(frozen=True, kw_only=True)
 class Options(Configured):
-    """body: `package.module:Class`, somebody's own, made without arguments."""
+    """Options of the command. body: `package.module:Class`, made without arguments."""
 
     runs: Annotated[int, typer.Option(metavar="N", min=1, help="Attacks, each with the next seed.")] = 20
     seed: Annotated[int, typer.Option(metavar="S", help="Of the first.")] = 0
@@ -52,7 +52,8 @@ def main(options: Options) -> int:
     console = Console(quiet=options.quiet)
     counts: Counter[str] = Counter()
     bad: list[Report] = []
-    for report in reports(options, config, kinds, make):
+    for seed in range(options.seed, options.seed + options.runs):
+        report = attack(seed, config, seconds=options.seconds, kinds=kinds, body=make)
         counts.update(report.counts)
         if report.wrong:
             bad.append(report)
@@ -62,18 +63,11 @@ def main(options: Options) -> int:
 
 
 def _kinds(only: Collection[str]) -> tuple[Kind, ...]:
-    """Raises InputRefused for one that there is not."""
+    """Choose the kinds of attacks; all if `only` is empty. Raises InputRefused for an unknown kind."""
     if unknown := set(only) - set(KINDS):
-        fault = Fault(
-            reason=f"no attack {', '.join(map(repr, sorted(unknown)))}", advice=f"one of {', '.join(KINDS)}"
-        )
-        raise InputRefused(fault)
+        reason = f"no attack {', '.join(map(repr, sorted(unknown)))}"
+        raise InputRefused(Fault(reason=reason, advice=f"one of {', '.join(KINDS)}"))
     return tuple(kind for kind in KINDS if kind in only) or KINDS
-
-
-def reports(options: Options, config: Config, kinds: tuple[Kind, ...], make: Making | None) -> Iterator[Report]:
-    for seed in range(options.seed, options.seed + options.runs):
-        yield attack(seed, config, seconds=options.seconds, kinds=kinds, body=make)
 
 
 def attack(
@@ -82,20 +76,20 @@ def attack(
     *,
     seconds: Seconds = 20.0,
     kinds: tuple[Kind, ...] = KINDS,
-    body: Making | None = None,
+    body: BodyMaker | None = None,
     client: Client | None = None,
 ) -> Report:
-    """One attack on the whole robot: what a test of one's own body or client calls.
+    """Attack the whole robot once; for tests of one's own body or client.
 
-    body: makes it, once the loop runs; behind the real control. Without one a lying body takes control's place if
-    `kinds` has "body". client: is given the hub, and is to end by itself, once the attack is over at the latest.
+    body: makes the body behind the real control, once the loop runs. Without it a lying body takes the place of
+    control if `kinds` has "body". client: gets the hub, and must have ended when the attack is over.
     """
     plan = Attack(seed=seed, kinds=kinds, seconds=seconds, own_body=body is not None)
     return run(plan, whole_robot(config, body), client)
 
 
-def whole_robot(config: Config | None = None, body: Making | None = None) -> Mapping[str, Service]:
-    """All services of a robot, before a still table with a person at it."""
+def whole_robot(config: Config | None = None, body: BodyMaker | None = None) -> Mapping[str, Service]:
+    """Services of a robot with their configuration, and a still table with a person at it."""
     config = config or Config()
     services = {name: roster.service(name, config) for name in roster.ROBOT}
     if body is not None:
@@ -103,7 +97,7 @@ def whole_robot(config: Config | None = None, body: Making | None = None) -> Map
     return {"simulation": still(tangram_world()), **services}
 
 
-async def _embody(bus: Bus, ready: Ready, config: Config, make: Making) -> None:
+async def _embody(bus: Bus, ready: Ready, config: Config, make: BodyMaker) -> None:
     try:
         body = make()
     except Exception as error:
@@ -113,11 +107,11 @@ async def _embody(bus: Bus, ready: Ready, config: Config, make: Making) -> None:
     await embody(bus, ready, config.control, body, covered_for=config.covered_for)
 
 
-def body_class(name: str) -> Making:
-    """Raises InputRefused if there is no such class of a body."""
+def body_class(name: str) -> BodyMaker:
+    """Import the class of a body. Raises InputRefused if there is none."""
     place, _, attribute = name.partition(":")
     if "" not in sys.path:
-        sys.path.insert(0, "")  # the folder of whoever calls, as with `python -m`
+        sys.path.insert(0, "")  # the current folder, as with `python -m`
     try:
         found = getattr(import_module(place), attribute)
     except (ImportError, AttributeError, ValueError) as error:
@@ -132,7 +126,7 @@ def _tell(console: Console, report: Report, options: Options) -> None:
     only = "".join(f" --only {kind}" for kind in options.only or ())
     body = f" --body {options.body}" if options.body else ""
     config = f" --config {options.config}" if options.config else ""
-    settings = config + "".join(f" --set {setting}" for setting in options.given)
+    settings = config + "".join(f" --set {setting}" for setting in options.overrides)
     again = f"engage hostile --seed {report.attack.seed} --runs 1 --seconds {options.seconds:g}{only}{body}{settings}"
     console.print(f"seed {report.attack.seed}: {again}", style="bold", highlight=False, soft_wrap=True)
     for line in report.wrong:
@@ -148,7 +142,7 @@ MISTAKES = (
 
 
 def table(counts: Mapping[str, int], runs: int) -> Table:
-    """What was sent, and what came of it."""
+    """Table of what was sent, and of the mistakes that followed."""
     made = Table(title=f"{runs} attacks", title_justify="left")
     made.add_column("what")
     made.add_column("how many", justify="right")

@@ -1,4 +1,4 @@
-"""Where the log goes: bugs to standard error, and with `--log FILE` a line for each thing that happens to a file.
+"""Setup of the log: bugs go to standard error; with `--log FILE` each event is a line of a file.
 
 Each line is appended whole, so that the services of one machine may share a file.
 """
@@ -15,14 +15,17 @@ from engage_hri.services.bus import journal
 
 LEVELS = {name.lower(): getattr(logging, name) for name in ("DEBUG", "INFO", "WARNING", "ERROR")}
 SOURCES = tuple(dict.fromkeys((*journal.NAMED, *keys.ROLES, "bus", "up")))
-"""Whose level can be set: services, the roles of others, the bus in memory, and `engage up`."""
+"""Sources with a level of their own: services, the roles of others, the bus in memory, and `engage up`."""
 
-OURS = "engage"
-"""The name of the handlers made here, of which there is one set."""
+HANDLER = "engage"
+"""Name of the handlers made here."""
 
 
-class Line(logging.Formatter):
-    """`2026-11-22T13:09:35.123+01:00 INFO realizer: block ask: done after 3.20 s`, whatever ids hold."""
+class LogLine(logging.Formatter):
+    """Form of a line:
+
+    `2026-11-22T13:09:35.123+01:00 INFO realizer: block ask: done after 3.20 s`, with unprintable letters escaped.
+    """
 
     def format(self, record: logging.LogRecord) -> str:
         at = datetime.fromtimestamp(record.created).astimezone().isoformat(timespec="milliseconds")
@@ -34,8 +37,8 @@ class Line(logging.Formatter):
         return line
 
 
-class Told(logging.Handler):
-    """Bugs, and what Engage says without a service's name, to standard error as it is at that moment."""
+class StandardError(logging.Handler):
+    """Handler that prints bugs, and warnings without a service's name, on the present standard error."""
 
     def emit(self, record: logging.LogRecord) -> None:
         if record.levelno >= (logging.WARNING if record.name == "engage" else logging.ERROR):
@@ -43,7 +46,7 @@ class Told(logging.Handler):
 
 
 def configure(path: Path | None = None, levels: Sequence[str] = ()) -> None:
-    """Set the log of this process up. path: appended to; None: no file.
+    """Set up the log of this process. path: file to append to; None: no file.
 
     levels: `debug` for all, or `realizer=debug` for one source. Raises InputRefused for an unknown level or source,
     and for a file that cannot be written.
@@ -54,19 +57,19 @@ def configure(path: Path | None = None, levels: Sequence[str] = ()) -> None:
             advice = f"LEVEL or SOURCE=LEVEL; levels: {', '.join(LEVELS)}; sources: {', '.join(SOURCES)}"
             bad = name if name not in LEVELS else source
             raise InputRefused(Fault(reason=f"unknown {bad!r}", where="--log-level", advice=advice))
-    handlers: list[logging.Handler] = [Told()]
+    handlers: list[logging.Handler] = [StandardError()]
     if path is not None:
         try:
             handlers.append(logging.FileHandler(path, encoding="utf-8", errors="backslashreplace"))
         except OSError as error:
             raise InputRefused(Fault(reason=f"cannot be written: {error.strerror}", where=f"--log {path}")) from error
-        handlers[-1].setFormatter(Line())
+        handlers[-1].setFormatter(LogLine())
     root = logging.getLogger()
-    for handler in [handler for handler in root.handlers if handler.name == OURS]:
+    for handler in [handler for handler in root.handlers if handler.name == HANDLER]:
         root.removeHandler(handler)
         handler.close()
     for handler in handlers:
-        handler.name = OURS
+        handler.name = HANDLER
         root.addHandler(handler)
     logging.getLogger("engage").setLevel(LEVELS[chosen.get("", "info" if path else "warning")])
     for source in SOURCES:

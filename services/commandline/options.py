@@ -1,6 +1,6 @@
-"""The options that several commands share: each is spelled here once, with its name, type, default and help.
+"""Options that several commands share, each with its name, type, default and help.
 
-A command's own file has a class `Options` that is made of these groups and adds the command's own options.
+A command's file has a class `Options` that inherits from these groups and adds the command's own options.
 """
 
 from collections.abc import Iterable, Sequence
@@ -28,11 +28,11 @@ WorldFile = Annotated[
     Path | None, typer.Option("--world", metavar="FILE", help="JSON of the entities; without it the tangram table.")
 ]
 HUMANS = {"appendix-b": "scripted"}
-"""Those whom the configuration calls otherwise."""
+"""Simulated humans with another name in the configuration."""
 
 
-def choices(seed: int | None, human: str | None, resolution: str | None) -> tuple[str, ...]:
-    """The command line's choices about the simulation as settings of the configuration."""
+def simulation_settings(seed: int | None, human: str | None, resolution: str | None) -> tuple[str, ...]:
+    """Translate options of the simulation to settings of the configuration."""
     chosen = {
         "control.variability.seed": seed,
         "simulation.seed": seed,
@@ -44,7 +44,7 @@ def choices(seed: int | None, human: str | None, resolution: str | None) -> tupl
 
 @dataclass(frozen=True, kw_only=True)
 class Configured:
-    """How the services are configured."""
+    """Options for the configuration of the services, and for the log."""
 
     config: Annotated[
         Path | None,
@@ -64,20 +64,20 @@ class Configured:
     ] = None
 
     @property
-    def given(self) -> tuple[str, ...]:
-        """All that the command line says of the configuration, as settings: a later one is stronger."""
+    def overrides(self) -> tuple[str, ...]:
+        """Settings that follow from all options, as `key=value`; a later one is stronger."""
         return tuple(self.settings or ())
 
     def load(self, *, defaults: Iterable[str] = ()) -> "Config":
-        """The file's configuration with the command line's settings before it. Raises InputRefused."""
+        """Read the configuration: the file, and the stronger settings of the options. Raises InputRefused."""
         from engage_hri.services.commandline.config import load
 
-        return load(self.config, settings=self.given, defaults=defaults)
+        return load(self.config, settings=self.overrides, defaults=defaults)
 
 
 @dataclass(frozen=True, kw_only=True)
 class Connected(Configured):
-    """Which robot on which bus. Without endpoints the bus is this machine's own."""
+    """Options for the robot and the bus. Without endpoints the bus is that of this machine."""
 
     robot: Annotated[
         str | None, typer.Option(metavar="NAME", help="The robot's namespace on the bus.", show_default="robot")
@@ -87,16 +87,16 @@ class Connected(Configured):
     ] = None
 
     @property
-    def given(self) -> tuple[str, ...]:
-        """The robot's name is stronger than a setting."""
+    def overrides(self) -> tuple[str, ...]:
+        """Settings of the options; `--robot` is stronger than `--set`."""
         if self.robot is None:
-            return super().given
+            return super().overrides
         if not is_utf8(self.robot):
             raise InputRefused(Fault(reason=f"robot {self.robot!r} is not UTF-8"))
-        return (*super().given, f"robot={json.encode(self.robot).decode()}")
+        return (*super().overrides, f"robot={json.encode(self.robot).decode()}")
 
     async def open(self, robot: str, listen: Sequence[str] = ()) -> "Hub":
-        """The Zenoh hub. Raises EngageError when an endpoint is bad or taken."""
+        """Open the Zenoh hub. Raises EngageError if an endpoint is bad or taken."""
         from engage_hri.services.bus.zenoh.hub import open_hub
 
         return await open_hub(robot, connect=self.connect or (), listen=listen)
@@ -104,7 +104,7 @@ class Connected(Configured):
 
 @dataclass(frozen=True, kw_only=True)
 class Listening(Connected):
-    """For what others may connect to."""
+    """Options for a process to which others may connect."""
 
     listen: Annotated[
         list[str] | None, typer.Option(metavar="ENDPOINT", help="Zenoh endpoint to listen on; may be repeated.")
@@ -113,7 +113,7 @@ class Listening(Connected):
 
 @dataclass(frozen=True, kw_only=True)
 class Simulated(Configured):
-    """What the simulation is like."""
+    """Options for the simulation."""
 
     seed: Annotated[int | None, typer.Option(metavar="N", help="Of all chance in the simulated body.")] = None
     human: Annotated[
@@ -123,14 +123,14 @@ class Simulated(Configured):
     resolution: Resolution = None
 
     @property
-    def given(self) -> tuple[str, ...]:
-        """Settings are stronger."""
-        return (*choices(self.seed, self.human, self.resolution), *super().given)
+    def overrides(self) -> tuple[str, ...]:
+        """Settings of the options; `--set` is stronger than the options of the simulation."""
+        return (*simulation_settings(self.seed, self.human, self.resolution), *super().overrides)
 
 
 @dataclass(frozen=True, kw_only=True)
 class Written:
-    """What is written and printed."""
+    """Options for the files that are written, and for printing."""
 
     events: Annotated[
         Path | None,

@@ -1,6 +1,4 @@
-"""What `--events`, `--feedback` and `--outcomes` write, as it comes: JSON lines, or feedback as XML. `-` is standard
-output.
-"""
+"""Files of `--events`, `--feedback` and `--outcomes`: JSON lines, or feedback as XML. `-` is standard output."""
 
 import sys
 from collections.abc import Callable
@@ -25,22 +23,19 @@ FeedbackFormat = Literal["json", "xml"]
 
 
 class Terminal(Console):
-    """Rich's console, but it leaves it to `services/commandline/app.py` what becomes of us when nobody reads on.
-
-    And an id between colons is no emoji: `b:x:start`.
-    """
+    """Rich's console, without its end of the process on a broken pipe, and without emoji in ids like `b:x:start`."""
 
     def __init__(self, **settings: Any) -> None:
         super().__init__(emoji=False, **settings)
 
     def on_broken_pipe(self) -> None:
-        raise  # the BrokenPipeError; Rich would end the process here
+        raise  # the BrokenPipeError, for services/commandline/ends.py
 
 
 class Outputs:
-    """A sink that writes what is public. A bad path is refused before anything starts.
+    """Sink that writes the public messages. A bad path is refused before anything starts.
 
-    format: of the feedback; None: as its file's name ends.
+    format: of the feedback; None: that of its file's ending.
     """
 
     def __init__(
@@ -52,7 +47,7 @@ class Outputs:
     ) -> None:
         self._paths = (events, feedback, outcomes)
         self.wanted: Callable[[Message], bool] = lambda message: True
-        """Which messages to write."""
+        """Filter: True for the messages to write."""
         named_xml = feedback is not None and feedback.suffix.lower() == ".xml"
         self._is_xml = format == "xml" or (format is None and named_xml)
         self._files = ExitStack()
@@ -61,7 +56,7 @@ class Outputs:
         self._outcomes: TextIO | None = None
 
     def console(self, *, quiet: bool) -> Console:
-        """For everything else: standard error if the lines have standard output for themselves."""
+        """Console for all other output: standard error if lines go to standard output."""
         return Terminal(stderr=STDOUT in self._paths, quiet=quiet)
 
     def __enter__(self) -> Self:
@@ -81,7 +76,7 @@ class Outputs:
                 self._feedback.flush()
             self._files.close()
         except OSError:
-            if error is None:  # else the same trouble once more
+            if error is None:  # otherwise it is the same trouble once more
                 raise
 
     def _open(self, path: Path | None) -> TextIO | None:
@@ -90,7 +85,7 @@ class Outputs:
         if path == STDOUT:
             return sys.stdout
         try:
-            # Line by line: whoever follows the file sees each line at once.
+            # Line by line, so that a reader that follows the file sees each line at once.
             return self._files.enter_context(path.open("w", buffering=1, encoding="utf-8"))
         except OSError as error:
             raise InputRefused(Fault(reason=f"cannot write: {error.strerror}", where=str(path))) from error

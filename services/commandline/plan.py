@@ -1,4 +1,4 @@
-"""`engage plan FILE`: check a block, or the block that a fragment becomes, and print its net. Nothing moves."""
+"""Command `engage plan FILE`: check a block, or the block that a fragment becomes, and print its net."""
 
 import sys
 from dataclasses import dataclass
@@ -14,7 +14,7 @@ from engage_hri.services.commandline.config import Config
 from engage_hri.services.commandline.generating import generated
 from engage_hri.services.commandline.options import Configured, Strict, WorldFile
 from engage_hri.services.commandline.process import DONE
-from engage_hri.services.commandline.prose import not_strict
+from engage_hri.services.commandline.prose import strict_refusal
 from engage_hri.services.commandline.sources import read_source, read_world
 from engage_hri.services.runtime.virtual_time import run_virtual
 
@@ -35,7 +35,7 @@ def main(options: Options) -> int:
     around = read_world(options.world)
     writers = {"text": export.as_text, "json": export.as_json, "dot": export.as_dot, "pnml": export.as_pnml}
     texts, warnings = [], 0
-    with source.blamed():
+    with source.naming_file():
         for plan in generated(source.things, around, config, str(options.file)):
             estimates = run_virtual(estimated(plan.block, around, config))
             planned = export.plan_block(plan.block, estimates)
@@ -45,12 +45,12 @@ def main(options: Options) -> int:
                 print(f"! {problem.kind} {problem.behavior or plan.block.id}: {problem.message}", file=sys.stderr)
     print("\n".join(text.rstrip("\n") for text in texts))
     if options.strict and warnings:
-        raise not_strict(warnings)
+        raise strict_refusal(warnings)
     return DONE
 
 
 async def estimated(block: Block, world: World, config: Config) -> tuple[Estimate, ...]:
-    """What the simulated body expects of the block in that world, from its home position."""
+    """Estimates of the simulated body for a block, from its home position."""
     from engage_hri.services.control.torso.body import SimulatedBody
     from engage_hri.services.realizer.points import performer
 

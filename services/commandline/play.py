@@ -1,4 +1,4 @@
-"""`engage play FILE...`: perform fragments and blocks, in a running system or in a private one."""
+"""Command `engage play FILE...`: perform fragments and blocks, in a running system or in a private one."""
 
 import asyncio
 import sys
@@ -17,7 +17,7 @@ from engage_hri.schemas.faults import EngageError, Fault, InputRefused, NoReply,
 from engage_hri.schemas.fragments import FragmentOutcome, TurnFragment
 from engage_hri.schemas.messages import Message
 from engage_hri.schemas.status import AskStatus
-from engage_hri.schemas.units import Seconds
+from engage_hri.schemas.units import A_DAY, Seconds
 from engage_hri.schemas.world import World
 from engage_hri.services.bus.interface import Hub
 from engage_hri.services.bus.memory import MemoryHub
@@ -29,18 +29,16 @@ from engage_hri.services.commandline.ends import readable
 from engage_hri.services.commandline.options import Connected, Strict, VirtualTime, WorldFile, Written
 from engage_hri.services.commandline.outputs import FeedbackFormat, Outputs, Terminal
 from engage_hri.services.commandline.played import Played
-from engage_hri.services.commandline.process import DONE, FAILED, REFUSED, run, unique
-from engage_hri.services.commandline.prose import Prose, Warnings, not_strict
+from engage_hri.services.commandline.process import DONE, FAILED, REFUSED, run, unique_name
+from engage_hri.services.commandline.prose import Prose, Warnings, strict_refusal
 from engage_hri.services.commandline.sources import InputFile, Thing, read_world, still
 from engage_hri.services.console.follow import Sink, following
 from engage_hri.services.console.live import Log
 from engage_hri.services.console.log import Telling
-from engage_hri.services.runtime.service import Service, running
+from engage_hri.services.runtime.service import running
 
 PATIENCE: Seconds = 5.0
-"""How long a running system may take to answer at all."""
-A_DAY: Seconds = 86_400.0
-"""The latest time of `--at`. Even on a clock that jumps every second of a robot's life costs something."""
+"""Time in which a running system must answer at all."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -66,15 +64,21 @@ class Options(Written, Connected):
         typer.Option(metavar="FILE", help="Write what became of each fragment, for a language model; - as above."),
     ] = None
     human: Annotated[
-        Literal["attentive", "none"],
-        typer.Option(help="With --embedded: one who follows the robot's gaze and answers, or nobody who does."),
-    ] = "attentive"
+        Literal["attentive", "none"] | None,
+        typer.Option(
+            help="With --embedded: one who follows the robot's gaze and answers, or nobody who does.",
+            show_default="attentive",
+        ),
+    ] = None
     strict: Strict = False
     verbose: Annotated[bool, typer.Option("--verbose", "-v", help="Print each sync point, too.")] = False
 
 
 class Job(NamedTuple):
-    """times: when to submit each source, seconds from the start; None: one after the other."""
+    """Sources with all that is needed to perform them.
+
+    times: when to submit each source, seconds from the start; None: one after the other.
+    """
 
     options: Options
     sources: tuple[InputFile, ...]
@@ -87,7 +91,7 @@ class Job(NamedTuple):
 
     @property
     def servers(self) -> frozenset[str]:
-        """Who performs what the sources hold."""
+        """Services that perform the sources."""
         things = [thing for source in self.sources for thing in source.things]
         return frozenset("generation" if isinstance(thing, TurnFragment) else "realizer" for thing in things)
 
@@ -97,7 +101,8 @@ class Job(NamedTuple):
 
 
 def main(options: Options) -> int:
-    for given, option in ((options.world, "--world"), (options.virtual_time, "--virtual-time")):
+    private = {"--world": options.world, "--human": options.human, "--virtual-time": options.virtual_time}
+    for option, given in private.items():
         if given and not options.embedded:
             raise InputRefused(Fault(reason=f"{option} is for a private system", advice="add --embedded"))
     if options.connect and options.embedded:
@@ -119,12 +124,12 @@ def main(options: Options) -> int:
         performing = _embedded(job, config, world) if options.embedded else _remote(job, config)
         code = run(performing, virtual_time=options.virtual_time)
     if options.strict and warnings.count and code == DONE:
-        raise not_strict(warnings.count)
+        raise strict_refusal(warnings.count)
     return code
 
 
 def submission_times(text: str | None, files: int) -> tuple[Seconds, ...] | None:
-    """`0,1.5` as seconds, one for each file; None: one after the other. Raises InputRefused."""
+    """Read `--at`: `0,1.5` is a time for each of two files; None: one after the other. Raises InputRefused."""
     if text is None:
         return None
     try:
@@ -132,31 +137,30 @@ def submission_times(text: str | None, files: int) -> tuple[Seconds, ...] | None
     except ValueError as error:
         raise InputRefused(Fault(reason=f"--at {text!r} is not a list of seconds", advice="--at 0,1.5")) from error
     if len(times) != files:
-        raise InputRefused(
-            Fault(reason=f"--at gives {len(times)} times for {files} files", advice="one for each file")
-        )
+        reason = f"--at gives {len(times)} times for {files} files"
+        raise InputRefused(Fault(reason=reason, advice="one for each file"))
     if not all(0 <= time <= A_DAY for time in times):
         raise InputRefused(Fault(reason=f"--at {text!r}: not from 0 to {A_DAY:g} seconds", advice="seconds from now"))
     return times
 
 
 @asynccontextmanager
-async def _private(job: Job, config: Config, world: World) -> AsyncIterator[Hub]:
-    """A system of our own: simulated body, still world; the policies only if a fragment needs them.
+async def _private_system(job: Job, config: Config, world: World) -> AsyncIterator[Hub]:
+    """Run a private system: simulated body and still world; generation only if there is a fragment.
 
-    Without a fragment nobody but the blocks themselves moves the head.
+    So without a fragment only the blocks themselves move the head.
     """
     names = ["realizer", "recognition", "control"]
     if job.has_fragments:
         names.append("generation")
-    services: dict[str, Service] = {name: roster.service(name, config) for name in names}
-    perception = still(world, is_attentive=job.options.human == "attentive")
+    services = {name: roster.service(name, config) for name in names}
+    perception = still(world, is_attentive=job.options.human != "none")
     async with MemoryHub(config.robot) as hub, running(hub, {"simulation": perception, **services}):
         yield hub
 
 
 async def _embedded(job: Job, config: Config, world: World) -> int:
-    async with _private(job, config, world) as hub:
+    async with _private_system(job, config, world) as hub:
         return await _perform_all(job, hub, None)
 
 
@@ -165,7 +169,7 @@ async def _remote(job: Job, config: Config) -> int:
         await _somebody_there(hub, job.servers)
         if job.has_fragments:
             async with connect(hub=hub) as robot:
-                # Without perception generation waits or refuses by itself.
+                # Without perception generation itself waits or refuses.
                 with suppress(NoReply):
                     checking.check(job.sources, await robot.world(PATIENCE), config.robot, job.outputs)
         return await _perform_all(job, hub, PATIENCE)
@@ -173,7 +177,7 @@ async def _remote(job: Job, config: Config) -> int:
 
 async def _somebody_there(hub: Hub, servers: frozenset[str]) -> None:
     """Wait for the servers, at most `PATIENCE` for all of them. Raises RunFailed for the first that is missing."""
-    bus = hub.join(unique("play-asks"))
+    bus = hub.join(unique_name("play-asks"))
     deadline = bus.now() + PATIENCE
     for server in sorted(servers):
         try:
@@ -184,8 +188,8 @@ async def _somebody_there(hub: Hub, servers: frozenset[str]) -> None:
 
 
 async def _perform_all(job: Job, hub: Hub, patience: Seconds | None) -> int:
-    """The worst exit code of all sources. patience: how long a service may take to answer at all."""
-    bus = hub.join(unique("play-log"))
+    """Perform all sources. Returns the worst exit code. patience: time in which a service must answer at all."""
+    bus = hub.join(unique_name("play-log"))
     log = Log(job.console, hub.robot, bus.now(), Telling(head=False, points=job.options.verbose, warnings=False))
 
     def tell(message: Message, at: Seconds) -> None:
@@ -220,7 +224,10 @@ async def _perform_each(job: Job, robot: Robot, patience: Seconds | None) -> int
 
 
 async def _perform(job: Job, source: InputFile, robot: Robot, patience: Seconds | None) -> int:
-    """Perform what a file holds, in order; its worst exit code. A failure is told and ends nothing else."""
+    """Perform the content of a file, in order.
+
+    Returns the worst exit code; a failure is told and ends nothing else.
+    """
     worst = DONE
     for thing in source.things:
         try:
@@ -236,10 +243,8 @@ async def _perform(job: Job, source: InputFile, robot: Robot, patience: Seconds 
         if isinstance(outcome, FragmentOutcome):
             job.prose.expect(outcome)
         elif outcome.dropped:
-            print(
-                f"{source.path}: {thing.id} was {outcome.status} without {', '.join(outcome.dropped)}",
-                file=sys.stderr,
-            )
+            left_out = ", ".join(outcome.dropped)
+            print(f"{source.path}: {thing.id} was {outcome.status} without {left_out}", file=sys.stderr)
         code = job.played.exit_code(outcome)
         if code != DONE:
             print(f"{source.path}: {thing.id} was {outcome.status}", file=sys.stderr)

@@ -1,4 +1,4 @@
-"""What is played here: which messages concern it, what of it is still open, and what its end is worth."""
+"""State of the played blocks and fragments: their messages, their open events, their exit code."""
 
 import asyncio
 from collections.abc import Iterable
@@ -14,11 +14,11 @@ from engage_hri.services.commandline.process import DONE, FAILED
 from engage_hri.services.commandline.sources import Thing
 
 GRACE: Seconds = 0.5
-"""How long after its limit the end of an event may take to get here."""
+"""Time after its limit in which the end of an event must arrive."""
 
 
 class Played:
-    """A sink that follows the played things and the connection events that they begin."""
+    """Sink that follows the played blocks and fragments and the connection events that they begin."""
 
     def __init__(self, things: Iterable[Thing]) -> None:
         things = tuple(things)
@@ -33,7 +33,7 @@ class Played:
         self._events: set[str] = set()
         """Ids of the connection events that have started."""
         self._open: dict[tuple[str, str], ConnectionEvent | None] = {}
-        """By block and behavior, what has begun and not ended; None until recognition has said that it started."""
+        """Events that have not ended, by block and behavior; None until recognition has told of the start."""
         fragments = [thing for thing in things if isinstance(thing, TurnFragment)]
         self._holds_turn = bool(fragments) and fragments[-1].turn_status in ("beginning", "middle")
         self._changed = asyncio.Event()
@@ -54,7 +54,7 @@ class Played:
         self._changed.set()
 
     def concerns(self, message: Message) -> bool:
-        """Is it to be written and told?"""
+        """Tell whether a message is about the played things, and so to be written and told."""
         match message:
             case (
                 BlockProgress(block=block)
@@ -64,7 +64,7 @@ class Played:
             ):
                 return block is None or block in self.blocks
             case ConnectionEvent(id=id):
-                # By block alone it could be of an earlier performance under the same id.
+                # The block alone does not tell: it may have been performed before, under the same id.
                 return id in self._events
         return True
 
@@ -84,7 +84,7 @@ class Played:
                 return
 
     def _longest_limit(self) -> Seconds | None:
-        """Of what is waited for; None if there is nothing."""
+        """Longest limit of the events that are waited for; None if there are none."""
         limits = [
             event.limit or 0.0 if event else 0.0
             for event in self._open.values()
@@ -93,5 +93,5 @@ class Played:
         return max(limits, default=None)
 
     def exit_code(self, outcome: FragmentOutcome | BlockOutcome) -> int:
-        """A block that another file's REPLACE ended counts as done."""
+        """Exit code of an outcome. A block that another file's REPLACE ended counts as done."""
         return DONE if outcome.status == "done" or outcome.replaced_by in self.blocks else FAILED

@@ -1,4 +1,4 @@
-"""How a command becomes a process: which loop it runs on, how it is stopped, what its exit code says."""
+"""Process of a command: its event loop, the signals that stop it, its exit codes."""
 
 import asyncio
 import os
@@ -13,16 +13,16 @@ from engage_hri.services.runtime.virtual_time import VirtualTimeLoop
 
 T = TypeVar("T")
 DONE, REFUSED, FAILED, UNREAD = 0, 2, 3, 128 + signal.SIGPIPE
-"""Exit codes: all done; input refused, nothing moved; failed while running; nobody reads the output any more."""
+"""Exit codes: all done; input refused, nothing moved; failed while running; reader of the output gone."""
 _stopping = [signal.SIGINT]
-"""The signal that stops us, if one does, is the last of these."""
+"""Signals received; the last one is the reason to stop."""
 
 
 def run(main: Coroutine[Any, Any, T], *, virtual_time: bool = False) -> T:
-    """Run to the end, on uvloop where it is installed (it measured a fifth faster on Zenoh), or in virtual time.
+    """Run to the end, on uvloop if it is installed (measured a fifth faster on Zenoh), or in virtual time.
 
-    Ctrl-C and SIGTERM cancel `main`; when it has ended KeyboardInterrupt is raised. The second Ctrl-C doesn't wait;
-    a second SIGTERM says nothing new.
+    Ctrl-C and SIGTERM cancel `main`; when it has ended, KeyboardInterrupt is raised. A second Ctrl-C does not wait
+    for that; a second SIGTERM is ignored.
     """
     # asyncio.Runner cancels `main` only if it finds this handler. A shell that starts us in the background has had
     # Ctrl-C ignored.
@@ -34,7 +34,7 @@ def run(main: Coroutine[Any, Any, T], *, virtual_time: bool = False) -> T:
 
 
 def run_until_signal(main: Coroutine[Any, Any, None]) -> None:
-    """Run what never ends by itself, or need not: Ctrl-C, SIGTERM and a reader who has had enough are good ends."""
+    """Run until Ctrl-C, SIGTERM, or the loss of the output's reader, all of which are good ends."""
     try:
         run(main)
     except* KeyboardInterrupt:
@@ -43,13 +43,13 @@ def run_until_signal(main: Coroutine[Any, Any, None]) -> None:
         silence()
 
 
-def unique(name: str) -> str:
-    """A participant name that no other process on the bus has."""
+def unique_name(name: str) -> str:
+    """Make a participant name that no other process on the bus has."""
     return f"{name}-{uuid.uuid4().hex[:8]}"
 
 
 async def forever() -> None:
-    """Until cancelled."""
+    """Wait until cancelled."""
     await asyncio.get_running_loop().create_future()
 
 
@@ -60,12 +60,12 @@ def _terminate(number: int, frame: object) -> None:
 
 
 def interrupted() -> int:
-    """The exit code after a KeyboardInterrupt: 130 after Ctrl-C, 143 after SIGTERM, as shells count."""
+    """Exit code after a KeyboardInterrupt: 130 after Ctrl-C, 143 after SIGTERM, as shells count."""
     return 128 + _stopping[-1]
 
 
 def silence() -> None:
-    """Nothing can be written any more: Python's own flush at its end must not complain of it."""
+    """Send the output to nowhere, once it can't be written, so that Python's flush at the end does not complain."""
     nowhere = os.open(os.devnull, os.O_WRONLY)
     for stream in (sys.stdout, sys.stderr):
         try:

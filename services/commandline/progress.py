@@ -1,4 +1,4 @@
-"""How far a study has come: a bar on a terminal, a line for each session anywhere else."""
+"""Progress of a study: a bar on a terminal, a line for each session anywhere else."""
 
 from contextlib import ExitStack
 from typing import Self
@@ -9,8 +9,8 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from engage_hri.services.study.records import SessionRecord
 
 
-class Following:
-    """Called with each session that ended. Rich's own refresh thread stays off."""
+class ProgressReport:
+    """Reporter that is called with each ended session. Rich's own refresh thread stays off."""
 
     def __init__(self, console: Console, total: int) -> None:
         self._console = console
@@ -33,11 +33,11 @@ class Following:
         if self._bar is not None:
             self._bar.update(self._task, advance=1, refresh=True)
         if self._bar is None or not record.finished:
-            self._console.print(told(record), markup=False, highlight=False, soft_wrap=True)
+            self._console.print(session_line(record), markup=False, highlight=False, soft_wrap=True)
 
 
-def told(record: SessionRecord) -> str:
-    """`operational 3: 155 s, 97 connection events`."""
+def session_line(record: SessionRecord) -> str:
+    """Result of a session: `operational 3: 155 s, 97 connection events`."""
     came_to = f"{record.duration:.0f} s, {record.statistics.events} connection events"
     name = f"{record.condition} {record.session}"
     return f"{name}: {came_to}" if record.finished else f"{name}: not finished: {record.reason} ({came_to})"

@@ -1,4 +1,4 @@
-"""What became of each fragment, in a line of prose, once all that it began is decided: words, looks, answers."""
+"""Result of each fragment as a line of prose, once its connection events are decided; and warnings."""
 
 from msgspec.structs import replace
 from rich.console import Console
@@ -15,7 +15,10 @@ from engage_hri.services.console import wording
 
 
 class Prose:
-    """A sink, on a console and in `--outcomes`. A fragment that has ended waits here for the answer to its turn."""
+    """Sink that prints results and writes them to `--outcomes`.
+
+    Ended fragments wait here for the answer to their turn.
+    """
 
     def __init__(self, console: Console, outputs: Outputs) -> None:
         self._console = console
@@ -29,12 +32,12 @@ class Prose:
             self._tell_decided()
 
     def expect(self, outcome: FragmentOutcome) -> None:
-        """It has ended; told now, or when its last event is decided."""
+        """Take the outcome of a fragment, to be told now or when its last event is decided."""
         self._waiting.append(outcome)
         self._tell_decided()
 
     def finish(self) -> None:
-        """Nobody waits any longer: tell the rest as it is."""
+        """Tell the rest as it is now."""
         while self._waiting:
             self._tell(self._waiting.pop(0))
 
@@ -46,14 +49,14 @@ class Prose:
         return replace(outcome, events=tuple(self._events.get(event.id, event) for event in outcome.events))
 
     def _tell(self, outcome: FragmentOutcome) -> None:
-        told = summary(self._now(outcome))
-        self._outputs.outcome(outcome.fragment, told)
-        text = f"{outcome.fragment}: {told.text}"
+        result = summary(self._now(outcome))
+        self._outputs.outcome(outcome.fragment, result)
+        text = f"{outcome.fragment}: {result.text}"
         self._console.print(text, style="bold", markup=False, highlight=False, soft_wrap=True)
 
 
 class Warnings:
-    """A sink that tells warnings, and counts them. Those of a block that is then refused say the refusal."""
+    """Sink that prints and counts warnings. Those of a block wait until it has started: its refusal repeats them."""
 
     def __init__(self, console: Console) -> None:
         self._console = console
@@ -73,16 +76,16 @@ class Warnings:
                 self.finish()
 
     def refused(self, block: str) -> None:
-        """That is told already."""
+        """Drop the waiting warnings of a block, as its refusal has told them."""
         self._held = [each for each in self._held if each.block != block]
 
     def finish(self) -> None:
-        """Tell what there is to tell."""
+        """Print the waiting warnings."""
         for each in self._held:
             self._console.print(wording.warning(each), markup=False, highlight=False, soft_wrap=True)
         self._held.clear()
 
 
-def not_strict(warnings: int) -> InputRefused:
-    """Why `--strict` fails."""
+def strict_refusal(warnings: int) -> InputRefused:
+    """Error with which `--strict` fails."""
     return InputRefused(Fault(reason=f"{warnings} warning{'s' * (warnings > 1)}; --strict allows none"))

@@ -1,4 +1,4 @@
-"""`engage run SERVICE`: one service as one process on the real bus."""
+"""Command `engage run SERVICE`: one service as one process on the real bus."""
 
 import asyncio
 import sys
@@ -16,21 +16,21 @@ from engage_hri.services.runtime.service import serve
 
 @dataclass(frozen=True, kw_only=True)
 class Options(Listening):
-    """attended: also until standard input closes, which is how a child sees its parent die."""
+    """Options of the command. attended: run only until standard input closes, as it does when our parent dies."""
 
     service: Annotated[roster.ServiceName, typer.Argument(help="Which service.", show_default=False)]
     attended: Annotated[bool, typer.Option("--attended", hidden=True)] = False
 
 
-def is_ready(name: str) -> str:
-    """What a service says on standard error when it serves. `engage up` waits for it."""
+def ready_line(name: str) -> str:
+    """Line that a service prints on standard error when it serves. `engage up` waits for it."""
     return f"{name} is ready"
 
 
 def main(options: Options) -> int:
     """Serve until a signal."""
     on_robot = options.service in roster.ROBOT
-    config = read(RobotConfig, options.config, settings=options.given) if on_robot else options.load()
+    config = read(RobotConfig, options.config, settings=options.overrides) if on_robot else options.load()
     run_until_signal(_serve(options, config))
     return DONE
 
@@ -39,11 +39,11 @@ async def _serve(options: Options, config: RobotConfig) -> None:
     name = options.service
     service = roster.service(name, config)
 
-    def stands() -> None:
-        print(is_ready(name), file=sys.stderr, flush=True)
+    def announce() -> None:
+        print(ready_line(name), file=sys.stderr, flush=True)
 
     async with await options.open(config.robot, options.listen or ()) as hub:
-        serving = asyncio.create_task(serve(hub, name, service, stands), name=f"service {name}")
+        serving = asyncio.create_task(serve(hub, name, service, announce), name=f"service {name}")
         waiting = {serving}
         if options.attended:
             waiting.add(asyncio.create_task(_until_closed(), name="parent"))
@@ -58,7 +58,7 @@ async def _serve(options: Options, config: RobotConfig) -> None:
 
 
 async def _until_closed() -> None:
-    """Return when whoever holds the other end of standard input is gone."""
+    """Wait until the other end of standard input is closed."""
     reader = asyncio.StreamReader()
     transport, _ = await asyncio.get_running_loop().connect_read_pipe(
         lambda: asyncio.StreamReaderProtocol(reader), sys.stdin

@@ -1,7 +1,7 @@
-"""One session of a study, and the child process that plays sessions as they are ordered.
+"""Sessions of a study, and the child process that plays them on order.
 
 The child reads orders from standard input and answers each on standard output, a line of JSON both ways: it needs no
-bus, and ends with whoever orders.
+bus, and ends with its parent.
 """
 
 import asyncio
@@ -25,14 +25,14 @@ from engage_hri.services.simulation import human_session
 from engage_hri.services.study.records import EventRecord, Recording, SessionRecord
 
 A_WHILE: Seconds = 120.0
-"""After the last event that was drawn: all that is open has ended by then."""
+"""Time after the last drawn event by which all open events have ended."""
 
 
 class Order(Struct, frozen=True, kw_only=True):
-    """Play this session.
+    """Order to play one session.
 
-    limit: a session is broken off after so long, in virtual time.
-    people: no robot, but two people drawn from Table 2.1; of the configuration only recognition counts.
+    limit: time after which it is broken off, in virtual time.
+    people: no robot, but two people drawn from Table 2.1; only the configuration of recognition counts.
     """
 
     session: int
@@ -43,8 +43,8 @@ class Order(Struct, frozen=True, kw_only=True):
     people: bool = False
 
 
-class Played(Struct, frozen=True, kw_only=True):
-    """What a session came to. trace: where in our code it failed, if it did."""
+class SessionResult(Struct, frozen=True, kw_only=True):
+    """Result of a session. trace: of the exception, if it failed by a bug of ours."""
 
     record: SessionRecord
     events: tuple[EventRecord, ...] = ()
@@ -53,11 +53,11 @@ class Played(Struct, frozen=True, kw_only=True):
 
 @dataclass(frozen=True, kw_only=True)
 class Options:
-    """There is nothing to choose."""
+    """Options of the command: none."""
 
 
 def main(options: Options) -> int:
-    """Play what standard input orders, until it ends."""
+    """Play the orders on standard input, until it ends."""
     orders = msgspec.json.Decoder(Order)
     for line in sys.stdin.buffer:
         sys.stdout.buffer.write(msgspec.json.encode(play(orders.decode(line))) + b"\n")
@@ -65,8 +65,8 @@ def main(options: Options) -> int:
     return DONE
 
 
-def play(order: Order) -> Played:
-    """One session in virtual time. Whatever goes wrong in it is in the answer; nothing is raised."""
+def play(order: Order) -> SessionResult:
+    """Play one session in virtual time. An error is in the result; nothing is raised."""
     recording = Recording(order.config.robot)
     reason = trace = ""
     try:
@@ -80,11 +80,11 @@ def play(order: Order) -> Played:
         reason, trace = _reason(error), traceback.format_exc()
     record = recording.session(session=order.session, condition=order.condition, seed=order.seed, reason=reason)
     events = recording.events(session=order.session, condition=order.condition)
-    return Played(record=record, events=events, trace=trace)
+    return SessionResult(record=record, events=events, trace=trace)
 
 
 async def _play_robot(order: Order, recording: Recording) -> None:
-    """Raises TimeoutError at the limit."""
+    """Play the tangram. Raises TimeoutError at the limit."""
     async with asyncio.timeout(order.limit):
         await play_tangram(order.config, (recording,))
 
@@ -106,7 +106,7 @@ def _play_people(order: Order, recording: Recording) -> None:
 
 
 def _reason(error: BaseException) -> str:
-    """The first cause, on one line."""
+    """First cause of an exception, on one line."""
     while isinstance(error, BaseExceptionGroup):
         error = error.exceptions[0]
     return " ".join(f"{type(error).__name__}: {error}".split())

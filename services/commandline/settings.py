@@ -1,6 +1,6 @@
-"""The configuration of what runs on a robot, and how any is read: TOML in, frozen structs out.
+"""Configuration of the services of a robot, and reading of any configuration: TOML in, frozen structs out.
 
-A bad one is refused at start, by file and key.
+A bad configuration is refused at start, with file and key.
 """
 
 import re
@@ -24,15 +24,15 @@ from engage_hri.services.realizer.config import RealizerConfig
 from engage_hri.services.recognition.config import RecognitionConfig
 
 ELSEWHERE = ("simulation", "collaboration")
-"""Sections of the same file, which a robot passes over: it loads nothing of what stands in for people."""
+"""Sections of the same file that a robot ignores: it loads nothing of the simulation and the task."""
 _ADVICE = "see docs/configuration.md"
 
 
 class RobotConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """One section (TOML table) for each service, and what several of them must agree on.
+    """Sections (TOML tables) of the services, and values that several of them share.
 
-    robot: the namespace on the bus and the robot's actor id. covered_for: how long an object that the world no longer
-    reports is taken to be covered, and spoken of and looked at where it was.
+    robot: the namespace on the bus and the robot's actor id. covered_for: time for which an object that is missing in
+    reports of the world is taken to be covered, so that the robot still speaks of it and looks at it.
     """
 
     robot: str = "robot"
@@ -53,7 +53,7 @@ Kind = TypeVar("Kind", bound=RobotConfig)
 
 
 def read(kind: type[Kind], path: Path | None, *, settings: Iterable[str] = (), defaults: Iterable[str] = ()) -> Kind:
-    """The configuration of a TOML file. Raises InputRefused with the file and the key that is wrong.
+    """Read a configuration from a TOML file. Raises InputRefused with the file and the bad key.
 
     settings: `section.key=value`, each stronger than the file. defaults: the same, weaker than the file.
     """
@@ -75,7 +75,7 @@ def read(kind: type[Kind], path: Path | None, *, settings: Iterable[str] = (), d
 
 
 def _explained(error: msgspec.ValidationError, kind: Any) -> str:
-    """What is wrong, what would be right, and the key."""
+    """Explain an error: what is wrong, what would be right, and the key."""
     reason, _, place = str(error).partition(" - at `$")
     key = place.strip("`").lstrip(".")
     for name in key.split(".") if key else ():
@@ -90,14 +90,14 @@ def _explained(error: msgspec.ValidationError, kind: Any) -> str:
 
 
 def _choices(kind: Any) -> list[str]:
-    """The words that a type is made of."""
+    """Words that a Literal type allows."""
     if get_origin(kind) is Literal:
         return list(get_args(kind))
     return [choice for part in get_args(kind) for choice in _choices(part)]
 
 
 def _not_a_number(table: dict[str, Any], place: str = "") -> str:
-    """The first key with the value nan: it is in no range, nor out of any."""
+    """First key with the value nan, which checks of ranges would not find; empty: none."""
     for name, value in table.items():
         key = f"{place}{name}"
         inner = _not_a_number(value, f"{key}.") if isinstance(value, dict) else key if value != value else ""
@@ -116,7 +116,7 @@ def _file(path: Path) -> dict[str, Any]:
 
 
 def _setting(text: str) -> dict[str, Any]:
-    """`recognition.gaze_resolution=table`; the value is TOML, or else a plain word."""
+    """Read a setting, `recognition.gaze_resolution=table`. The value is TOML, or else a plain word."""
     key, equals, value = text.partition("=")
     if not is_utf8(text):
         raise InputRefused(Fault(reason=f"setting {text!r} is not UTF-8", advice="section.key=value"))

@@ -1,4 +1,4 @@
-"""`engage simulate`: many sessions in virtual time, what they come to, and what that says about the hypotheses."""
+"""Command `engage simulate`: many sessions in virtual time, their results, and tests of the hypotheses."""
 
 import os
 import platform
@@ -22,35 +22,35 @@ from engage_hri.schemas.units import Seconds
 from engage_hri.services.commandline.config import Config
 from engage_hri.services.commandline.demo import DEFAULTS
 from engage_hri.services.commandline.folder import Folder
-from engage_hri.services.commandline.options import Configured, Quiet, Resolution, choices
+from engage_hri.services.commandline.options import Configured, Quiet, Resolution, simulation_settings
 from engage_hri.services.commandline.outputs import Terminal
 from engage_hri.services.commandline.process import DONE, FAILED, interrupted, run
-from engage_hri.services.commandline.progress import Following
-from engage_hri.services.commandline.session import Order, Played
+from engage_hri.services.commandline.progress import ProgressReport
+from engage_hri.services.commandline.session import Order, SessionResult
 from engage_hri.services.commandline.validation import beside_table_2_1
 from engage_hri.services.commandline.workers import play_all
 from engage_hri.services.runtime.service import installed_version
 from engage_hri.services.study import files, summary
-from engage_hri.services.study.conditions import CONDITIONS, WORSE
+from engage_hri.services.study.conditions import CONDITIONS, DEGRADATIONS
 from engage_hri.services.study.hypotheses import Finding, findings
 from engage_hri.services.study.records import EventRecord, SessionRecord
 from engage_hri.services.study.summary import Table
 
 PEOPLE = "table-2-1"
-"""The human whose sessions have no robot, and so no condition."""
+"""Name of the human for sessions of two people, without a robot and so without a condition."""
 TWO_PEOPLE = "human-human"
-"""What stands in their column `condition`."""
+"""Value of their column `condition`."""
 BY_WORDS = ("collaboration.mode=task",)
-"""For people who follow the robot's words and no script: it may choose its own."""
+"""Setting for people who follow the robot's words and no script: the robot may choose its words."""
 USUAL = {"listening": BY_WORDS, "stochastic": BY_WORDS, PEOPLE: ()}
-"""What suits a human, weaker than the user's settings; all others act the transcript."""
+"""Settings for each human, weaker than the user's; humans that are not listed act the transcript."""
 DECIDED = {
     "simulation.human": "--human",
     "simulation.seed": "--seed",
     "control.variability.seed": "--seed",
     "generation.condition": "--condition",
 }
-"""Keys that the command line decides for each session."""
+"""Keys that are set for each session, with the option for each."""
 PLOTS = ("events.png", "delays.png", "failure_rates.png", "mtbce.png", "completion_time.png")
 FILES = ("study.json", "events.csv", "sessions.csv", "hypotheses.csv", "summary.md", "failures.txt", *PLOTS)
 
@@ -90,13 +90,13 @@ def main(options: Options) -> int:
     orders = orders_of(options)
     folder = Folder(options.out, FILES, overwrite=options.overwrite)
     console = Terminal(quiet=options.quiet)
-    played: list[Played] = []
+    played: list[SessionResult] = []
     is_broken_off = False
-    with Following(console, len(orders)) as following:
+    with ProgressReport(console, len(orders)) as report:
 
-        def tell(one: Played) -> None:
+        def tell(one: SessionResult) -> None:
             played.append(one)
-            following(one.record)
+            report(one.record)
 
         try:
             run(play_all(orders, options.jobs or os.cpu_count() or 1, tell))
@@ -110,7 +110,7 @@ def main(options: Options) -> int:
         tables = tables_of(records, found, people=options.human == PEOPLE)
         folder.write(contents(options, orders, played, found, tables, draw))
         for table in tables:
-            console.print("", shown(table), sep="\n")
+            console.print("", rendered(table), sep="\n")
         console.print(f"\nresults in {options.out}", markup=False, highlight=False, soft_wrap=True)
     if is_broken_off:
         return interrupted()
@@ -118,7 +118,7 @@ def main(options: Options) -> int:
 
 
 def _plotting() -> Draw:
-    """Raises InputRefused without the extra, before any session has been played for nothing."""
+    """Import the function that draws. Raises InputRefused without matplotlib, before any session is played."""
     try:
         from engage_hri.services.study.plots import draw
     except ImportError as error:
@@ -131,8 +131,8 @@ def _plotting() -> Draw:
 
 
 def orders_of(options: Options) -> list[Order]:
-    """By condition, then by number. The same number is the same seed in each condition. Raises InputRefused."""
-    for setting in options.given:
+    """Make the orders, by condition, then by number; a number has the same seed everywhere. Raises InputRefused."""
+    for setting in options.overrides:
         key = setting.partition("=")[0].strip()
         if key in DECIDED:
             raise InputRefused(Fault(reason=f"a study decides {key!r} itself", advice=f"use {DECIDED[key]}"))
@@ -149,14 +149,14 @@ def orders_of(options: Options) -> list[Order]:
 
 
 def _order(options: Options, condition: str, number: int) -> Order:
-    """Weaker than the user's settings: what makes a condition worse. Stronger: seed and condition themselves."""
+    """Make one order. The user's settings override what makes a condition worse, but not seed and condition."""
     seed, people = options.seed + number, options.human == PEOPLE
     defaults = [*USUAL.get(options.human, DEFAULTS)]
-    chosen = [*choices(seed, None if people else options.human, options.resolution)]
+    chosen = [*simulation_settings(seed, None if people else options.human, options.resolution)]
     if not people:
-        defaults += WORSE[condition]
+        defaults += DEGRADATIONS[condition]
         chosen.append(f"generation.condition={condition}")
-    config = replace(options, settings=[*options.given, *chosen]).load(defaults=defaults)
+    config = replace(options, settings=[*options.overrides, *chosen]).load(defaults=defaults)
     return Order(session=number, condition=condition, seed=seed, limit=options.limit, config=config, people=people)
 
 
@@ -164,6 +164,7 @@ def _order(options: Options, condition: str, number: int) -> Order:
 
 
 def tables_of(records: Sequence[SessionRecord], found: Sequence[Finding], *, people: bool) -> list[Table]:
+    """Tables for the terminal and for summary.md."""
     tables = [summary.overview(records)]
     if people:
         tables.append(beside_table_2_1(records))
@@ -177,12 +178,12 @@ def tables_of(records: Sequence[SessionRecord], found: Sequence[Finding], *, peo
 def contents(
     options: Options,
     orders: Sequence[Order],
-    played: Sequence[Played],
+    played: Sequence[SessionResult],
     found: Sequence[Finding],
     tables: Sequence[Table],
     draw: Draw,
 ) -> dict[str, bytes]:
-    """The results by file name. Nothing in them depends on the number of processes."""
+    """Results by file name. Nothing in them depends on the number of processes."""
     records = [one.record for one in played]
     events = [event for one in played for event in one.events]
     texts = {
@@ -201,10 +202,10 @@ def contents(
 
 
 class Study(Struct, frozen=True, kw_only=True):
-    """study.json: what it takes to play the same sessions again.
+    """Content of study.json: all that is needed to play the same sessions again.
 
-    played: less than ordered if it was interrupted. settings: as given. configurations: complete, by condition, of
-    the first session; session k has the seed `seed` + k.
+    played: fewer than ordered if it was interrupted. settings: those of the user. configurations: complete, by
+    condition, of the first session; session k has the seed `seed` + k.
     """
 
     versions: dict[str, str]
@@ -224,21 +225,21 @@ def _study(options: Options, orders: Sequence[Order], played: int) -> Study:
     return Study(
         versions={"engage": installed_version(), "python": platform.python_version(), "numpy": np.__version__},
         human=options.human, conditions=tuple(first), sessions=options.sessions, seed=options.seed,
-        limit=options.limit, ordered=len(orders), played=played, settings=options.given,
+        limit=options.limit, ordered=len(orders), played=played, settings=options.overrides,
         configurations=first,
     )  # fmt: skip
 
 
-def shown(table: Table) -> RenderableType:
-    """For a terminal."""
-    return Group(drawn(table), *(Text(note, style="dim") for note in table.notes))
+def rendered(table: Table) -> RenderableType:
+    """Draw a table with its notes, for a terminal."""
+    return Group(grid(table), *(Text(note, style="dim") for note in table.notes))
 
 
-def drawn(table: Table) -> RichTable:
-    """Without the notes."""
-    grid = RichTable(title=table.title, title_justify="left", box=box.HORIZONTALS, show_edge=False, padding=0)
+def grid(table: Table) -> RichTable:
+    """Draw a table without its notes."""
+    made = RichTable(title=table.title, title_justify="left", box=box.HORIZONTALS, show_edge=False, padding=0)
     for index, column in enumerate(table.columns):
-        grid.add_column(column, justify="right" if index else "left", overflow="fold")
+        made.add_column(column, justify="right" if index else "left", overflow="fold")
     for row in table.rows:
-        grid.add_row(*map(escape, row))
-    return grid
+        made.add_row(*map(escape, row))
+    return made

@@ -1,4 +1,4 @@
-"""Reading the files people name: fragments, blocks, worlds. Everything is read and checked before anything moves."""
+"""Reading of the files on the command line: fragments, blocks, worlds. All are checked before anything moves."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -20,14 +20,14 @@ Thing = Block | TurnFragment
 
 
 class InputFile(Struct, frozen=True, kw_only=True):
-    """A file and what it holds, in order."""
+    """A file with its blocks and fragments, in order."""
 
     path: Path
     things: tuple[Thing, ...]
 
     @contextmanager
-    def blamed(self) -> Iterator[None]:
-        """A refusal inside the body of `with` names this file."""
+    def naming_file(self) -> Iterator[None]:
+        """Add this file to the place of each InputRefused that is raised in the body of `with`."""
         try:
             yield
         except InputRefused as error:
@@ -39,7 +39,7 @@ class InputFile(Struct, frozen=True, kw_only=True):
 
 
 def read_source(path: Path) -> InputFile:
-    """Raises InputRefused with the file, the line or JSON path, and the reason."""
+    """Read a file. Raises InputRefused with the file, the line or JSON path, and the reason."""
     unnamed = path.stem if is_id(path.stem) else json_codec.UNNAMED
     things = json_codec.read(_bytes(path), str(path), unnamed)
     if not things:
@@ -48,9 +48,9 @@ def read_source(path: Path) -> InputFile:
 
 
 def read_world(path: Path | None) -> World:
-    """The entities of a JSON file; the tangram table without one. Raises InputRefused with the JSON path.
+    """Read a world from a JSON file; the tangram table without one. Raises InputRefused with the JSON path.
 
-    If there is nobody in the file, the person of the tangram table is, so that there is somebody to speak to.
+    A file without people gets the person of the tangram table, so that there is somebody to speak to.
     """
     from engage_hri.services.simulation.still import load_world, tangram_world
 
@@ -61,7 +61,7 @@ def read_world(path: Path | None) -> World:
 
 
 def still(world: World, *, is_attentive: bool = False) -> Service:
-    """Perception for a world in which nothing moves by itself. is_attentive: its person minds the robot."""
+    """Perception of a world in which nothing moves by itself. is_attentive: its person reacts to the robot."""
     from engage_hri.services.simulation.still import show_world
 
     return partial(show_world, world=world, is_attentive=is_attentive)

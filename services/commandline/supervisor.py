@@ -1,7 +1,7 @@
-"""Keep child processes running: logs with a name before each line, restarts with growing pauses, an orderly end.
+"""Supervision of child processes: logs with a name before each line, restarts with growing pauses, an orderly end.
 
-A child gets SIGTERM when we are told to stop, SIGKILL if it does not listen, and sees its standard input close if
-we die without a word, so that nothing outlives its supervisor.
+At the end a child gets SIGTERM, then SIGKILL if it does not end in time. If the supervisor is killed, the child sees
+its standard input close. So no child outlives its supervisor.
 """
 
 import asyncio
@@ -17,18 +17,18 @@ from engage_hri.schemas.units import Seconds
 
 LOG = logging.getLogger("engage.up")
 Tell = Callable[[str, str], None]
-"""Takes a child's name and a line of its log."""
+"""Receiver of a child's name and a line of its log."""
 FIRST_PAUSE: Seconds = 0.5
 LONGEST_PAUSE: Seconds = 10.0
-"""Between a crash and the restart, doubling from the first to the longest."""
+"""Pauses between a crash and the restart; each is twice the one before."""
 STABLE: Seconds = 20.0
-"""A child that ran for so long starts over with the first pause."""
+"""Running time after which the next pause is the first one again."""
 PATIENCE: Seconds = 5.0
-"""From SIGTERM to SIGKILL."""
+"""Time from SIGTERM to SIGKILL."""
 
 
 def pause_after(previous: Seconds | None, lived: Seconds) -> Seconds:
-    """How long to wait before the next start. previous: the pause before, None at the first crash."""
+    """Pause before the next start. previous: the pause before that, None at the first crash."""
     if previous is None or lived >= STABLE:
         return FIRST_PAUSE
     return min(2 * previous, LONGEST_PAUSE)
@@ -36,7 +36,7 @@ def pause_after(previous: Seconds | None, lived: Seconds) -> Seconds:
 
 @contextmanager
 def without_threads() -> Iterator[None]:
-    """Python 3.11 watches each child with a thread unless told to use what Linux offers, as later ones do."""
+    """Make Python 3.11 watch children without a thread for each, as later versions do on Linux."""
     if sys.version_info >= (3, 12) or sys.platform != "linux":
         yield
         return
@@ -54,10 +54,10 @@ def without_threads() -> Iterator[None]:
 async def spawned(
     end: Callable[[Process], Awaitable[None]], *arguments: str, limit: int = 2**16, stderr: int | None = None
 ) -> AsyncIterator[Process]:
-    """A child process while the body of `async with` runs, with pipes to standard input and output. At the end `end`
-    must see to it that it has ended; no cancellation cuts that short, however often it comes.
+    """Run a child process while the body of `async with` runs, with pipes to standard input and output.
 
-    The child has its own process group: a terminal's Ctrl-C reaches us alone, and we end the children in order.
+    end: is called at the end, and must end the process; cancellations do not cut it short. The child has its own
+    process group: a terminal's Ctrl-C reaches only us, and we end the children in order.
     """
     creating = asyncio.ensure_future(
         asyncio.create_subprocess_exec(
@@ -67,13 +67,13 @@ async def spawned(
     try:
         yield await asyncio.shield(creating)
     finally:
-        await _to_its_end(_ended(creating, end))
+        await _uncancelled(_ended(creating, end))
 
 
 async def _ended(creating: "asyncio.Future[Process]", end: Callable[[Process], Awaitable[None]]) -> None:
     process = await creating
     await end(process)
-    # Only with the last of its pipes is asyncio's own part of it closed; if the loop was sooner it would complain.
+    # asyncio closes its own part with the last pipe; it complains if the loop is closed before.
     assert process.stdin is not None
     assert process.stdout is not None
     process.stdin.close()
@@ -81,8 +81,8 @@ async def _ended(creating: "asyncio.Future[Process]", end: Callable[[Process], A
         pass
 
 
-async def _to_its_end(work: Coroutine[Any, Any, None]) -> None:
-    """As `await work`, but a cancellation is raised only when that is done."""
+async def _uncancelled(work: Coroutine[Any, Any, None]) -> None:
+    """Await `work` to its end; a cancellation is raised only after that."""
     task = asyncio.ensure_future(work)
     cancellation: asyncio.CancelledError | None = None
     while not task.done():
@@ -96,14 +96,14 @@ async def _to_its_end(work: Coroutine[Any, Any, None]) -> None:
 
 
 async def killed(process: Process) -> None:
-    """End it at once: it holds nothing that needs an orderly end."""
+    """Kill a process that needs no orderly end."""
     with suppress(ProcessLookupError):
         process.kill()
     await process.wait()
 
 
 class Child:
-    """One supervised process. once: it may end by itself, with exit code 0, and is then not started again."""
+    """A supervised process. once: it may end by itself, with exit code 0, and is then not started again."""
 
     def __init__(self, name: str, arguments: Sequence[str], tell: Tell, *, once: bool = False) -> None:
         self.name = name
@@ -115,7 +115,7 @@ class Child:
         self._tell = tell
 
     async def keep(self) -> None:
-        """Run it, again after each crash, until cancelled (which stops it), or done if it runs once."""
+        """Run the process, again after each crash, until cancelled (which stops it), or done if it runs once."""
         loop = asyncio.get_running_loop()
         pause: Seconds | None = None
         while True:
@@ -162,7 +162,7 @@ class Child:
 
 
 class ChildRefused(RunFailed):
-    """A child ended with exit code 2: what it was given is wrong, and would be wrong again."""
+    """A child ended with exit code 2: its input is wrong, and would be wrong again."""
 
     def __init__(self, name: str) -> None:
         super().__init__(Fault(reason=f"{name} could not start", advice="its log says why"))
@@ -176,13 +176,13 @@ async def _line(stream: asyncio.StreamReader) -> bytes:
 
 
 def ending(code: int) -> str:
-    """How a process ended, from its return code as asyncio has it."""
+    """Words for the end of a process. code: the return code as asyncio gives it, negative for a signal."""
     return f"signal {-code}" if code < 0 else f"exit code {code}"
 
 
 @asynccontextmanager
 async def supervised(children: Mapping[str, Child]) -> AsyncIterator[None]:
-    """Keep the children running while the body of `async with` runs; at its end all have ended, last first."""
+    """Keep children running while the body of `async with` runs; at its end all are ended, the last one first."""
     with without_threads():
         async with asyncio.TaskGroup() as group:
             tasks = [group.create_task(child.keep(), name=f"child {name}") for name, child in children.items()]

@@ -1,4 +1,4 @@
-"""The anchor tangram from the person's coming to their leaving, with everything in this process."""
+"""Session of the anchor tangram, from the person's arrival to their leaving, with all services in this process."""
 
 import asyncio
 from collections.abc import Iterable
@@ -12,7 +12,7 @@ from engage_hri.services.runtime.service import Ready, Service, running
 
 
 async def play_tangram(config: Config, sinks: Iterable[Sink]) -> None:
-    """Run all services until the task is over. sinks: who is told all that happens, with instants of this loop."""
+    """Run all services until the task is over. sinks: get all messages, with instants of this loop."""
     finished = asyncio.Event()
 
     def ending(service: Service) -> Service:

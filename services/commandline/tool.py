@@ -1,4 +1,4 @@
-"""`engage tool`: the definition of the tool by which a language model speaks through the robot."""
+"""Command `engage tool`: print the tool by which a language model speaks through the robot."""
 
 from dataclasses import dataclass
 from pathlib import Path

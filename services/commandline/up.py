@@ -1,4 +1,4 @@
-"""`engage up`: the services as processes of their own on this machine, watched over until Ctrl-C."""
+"""Command `engage up`: run the services as processes on this machine, supervised until Ctrl-C."""
 
 import asyncio
 import sys
@@ -12,18 +12,18 @@ from rich.text import Text
 
 from engage_hri.services.commandline.claim import claiming
 from engage_hri.services.commandline.config import Config
-from engage_hri.services.commandline.demo import DEFAULTS, Tallying, shown
+from engage_hri.services.commandline.demo import DEFAULTS, Tallying, scene_view
 from engage_hri.services.commandline.options import Listening, Simulated, Written
 from engage_hri.services.commandline.outputs import Outputs
 from engage_hri.services.commandline.process import DONE, forever, run_until_signal
 from engage_hri.services.commandline.roster import ROBOT
-from engage_hri.services.commandline.run import is_ready
+from engage_hri.services.commandline.run import ready_line
 from engage_hri.services.commandline.supervisor import Child, supervised
 from engage_hri.services.console import tally
 from engage_hri.services.console.follow import following
 
 WITHOUT_TASK = ("simulation.human=attentive",)
-"""Whoever tries the robot finds somebody who minds it."""
+"""Setting without the task: a person who reacts to the robot."""
 STYLES = ("cyan", "magenta", "green", "yellow", "blue", "red")
 
 
@@ -33,7 +33,7 @@ class Options(Written, Simulated, Listening):
 
 
 def main(options: Options) -> int:
-    # A bad one is refused here, not by every child.
+    # A bad configuration is refused here, and not by every child.
     config = options.load(defaults=DEFAULTS if options.task else WITHOUT_TASK)
     with Outputs(options.events, options.feedback) as outputs:
         console = outputs.console(quiet=options.quiet)
@@ -42,7 +42,7 @@ def main(options: Options) -> int:
 
 
 async def _up(options: Options, config: Config, outputs: Outputs, console: Console) -> None:
-    # Our own session comes first and stays: children may crash, the place where all find one another does not.
+    # Our own session comes first and stays, for children find one another through it, and may crash.
     async with await options.open(config.robot, options.listen or ()) as hub, claiming(hub) as claim:
         await claim.granted()
         await hub.wait_until_free(*_names(options))
@@ -51,7 +51,7 @@ async def _up(options: Options, config: Config, outputs: Outputs, console: Conso
         live = options.task and console.is_terminal and not options.quiet
         arrivals = Arrivals(_names(options), console)
         children = _children(options, config, console, arrivals)
-        with shown(console, config.robot, bus.now(), live) as show:
+        with scene_view(console, config.robot, bus.now(), live) as show:
             sinks = (show, tallying, outputs) if options.task else (outputs,)
             async with following(bus, sinks), supervised(children), asyncio.TaskGroup() as group:
                 holding = group.create_task(claim.held_until(arrivals.complete), name="claim")
@@ -75,17 +75,17 @@ def _children(options: Options, config: Config, console: Console, arrivals: "Arr
 
     def tell(name: str, line: str) -> None:
         console.print(Text(f"{name:>{width}} │ ", style=styles[name]) + Text(line), soft_wrap=True)
-        if line == is_ready(name):
+        if line == ready_line(name):
             arrivals(name)
 
     return {name: Child(name, command(name, options, config), tell, once=name == "collaboration") for name in names}
 
 
 def command(name: str, options: Options, config: Config) -> list[str]:
-    """The child's command line: `engage run NAME`, by our interpreter, on our bus, configured as we are."""
-    # What was decided here, by default or by option, is told in full, so that all children agree.
+    """Make a child's command line: `engage run NAME`, with our interpreter, bus and configuration."""
+    # Values decided here, by default or by option, are passed on, so that all children agree.
     settings = (
-        *options.given,
+        *options.overrides,
         f"recognition.gaze_resolution={config.recognition.gaze_resolution}",
         f"simulation.human={config.simulation.human}",
     )
@@ -101,7 +101,7 @@ def command(name: str, options: Options, config: Config) -> list[str]:
 
 
 class Arrivals:
-    """Told of each child that is ready; says once that all are. Those of another `up` do not count."""
+    """Counter of the children that are ready; prints once that all are. Those of another `up` do not count."""
 
     def __init__(self, names: Iterable[str], console: Console) -> None:
         self._missing = set(names)

@@ -1,14 +1,14 @@
-"""Sessions of two people beside the table that they are drawn from: thesis, Table 2.1."""
+"""Comparison of sessions of two people with the table that they are drawn from: thesis, Table 2.1."""
 
 from collections.abc import Sequence
 
 from engage_hri.services.simulation.table_2_1 import EVENTS, LONGEST_GAP, MTBCE, TABLE
 from engage_hri.services.study.records import SessionRecord
-from engage_hri.services.study.summary import Table, known, number, numbers, pooled, spelled
+from engage_hri.services.study.summary import Table, known, mean_and_deviation, number, numbers, pooled
 
 
 def beside_table_2_1(records: Sequence[SessionRecord]) -> Table:
-    """Each number of the table with what the finished sessions came to."""
+    """Compare each number of the table with the finished sessions."""
     done = [record for record in records if record.finished]
     rows: list[tuple[str, str, str]] = []
     for kind, row in TABLE.items():
@@ -25,10 +25,11 @@ def beside_table_2_1(records: Sequence[SessionRecord]) -> Table:
             measured = (found.failed_delay_min, found.failed_delay_mean, found.failed_delay_max)
             rows.append((f"{name}, failed after (s)", numbers(failed), numbers(measured)))
     events = [float(record.statistics.events) for record in done]
-    rows.append(("all, events per session", str(EVENTS), spelled(events, 1)))
-    rows.append(("MTBCE (s)", number(MTBCE, 1), spelled(known(record.statistics.mtbce for record in done), 2)))
+    rows.append(("all, events per session", str(EVENTS), mean_and_deviation(events, 1)))
+    means = known(record.statistics.mtbce for record in done)
+    rows.append(("MTBCE (s)", number(MTBCE, 1), mean_and_deviation(means, 2)))
     gaps = known(record.statistics.max_gap for record in done)
-    rows.append(("longest gap (s)", number(LONGEST_GAP, 0), spelled(gaps, 1)))
+    rows.append(("longest gap (s)", number(LONGEST_GAP, 0), mean_and_deviation(gaps, 1)))
     return Table(
         title="Beside Table 2.1", columns=("", "table", "sessions, pooled"), rows=tuple(rows),
         notes=(

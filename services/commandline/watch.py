@@ -1,4 +1,4 @@
-"""`engage watch`: follow a running system, as text or as JSON lines."""
+"""Command `engage watch`: follow a running system, as text or as JSON lines."""
 
 import asyncio
 from collections.abc import Collection
@@ -18,7 +18,7 @@ from engage_hri.schemas.units import Seconds
 from engage_hri.services.commandline.config import Config
 from engage_hri.services.commandline.options import Connected
 from engage_hri.services.commandline.outputs import Terminal
-from engage_hri.services.commandline.process import DONE, forever, run_until_signal, unique
+from engage_hri.services.commandline.process import DONE, forever, run_until_signal, unique_name
 from engage_hri.services.console.follow import FOLLOWED, Sink, following
 from engage_hri.services.console.live import Log
 from engage_hri.services.console.log import Telling
@@ -47,9 +47,9 @@ class Options(Connected):
 
 
 class Wanted(NamedTuple):
-    """What to show: these subjects; of connection events and statistics those of `actor` and these kinds.
+    """Selection of what to show. Empty fields select all.
 
-    Empty stands for all. Of a person there are only events and statistics, of kinds only events.
+    only: subjects. actor: a person, who has only events and statistics. kinds: of connection events.
     """
 
     only: tuple[str, ...] = ()
@@ -57,13 +57,12 @@ class Wanted(NamedTuple):
     kinds: tuple[str, ...] = ()
 
     def check(self) -> None:
-        """Raises InputRefused for what can't be asked for."""
+        """Refuse unknown subjects and kinds, and bad ids. Raises InputRefused."""
         known = (("--only", self.only, SUBJECTS), ("--kind", self.kinds, get_args(EventKind)))
         for option, given, good in known:
             for name in set(given) - set(good):
-                raise InputRefused(
-                    Fault(reason=f"unknown {name!r}", where=option, advice=f"known: {', '.join(good)}")
-                )
+                advice = f"known: {', '.join(good)}"
+                raise InputRefused(Fault(reason=f"unknown {name!r}", where=option, advice=advice))
         try:
             keys.chunk(self.actor)
         except ValueError as error:
@@ -101,8 +100,8 @@ async def _watch(options: Options, config: Config, wanted: Wanted) -> None:
     from engage_hri.services.bus.zenoh.neighbors import tell_if_alone
 
     async with await options.open(config.robot) as hub:
-        bus = hub.join(unique("watch"))
-        # As text everything includes what people do and say, but statistics would drown it.
+        bus = hub.join(unique_name("watch"))
+        # Text without a selection includes what people do and say, but no statistics, which would drown the rest.
         everything = wanted.is_everything and not options.json
         telling = Telling(statistics=not everything)
         show: Sink = as_json if options.json else Log(Terminal(), config.robot, bus.now(), telling)

@@ -1,1 +1,1 @@
-"""What people see of a running system: a live view, a plain log, and the tally at the end. It only reads."""
+"""Views of a running system for people: a live view, a plain log, and the tally at the end. Only readers."""

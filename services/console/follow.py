@@ -1,4 +1,4 @@
-"""Listen to a running system and pass on what happens, each message with the local instant it speaks of."""
+"""Listening to a running system: each message is passed on with the local instant that it tells of."""
 
 import asyncio
 from collections.abc import AsyncIterator, Callable, Collection, Iterable
@@ -14,7 +14,6 @@ from engage_hri.services.client.event_stream import EventStream
 
 Sink = Callable[[Message, Seconds], None]
 FOLLOWED = (
-    keys.FRAGMENT,
     keys.ANY_FEEDBACK,
     keys.SYNC_POINT,
     keys.ANY_ACTION,
@@ -26,7 +25,7 @@ FOLLOWED = (
     keys.ANY_FAULT,
     keys.ANY_ALIVE,
 )
-"""Everything but the streams and what only machines talk about."""
+"""Expressions for all messages that people want to see. Presence ends the events of a dead recognition."""
 
 
 @asynccontextmanager
@@ -38,10 +37,11 @@ async def following(
     patterns: Collection[str] = FOLLOWED,
     kinds: Collection[str] = (),
 ) -> AsyncIterator[None]:
-    """Feed the sinks, in order, while the body of `async with` runs; what has arrived by its end is still fed.
+    """Feed the sinks, in order, while the body of `async with` runs; messages that have arrived by its end are still
+    fed.
 
-    past: also with what the bus still has from before, of connection events those that are open. kinds: of
-    connection events only these; all if empty.
+    past: feed also earlier messages that the bus still has; of connection events those that are open.
+    kinds: of connection events; empty: all.
     """
     sinks = tuple(sinks)
     events = EventStream(bus.now(), bus.stamp, kinds=kinds, opening=past)
@@ -67,7 +67,7 @@ async def following(
                     for event in events.expire(bus.now()):
                         tell(event, bus.now())
 
-        # In a group: a sink that fails ends the body, which might wait for ever.
+        # A group, so that a failing sink ends the body, which might wait for ever.
         async with asyncio.TaskGroup() as group:
             listening = group.create_task(listen(), name="console")
             try:
@@ -80,6 +80,6 @@ async def following(
 
 
 def instant(bus: Bus, message: Message, arrived: Seconds) -> Seconds:
-    """When what the message tells happened, in local loop time; its arrival if it does not say."""
+    """Instant that a message tells of, in local loop time; that of its arrival if it has none."""
     at = message.since if isinstance(message, HeadOwner) else getattr(message, "at", None)
     return bus.local(at) if isinstance(at, Stamp) else arrived

@@ -1,7 +1,6 @@
-"""The two ways to show a scene as it changes: redrawn in place on a terminal, or told line by line anywhere else."""
+"""Two sinks that show a changing scene: redrawn in place on a terminal, or line by line anywhere else."""
 
 import asyncio
-from types import TracebackType
 from typing import Self
 
 from rich.console import Console, RenderableType
@@ -13,11 +12,11 @@ from engage_hri.services.console import log, view
 from engage_hri.services.console.render import render
 
 REDRAW: Seconds = 0.1
-"""At most ten pictures a second, each drawn because something happened."""
+"""Least time between two pictures; each is drawn because of a message."""
 
 
 class LiveView:
-    """A sink that keeps a picture of the scene on the terminal. Rich's own refresh thread stays off."""
+    """Sink that keeps a picture of the scene on the terminal. Rich's own refresh thread stays off."""
 
     def __init__(self, console: Console, robot: str, began: Seconds) -> None:
         self.scene = view.empty(robot, began)
@@ -41,9 +40,7 @@ class LiveView:
         self._live.start()
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *raised: object) -> None:
         if self._due is not None:
             self._due.cancel()
         self._live.update(self._picture(), refresh=True)
@@ -51,7 +48,7 @@ class LiveView:
 
 
 class Log:
-    """A sink that prints a line for each thing that matters."""
+    """Sink that prints a line for each message that matters."""
 
     def __init__(self, console: Console, robot: str, began: Seconds, telling: log.Telling | None = None) -> None:
         self.scene = view.empty(robot, began)
@@ -60,14 +57,12 @@ class Log:
 
     def __call__(self, message: Message, at: Seconds) -> None:
         before, self.scene = self.scene, view.feed(self.scene, message, at)
-        line = log.told(message, before, self.scene, at, self._telling)
+        line = log.line(message, before, self.scene, at, self._telling)
         if line is not None:
             self._console.print(line, markup=False, highlight=False, soft_wrap=True)
 
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *raised: object) -> None:
         return None

@@ -1,4 +1,4 @@
-"""The same news as plain lines, one per thing that matters: for a log file, a pipe, or a screen reader."""
+"""Lines of the log, one for each message that matters: for a file, a pipe, or a screen reader."""
 
 from msgspec import Struct
 
@@ -14,8 +14,10 @@ from engage_hri.services.console.view import OWN_BLOCKS, Scene
 
 
 class Telling(Struct, frozen=True, kw_only=True):
-    """What the log tells. actions: what people and the robot do; points: sync points; head: who owns the head;
-    statistics: statistics; warnings: of the realizer and of the policies.
+    """Choice of the messages in the log.
+
+    actions: of people and the robot. points: sync points. head: owner of the head. warnings: of the realizer and of
+    the policies.
     """
 
     actions: bool = True
@@ -25,8 +27,8 @@ class Telling(Struct, frozen=True, kw_only=True):
     warnings: bool = True
 
 
-def told(message: Message, before: Scene, after: Scene, at: Seconds, telling: Telling) -> str | None:
-    """The line for one message, None for most. before, after: the scene around it. at: the instant it speaks of."""
+def line(message: Message, before: Scene, after: Scene, at: Seconds, telling: Telling) -> str | None:
+    """Write the line for one message; None for most. before, after: the scene around it. at: its local instant."""
     text = _text(message, before, after, telling)
     return None if text is None else f"{wording.clock(at - after.began):>8}  {text}"
 
@@ -39,14 +41,13 @@ def _text(message: Message, before: Scene, after: Scene, telling: Telling) -> st
             planned = "" if message.predicted is None else f" (planned {wording.seconds(message.predicted)})"
             return f"{block}:{message.behavior}:{message.sync} at {wording.seconds(message.time)}{planned}"
         case ConnectionEvent(state=state) if state != "completed":
-            about = f" about {wording.names(message.objects)}" if message.objects else ""
-            who = f"{message.initiator} → {message.responder}"
-            kind = wording.KINDS[message.kind]
-            return f"* {kind}, {who}{about} ({message.cause}): {wording.decision(message)}"
+            about = f" about {', '.join(message.objects)}" if message.objects else ""
+            kind, decided = wording.KINDS[message.kind], wording.decision(message)
+            return f"* {kind}, {message.initiator} → {message.responder}{about} ({message.cause}): {decided}"
         case Statistics() if telling.statistics:
             return wording.statistics(message)
         case HeadOwner() if telling.head:
-            waiting = wording.names([claim.kind for claim in message.waiting])
+            waiting = ", ".join(claim.kind for claim in message.waiting)
             return f"head: {wording.claim(message.owner)}" + (f"; waiting: {waiting}" if waiting else "")
         case BlockProgress(progress="end", block=str() as block) if not block.startswith(OWN_BLOCKS):
             return f"block {block}: {message.status}"
@@ -66,12 +67,11 @@ def _action(message: ActionBegan | ActionEnded | ActorFound | ActorLost, before:
             return f"{actor} has left"
         case ActionEnded(action="speak"):
             # An utterance is told once its last word is out; of people the words are not known.
-            said = [u for u in before.said if u.open and u.actor == actor and u.text]
-            return (
-                f'{actor}: "{said[-1].text}" (from {wording.clock(said[-1].began - before.began)})' if said else None
-            )
+            for said in reversed(before.said):
+                if said.open and said.actor == actor and said.text:
+                    return f'{actor}: "{said.text}" (from {wording.clock(said.began - before.began)})'
         case ActionBegan(action="speak") if actor == before.robot:
             return None
         case ActionBegan(action=action, targets=targets):
-            return " ".join((actor, *filter(None, wording.deed(action, targets, before.robot))))
+            return " ".join((actor, *filter(None, wording.action_words(action, targets, before.robot))))
     return None

@@ -1,4 +1,4 @@
-"""Draw a scene with rich, as large as the terminal is. No state: the same scene gives the same picture."""
+"""Drawing of a scene with Rich, as large as the terminal. No state: the same scene gives the same picture."""
 
 from math import inf
 
@@ -14,7 +14,7 @@ from engage_hri.services.console import wording
 from engage_hri.services.console.view import Actor, EventInView, PointInView, Scene
 
 HEIGHT = 30
-"""In lines, where nothing says how high the terminal is."""
+"""Lines of the picture if the height of the terminal is unknown."""
 SMALL = (72, 20)
 """Columns and lines below which there are no frames, and no plan beside the people."""
 WIDE = 100
@@ -22,9 +22,9 @@ WIDE = 100
 FRAME = 2
 """Lines that a frame takes."""
 AHEAD = 4
-"""At least so many of the planned points are shown."""
+"""Least number of planned points that are shown."""
 NOTICED: Seconds = 0.1
-"""People notice when speech and gesture are further apart."""
+"""Distance of speech and gesture from which people notice it."""
 MARKS = {
     "started": ("…", "bold yellow"),
     "succeeded": ("✓", "green"),
@@ -38,7 +38,7 @@ MARKS = {
 
 
 def render(scene: Scene, width: int = 80, height: int | None = None) -> RenderableType:
-    """The whole live view. width, height: of the terminal, in columns and lines; all of it is used."""
+    """Draw the whole live view. width, height: of the terminal, in columns and lines; all of it is used."""
     height = height or HEIGHT
     notes: list[RenderableType] = [
         Text(f"! {n}", style="yellow", no_wrap=True, overflow="ellipsis") for n in scene.notes
@@ -57,7 +57,7 @@ def _small(scene: Scene, width: int, height: int) -> list[RenderableType]:
 
 
 def _framed(scene: Scene, width: int, height: int) -> list[RenderableType]:
-    """People and words on the left, the plan on the right, and below what this is about."""
+    """Parts of the large view: people and words on the left, the plan on the right, connection events below."""
     upper = max(11, height * 2 // 5)
     people = _people(scene)
     doing = min(max(5, len(people) + FRAME), upper // 2)
@@ -70,7 +70,7 @@ def _framed(scene: Scene, width: int, height: int) -> list[RenderableType]:
     top.add_column(ratio=5)
     top.add_row(left, _plan(scene, upper - FRAME))
     shown = height - upper - FRAME
-    return [top, _panel(_events(scene, width - 4, shown), _often(scene))]
+    return [top, _panel(_events(scene, width - 4, shown), _frequency(scene))]
 
 
 def _panel(inner: RenderableType, title: Text) -> Panel:
@@ -81,9 +81,9 @@ def _title(scene: Scene) -> Text:
     return Text(f"engage {wording.clock(scene.now - scene.began)}", style="bold")
 
 
-def _often(scene: Scene) -> Text:
-    often = scene.session.mtbce if scene.session else None
-    return Text("connection events" if often is None else f"connection events, one every {wording.seconds(often)}")
+def _frequency(scene: Scene) -> Text:
+    mtbce = scene.session.mtbce if scene.session else None
+    return Text("connection events" if mtbce is None else f"connection events, one every {wording.seconds(mtbce)}")
 
 
 def _style(scene: Scene, actor: str) -> str:
@@ -91,7 +91,7 @@ def _style(scene: Scene, actor: str) -> str:
 
 
 def _people(scene: Scene) -> list[Text]:
-    """A line for each person, the robot first; then who owns its head."""
+    """Lines for all actors, the robot first, and a last one for the owner of its head."""
     actors = sorted(scene.actors, key=lambda actor: actor.id != scene.robot)
     wide = max((len(actor.id) for actor in actors), default=0)
     lines = [
@@ -115,13 +115,13 @@ def _doing(scene: Scene, actor: Actor) -> Text:
     for action in sorted(actor.doing, key=lambda doing: doing.action != "look"):
         if doing:
             doing += Text(", ")
-        verb, target = wording.deed(action.action, action.targets, scene.robot)
+        verb, target = wording.action_words(action.action, action.targets, scene.robot)
         doing += Text(verb) + Text(f" {target}" if target else "", style="bold")
     return doing
 
 
 def _said(scene: Scene) -> RenderableType:
-    """Words as they are said; of people the words are not known."""
+    """Utterances with their words; those of people have none."""
     lines = []
     for utterance in scene.said:
         text = Text(f"{utterance.actor}: ", style=_style(scene, utterance.actor))
@@ -133,7 +133,7 @@ def _said(scene: Scene) -> RenderableType:
 
 
 class _LastLines:
-    """Exactly `height` lines: the end of what is higher, where the newest stands."""
+    """Part of exactly `height` lines; of a higher one the end is shown, where the newest lines are."""
 
     def __init__(self, whole: RenderableType, height: int) -> None:
         self._whole = whole
@@ -147,13 +147,13 @@ class _LastLines:
 
 
 def _plan(scene: Scene, height: int) -> Panel:
-    """The block that runs: when each of its points was planned, and when the body reported it."""
+    """Table of the running block: the planned time of each point, and the one that the body reported."""
     block = scene.block
     table = Table(box=None, expand=True, pad_edge=False)
     table.add_column("seconds", no_wrap=True, overflow="ellipsis", ratio=1)
     for name in ("planned", "measured", "late"):
         table.add_column(name, justify="right", no_wrap=True, min_width=5)
-    for points in _window(_together(block.points), height - 1) if block else ():
+    for points in _window(_rows(block.points), height - 1) if block else ():
         first = points[0]
         came, late = first.realised is not None, first.slip
         noticed = late is not None and abs(late) >= NOTICED
@@ -163,13 +163,13 @@ def _plan(scene: Scene, height: int) -> Panel:
             Text(wording.number(first.realised), style="green" if came else "dim"),
             Text(wording.number(late, sign=True), style="yellow" if noticed else "dim"),
         )
-    # Ids are other people's: as Text, so that brackets in them are not read as markup.
+    # Foreign ids are shown as Text, so that brackets in them are not read as markup.
     title = Text(f"{block.id}: {block.status or 'running'}" if block else "the robot does nothing yet")
     return _panel(_LastLines(table, height), title)
 
 
-def _together(points: tuple[PointInView, ...]) -> list[list[PointInView]]:
-    """Points of one behavior that are one instant share a row."""
+def _rows(points: tuple[PointInView, ...]) -> list[list[PointInView]]:
+    """Group the points of one behavior that are the same instant into rows."""
     rows: list[list[PointInView]] = []
     for point in points:
         last = rows[-1][0] if rows else None
@@ -187,7 +187,7 @@ def _ms(value: float | None) -> int | None:
 
 
 def _window(rows: list[list[PointInView]], shown: int) -> list[list[PointInView]]:
-    """The newest realised rows and the next planned ones, by time."""
+    """Choose the newest realised rows and the next planned ones, by time."""
     came = sorted((row for row in rows if row[0].realised is not None), key=lambda row: row[0].realised or 0.0)
     to_come = [row for row in rows if row[0].realised is None]
     to_come.sort(key=lambda row: inf if row[0].planned is None else row[0].planned)
@@ -197,12 +197,12 @@ def _window(rows: list[list[PointInView]], shown: int) -> list[list[PointInView]
 
 
 def _events(scene: Scene, width: int, height: int) -> RenderableType:
-    """The newest last, a line each; as many as there is room for. Narrow: without why each was begun."""
+    """Table of the newest connection events, the last one at the end. A narrow one has no column for the cause."""
     narrow, wide = width < SMALL[0] - 2 * FRAME, width >= WIDE - 2 * FRAME
     table = Table(box=None, expand=True, pad_edge=False, padding=(0, 1, 0, 0))
     for name, least in (("", 1), ("at", 6), ("event", 13), ("who", 11), ("about", 5), ("why", 5), ("outcome", 9)):
         if not (narrow and name == "why"):
-            # What is left over goes to the last column, or where that would be cut, is taken from the objects.
+            # The last column gets the rest of the width; if it would be cut, the objects get less instead.
             ratio = 1 if name == ("outcome" if wide else "about") else None
             most = None if wide or name != "outcome" else 10 if narrow else 17
             table.add_column(name, no_wrap=True, overflow="ellipsis", min_width=least, max_width=most, ratio=ratio)
@@ -220,7 +220,7 @@ def _event(row: EventInView, scene: Scene) -> tuple[RenderableType, ...]:
         Text(wording.clock(row.began - scene.began), style="dim"),
         Text(wording.KINDS[event.kind], style="bold" if event.state == "started" else ""),
         Text(f"{event.initiator}→{event.responder}"),
-        Text(wording.names(event.objects)),
+        Text(", ".join(event.objects)),
         Text(event.cause, style="dim"),
         Text(wording.decision(event), style=style),
     )

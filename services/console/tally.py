@@ -1,7 +1,7 @@
-"""The end of a session in numbers: events per kind with outcome and delays, MTBCE, duration."""
+"""Numbers at the end of a session: events of each kind with outcome and delays, MTBCE, duration."""
 
-import msgspec
 from msgspec import Struct
+from msgspec.structs import replace
 from rich import box
 from rich.console import Group, RenderableType
 from rich.table import Table
@@ -17,7 +17,10 @@ from engage_hri.services.console import wording
 
 
 class Counted(Struct, frozen=True, kw_only=True):
-    """Events of one kind and one side. Optional failures are counted apart: they never count in failure rates."""
+    """Numbers of events of one kind and one initiator.
+
+    Optional failures are counted apart, and are in no failure rate.
+    """
 
     count: int = 0
     succeeded: int = 0
@@ -27,11 +30,11 @@ class Counted(Struct, frozen=True, kw_only=True):
     """Preempted, withdrawn or superseded, or lost."""
     open: int = 0
     delays: tuple[Seconds, ...] = ()
-    """Of those that succeeded."""
+    """Delays of the events that succeeded."""
 
 
 class Tally(Struct, frozen=True, kw_only=True):
-    """began, now: local instants. events: the decision (or last state) of each event, by id."""
+    """Events and numbers of a session. began, now: local instants. events: each with its decision or last state."""
 
     began: Seconds
     now: Seconds
@@ -52,8 +55,8 @@ def empty(at: Seconds) -> Tally:
 
 
 def feed(tally: Tally, message: Message, at: Seconds) -> Tally:
-    """The tally after `message`, which speaks of the local instant `at`."""
-    tally = msgspec.structs.replace(tally, now=max(tally.now, at))
+    """Add a message to the tally. at: its local instant."""
+    tally = replace(tally, now=max(tally.now, at))
     match message:
         case ConnectionEvent():
             known = {event.id: event for event in tally.events}
@@ -61,53 +64,50 @@ def feed(tally: Tally, message: Message, at: Seconds) -> Tally:
             if message.state in ("completed", "lost") and before not in ("started", message.state):
                 return tally  # its decision is what counts
             known[message.id] = message
-            return msgspec.structs.replace(tally, events=tuple(known.values()))
+            return replace(tally, events=tuple(known.values()))
         case Statistics(actor="", session=session):
-            return msgspec.structs.replace(tally, session=session)
+            return replace(tally, session=session)
         case FragmentOutcome(status=status):
             unfinished = tally.unfinished + (status != "done")
-            return msgspec.structs.replace(tally, fragments=tally.fragments + 1, unfinished=unfinished)
+            return replace(tally, fragments=tally.fragments + 1, unfinished=unfinished)
         case BlockProgress(progress="end"):
-            return msgspec.structs.replace(tally, blocks=tally.blocks + 1)
+            return replace(tally, blocks=tally.blocks + 1)
     return tally
 
 
 def count(tally: Tally, kind: EventKind, initiator: str | None, robot: str) -> Counted:
-    """One row: events of `kind` initiated by the robot, or by people (initiator None)."""
-    counted = Counted()
-    for event in tally.events:
-        if event.kind != kind or (event.initiator == robot) != (initiator == robot):
-            continue
-        succeeded = event.state in ("succeeded", "completed")
-        failed = event.state == "failed"
-        counted = Counted(
-            count=counted.count + 1,
-            succeeded=counted.succeeded + succeeded,
-            failed=counted.failed + (failed and not event.optional),
-            failed_optional=counted.failed_optional + (failed and event.optional),
-            other=counted.other + (event.state in ("preempted", "withdrawn", "superseded", "lost")),
-            open=counted.open + (event.state == "started"),
-            delays=(*counted.delays, event.delay) if succeeded and event.delay is not None else counted.delays,
-        )
-    return counted
+    """Count the events of one kind that the robot began, or people (initiator None)."""
+    of_kind = [e for e in tally.events if e.kind == kind and (e.initiator == robot) == (initiator == robot)]
+    succeeded = [event for event in of_kind if event.state in ("succeeded", "completed")]
+    failed = [event.optional for event in of_kind if event.state == "failed"]
+    is_open = sum(event.state == "started" for event in of_kind)
+    return Counted(
+        count=len(of_kind),
+        succeeded=len(succeeded),
+        failed=failed.count(False),
+        failed_optional=failed.count(True),
+        other=len(of_kind) - len(succeeded) - len(failed) - is_open,
+        open=is_open,
+        delays=tuple(event.delay for event in succeeded if event.delay is not None),
+    )
 
 
 KINDS: tuple[tuple[EventKind, str], ...] = tuple(wording.KINDS.items())
 
 
 def render(tally: Tally, robot: str) -> RenderableType:
-    """The table and the last line, 80 columns wide."""
+    """Draw the table and the last lines, 80 columns wide."""
     table = Table(box=box.HORIZONTALS, padding=0, show_edge=False)
     table.add_column("by", no_wrap=True)
     table.add_column("connection event", no_wrap=True)
     for name in ("count", "succeeded", "failed", "opt.", "dropped", "delay (s)"):
         table.add_column(name, justify="right", no_wrap=True)
-    for side, who in ((robot, robot), (None, "people")):
+    for initiator, name_of_initiator in ((robot, robot), (None, "people")):
         for kind, name in KINDS:
-            row = count(tally, kind, side, robot)
+            row = count(tally, kind, initiator, robot)
             if row.count:
                 numbers = (row.count, row.succeeded, row.failed, row.failed_optional, row.other + row.open)
-                table.add_row(Text(who), name, *map(str, numbers), _delays(row.delays))
+                table.add_row(Text(name_of_initiator), name, *map(str, numbers), _delays(row.delays))
     return Group(table, Text(_NOTE, style="dim"), Text(_last_lines(tally)))
 
 

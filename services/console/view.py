@@ -1,12 +1,12 @@
-"""What is going on, as one value: who speaks, who looks where, what is planned and realised, which events are open.
+"""Scene: one value with the actors, words, blocks with their sync points, and connection events of a running system.
 
 `feed(scene, message, at)` gives the next scene; `services/console/render.py` draws one. Nothing here knows the bus.
 """
 
 from collections.abc import Mapping
 
-import msgspec
 from msgspec import Struct
+from msgspec.structs import replace
 
 from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost
 from engage_hri.schemas.attention import Claim, HeadOwner
@@ -14,9 +14,7 @@ from engage_hri.schemas.behaviors import Action
 from engage_hri.schemas.body import WordSpoken
 from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.feedback import BlockProgress, PredictionFeedback, SyncPointProgress, WarningFeedback
-from engage_hri.schemas.fragments import PerformFragment
 from engage_hri.schemas.messages import Message
-from engage_hri.schemas.presence import PeerAlive, PeerGone
 from engage_hri.schemas.recognition import ConnectionEvent, Statistics, WindowStatistics
 from engage_hri.schemas.speakable import joined
 from engage_hri.schemas.units import Seconds
@@ -26,11 +24,11 @@ EVENTS_KEPT = 100
 NOTES_KEPT = 3
 ENDED_BLOCKS_KEPT = 2
 OWN_BLOCKS = ("maintenance-", "response-")
-"""How generation names the blocks of its gaze arbiter; the view shows their effect, not their points."""
+"""Prefixes of the ids of the gaze arbiter's blocks; the view shows their effect, not their points."""
 
 
 class Doing(Struct, frozen=True):
-    """One action under way. targets: entity ids; empty with `look`: away."""
+    """An action under way. targets: entity ids; empty with `look`: away."""
 
     action: Action
     targets: tuple[str, ...]
@@ -38,6 +36,8 @@ class Doing(Struct, frozen=True):
 
 
 class Actor(Struct, frozen=True, kw_only=True):
+    """The robot or a person, with the actions under way."""
+
     id: str
     doing: tuple[Doing, ...] = ()
     present: bool = True
@@ -48,7 +48,7 @@ class Actor(Struct, frozen=True, kw_only=True):
 
 
 class UtteranceInView(Struct, frozen=True, kw_only=True):
-    """text: the words said so far; of people the words are not known."""
+    """Utterance of an actor. text: the words said so far; empty for people."""
 
     actor: str
     began: Seconds
@@ -67,19 +67,19 @@ class PointInView(Struct, frozen=True, kw_only=True):
 
     @property
     def slip(self) -> Seconds | None:
-        """How much later it came than planned."""
+        """Time by which the point came later than planned."""
         return None if self.planned is None or self.realised is None else self.realised - self.planned
 
 
 class BlockInView(Struct, frozen=True, kw_only=True):
-    """places: of points, where in `points` each is, by behavior and name: looked up for each sync point."""
+    """Block with its sync points. places: index of each point in `points`, by behavior and name."""
 
     id: str
     began: Seconds
     points: tuple[PointInView, ...] = ()
     places: Mapping[tuple[str, str], int] = {}
     status: str = ""
-    """Empty while it runs."""
+    """Status at its end; empty while it runs."""
 
 
 class EventInView(Struct, frozen=True, kw_only=True):
@@ -90,7 +90,7 @@ class EventInView(Struct, frozen=True, kw_only=True):
 
 
 class Scene(Struct, frozen=True, kw_only=True):
-    """robot: its actor id. began: the instant that the view calls zero."""
+    """State of everything that is shown. robot: its actor id. began: the instant that counts as zero."""
 
     robot: str
     began: Seconds
@@ -102,8 +102,6 @@ class Scene(Struct, frozen=True, kw_only=True):
     owner: Claim | None = None
     waiting: tuple[Claim, ...] = ()
     session: WindowStatistics | None = None
-    services: tuple[str, ...] = ()
-    fragment: str = ""
     notes: tuple[str, ...] = ()
 
     def actor(self, id: str) -> Actor:
@@ -111,7 +109,7 @@ class Scene(Struct, frozen=True, kw_only=True):
 
     @property
     def block(self) -> BlockInView | None:
-        """The block worth showing: the newest that runs, else the last that ended."""
+        """Block to show: the newest that runs, else the last that ended."""
         running = [block for block in self.blocks if not block.status]
         return running[-1] if running else (self.blocks[-1] if self.blocks else None)
 
@@ -121,8 +119,8 @@ def empty(robot: str, at: Seconds) -> Scene:
 
 
 def feed(scene: Scene, message: Message, at: Seconds) -> Scene:
-    """The scene after `message`, which speaks of the local instant `at`."""
-    scene = msgspec.structs.replace(scene, now=max(scene.now, at))
+    """Change the scene by a message. at: its local instant."""
+    scene = replace(scene, now=max(scene.now, at))
     match message:
         case ActionBegan() | ActionEnded() | ActorFound() | ActorLost():
             return _act(scene, message, at)
@@ -141,15 +139,9 @@ def feed(scene: Scene, message: Message, at: Seconds) -> Scene:
         case ConnectionEvent():
             return _event(scene, message, at)
         case HeadOwner(owner=owner, waiting=waiting):
-            return msgspec.structs.replace(scene, owner=owner, waiting=waiting)
+            return replace(scene, owner=owner, waiting=waiting)
         case Statistics(actor="", session=session):
-            return msgspec.structs.replace(scene, session=session)
-        case PerformFragment(fragment=fragment):
-            return msgspec.structs.replace(scene, fragment=f"{fragment.id} ({fragment.turn_status})")
-        case PeerAlive(participant=name):
-            return msgspec.structs.replace(scene, services=tuple(sorted({*scene.services, name})))
-        case PeerGone(participant=name):
-            return msgspec.structs.replace(scene, services=tuple(s for s in scene.services if s != name))
+            return replace(scene, session=session)
         case WarningFeedback(block=block, behavior=behavior, kind=kind, message=text):
             place = ":".join(part for part in (block, behavior) if part)
             return _note(scene, f"{kind} {place}: {text}")
@@ -162,7 +154,7 @@ def _act(scene: Scene, message: ActionBegan | ActionEnded | ActorFound | ActorLo
     actor = scene.actor(message.actor)
     match message:
         case ActionBegan(action=action, targets=targets):
-            # Whoever looks at something new has stopped looking at the last thing.
+            # A new look ends the last one.
             others = tuple(
                 d for d in actor.doing if d.action != action or (action != "look" and d.targets != targets)
             )
@@ -176,7 +168,7 @@ def _act(scene: Scene, message: ActionBegan | ActionEnded | ActorFound | ActorLo
             actor = Actor(id=actor.id, present=False)
     known = any(other.id == actor.id for other in scene.actors)
     actors = tuple(actor if other.id == actor.id else other for other in scene.actors)
-    scene = msgspec.structs.replace(scene, actors=actors if known else (*scene.actors, actor))
+    scene = replace(scene, actors=actors if known else (*scene.actors, actor))
     if isinstance(message, ActionBegan | ActionEnded) and message.action == "speak":
         return _voice(scene, message, at)
     return scene
@@ -184,14 +176,12 @@ def _act(scene: Scene, message: ActionBegan | ActionEnded | ActorFound | ActorLo
 
 def _voice(scene: Scene, message: ActionBegan | ActionEnded, at: Seconds) -> Scene:
     if isinstance(message, ActionEnded):
-        said = tuple(
-            msgspec.structs.replace(u, open=False) if u.open and u.actor == message.actor else u for u in scene.said
-        )
-        return msgspec.structs.replace(scene, said=said)
+        said = tuple(replace(u, open=False) if u.open and u.actor == message.actor else u for u in scene.said)
+        return replace(scene, said=said)
     utterance = UtteranceInView(actor=message.actor, behavior=message.behavior, began=at)
     if any(u.open and (u.actor, u.behavior) == (message.actor, message.behavior) for u in scene.said):
         return scene
-    return msgspec.structs.replace(scene, said=(*scene.said, utterance)[-UTTERANCES_KEPT:])
+    return replace(scene, said=(*scene.said, utterance)[-UTTERANCES_KEPT:])
 
 
 def _speak(scene: Scene, word: WordSpoken, at: Seconds) -> Scene:
@@ -200,34 +190,31 @@ def _speak(scene: Scene, word: WordSpoken, at: Seconds) -> Scene:
     for index in reversed(range(len(said))):
         if said[index].behavior == behavior and said[index].open:
             text = joined((said[index].text, word.word))
-            said[index] = msgspec.structs.replace(said[index], text=text)
+            said[index] = replace(said[index], text=text)
             break
     else:
         said.append(UtteranceInView(actor=scene.robot, behavior=behavior, began=at, text=word.word))
-    return msgspec.structs.replace(scene, said=tuple(said)[-UTTERANCES_KEPT:])
+    return replace(scene, said=tuple(said)[-UTTERANCES_KEPT:])
 
 
 def _block(scene: Scene, message: BlockProgress, at: Seconds) -> Scene:
     assert message.block is not None
     if message.progress == "start":
         others = tuple(block for block in scene.blocks if block.id != message.block)
-        return msgspec.structs.replace(scene, blocks=(*others, BlockInView(id=message.block, began=at)))
-    blocks = [
-        msgspec.structs.replace(block, status=message.status) if block.id == message.block else block
-        for block in scene.blocks
-    ]
+        return replace(scene, blocks=(*others, BlockInView(id=message.block, began=at)))
+    blocks = [replace(block, status=message.status) if block.id == message.block else block for block in scene.blocks]
     ended = [block for block in blocks if block.status]
     forgotten = {block.id for block in ended[:-ENDED_BLOCKS_KEPT]}
-    return msgspec.structs.replace(scene, blocks=tuple(block for block in blocks if block.id not in forgotten))
+    return replace(scene, blocks=tuple(block for block in blocks if block.id not in forgotten))
 
 
 def _points(scene: Scene, id: str, news: tuple[PointInView, ...]) -> Scene:
     blocks = tuple(_merged(block, news) if block.id == id else block for block in scene.blocks)
-    return msgspec.structs.replace(scene, blocks=blocks)
+    return replace(scene, blocks=blocks)
 
 
 def _merged(block: BlockInView, news: tuple[PointInView, ...]) -> BlockInView:
-    """A plan never unsays what was realised, and a realised point keeps the newest plan made before it."""
+    """Add points to a block. A realised point keeps its time, and the newest plan before it."""
     points, places = list(block.points), block.places
     if any((new.behavior, new.sync) not in places for new in news):
         known = ((point.behavior, point.sync) for point in (*points, *news))
@@ -238,23 +225,23 @@ def _merged(block: BlockInView, news: tuple[PointInView, ...]) -> BlockInView:
             points.append(new)
         elif (old := points[place]).realised is None:
             planned = old.planned if new.planned is None else new.planned
-            points[place] = msgspec.structs.replace(new, planned=planned)
-    return msgspec.structs.replace(block, points=tuple(points), places=places)
+            points[place] = replace(new, planned=planned)
+    return replace(block, points=tuple(points), places=places)
 
 
 def _event(scene: Scene, event: ConnectionEvent, at: Seconds) -> Scene:
     known = [other for other in scene.events if other.event.id == event.id]
     began = known[0].began if known else at
     if event.state in ("completed", "lost") and known and known[0].event.state != "started":
-        # The shared phase is over; what the reader wants to keep seeing is the decision.
-        event = msgspec.structs.replace(event, state=known[0].event.state, delay=known[0].event.delay)
+        # The shared phase is over; the view goes on to show the decision.
+        event = replace(event, state=known[0].event.state, delay=known[0].event.delay)
     new = EventInView(event=event, began=began)
     if known:
         events = tuple(new if other.event.id == event.id else other for other in scene.events)
     else:
         events = (*scene.events, new)[-EVENTS_KEPT:]
-    return msgspec.structs.replace(scene, events=events)
+    return replace(scene, events=events)
 
 
 def _note(scene: Scene, text: str) -> Scene:
-    return msgspec.structs.replace(scene, notes=(*scene.notes, text)[-NOTES_KEPT:])
+    return replace(scene, notes=(*scene.notes, text)[-NOTES_KEPT:])

@@ -1,4 +1,4 @@
-"""How the console says things: one spelling for the live view, the log and the tally."""
+"""Words for the live view, the log and the tally, so that all say the same."""
 
 from collections.abc import Sequence
 
@@ -18,14 +18,12 @@ KINDS: dict[EventKind, str] = {
 
 
 def seconds(value: Seconds | None, sign: bool = False) -> str:
-    """`1.24 s`, with `+` or `-` if asked; `-` for None."""
-    if value is None:
-        return "-"
-    return f"{number(value, sign)} s"
+    """Write seconds as `1.24 s`, with `+` or `-` if asked; `-` for None."""
+    return "-" if value is None else f"{number(value, sign)} s"
 
 
 def number(value: Seconds | None, sign: bool = False) -> str:
-    """The same without the unit, for tables that name it once."""
+    """Write seconds without the unit, for tables that name it once; `-` for None."""
     if value is None:
         return "-"
     text = f"{value:{'+' if sign else ''}.2f}"
@@ -33,7 +31,7 @@ def number(value: Seconds | None, sign: bool = False) -> str:
 
 
 def clock(value: Seconds) -> str:
-    """`1:23.4` since the view began."""
+    """Write seconds since the view began as `1:23.4`."""
     minutes, rest = divmod(max(0.0, value), 60)
     return f"{int(minutes)}:{rest:04.1f}"
 
@@ -48,10 +46,10 @@ VERBS: dict[Action, tuple[str, str]] = {
 }
 
 
-def deed(action: Action, targets: Sequence[str], robot: str) -> tuple[str, str]:
-    """What someone does, and at, to or with what: `looks`, `at the robot`. An actor's id as a target means its face.
+def action_words(action: Action, targets: Sequence[str], robot: str) -> tuple[str, str]:
+    """Words for an action and its targets: `looks`, `at the robot`.
 
-    A look without targets is a look away; other actions may have none.
+    A look without targets is a look away; other actions without targets have no words for them.
     """
     verb, preposition = VERBS[action]
     if not targets:
@@ -60,7 +58,7 @@ def deed(action: Action, targets: Sequence[str], robot: str) -> tuple[str, str]:
 
 
 def decision(event: ConnectionEvent) -> str:
-    """`succeeded 0.42 s`, `waiting`, `failed (optional)`..."""
+    """Words for the state of an event: `succeeded 0.42 s`, `waiting`, `failed (optional)`..."""
     if event.state == "started":
         text = "waiting"
     elif event.state in ("succeeded", "failed", "completed") and event.delay is not None:
@@ -71,13 +69,13 @@ def decision(event: ConnectionEvent) -> str:
 
 
 def warning(message: WarningFeedback) -> str:
-    """`! NO_SUCH_TARGET block:behavior: what is wrong`."""
+    """Write a warning as `! NO_SUCH_TARGET block:behavior: what is wrong`."""
     place = ":".join(part for part in (message.block, message.behavior) if part)
     return f"! {message.kind} {place}: {message.message}"
 
 
 def statistics(statistics: Statistics) -> str:
-    """`anna: engaged 0.92; 12 events, MTBCE 5.31 s`; the reasons, too, if it is less than engaged."""
+    """Write `anna: engaged 0.92; 12 events, MTBCE 5.31 s`, with the reasons if the level is less than engaged."""
     engagement = f"{statistics.level} {number(statistics.engagement)}" if statistics.engagement is not None else "-"
     reasons = f" ({'; '.join(statistics.reasons)})" if statistics.reasons and statistics.level != "engaged" else ""
     count = statistics.session.events
@@ -86,10 +84,6 @@ def statistics(statistics: Statistics) -> str:
 
 
 def claim(claim: Claim) -> str:
-    """`fragment: rectangle (turn-3)`."""
+    """Write a claim as `fragment: rectangle (turn-3)`."""
     text = f"{claim.kind}: {claim.target}" if claim.target else claim.kind
     return f"{text} ({claim.reason})" if claim.reason else text
-
-
-def names(ids: Sequence[str]) -> str:
-    return ", ".join(ids)

@@ -11,7 +11,7 @@ from difflib import get_close_matches
 from msgspec.structs import replace
 
 from engage_hri.schemas.behaviors import Gaze, GazeShift, HeadDirectionShift, Pointing, Reference, Speech
-from engage_hri.schemas.check import sound
+from engage_hri.schemas.check import validated
 from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.fragments import TurnFragment
 from engage_hri.schemas.syncref import SyncRef
@@ -46,7 +46,7 @@ def _places_as_written(fragment: TurnFragment) -> Iterator[None]:
 
 
 def _checked(fragment: TurnFragment, world: World, robot: str, longest: int) -> TurnFragment:
-    fragment = sound(fragment)
+    fragment = validated(fragment)
     for index, behavior in enumerate(fragment.behaviors):
         if isinstance(behavior, Speech) and len(behavior.text) > longest:
             reason = f"{len(behavior.text)} characters of speech, at most {longest} can be said in one go"

@@ -7,7 +7,7 @@ from functools import lru_cache
 from itertools import pairwise
 from typing import Literal, NamedTuple
 
-from engage_hri.schemas.behavior_types import TYPES, Performer, named, sync_points
+from engage_hri.schemas.behavior_types import TYPES, Performer, sync_points, types_with
 from engage_hri.schemas.behaviors import Behavior, Event, Speech, Wait
 from engage_hri.schemas.body import Estimate
 from engage_hri.schemas.references import type_name
@@ -34,10 +34,10 @@ start: it is not begun yet. hold: it comes there and holds. passive: it cannot w
 prompt: it could hold, but sets out so late that it need not. (A look that is on its target too early misleads.)
 """
 
-WITH_STROKE = named(has_stroke=True)
-ON_TARGET = named(lasts=True, performer="body")
+WITH_STROKE = types_with(has_stroke=True)
+ON_TARGET = types_with(lasts=True, performer="body")
 """Types that stay where they are, once arrived, until something ends them."""
-SHIFTS = named(turns_base=True)
+SHIFTS = types_with(turns_base=True)
 """Types that turn what a gaze returns to. One that starts during a gaze moves nothing, and ends at once."""
 
 NOMINAL_PER_CHARACTER: Seconds = 0.07

@@ -20,7 +20,7 @@ from engage_hri.schemas.body import (
     SyncPointReached,
     WordSpoken,
 )
-from engage_hri.schemas.check import sound
+from engage_hri.schemas.check import validated
 from engage_hri.schemas.faults import EngageError, Fault, NoReply
 from engage_hri.schemas.feedback import WarningFeedback
 from engage_hri.schemas.presence import PeerAlive, PeerGone
@@ -196,7 +196,7 @@ class _Realizer:
             advice = "send several (blocks with APPEND, fragments of one turn); `realizer.most` is the limit"
             raise BlockRefused(Fault(reason=reason, where=block.id, advice=advice))
         await unhurried(relation_steps(block, elsewhere))  # Finds a bad reference before the body is asked.
-        block = sound(block)
+        block = validated(block)
         barred: set[tuple[str, Hand]] = set()
         chosen, estimates = block, await self._estimates(block, {})
         first, is_asked_again = estimates, False

@@ -1,1 +1,1 @@
-"""A study of many sessions: what each leaves behind, numbers of them all, plots, tests of hypotheses. Pure."""
+"""Study of many sessions: records of each, numbers of all, plots, tests of hypotheses. Pure."""

@@ -1,4 +1,4 @@
-"""The conditions of the study, each as settings of the configuration. Thesis, chapter 5.
+"""Conditions of the study, each as settings of the configuration. Thesis, chapter 5.
 
 The policies know nothing of a study: a condition is a configuration that any robot could be given.
 """
@@ -10,9 +10,9 @@ Condition = Literal["operational", "degraded-generation", "degraded-recognition"
 CONDITIONS: tuple[Condition, ...] = get_args(Condition)
 BASELINE: Condition = "operational"
 DEGRADED = tuple(condition for condition in CONDITIONS if condition != BASELINE)
-"""What is compared with it."""
+"""Conditions that are compared with the baseline."""
 
-WORSE: Mapping[str, tuple[str, ...]] = {
+DEGRADATIONS: Mapping[str, tuple[str, ...]] = {
     "operational": (),
     "degraded-generation": (),
     "degraded-recognition": (
@@ -21,9 +21,9 @@ WORSE: Mapping[str, tuple[str, ...]] = {
         "simulation.faults.dropped_speech=0.5",
     ),
 }
-"""What makes a condition worse, besides what `generation.condition` does; weaker than the user's own settings.
+"""Settings that make a condition worse, besides `generation.condition`; weaker than the user's own settings.
 
-Degraded recognition: the thesis names the condition and leaves it to another. Ours is poor perception. Of half the
-person's looks nothing is noticed, of the others three in ten are taken for a look at something near, half of what
-they say is not heard. The robot's own behavior is the full one, but it rests on that.
+Degraded recognition is only named in the thesis. Here it is poor perception: half of the person's looks are not
+noticed, three in ten of the others are taken for a look at something near, and half of the person's utterances are
+not heard. The robot's own behavior is complete, but rests on this perception.
 """

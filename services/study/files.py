@@ -1,4 +1,4 @@
-"""The files of a study as text: CSV with a fixed set of columns, whatever happened."""
+"""Files of a study as text: CSV, always with the same columns."""
 
 import csv
 import io
@@ -6,7 +6,6 @@ from collections.abc import Iterable, Sequence
 
 import msgspec
 
-from engage_hri.schemas.units import Seconds
 from engage_hri.services.study.hypotheses import Finding
 from engage_hri.services.study.records import EventRecord, SessionRecord
 from engage_hri.services.study.summary import KINDS
@@ -53,11 +52,7 @@ def _csv(columns: Sequence[str], rows: Iterable[Sequence[Cell]]) -> str:
 
 
 def _cell(cell: Cell) -> Cell:
-    """Microseconds are enough; `true` and `false` as everywhere else but in Python; empty for what is not known."""
+    """Write a cell: numbers to the millionth, `true` and `false` in small letters."""
     if isinstance(cell, bool):
         return "true" if cell else "false"
-    return _rounded(cell) if isinstance(cell, float) else cell
-
-
-def _rounded(value: Seconds) -> Seconds:
-    return round(value, 6) + 0.0  # + 0.0: no negative zero
+    return round(cell, 6) + 0.0 if isinstance(cell, float) else cell  # + 0.0: no negative zero

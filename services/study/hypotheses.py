@@ -35,10 +35,6 @@ class Hypothesis(Struct, frozen=True, kw_only=True):
     baseline: bool = True
 
 
-def _pair_delay(record: SessionRecord) -> float | None:
-    return record.of("adjacency_pair").delay_mean
-
-
 def _change(record: SessionRecord) -> float | None:
     return record.eye_contact.change if record.eye_contact else None
 
@@ -50,7 +46,8 @@ HYPOTHESES = (
     ),
     Hypothesis(
         name="7", claim="the mean adjacency pair delay is less in operational", sign=1, unit="s",
-        measure="mean delay of the adjacency pairs that were answered", value=_pair_delay,
+        measure="mean delay of the adjacency pairs that were answered",
+        value=lambda record: record.of("adjacency_pair").delay_mean,
     ),
     Hypothesis(
         name="8", claim="the puzzle is completed sooner in operational", sign=1, unit="s",
@@ -93,7 +90,7 @@ class Finding(Struct, frozen=True, kw_only=True):
 
 
 def findings(records: Sequence[SessionRecord]) -> list[Finding]:
-    """Every hypothesis in every degraded condition there is, from the finished sessions."""
+    """Test every hypothesis in every degraded condition, with the finished sessions."""
     values = {(record.condition, record.session): record for record in records if record.finished}
     conditions = {record.condition for record in records}
     operational = BASELINE in conditions
@@ -122,7 +119,7 @@ def findings(records: Sequence[SessionRecord]) -> list[Finding]:
 def _samples(
     hypothesis: Hypothesis, condition: str, records: dict[tuple[str, int], SessionRecord]
 ) -> tuple[list[float], list[float]]:
-    """What operational and degraded sessions with the same seeds measured; pairs with a gap are left out."""
+    """Measurements of operational and degraded sessions with the same seeds, without pairs that lack one."""
     bases, degraded = [], []
     for (name, session), record in sorted(records.items()):
         if name != condition:

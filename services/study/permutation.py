@@ -1,4 +1,4 @@
-"""The paired test of a study: how often would chance alone give a difference so large?
+"""Paired permutation test: how often chance alone would give a difference as large as that of a study.
 
 Each session is compared with the one of the same seed in the other condition. If the conditions did the same, each
 difference could as well have the other sign; the test counts how many choices of signs give a sum as far from zero.
@@ -15,11 +15,11 @@ from numpy.typing import NDArray
 from engage_hri.schemas.units import Probability
 
 EXACT = 14
-"""Up to so many pairs all choices of signs are counted."""
+"""Number of pairs up to which all choices of signs are counted."""
 DRAWS = 20_000
-"""Beyond, so many are drawn."""
+"""Number of choices of signs that are drawn for more pairs."""
 LEVEL = 0.05
-"""Of the test; the interval holds what it would not reject."""
+"""Level of the test; the interval holds the differences that it does not reject."""
 STEPS = 60
 """Halvings in the search for an end of the interval: to the last bit."""
 
@@ -27,7 +27,7 @@ Array = NDArray[np.float64]
 
 
 class Paired(Struct, frozen=True, kw_only=True):
-    """n pairs with differences of this mean. None: cannot be said.
+    """Result of the test for n pairs, with the mean of their differences. None: unknown.
 
     low, high: all true differences that the test does not reject at 5 %; None when n is too small to reject any.
     effect: mean / standard deviation of the differences (Cohen's d for pairs); None if they do not vary.
@@ -43,7 +43,7 @@ class Paired(Struct, frozen=True, kw_only=True):
 
 
 def paired(differences: Sequence[float]) -> Paired:
-    """Are these differences of another mean than zero?"""
+    """Test whether differences have another mean than zero."""
     d = np.asarray(differences, dtype=np.float64)
     n = len(d)
     if n == 0:
@@ -57,7 +57,7 @@ def paired(differences: Sequence[float]) -> Paired:
 
 
 class _SignFlips:
-    """All choices of signs, or many, for a sample: only their sums over the sample and over ones are needed."""
+    """Sums of a sample under all choices of signs, or under many, and the sums of the signs alone."""
 
     def __init__(self, d: Array) -> None:
         n = len(d)
@@ -74,19 +74,19 @@ class _SignFlips:
 
     @property
     def can_reject(self) -> bool:
-        """Could any sample of this size be significant? Two choices of signs always are as extreme as the sample."""
+        """True if a sample of this size can be significant; two choices of signs are always as extreme."""
         return 2.0 / 2.0**self._n < LEVEL
 
     def p(self, shift: float) -> Probability:
-        """Of the hypothesis that the true difference is `shift`."""
+        """Two-sided p of the hypothesis that the true difference is `shift`."""
         slack = 1e-9 * float(np.abs(self._d - shift).sum())  # sums that are equal but for rounding
         extreme = np.abs(self._sums - shift * self._ones) >= abs(self._sum - shift * self._n) - slack
         return float(extreme.mean())
 
     def end(self, side: int) -> float:
-        """Where the differences that the test does not reject end below (-1) or above (+1)."""
+        """Lower (-1) or upper (+1) end of the differences that the test does not reject."""
         inside = self._sum / self._n
-        # Beyond the most extreme difference every sign is as it would be by chance alone: certainly rejected.
+        # Beyond the most extreme difference all signs are the same: certainly rejected.
         outside = float(self._d.min() if side < 0 else self._d.max())
         outside += side * 1e-9 * max(1.0, abs(outside))
         if self.p(outside) >= LEVEL:
@@ -101,7 +101,7 @@ class _SignFlips:
 
 
 def holm(ps: Sequence[Probability | None]) -> list[Probability | None]:
-    """Corrected for asking several questions at once (Holm 1979); None stays None and counts for nothing."""
+    """Correct p for several questions at once (Holm 1979); None stays None and does not count."""
     asked = sorted((p, index) for index, p in enumerate(ps) if p is not None)
     corrected: list[Probability | None] = [None] * len(ps)
     largest = 0.0

@@ -1,6 +1,6 @@
-"""The plots of a study as PNG. Conditions have colors that color-blind people can tell apart (Okabe and Ito).
+"""Plots of a study as PNG. Conditions have colors that color-blind people can tell apart (Okabe and Ito).
 
-Needs matplotlib, the extra `study`; nothing imports this file before plots are wanted. No pyplot, so no state.
+Needs matplotlib, the extra `study`; imported only when plots are wanted. No pyplot, so no state.
 """
 
 import io
@@ -15,16 +15,16 @@ from engage_hri.services.study.summary import KINDS, RESPONDED, by_condition, po
 
 COLORS = ("#0072B2", "#E69F00", "#009E73")
 HATCHES = ("", "//", "..")
-"""For prints without color."""
+"""Hatches of the bars, for prints without color."""
 DPI = 120
 
 Groups = Mapping[str, Sequence[SessionRecord]]
 Height = Callable[[str, EventKind], tuple[float, str]]
-"""Of the bar for a condition and a kind, with the words above it."""
+"""Height of the bar for a condition and a kind, with the words above it."""
 
 
 def draw(records: Sequence[SessionRecord], events: Sequence[EventRecord]) -> dict[str, bytes]:
-    """PNGs by file name, of the finished sessions."""
+    """Draw the finished sessions: PNGs by file name."""
     groups = by_condition(records)
     finished = {(record.condition, record.session) for record in records if record.finished}
     counted = [event for event in events if (event.condition, event.session) in finished]
@@ -32,17 +32,11 @@ def draw(records: Sequence[SessionRecord], events: Sequence[EventRecord]) -> dic
         "events.png": _png(_events(groups)),
         "delays.png": _png(_delays(groups, counted)),
         "failure_rates.png": _png(_failure_rates(groups)),
-        "mtbce.png": _png(_each_session(groups, "mean time between connection events (s)", _mtbce)),
-        "completion_time.png": _png(_each_session(groups, "completion time (s)", _completion_time)),
+        "mtbce.png": _png(
+            _each_session(groups, "mean time between connection events (s)", lambda one: one.statistics.mtbce)
+        ),
+        "completion_time.png": _png(_each_session(groups, "completion time (s)", lambda one: one.completion_time)),
     }
-
-
-def _mtbce(record: SessionRecord) -> float | None:
-    return record.statistics.mtbce
-
-
-def _completion_time(record: SessionRecord) -> float | None:
-    return record.completion_time
 
 
 # -- what is drawn ----------------------------------------------------------------------------------------------
@@ -95,7 +89,7 @@ def _delays(groups: Groups, events: Sequence[EventRecord]) -> Figure:
 
 
 def _each_session(groups: Groups, label: str, measure: Callable[[SessionRecord], float | None]) -> Figure:
-    """A point for each session, over a box."""
+    """Draw a point for each session, over a box."""
     figure, axes = _one_panel()
     samples = [[value for record in group if (value := measure(record)) is not None] for group in groups.values()]
     _boxes(axes, groups, samples, whiskers=(0, 100))
@@ -129,10 +123,8 @@ def _tidy(axes: Axes) -> None:
     axes.grid(axis="y", color="0.9")
 
 
-def _bars(
-    axes: Axes, groups: Groups, kinds: Sequence[EventKind], height: Callable[[str, EventKind], tuple[float, str]]
-) -> None:
-    """For each kind a bar for each condition, beside one another."""
+def _bars(axes: Axes, groups: Groups, kinds: Sequence[EventKind], height: Height) -> None:
+    """Draw for each kind a bar for each condition, side by side."""
     width = 0.84 / max(1, len(groups))
     for index, name in enumerate(groups):
         places = [number + (index - (len(groups) - 1) / 2) * width for number in range(len(kinds))]
@@ -149,7 +141,7 @@ def _bars(
 
 
 def _boxes(axes: Axes, groups: Groups, samples: Sequence[Sequence[float]], whiskers: tuple[float, float]) -> None:
-    """A box from quartile to quartile for each condition. whiskers: percentiles. Nothing for an empty sample."""
+    """Draw a box from quartile to quartile for each condition with a sample. whiskers: percentiles."""
     for index, sample in enumerate(samples):
         if sample:
             axes.boxplot(
@@ -166,7 +158,7 @@ def _boxes(axes: Axes, groups: Groups, samples: Sequence[Sequence[float]], whisk
 
 
 def _png(figure: Figure) -> bytes:
-    """The same bytes each time."""
+    """Write a figure as PNG: the same bytes each time."""
     picture = io.BytesIO()
     figure.savefig(picture, format="png", dpi=DPI, metadata={"Software": None})
     return picture.getvalue()

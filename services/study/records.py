@@ -1,4 +1,4 @@
-"""What one session leaves behind, from the messages on the bus alone: the rows of events.csv and sessions.csv."""
+"""Records of one session, from the messages on the bus alone: the rows of events.csv and sessions.csv."""
 
 from itertools import pairwise
 from typing import Literal
@@ -26,13 +26,13 @@ class EventRecord(Struct, frozen=True, kw_only=True):
     """`open`: the session was broken off before it was decided."""
     optional: bool
     start: Seconds
-    """Since the session's beginning."""
+    """Seconds since the session's beginning."""
     delay: Seconds | None
-    """As in `ConnectionEvent`: of failures from start to failure."""
+    """Delay as in `ConnectionEvent`: of a failed event from start to failure."""
 
 
 class EyeContact(Struct, frozen=True, kw_only=True):
-    """How much of each third of the session the person looks at the robot's face, 0..1."""
+    """Share of each third of the session in which the person looks at the robot's face, 0..1."""
 
     first: Probability
     second: Probability
@@ -40,22 +40,22 @@ class EyeContact(Struct, frozen=True, kw_only=True):
 
     @property
     def change(self) -> float:
-        """From the first third to the last."""
+        """Change from the first third to the last."""
         return self.last - self.first
 
 
 class SessionRecord(Struct, frozen=True, kw_only=True):
-    """One session in numbers. `statistics` is recognition's own last word."""
+    """A session in numbers. statistics: the last that recognition published."""
 
     session: int
     condition: str
     seed: int
     finished: bool
     reason: str = ""
-    """Why it is not finished."""
+    """Reason why it is not finished; empty if it is."""
     duration: Seconds = 0.0
     completion_time: Seconds | None = None
-    """From when the person was first seen until the last piece lay."""
+    """Time from the person's arrival until the last piece lay."""
     adjacency_pairs_every: Seconds | None = None
     """Mean time between the starts of adjacency pairs."""
     eye_contact: EyeContact | None = None
@@ -67,7 +67,7 @@ class SessionRecord(Struct, frozen=True, kw_only=True):
 
 
 class Recording:
-    """Takes every message of a session, with the instant it speaks of, counted from the session's beginning."""
+    """Sink that records a session. Instants count from the session's beginning."""
 
     def __init__(self, robot: str) -> None:
         self._robot = robot
@@ -111,7 +111,7 @@ class Recording:
             self._looking_since = None
 
     def session(self, *, session: int, condition: str, seed: int, reason: str = "") -> SessionRecord:
-        """reason: why it ended before its end, if it did."""
+        """Record of the session so far. reason: why it was broken off, if it was."""
         self._look_ends(self._now)
         completion = None
         if self._came is not None and self._last_placed is not None and not reason:
@@ -125,7 +125,7 @@ class Recording:
         )  # fmt: skip
 
     def events(self, *, session: int, condition: str) -> tuple[EventRecord, ...]:
-        """In the order of their starts."""
+        """Records of the connection events, in the order of their starts."""
         events = sorted(self._events.values(), key=lambda event: event.started.seconds)
         return tuple(
             EventRecord(
@@ -136,7 +136,7 @@ class Recording:
         )  # fmt: skip
 
     def _eye_contact(self) -> EyeContact | None:
-        """None without a person, or if they left at once."""
+        """Eye contact in each third; None without a person, or if the person left at once."""
         if self._came is None:
             return None
         end = self._now if self._left is None else self._left

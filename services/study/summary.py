@@ -1,4 +1,4 @@
-"""What the sessions come to, as tables that read the same in a terminal and in Markdown."""
+"""Summary of sessions, as tables for a terminal and for Markdown."""
 
 from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
@@ -14,12 +14,12 @@ from engage_hri.services.study.records import SessionRecord
 
 KINDS: tuple[EventKind, ...] = get_args(EventKind)
 RESPONDED = tuple(kind for kind in KINDS if kind != "backchannel")
-"""A backchannel can neither fail nor be late."""
+"""Kinds with a responder; a backchannel can neither fail nor be late."""
 MISSING = "-"
 
 
 class Table(Struct, frozen=True, kw_only=True):
-    """The first column is words, the others numbers."""
+    """Table with words in its first column and numbers in the others."""
 
     title: str
     columns: tuple[str, ...]
@@ -37,7 +37,7 @@ class Table(Struct, frozen=True, kw_only=True):
 
 
 def by_condition(records: Iterable[SessionRecord]) -> dict[str, list[SessionRecord]]:
-    """The finished sessions of each condition; conditions without one are there, too."""
+    """Group the finished sessions by condition; a condition without any has an empty group."""
     groups: dict[str, list[SessionRecord]] = {}
     for record in records:
         group = groups.setdefault(record.condition, [])
@@ -47,7 +47,7 @@ def by_condition(records: Iterable[SessionRecord]) -> dict[str, list[SessionReco
 
 
 def pooled(records: Iterable[SessionRecord], kind: EventKind) -> KindStatistics:
-    """The events of one kind in all sessions together."""
+    """Add up the events of one kind in all sessions."""
     parts = [record.of(kind) for record in records]
     succeeded, failed = sum(part.succeeded for part in parts), sum(part.failed for part in parts)
     return KindStatistics(
@@ -63,7 +63,7 @@ def pooled(records: Iterable[SessionRecord], kind: EventKind) -> KindStatistics:
 
 
 def _weighted(means: Iterable[tuple[float | None, int]]) -> float | None:
-    """The mean of means with their weights; None where there was nothing."""
+    """Weighted mean of means; None if there are none."""
     parts = [(mean, weight) for mean, weight in means if mean is not None]
     return sum(mean * weight for mean, weight in parts) / sum(weight for _, weight in parts) if parts else None
 
@@ -76,16 +76,16 @@ def known(values: Iterable[float | None]) -> list[float]:
 
 
 def overview(records: Sequence[SessionRecord]) -> Table:
-    """One column for each condition; what is known of none of them is left out."""
+    """Table with a column for each condition, without rows that are empty in all of them."""
     groups = by_condition(records)
     ordered = Counter(record.condition for record in records)
     rows = [("finished", *(f"{len(group)} of {ordered[name]}" for name, group in groups.items()))]
     for title, digits, measure in _MEASURES:
-        cells = (spelled(known(map(measure, group)), digits) for group in groups.values())
+        cells = (mean_and_deviation(known(map(measure, group)), digits) for group in groups.values())
         rows.append((title, *cells))
     for kind in KINDS:
         counts = ([float(record.of(kind).count) for record in group] for group in groups.values())
-        rows.append((kind.replace("_", " "), *(spelled(count, 1) for count in counts)))
+        rows.append((kind.replace("_", " "), *(mean_and_deviation(count, 1) for count in counts)))
         if kind in RESPONDED:
             all_of = [pooled(group, kind) for group in groups.values()]
             rows.append(("- failure rate", *(number(one.failure_rate, 3) for one in all_of)))
@@ -119,7 +119,7 @@ _MEASURES: tuple[tuple[str, int, Callable[[SessionRecord], float | None]], ...] 
 
 
 def hypotheses(found: Sequence[Finding]) -> Table:
-    """One row for each finding."""
+    """Table with a row for each finding."""
     rows = (
         (
             finding.hypothesis, finding.condition.removeprefix("degraded-"), str(finding.n),
@@ -158,18 +158,18 @@ def unfinished(records: Sequence[SessionRecord]) -> Table:
 
 
 def number(value: float | None, digits: int = 2) -> str:
-    """No negative zero; `-` for what is not known."""
+    """Write a number without negative zero; `-` for None."""
     return MISSING if value is None else f"{round(value, digits) + 0.0:.{digits}f}"
 
 
 def numbers(values: Iterable[float | None]) -> str:
-    """`0.00 0.31 2.00`, or one `-` if nothing is known."""
+    """Write numbers as `0.00 0.31 2.00`, or as one `-` if all are None."""
     words = [number(value) for value in values]
     return MISSING if set(words) == {MISSING} else " ".join(words)
 
 
-def spelled(values: Sequence[float], digits: int) -> str:
-    """`5.71 ± 0.20`."""
+def mean_and_deviation(values: Sequence[float], digits: int) -> str:
+    """Write mean and standard deviation as `5.71 ± 0.20`."""
     if not values:
         return MISSING
     middle = number(mean(values), digits)

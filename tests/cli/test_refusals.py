@@ -172,6 +172,8 @@ def test_a_bad_configuration_is_refused_with_file_and_key(
         (["demo", "--config", "missing.toml"], "missing.toml: No such file"),
         (["play", "missing.xml"], "missing.xml: No such file"),
         (["play", "--virtual-time", "x.xml"], "add --embedded"),
+        (["play", "--human", "attentive", "x.xml"], "--human is for a private system (add --embedded)"),
+        (["play", "--human", "none", "x.xml"], "--human is for a private system (add --embedded)"),
         (["play", "--embedded", "--at", "1,2", "x.xml"], "2 times for 1 files"),
         (["play", "--embedded", "--at", "soon", "x.xml"], "not a list of seconds"),
         (["play", "--embedded", "--at=-1", "x.xml"], "not from 0 to 86400 seconds"),

@@ -13,7 +13,7 @@ from rich.console import Console
 from engage_hri.services.commandline import session as playing
 from engage_hri.services.commandline import simulate, workers
 from engage_hri.services.commandline.config import Config, load
-from engage_hri.services.commandline.session import Order, Played, play
+from engage_hri.services.commandline.session import Order, SessionResult, play
 from engage_hri.services.commandline.workers import play_all
 from engage_hri.services.runtime.virtual_time import Deadlock
 from engage_hri.services.study import summary
@@ -112,7 +112,7 @@ def test_the_number_of_processes_changes_nothing(engage: Engage, tmp_path: Path)
 def test_another_process_plays_the_same_session_with_the_robot() -> None:
     """And again the same after another one. Broken off early, to be quick."""
     orders = simulate.orders_of(simulate.Options(sessions=1, seed=7, out=Path(), limit=12.0))[:2]
-    told: list[Played] = []
+    told: list[SessionResult] = []
 
     asyncio.run(play_all([*orders, *orders], 1, told.append))
 
@@ -237,7 +237,7 @@ def test_tables_of_many_sessions_fit_a_narrow_terminal() -> None:
     ]
 
     for table in (summary.hypotheses([found]), summary.overview(records)):
-        assert Console(width=200).measure(simulate.drawn(table)).maximum <= 80
+        assert Console(width=200).measure(simulate.grid(table)).maximum <= 80
 
 
 # -- what goes wrong --------------------------------------------------------------------------------------------
@@ -295,7 +295,7 @@ async def test_a_child_that_is_lost_costs_only_its_session(
     monkeypatch.setattr(workers, "PATIENCE", 1.0)
     told: list[SessionRecord] = []
 
-    def tell(played: Played) -> None:
+    def tell(played: SessionResult) -> None:
         told.append(played.record)
 
     await play_all([order(number) for number in range(4)], 2, tell, worker=answering(deed))

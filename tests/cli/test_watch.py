@@ -83,7 +83,7 @@ async def heard(events: EventFeed, state: str) -> ConnectionEvent:
 def parsed(text: str) -> Any:
     """The line, which has exactly the keys of its message."""
     made = json.loads(text)
-    (kind,) = (each for each in get_args(lines.Told) if each.__struct_config__.tag == made["type"])
+    (kind,) = (each for each in get_args(lines.LineMessage) if each.__struct_config__.tag == made["type"])
     assert list(made) == ["type", *kind.__struct_fields__]
     return made
 

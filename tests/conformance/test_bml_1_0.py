@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from engage_hri.schemas.blocks import Block
-from engage_hri.schemas.documents.dialects import core, spelled
+from engage_hri.schemas.documents.dialects import core, in_dialect
 from engage_hri.schemas.documents.json_codec import read
 from engage_hri.schemas.documents.xml_encode import encode_xml
 from tests.conformance.case import Case, cases
@@ -40,7 +40,7 @@ def test_what_is_meant_as_bml_1_0_is_bml_1_0(case: Case) -> None:
 @pytest.mark.parametrize("case", [case for case in PERFORMED if case.rule != NAMES_ONLY], ids=str)
 def test_what_we_write_of_it_as_bml_1_0_is_bml_1_0_and_read_without_a_warning(case: Case) -> None:
     for block in _blocks(case).values():
-        written = encode_xml(spelled(core(block), "bml-1.0", _blocks(case)))
+        written = encode_xml(in_dialect(core(block), "bml-1.0", _blocks(case)))
         (again,) = read(written)
 
         assert violations(written) == []

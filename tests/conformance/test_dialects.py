@@ -11,15 +11,16 @@ from msgspec import structs
 from engage_hri.schemas import behaviors as of
 from engage_hri.schemas.behavior_types import dialect_sync
 from engage_hri.schemas.blocks import Block
-from engage_hri.schemas.documents.dialects import core, spelled
+from engage_hri.schemas.documents.dialects import core, in_dialect
 from engage_hri.schemas.documents.json_codec import encode_json, read
 from engage_hri.schemas.documents.xml_decode import encode_xml
 from engage_hri.schemas.faults import InputRefused
-from engage_hri.schemas.references import type_name, without_lines
+from engage_hri.schemas.references import type_name
 from engage_hri.schemas.syncref import SYNC_POINTS, SyncRef
 from engage_hri.services.realizer.plan.planner import Plan, plan_block
 from tests.conformance.case import Case, cases
 from tests.schemas.grammar import violations
+from tests.schemas.strategies import without_lines
 
 CASES = list(cases(Path(__file__).parent / "cases"))
 RULES = {
@@ -120,14 +121,14 @@ def test_any_block_has_the_same_net_in_each_dialect(block: Block) -> None:
     assert verdict(draft.replace(b' xmlns="org.mindmakers.bml"', b"")) == expected
     (read_back,) = read(draft)
     assert verdict(encode_json(read_back)) == expected
-    assert meaning(encode_xml(spelled(block, "bml-1.0"))) == meaning(draft)
-    assert meaning(encode_xml(spelled(spelled(block, "bml-1.0"), "draft"))) == meaning(draft)
+    assert meaning(encode_xml(in_dialect(block, "bml-1.0"))) == meaning(draft)
+    assert meaning(encode_xml(in_dialect(in_dialect(block, "bml-1.0"), "draft"))) == meaning(draft)
 
 
 @settings(max_examples=80, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(any_blocks(every=True))
 def test_any_block_is_bml_1_0_once_spelled_so(block: Block) -> None:
-    written = encode_xml(spelled(block, "bml-1.0"))
+    written = encode_xml(in_dialect(block, "bml-1.0"))
 
     assert violations(written) == []
     assert b"edu.wpi.ebml" not in written
@@ -138,7 +139,7 @@ def test_two_points_that_bml_1_0_calls_by_one_name_stay_timed_both() -> None:
     waits = (of.Wait(id="w", duration=1.0), of.Wait(id="v", duration=2.0))
     block = Block(id="b", behaviors=(gaze, *waits))
 
-    named = spelled(block, "bml-1.0")
+    named = in_dialect(block, "bml-1.0")
 
     assert named.constraints != ()
     assert violations(encode_xml(named)) == []

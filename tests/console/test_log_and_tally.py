@@ -19,7 +19,7 @@ def lines(messages: tuple[tuple[Message, Seconds], ...], telling: Telling) -> li
     scene = view.empty("robot", 10.0)
     for message, time in messages:
         before, scene = scene, view.feed(scene, message, time)
-        if (line := log.told(message, before, scene, time, telling)) is not None:
+        if (line := log.line(message, before, scene, time, telling)) is not None:
             told.append(line.strip())
     return told
 

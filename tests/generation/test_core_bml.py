@@ -10,7 +10,7 @@ from engage_hri.schemas import behaviors as of
 from engage_hri.schemas import keys
 from engage_hri.schemas.behavior_types import dialect_sync, sync_points
 from engage_hri.schemas.blocks import Block, BlockOutcome, PerformBlock
-from engage_hri.schemas.documents.dialects import core, spelled
+from engage_hri.schemas.documents.dialects import core, in_dialect
 from engage_hri.schemas.documents.xml_decode import decode_xml, encode_xml
 from engage_hri.schemas.documents.xml_feedback import encode_feedback
 from engage_hri.schemas.faults import InputRefused
@@ -106,7 +106,7 @@ def block_of(fragment: TurnFragment, config: Config) -> Block:
 
 def as_core_bml(block: Block) -> Block:
     """Through its XML, as another program would get it."""
-    written = encode_xml(spelled(core(block), "bml-1.0"))
+    written = encode_xml(in_dialect(core(block), "bml-1.0"))
     assert violations(written) == []
     assert b"edu.wpi.ebml" not in written
     again = decode_xml(written)

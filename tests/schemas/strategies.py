@@ -8,6 +8,7 @@ from msgspec.structs import replace
 from engage_hri.schemas import behaviors as of
 from engage_hri.schemas.blocks import Block, Composition, Dialect
 from engage_hri.schemas.fragments import TurnFragment, TurnStatus
+from engage_hri.schemas.references import AnyBehavior, AnyInput
 from engage_hri.schemas.syncref import SYNC_POINTS, SyncRef
 
 # Letters that XML must escape, white space that it would collapse, and some beyond ASCII.
@@ -140,3 +141,28 @@ def fragments(draw: st.DrawFn) -> TurnFragment:
         delay_target=draw(words),
         accept=draw(actions),
     )
+
+
+def without_lines(thing: AnyInput) -> AnyInput:
+    """Set every `line` to 0, as if the document had not come from XML."""
+    if isinstance(thing, TurnFragment):
+        thing = replace(thing, line=0)
+    return replace(
+        thing,
+        behaviors=tuple(_behavior_without_lines(behavior) for behavior in thing.behaviors),
+        constraints=tuple(
+            of.Constraint(
+                id=each.id,
+                required=each.required,
+                operators=tuple(replace(operator, line=0) for operator in each.operators),
+            )
+            for each in thing.constraints
+        ),
+    )
+
+
+def _behavior_without_lines(behavior: AnyBehavior) -> AnyBehavior:
+    behavior = replace(behavior, line=0)
+    if isinstance(behavior, of.Reference) and behavior.options is not None:
+        return replace(behavior, options=tuple(replace(option, line=0) for option in behavior.options))
+    return behavior

@@ -75,13 +75,13 @@ def test_a_row_agrees_with_itself(row: object) -> None:
     assert row.points in (SYNC_POINTS, ("start", "end"))
     assert set(row.holds) <= set(row.points)
     assert len(row.nominal) == len(row.points) - 1
-    assert set(row.spelled) <= set(row.points)
+    assert set(row.bml_1_0_names) <= set(row.points)
     instants = [sync for group in row.one_instant for sync in group]
     assert len(instants) == len(set(instants))
     for group in row.one_instant:
         start = row.points.index(group[0])
         assert row.points[start : start + len(group)] == group
-        assert len([sync for sync in group if sync in row.spelled]) == 1
+        assert len([sync for sync in group if sync in row.bml_1_0_names]) == 1
     for sync in row.points:
         assert dialect_sync(same_instant(sync, row.name), row.name, "bml-1.0") is not None
 

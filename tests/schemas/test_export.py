@@ -126,7 +126,7 @@ def test_every_line_of_watch_fits() -> None:
             fits.validate(json.loads(line))
             seen.add(json.loads(line)["type"])
 
-    assert seen == {kind.__struct_config__.tag for kind in get_args(lines.Told)}
+    assert seen == {kind.__struct_config__.tag for kind in get_args(lines.LineMessage)}
 
 
 def test_a_stale_file_is_noticed_and_put_right(tmp_path: Path) -> None:

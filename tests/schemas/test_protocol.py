@@ -76,7 +76,7 @@ def test_numbers_and_names_are_those_of_the_code(said: str) -> None:
     assert " ".join(said.split()) in " ".join(PAGE.split())
 
 
-@pytest.mark.parametrize("kind", get_args(lines.Told))
+@pytest.mark.parametrize("kind", get_args(lines.LineMessage))
 def test_the_table_of_json_lines_names_the_message_of_each(kind: type[msgspec.Struct]) -> None:
     name, tag = kind.__name__, kind.__struct_config__.tag
 

@@ -5,12 +5,12 @@ from hypothesis import HealthCheck, given, settings
 
 from engage_hri.schemas.behaviors import Speech
 from engage_hri.schemas.blocks import Block
-from engage_hri.schemas.documents.dialects import spelled
+from engage_hri.schemas.documents.dialects import in_dialect
 from engage_hri.schemas.documents.json_codec import decode_json, encode_json, read
 from engage_hri.schemas.documents.xml_decode import decode_xml, encode_xml
 from engage_hri.schemas.fragments import TurnFragment
-from engage_hri.schemas.references import disambiguated, without_lines
-from tests.schemas.strategies import blocks, fragments
+from engage_hri.schemas.references import disambiguated
+from tests.schemas.strategies import blocks, fragments, without_lines
 from tests.schemas.test_xml_codec import BML_1_0, DRAFT
 
 quick = settings(max_examples=40, suppress_health_check=[HealthCheck.too_slow], deadline=None)
@@ -67,7 +67,7 @@ def test_markup_of_words_survives_xml_in_each_dialect(text: str, namespace: str)
     assert block.behaviors[0].markup
 
     for dialect in ("draft", "bml-1.0"):
-        written = decode_xml(encode_xml(spelled(block, dialect)))
+        written = decode_xml(encode_xml(in_dialect(block, dialect)))
         assert isinstance(written, Block)
         assert without_lines(written).behaviors == without_lines(block).behaviors
 

@@ -2,6 +2,8 @@
 
 import json
 
+import pytest
+
 from engage_hri.schemas.blocks import SpokenText
 from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.fragments import FragmentOutcome, GestureChoice, ReferenceChoice
@@ -65,6 +67,18 @@ def test_a_good_fragment_is_told_in_a_few_hundred_characters() -> None:
     )
 
 
+@pytest.mark.parametrize("words", ["Really?", 'He said "go!"', "Wait…", "請。", "「請。」"])
+def test_words_that_end_with_a_stop_of_their_own_get_no_other(words: str) -> None:
+    assert summary(outcome(spoken=said(words))).text == f'Said: "{words}"'
+
+
+@pytest.mark.parametrize("words", ["Please move the blue piece", "first,", "3.5", "請"])
+def test_a_full_stop_parts_words_without_one_from_the_next_sentence(words: str) -> None:
+    told = summary(outcome(spoken=said(words), choices=(choice("cup"),)))
+
+    assert told.text.startswith(f'Said: "{words}". cup: ')
+
+
 def test_what_was_interrupted_tells_the_words_really_spoken_and_why() -> None:
     cut = outcome(
         status="interrupted",
@@ -77,7 +91,7 @@ def test_what_was_interrupted_tells_the_words_really_spoken_and_why() -> None:
     assert (told.status, told.said, told.cut_short) == ("interrupted", "Please take that", True)
     assert told.problems == ("f: ann took the floor",)
     assert told.text == (
-        'The fragment was interrupted. Only said: "Please take that" Problems: f: ann took the floor.'
+        'The fragment was interrupted. Only said: "Please take that". Problems: f: ann took the floor.'
     )
 
 

@@ -29,7 +29,7 @@ from engage_hri.schemas.blocks import Block
 from engage_hri.schemas.documents.xml_decode import decode_xml, encode_xml
 from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.fragments import TurnFragment
-from engage_hri.schemas.references import without_lines
+from tests.schemas.strategies import without_lines
 
 DRAFT = "org.mindmakers.bml"
 BML_1_0 = "http://www.bml-initiative.org/bml/bml-1.0"
