@@ -71,6 +71,13 @@ ON_A_ROBOT = {"realizer", "generation", "recognition", "control"}
 THREADS = {"threading", "_thread", "concurrent", "multiprocessing"}
 THREAD_CALLS = {"to_thread", "run_in_executor", "Thread", "ThreadPoolExecutor"}
 
+NO_SUBJECTS = re.compile(
+    "(Its?|Who|Whose|Whom|What|Which|How|When|Where|Whether|Why|Of|Is|Has|Have|Does|Do|Did|Are|May|Can|Could|Was|Were|Will"
+    "|As|From|To|In|On|At|By|Under|(No|Some|Every)body|Those|That|This|These|They|There|Here|And|Or|But|So|If|Once|Only"
+    "|Also|Rather|Without|Until|Between)\\b"
+)
+"""Words that a docstring does not begin with: a stranger does not know what they speak of."""
+
 MACHINE_PATH = re.compile(r"(?<![\w./}$-])/(?:work|home|Users|root|mnt|opt)/\w+")
 INDEX_ADDRESS = re.compile(
     r"--(?:extra-)?index-url|--find-links|(?:https?|file)://[^\s\"'<>]+/simple\b|https?://\d+\.\d+\.\d+\.\d+[^\s]*/pypi"
@@ -108,6 +115,8 @@ def _in_code(place: PurePosixPath, text: str, tree: ast.Module) -> Iterator[str]
             yield f"imports {module}: its name is engage_hri.{module}"
     for module in _imports(place, tree):
         yield from (f"imports {module}: {reason}" for reason in _import(place, module))
+    if place.parts[0] in ("schemas", "services", "engage_hri"):
+        yield from _docstrings(tree)
     if place.parts[0] in ("schemas", "services"):
         for name in _called(tree) & THREAD_CALLS:
             yield f"calls {name}: this code starts no threads"
@@ -115,6 +124,14 @@ def _in_code(place: PurePosixPath, text: str, tree: ast.Module) -> Iterator[str]
         for node in ast.walk(tree):
             if isinstance(node, ast.Constant) and isinstance(node.value, str) and "engage/v1" in node.value:
                 yield f"line {node.lineno} spells a key expression: schemas/keys.py has them all"
+
+
+def _docstrings(tree: ast.Module) -> Iterator[str]:
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef):
+            first, *_ = (ast.get_docstring(node) or "-").splitlines()
+            if NO_SUBJECTS.match(first) or first.rstrip().endswith("?"):
+                yield f"{first!r} does not begin with a noun or a verb"
 
 
 def _import(place: PurePosixPath, module: str) -> Iterator[str]:
@@ -290,6 +307,8 @@ def test_the_list_of_shells_holds_only_files_that_need_it() -> None:
         ("schemas/x.py", "from services import bus", "knows no service"),
         ("schemas/x.py", "def f():\n    from time import monotonic", "pure"),
         ("services/realizer/plan/x.py", "import random", "pure"),
+        ("services/realizer/plan/x.py", '"""It begins."""', "noun or a verb"),
+        ("schemas/x.py", 'def f():\n    """Noticeably?"""', "noun or a verb"),
         ("services/realizer/plan/x.py", "import logging.handlers", "pure"),
         ("services/realizer/plan/x.py", "from engage_hri.services.requests.ends import Requester", "pure"),
         ("services/realizer/plan/x.py", "from engage_hri.services.bus import zenoh", "pure"),

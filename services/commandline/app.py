@@ -47,7 +47,11 @@ def command(name: str) -> Any:
     run.__signature__ = inspect.Signature([taken[option] for option in names])  # type: ignore[attr-defined]
     alone = typer.Typer(add_completion=False, pretty_exceptions_enable=False)
     alone.command(name, help=COMMANDS[name])(run)
-    return typer.main.get_command(alone)
+    made = typer.main.get_command(alone)
+    for option in made.params:
+        if getattr(option, "is_flag", False):
+            option.metavar = ""  # else the help calls it `<bool>`
+    return made
 
 
 class Commands(TyperGroup):

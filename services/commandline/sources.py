@@ -71,4 +71,6 @@ def _bytes(path: Path) -> bytes:
     try:
         return path.read_bytes()
     except OSError as error:
-        raise InputRefused(Fault(reason=error.strerror or str(error), where=str(path))) from error
+        raise InputRefused(
+            Fault(reason=error.strerror or str(error), where=str(path), advice="check the path")
+        ) from error

@@ -61,7 +61,7 @@ async def _up(options: Options, config: Config, outputs: Outputs, console: Conso
                     await forever()
                 holding.cancel()
     if options.task:
-        console.print(tally.render(tallying.tally, config.robot))
+        console.print(tally.render(tallying.tally, config.robot, console.width))
 
 
 def _names(options: Options) -> tuple[str, ...]:
