@@ -18,7 +18,7 @@ from engage_hri.schemas.export import BUNDLE, EXPORTED, ID, bundle, files, stale
 from engage_hri.schemas.faults import InputRefused
 from engage_hri.schemas.fragments import TurnFragment
 from engage_hri.schemas.messages import Message, decode
-from engage_hri.services.hostile.typed import Typed, Words, distorted
+from engage_hri.services.hostile.typed import RandomMessages, Words, distorted
 from tests.schemas.strategies import blocks, fragments
 
 SCHEMA: dict[str, Any] = json.loads((EXPORTED / BUNDLE).read_bytes())
@@ -85,7 +85,7 @@ def test_units_are_in_the_schema() -> None:
 def test_what_the_codec_writes_fits_and_what_fits_it_reads(name: str) -> None:
     """Random messages as they are, and each with one thing in it of the wrong type, missing or too much."""
     chance = Random(name)
-    typed, fits = Typed(chance, Words()), validator(name)
+    typed, fits = RandomMessages(chance, Words()), validator(name)
     verdicts = set()
     for _ in range(60):
         message = typed.message(1.0, name)
@@ -119,7 +119,7 @@ def test_a_fragment_as_it_is_written_fits(fragment: TurnFragment) -> None:
 
 
 def test_every_line_of_watch_fits() -> None:
-    typed, fits, seen = Typed(Random(5), Words()), validator("Line"), set()
+    typed, fits, seen = RandomMessages(Random(5), Words()), validator("Line"), set()
     for name in MESSAGES * 10:
         message = typed.message(1.0, name)
         if not refusal(message) and (line := lines.line(message)) is not None:
