@@ -44,6 +44,13 @@ class Blocks:
         self.ended: Latest[str, Seconds] = Latest(BLOCKS_KEPT)
         self._points: Latest[str, dict[str, Seconds]] = Latest(BLOCKS_KEPT)
 
+    def begin(self, block: str, at: Seconds) -> None:
+        """Forget what is known of an earlier performance under this id."""
+        if self.ended.get(block, at) < at:
+            del self.ended[block]
+        if block in self._points:
+            self._points[block] = {name: time for name, time in self._points[block].items() if time >= at}
+
     def realised(self, block: str, behavior: str, sync: str, at: Seconds) -> str:
         """Remember a point. Returns its name, `behavior:sync`."""
         name = _name(behavior, sync)

@@ -134,6 +134,8 @@ class Session:
             case SyncPointProgress(block=block):
                 name = self.blocks.realised(block, observation.behavior, observation.sync, at)
                 self._people.apply_to_all(at, lambda person: person.point_realised(block, name, at))
+            case BlockProgress(block=str() as block, progress="start"):
+                self._block_begins(block, at)
             case BlockProgress(block=str() as block, progress="end"):
                 self._block_ended(block, at, aborted=observation.status in ("failed", "interrupted"))
             case RobotState(speaking=said):
@@ -344,6 +346,13 @@ class Session:
             self._people.apply_to_all(at, step)
         elif actor in self.persons:
             self._people.apply(actor, at, step)
+
+    def _block_begins(self, block: str, at: Seconds) -> None:
+        """Forget an earlier block of this id, and an earlier turn: a turn is called like the block that opens it."""
+        self.blocks.begin(block, at)
+        for turns in (self._ended_turns, self._aborted_turns):
+            if turns.get(block, at) < at:
+                del turns[block]
 
     def _block_ended(self, block: str, at: Seconds, *, aborted: bool) -> None:
         self.blocks.ended[block] = at
