@@ -1,4 +1,4 @@
-"""Decoding of UTF-8; other bytes are refused with their line."""
+"""Decoding of UTF-8; other bytes are refused with their line. Text for people's eyes."""
 
 from engage_hri.schemas.faults import Fault, InputRefused
 
@@ -22,3 +22,8 @@ def is_utf8(text: str) -> bool:
     except UnicodeEncodeError:
         return False
     return True
+
+
+def printable(text: str) -> str:
+    """Return the text on one line, without what a terminal would obey: that is written as Python escapes it."""
+    return text if text.isprintable() else "".join(c if c.isprintable() else repr(c)[1:-1] for c in text)

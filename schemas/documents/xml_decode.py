@@ -290,7 +290,7 @@ class _Document:
         plain = attributes(element)
         raw = fields({name: value for name, value in plain.items() if name not in grammar.SYNC_ATTRIBUTES})
         known = {*kind.__struct_fields__, "character_id", "propose" if kind is of.Reference else "id"}
-        for name in raw.keys() - known:
+        for name in sorted(raw.keys() - known):
             reason = f"<{local_name(element)}> has no attribute {grammar.attribute(name)!r}"
             known_names = (grammar.attribute(each) for each in grammar.attribute_fields(kind) if each != "required")
             raise self._source.refusal(reason, element, advice=f"known: {', '.join(known_names)}")

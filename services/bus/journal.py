@@ -27,8 +27,8 @@ Entry = tuple[int, str]
 
 NAMED = (*keys.SERVICES, "simulation", "collaboration")
 """Services, each with a log of its own. Other participants, which come and go, share one by role."""
-BUS = logging.getLogger("engage.bus")
-"""Log of a process before a participant has joined, and of the bus in memory, where all see the same."""
+PEERS = logging.getLogger("engage.peers")
+"""Who comes and goes."""
 
 
 def logger(name: str, role: str) -> logging.Logger:
@@ -116,11 +116,12 @@ _TOLD: dict[type, Callable[[Any], Entry]] = {
 
 
 def note(log: logging.Logger, key: str, message: Message) -> None:
-    """Write the line of a message that is published under the key. It is not made if no log has its level."""
+    """Write the line of a message that is published under the key. Most messages have none, which is seen at once."""
     if type(message) in _TOLD or (log.isEnabledFor(DEBUG) and keys.key_class(key) != "stream"):
         log.log(*entry(message))
 
 
-def note_presence(log: logging.Logger, message: PeerAlive | PeerGone) -> None:
-    """Write the line of a participant that has come or gone, as the owner of this log sees it."""
-    log.log(*presence(message))
+def note_presence(message: PeerAlive | PeerGone, viewer: str = "") -> None:
+    """Write the line of a participant that has come or gone, as `viewer` sees it; empty: as all see it."""
+    level, text = presence(message)
+    PEERS.log(level, f"{text}; seen by {viewer}" if viewer else text)

@@ -133,7 +133,7 @@ class MemoryHub(Hub):
         return tuple(sorted(bus.name for bus in self._buses.values() if bus.is_alive))
 
     def announce(self, name: str, message: PeerAlive | PeerGone) -> None:
-        journal.note_presence(journal.BUS, message)
+        journal.note_presence(message)
         for bus in list(self._buses.values()):
             bus.deliver(Received(keys.alive(name), message, name, self._loop.time()), self.sent + 1)
 

@@ -6,6 +6,7 @@ The file is loaded when its command is called. The list of all commands needs on
 import inspect
 import sys
 from importlib import import_module
+from io import TextIOWrapper
 from typing import Annotated, Any, NoReturn
 
 import typer
@@ -89,7 +90,7 @@ def _print_version(asked: bool) -> None:
 @app.callback()
 def engage(
     version: Annotated[
-        bool, typer.Option("--version", callback=_print_version, is_eager=True, help="Print the version.")
+        bool, typer.Option("--version", metavar="", callback=_print_version, is_eager=True, help="Print the version.")
     ] = False,
 ) -> None:
     """The engagement layer for robots that talk with people."""
@@ -97,4 +98,7 @@ def engage(
 
 def main(arguments: list[str] | None = None) -> NoReturn:
     """Run a command. Bad input is one line on standard error, never a traceback; a bug of ours is a traceback."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, TextIOWrapper):
+            stream.reconfigure(errors="backslashreplace")  # a terminal that knows no arrows still gets the rest
     sys.exit(exit_code(app, arguments))

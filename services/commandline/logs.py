@@ -6,35 +6,41 @@ Each line is appended whole, so that the services of one machine may share a fil
 import logging
 import sys
 from collections.abc import Sequence
+from contextlib import suppress
 from datetime import datetime
 from pathlib import Path
 
 from engage_hri.schemas import keys
 from engage_hri.schemas.faults import Fault, InputRefused
+from engage_hri.schemas.utf8 import printable
 from engage_hri.services.bus import journal
 
 LEVELS = {name.lower(): getattr(logging, name) for name in ("DEBUG", "INFO", "WARNING", "ERROR")}
-SOURCES = tuple(dict.fromkeys((*journal.NAMED, *keys.ROLES, "bus", "up")))
-"""Sources with a level of their own: services, the roles of others, the bus in memory, and `engage up`."""
+SOURCES = tuple(dict.fromkeys((*journal.NAMED, *keys.ROLES, "peers", "up")))
+"""Sources with a level of their own: services, the roles of others, `peers` (who comes and goes), and `engage up`."""
 
 HANDLER = "engage"
 """Name of the handlers made here."""
 
 
-class LogLine(logging.Formatter):
-    """Form of a line:
-
-    `2026-11-22T13:09:35.123+01:00 INFO realizer: block ask: done after 3.20 s`, with unprintable letters escaped.
-    """
+class Escaped(logging.Formatter):
+    """Form of a record without unprintable letters. Each line of a traceback is escaped by itself, and indented."""
 
     def format(self, record: logging.LogRecord) -> str:
+        trace = self.formatException(record.exc_info).split("\n") if record.exc_info else ()
+        return "\n  ".join(map(printable, (self.head(record) + record.getMessage(), *trace)))
+
+    def head(self, record: logging.LogRecord) -> str:
+        """What comes before the message."""
+        return ""
+
+
+class LogLine(Escaped):
+    """Form of a line: `2026-11-22T13:09:35.123+01:00 INFO realizer: block ask: done after 3.20 s`."""
+
+    def head(self, record: logging.LogRecord) -> str:
         at = datetime.fromtimestamp(record.created).astimezone().isoformat(timespec="milliseconds")
-        source = record.name.removeprefix("engage.")
-        text = record.getMessage()
-        line = f"{at} {record.levelname} {source}: " + "".join(c if c.isprintable() else repr(c)[1:-1] for c in text)
-        if record.exc_info:
-            line += "\n  " + self.formatException(record.exc_info).replace("\n", "\n  ")
-        return line
+        return f"{at} {record.levelname} {record.name.removeprefix('engage.')}: "
 
 
 class StandardError(logging.Handler):
@@ -45,22 +51,40 @@ class StandardError(logging.Handler):
             print(self.format(record), file=sys.stderr)
 
 
+class LogFile(logging.FileHandler):
+    """Handler that appends to a file. What cannot be written is told once, and ends the log, not the robot."""
+
+    def handleError(self, record: logging.LogRecord) -> None:
+        logging.getLogger().removeHandler(self)
+        with suppress(OSError):  # what is left unwritten
+            self.stream.close()
+        print(f"--log {self.baseFilename}: {sys.exception()}; no more is logged", file=sys.stderr)
+
+
 def configure(path: Path | None = None, levels: Sequence[str] = ()) -> None:
     """Set up the log of this process. path: file to append to; None: no file.
 
     levels: `debug` for all, or `realizer=debug` for one source. Raises InputRefused for an unknown level or source,
-    and for a file that cannot be written.
+    levels without a file, and a file that cannot be written.
     """
-    chosen = {source: name for source, _, name in (level.rpartition("=") for level in levels)}
-    for source, name in chosen.items():
-        if name not in LEVELS or source not in ("", *SOURCES):
+    if levels and path is None:
+        raise InputRefused(
+            Fault(reason="there is no log whose level it could be", where="--log-level", advice="add --log FILE")
+        )
+    chosen = {}
+    for source, equals, name in (level.lower().rpartition("=") for level in levels):
+        chosen[source] = name
+        if name not in LEVELS or source not in (SOURCES if equals else ("",)):
             advice = f"LEVEL or SOURCE=LEVEL; levels: {', '.join(LEVELS)}; sources: {', '.join(SOURCES)}"
             bad = name if name not in LEVELS else source
             raise InputRefused(Fault(reason=f"unknown {bad!r}", where="--log-level", advice=advice))
     handlers: list[logging.Handler] = [StandardError()]
+    handlers[0].setFormatter(Escaped())
     if path is not None:
         try:
-            handlers.append(logging.FileHandler(path, encoding="utf-8", errors="backslashreplace"))
+            if path.is_fifo() or str(path) == "-":
+                raise OSError(0, "it is no file")
+            handlers.append(LogFile(path, encoding="utf-8", errors="backslashreplace"))
         except OSError as error:
             raise InputRefused(Fault(reason=f"cannot be written: {error.strerror}", where=f"--log {path}")) from error
         handlers[-1].setFormatter(LogLine())

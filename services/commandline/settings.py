@@ -111,7 +111,7 @@ def _file(path: Path) -> dict[str, Any]:
         return tomllib.loads(utf8(path.read_bytes(), str(path)))
     except OSError as error:
         raise InputRefused(Fault(reason=error.strerror or str(error), where=str(path))) from error
-    except tomllib.TOMLDecodeError as error:
+    except (ValueError, RecursionError) as error:  # a TOMLDecodeError is a ValueError, and so is a number too long
         raise InputRefused(Fault(reason=f"not TOML: {error}", where=str(path), advice=_ADVICE)) from error
 
 

@@ -94,10 +94,16 @@ def command(name: str, options: Options, config: Config) -> list[str]:
         *(sys.executable, "-P", "-m", "engage_hri", "run", name, "--attended", "--robot", config.robot),
         *(("--config", str(options.config)) if options.config else ()),
         *(("--log", str(options.log)) if options.log else ()),
-        *(part for level in options.log_level or () for part in ("--log-level", level)),
+        *(part for level in _log_levels(options) for part in ("--log-level", level)),
         *(part for setting in settings for part in ("--set", setting)),
         *(part for endpoint in endpoints for part in ("--connect", endpoint)),
     ]
+
+
+def _log_levels(options: Options) -> list[str]:
+    """Log levels of a child. Peers are logged once, by `up` itself, unless the command line says otherwise."""
+    given = options.log_level or []
+    return ["peers=warning", *given] if options.log else given
 
 
 class Arrivals:

@@ -8,6 +8,7 @@ from rich.live import Live
 
 from engage_hri.schemas.messages import Message
 from engage_hri.schemas.units import Seconds
+from engage_hri.schemas.utf8 import printable
 from engage_hri.services.console import log, view
 from engage_hri.services.console.render import render
 
@@ -59,7 +60,7 @@ class Log:
         before, self.scene = self.scene, view.feed(self.scene, message, at)
         line = log.line(message, before, self.scene, at, self._telling)
         if line is not None:
-            self._console.print(line, markup=False, highlight=False, soft_wrap=True)
+            self._console.print(printable(line), markup=False, highlight=False, soft_wrap=True)
 
     def __enter__(self) -> Self:
         return self

@@ -10,6 +10,7 @@ from rich.table import Table
 from rich.text import Text
 
 from engage_hri.schemas.units import Seconds
+from engage_hri.schemas.utf8 import printable
 from engage_hri.services.console import wording
 from engage_hri.services.console.view import Actor, EventInView, PointInView, Scene
 
@@ -41,7 +42,7 @@ def render(scene: Scene, width: int = 80, height: int | None = None) -> Renderab
     """Draw the whole live view. width, height: of the terminal, in columns and lines; all of it is used."""
     height = height or HEIGHT
     notes: list[RenderableType] = [
-        Text(f"! {n}", style="yellow", no_wrap=True, overflow="ellipsis") for n in scene.notes
+        Text(printable(f"! {n}"), style="yellow", no_wrap=True, overflow="ellipsis") for n in scene.notes
     ]
     small = width < SMALL[0] or height < SMALL[1]
     notes = notes[-1:] if small else notes
@@ -78,7 +79,8 @@ def _panel(inner: RenderableType, title: Text) -> Panel:
 
 
 def _title(scene: Scene) -> Text:
-    return Text(f"engage {wording.clock(scene.now - scene.began)}", style="bold")
+    text = f"engage {wording.clock(scene.now - scene.began)}"
+    return Text(text, style="bold", no_wrap=True, overflow="ellipsis")
 
 
 def _frequency(scene: Scene) -> Text:
@@ -93,12 +95,13 @@ def _style(scene: Scene, actor: str) -> str:
 def _people(scene: Scene) -> list[Text]:
     """Lines for all actors, the robot first, and a last one for the owner of its head."""
     actors = sorted(scene.actors, key=lambda actor: actor.id != scene.robot)
-    wide = max((len(actor.id) for actor in actors), default=0)
+    wide = max((len(printable(actor.id)) for actor in actors), default=0)
     lines = [
-        Text(actor.id.ljust(wide) + " ", style=_style(scene, actor.id)) + _doing(scene, actor) for actor in actors
+        Text(printable(actor.id).ljust(wide) + " ", style=_style(scene, actor.id)) + _doing(scene, actor)
+        for actor in actors
     ]
     if scene.owner is not None:
-        line = Text(f"{'head'.ljust(wide)} ", style="dim") + Text(wording.claim(scene.owner))
+        line = Text(f"{'head'.ljust(wide)} ", style="dim") + Text(printable(wording.claim(scene.owner)))
         if scene.waiting:
             line += Text(f"; waiting: {', '.join(claim.kind for claim in scene.waiting)}", style="dim")
         lines.append(line)
@@ -116,7 +119,7 @@ def _doing(scene: Scene, actor: Actor) -> Text:
         if doing:
             doing += Text(", ")
         verb, target = wording.action_words(action.action, action.targets, scene.robot)
-        doing += Text(verb) + Text(f" {target}" if target else "", style="bold")
+        doing += Text(verb) + Text(printable(f" {target}") if target else "", style="bold")
     return doing
 
 
@@ -124,8 +127,8 @@ def _said(scene: Scene) -> RenderableType:
     """Utterances with their words; those of people have none."""
     lines = []
     for utterance in scene.said:
-        text = Text(f"{utterance.actor}: ", style=_style(scene, utterance.actor))
-        text.append(utterance.text or "…", style="bold" if utterance.open else "dim")
+        text = Text(printable(f"{utterance.actor}: "), style=_style(scene, utterance.actor))
+        text.append(printable(utterance.text) or "…", style="bold" if utterance.open else "dim")
         if utterance.open:
             text.append("▌", style="blink")
         lines.append(text)
@@ -140,7 +143,8 @@ class _LastLines:
         self._height = height
 
     def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
-        lines = console.render_lines(self._whole, options.update(height=None))[-self._height :]
+        lines = console.render_lines(self._whole, options.update(height=None))
+        lines = lines[max(0, len(lines) - self._height) :]
         for line in (*lines, *([Segment(" ")] for _ in range(self._height - len(lines)))):
             yield from line
             yield Segment.line()
@@ -158,13 +162,16 @@ def _plan(scene: Scene, height: int) -> Panel:
         came, late = first.realised is not None, first.slip
         noticed = late is not None and abs(late) >= NOTICED
         table.add_row(
-            Text(f"{first.behavior}: {', '.join(point.sync for point in points)}", style="" if came else "dim"),
+            Text(
+                printable(f"{first.behavior}: {', '.join(point.sync for point in points)}"),
+                style="" if came else "dim",
+            ),
             wording.number(first.planned),
             Text(wording.number(first.realised), style="green" if came else "dim"),
             Text(wording.number(late, sign=True), style="yellow" if noticed else "dim"),
         )
     # Foreign ids are shown as Text, so that brackets in them are not read as markup.
-    title = Text(f"{block.id}: {block.status or 'running'}" if block else "the robot does nothing yet")
+    title = Text(printable(f"{block.id}: {block.status or 'running'}") if block else "the robot does nothing yet")
     return _panel(_LastLines(table, height), title)
 
 
@@ -219,8 +226,8 @@ def _event(row: EventInView, scene: Scene) -> tuple[RenderableType, ...]:
         Text(mark, style=style),
         Text(wording.clock(row.began - scene.began), style="dim"),
         Text(wording.KINDS[event.kind], style="bold" if event.state == "started" else ""),
-        Text(f"{event.initiator}→{event.responder}"),
-        Text(", ".join(event.objects)),
+        Text(printable(f"{event.initiator}→{event.responder}")),
+        Text(printable(", ".join(event.objects))),
         Text(event.cause, style="dim"),
         Text(wording.decision(event), style=style),
     )

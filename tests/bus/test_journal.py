@@ -102,8 +102,8 @@ async def test_a_bus_logs_what_it_publishes_and_no_streams(caplog: pytest.LogCap
 
     assert [(record.name, record.getMessage()) for record in caplog.records] == [
         ("engage.realizer", "block b: started"),
-        ("engage.bus", f"peer realizer: here, life {bus.run}"),
-        ("engage.bus", "peer realizer: gone"),
+        ("engage.peers", f"peer realizer: here, life {bus.run}"),
+        ("engage.peers", "peer realizer: gone"),
     ]
 
 

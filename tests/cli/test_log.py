@@ -1,10 +1,12 @@
 """`--log FILE`: what of a run is in the file, at which level, and what is not."""
 
+import logging
 import re
 from pathlib import Path
 
 import pytest
 
+from engage_hri.services.commandline import logs
 from tests.cli.command import FRAGMENT, Engage
 
 LINE = re.compile(r"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d\.\d{3}[+-]\d\d:\d\d (DEBUG|INFO|WARNING|ERROR) ([a-z]+): .+")
@@ -23,7 +25,7 @@ def test_the_file_has_a_line_for_each_thing_that_happened(engage: Engage, tmp_pa
     text = "\n".join(played(engage, tmp_path))
 
     for expected in (
-        "INFO bus: peer realizer: here", "INFO bus: peer realizer: gone", "INFO simulation: person human: here",
+        "INFO peers: peer realizer: here", "INFO peers: peer realizer: gone", "INFO simulation: person human: here",
         "INFO realizer: block ask: done after", "INFO recognition: event ", "directed_gaze from robot to human",
         "INFO generation: fragment ask of ", "INFO generation: turn ask to human: done",
     ):  # fmt: skip
@@ -74,8 +76,11 @@ def test_a_line_stays_one_line_whatever_a_target_is_called(engage: Engage, tmp_p
     ("options", "told"),
     [
         (("--log", "/nowhere/robot.log"), "--log /nowhere/robot.log: cannot be written: No such file or directory"),
-        (("--log-level", "loud"), "--log-level: unknown 'loud'"),
-        (("--log-level", "voice=debug"), "--log-level: unknown 'voice'"),
+        (("--log", "robot.log", "--log-level", "loud"), "--log-level: unknown 'loud'"),
+        (("--log", "robot.log", "--log-level", "voice=debug"), "--log-level: unknown 'voice'"),
+        (("--log", "robot.log", "--log-level", "=debug"), "--log-level: unknown ''"),
+        (("--log-level", "debug"), "--log-level: there is no log whose level it could be (add --log FILE)"),
+        (("--log", "-"), "--log -: cannot be written: it is no file"),
     ],
 )
 def test_what_cannot_be_done_is_refused(engage: Engage, tmp_path: Path, options: tuple[str, ...], told: str) -> None:
@@ -85,3 +90,33 @@ def test_what_cannot_be_done_is_refused(engage: Engage, tmp_path: Path, options:
 
     assert result.code == 2
     assert result.err.startswith(told)
+
+
+def test_a_full_disk_is_told_once_and_ends_only_the_log(engage: Engage, tmp_path: Path) -> None:
+    file = tmp_path / "ask.xml"
+    file.write_text(FRAGMENT)
+    result = engage("play", file, "--embedded", "--virtual-time", "--quiet", "--log", "/dev/full")
+
+    assert (result.code, result.err) == (
+        0,
+        "--log /dev/full: [Errno 28] No space left on device; no more is logged\n",
+    )
+
+
+@pytest.mark.contained
+def test_a_traceback_can_forge_no_line_and_no_colour(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    log, evil = tmp_path / "robot.log", "x\n2026 INFO forged\x1b[2J\r\u2028\x85"
+    logs.configure(log)
+    try:
+        raise ValueError(evil)
+    except ValueError:
+        logging.getLogger("engage.realizer").exception("bad %s", evil)
+    logs.configure()
+    head, *rest = log.read_text().split("\n")[:-1]
+
+    assert LINE.fullmatch(head)
+    assert rest
+    assert all(line.startswith("  ") for line in rest)
+    for text in (log.read_text(), capsys.readouterr().err):
+        assert all(line.isprintable() for line in text.split("\n"))
+        assert text.count("forged") == 2

@@ -5,6 +5,7 @@ from types import FrameType
 
 import msgspec
 import pytest
+from msgspec.structs import replace
 from rich.console import Console
 
 from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorLost
@@ -161,6 +162,56 @@ def test_what_somebody_does_beside_looking_is_told_after_it(scene: view.Scene) -
     scene = view.feed(scene, ActionBegan(actor="human", action="look", at=at(12.0)), 12.0)
 
     assert "human looks away, points at cup, nods to cup" in drawn(scene, 200)
+
+
+@pytest.mark.parametrize("evil", ["a\nb", "\x1b[2J", "\x9b31m", "\u202eabc", "a\rb"])
+@pytest.mark.parametrize(("width", "height"), [(60, 15), (120, 40)])
+def test_what_a_terminal_would_obey_is_spelled_out(evil: str, width: int, height: int) -> None:
+    scene = view.empty("robot", 0.0)
+    scene = view.feed(scene, ActionBegan(actor=evil, action="look", at=at(1.0), targets=(evil,)), 1.0)
+    scene = view.feed(scene, BlockProgress(block=evil, progress="start", at=at(1.0)), 1.0)
+    scene = fed(view.feed, scene, [event("e1", "started", 2.0, responder=evil, objects=(evil,))])
+    said = (view.UtteranceInView(actor=evil, began=0.0, text=evil),)
+    scene = replace(scene, owner=Claim(kind="face", priority=6, target=evil), notes=(evil,), said=said)
+
+    lines = drawn(scene, width, height).split("\n")
+
+    assert len(lines) == height + 1
+    assert all(line.isprintable() for line in lines)
+
+
+@pytest.mark.parametrize(("width", "height"), [(5, 3), (10, 5), (1, 1)])
+def test_a_tiny_terminal_gets_no_more_lines_for_it(scene: view.Scene, width: int, height: int) -> None:
+    scene = replace(
+        scene, said=tuple(view.UtteranceInView(actor="a", began=0.0, text="word " * 50) for _ in range(40))
+    )
+
+    assert len(drawn(scene, width, height).splitlines()) <= height + 2
+
+
+def test_the_newest_warning_is_the_one_a_small_view_has(scene: view.Scene) -> None:
+    text = drawn(replace(scene, notes=("older", "newer")), 60, 15)
+
+    assert "newer" in text
+    assert "older" not in text
+
+
+def test_who_is_early_is_noticed_like_who_is_late() -> None:
+    scene = view.feed(view.empty("robot", 0.0), BlockProgress(block="b", progress="start", at=at(0.0)), 0.0)
+    for behavior, time in (("early", 0.2), ("late", 0.8), ("right", 0.55)):
+        reached = SyncPointProgress(block="b", behavior=behavior, sync="start", at=at(1.0), time=time, predicted=0.5)
+        scene = view.feed(scene, reached, 1.0)
+    console = Console(width=120, file=StringIO(), force_terminal=True, color_system="standard")
+    console.print(render(scene, 120, 40))
+    yellow = "\x1b[33m"
+
+    rows = [line for line in console.file.getvalue().splitlines() if ": start" in line]  # type: ignore[attr-defined]
+    assert [("early" in row or "late" in row) == (yellow in row) for row in rows] == [True] * 3
+    assert [name for row in rows for name in ("early", "right", "late") if f" {name}:" in row] == [
+        "early",
+        "right",
+        "late",
+    ]
 
 
 def test_the_view_has_no_word_that_a_visitor_must_look_up(scene: view.Scene) -> None:

@@ -90,7 +90,7 @@ class ZenohHub(Hub):
         if name in self._buses:
             raise ValueError(f"participant {name!r} is on the bus already")
         self._buses[name] = bus = ZenohBus(self, name, role)
-        self.readers.log = next(iter(self._buses.values())).log
+        self.readers.viewer = next(iter(self._buses))
         return bus
 
     async def wait_until_free(self, *names: str) -> None:

@@ -38,11 +38,11 @@ class _Reader:
 
 
 class Readers:
-    """All subscriptions of the process. refused: number of bad payloads. log: for peers that come and go."""
+    """All subscriptions of the process. refused: number of bad payloads. viewer: name for the log."""
 
     def __init__(self, session: zenoh.Session, bridge: LoopBridge, sent: SentLog, peers: Peers) -> None:
         self.refused = 0
-        self.log = journal.BUS
+        self.viewer = ""
         self._loop = asyncio.get_running_loop()
         self._session = session
         self._bridge = bridge
@@ -243,7 +243,7 @@ class Readers:
 
     def participant_changed(self, name: str, run: str, there: bool) -> None:
         message = PeerAlive(participant=name, run=run) if there else PeerGone(participant=name)
-        journal.note_presence(self.log, message)
+        journal.note_presence(message, self.viewer)
         for reader in self._readers:
             self._offer_presence(reader, message)
 
