@@ -2,7 +2,8 @@
 
 A new type is a struct in behaviors.py and a row here. Its sync points, where it can wait, which of its points are one
 instant, who performs it, what it takes the place of, its XML namespace and its spelling in BML 1.0 follow from that;
-so do the contract of bodies and the table in docs/control.md. Sources: BML 1.0, chapters 3 to 10; thesis 4.1.2.
+so does the contract of bodies. The table in docs/control.md is held to the rows by a test.
+Sources: BML 1.0, chapters 3 to 10; thesis 4.1.2.
 """
 
 from collections.abc import Mapping

@@ -1,4 +1,4 @@
-"""Log lines for messages as they are published, and for peers that come and go. The words spoken are not logged.
+"""Log lines for messages as they are published, and for peers that come and go. Spoken words are in none.
 
 A line for each block, fragment and turn that has ended, each connection event that is decided, each person and peer
 that comes or goes, each warning and refusal; at level DEBUG one for every message but the streams. Loggers are named

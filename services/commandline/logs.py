@@ -57,7 +57,7 @@ class LogFile(logging.FileHandler):
     def handleError(self, record: logging.LogRecord) -> None:
         logging.getLogger().removeHandler(self)
         with suppress(OSError):  # what is left unwritten
-            self.stream.close()
+            self.close()
         print(f"--log {self.baseFilename}: {sys.exception()}; no more is logged", file=sys.stderr)
 
 

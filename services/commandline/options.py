@@ -115,7 +115,7 @@ class Listening(Connected):
 class Simulated(Configured):
     """Options for the simulation."""
 
-    seed: Annotated[int | None, typer.Option(metavar="N", min=0, help="Of all chance in the simulated body.")] = None
+    seed: Annotated[int | None, typer.Option(metavar="N", min=0, help="Of all chance in the simulation.")] = None
     human: Annotated[
         Literal["appendix-b", "misplacing", "listening", "stochastic", "attentive"] | None,
         typer.Option(help="How the simulated human behaves: docs/commands.md tells of each.", show_default=False),

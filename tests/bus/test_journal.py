@@ -51,6 +51,11 @@ def happened(state: str, delay: float | None = None) -> ConnectionEvent:
         ),
         (FragmentOutcome(id="f", requester="me", fragment="f", status="done"), "INFO", "fragment f of me: done"),
         (
+            FragmentOutcome(id="f", requester="me", fragment="f", status="interrupted", replaced_by="g"),
+            "INFO",
+            "fragment f of me: interrupted: replaced by g",
+        ),
+        (
             FragmentOutcome(id="f", requester="me", fragment="f", status="failed", fault=Fault(reason="no voice")),
             "INFO",
             "fragment f of me: failed: no voice",

@@ -4,6 +4,7 @@ from pathlib import Path
 import pytest
 
 from engage_hri.schemas.faults import InputRefused
+from engage_hri.services.commandline import up
 from engage_hri.services.commandline.config import Config, load
 from engage_hri.services.commandline.roster import NAMES, service
 from engage_hri.services.commandline.settings import ELSEWHERE, RobotConfig, read
@@ -102,3 +103,10 @@ def test_a_bad_setting_is_refused_with_its_key(setting: str, reason: str) -> Non
 def test_a_number_out_of_its_range_is_refused_and_says_the_range(setting: str, reason: str) -> None:
     with pytest.raises(InputRefused, match=reason):
         load(settings=[setting])
+
+
+def test_a_setting_is_stronger_than_an_option_of_the_simulation_and_the_robots_name_than_a_setting() -> None:
+    options = up.Options(seed=3, human="listening", robot="melvin", settings=["simulation.seed=4", "robot=other"])
+    config = options.load()
+
+    assert (config.simulation.seed, config.simulation.human, config.robot) == (4, "listening", "melvin")

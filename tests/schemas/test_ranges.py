@@ -1,0 +1,35 @@
+"""Which numbers each check of a configuration takes, at its edges."""
+
+from math import inf, nan
+from types import SimpleNamespace
+
+import pytest
+
+from engage_hri.schemas import ranges
+
+CHECKS = (ranges.positive, ranges.not_negative, ranges.shares, ranges.inner_shares)
+
+
+@pytest.mark.parametrize(
+    ("value", "taken"),
+    [
+        (-1.0, [False, False, False, False]),
+        (0.0, [False, True, True, False]),
+        (0.5, [True, True, True, True]),
+        (1.0, [True, True, True, False]),
+        (2.0, [True, True, False, False]),
+        (inf, [False] * 4),
+        (nan, [False] * 4),
+    ],
+)
+def test_each_check_takes_what_its_name_says(value: float, taken: list[bool]) -> None:
+    found = []
+    for check in CHECKS:
+        try:
+            check(SimpleNamespace(late=value), ["late"])
+            found.append(True)
+        except ValueError as error:
+            assert str(error).startswith("late must ")
+            found.append(False)
+
+    assert found == taken
