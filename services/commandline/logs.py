@@ -31,7 +31,7 @@ class Escaped(logging.Formatter):
         return "\n  ".join(map(printable, (self.head(record) + record.getMessage(), *trace)))
 
     def head(self, record: logging.LogRecord) -> str:
-        """What comes before the message."""
+        """Return the text before the message."""
         return ""
 
 

@@ -53,7 +53,7 @@ def happened(state: str, delay: float | None = None) -> ConnectionEvent:
         (
             FragmentOutcome(id="f", requester="me", fragment="f", status="interrupted", replaced_by="g"),
             "INFO",
-            "fragment f of me: interrupted: replaced by g",
+            "fragment f of me: interrupted, replaced by g",
         ),
         (
             FragmentOutcome(id="f", requester="me", fragment="f", status="failed", fault=Fault(reason="no voice")),
