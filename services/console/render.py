@@ -155,7 +155,7 @@ def _plan(scene: Scene, height: int) -> Panel:
     block = scene.block
     table = Table(box=None, expand=True, pad_edge=False)
     table.add_column("seconds", no_wrap=True, overflow="ellipsis", ratio=1)
-    for name in ("planned", "measured", "late"):
+    for name in ("plan", "came", "late"):
         table.add_column(name, justify="right", no_wrap=True, min_width=5)
     for points in _window(_rows(block.points), height - 1) if block else ():
         first = points[0]
