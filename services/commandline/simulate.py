@@ -2,7 +2,8 @@
 
 import os
 import platform
-from collections.abc import Callable, Sequence
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Literal
@@ -107,7 +108,8 @@ def main(options: Options) -> int:
         played.sort(key=lambda one: place[one.record.condition, one.record.session])
         records = [one.record for one in played]
         found = findings(records)
-        tables = tables_of(records, found, people=options.human == PEOPLE)
+        ordered = Counter(order.condition for order in orders)
+        tables = tables_of(records, found, ordered, people=options.human == PEOPLE)
         folder.write(contents(options, orders, played, found, tables, draw))
         for table in tables:
             console.print("", rendered(table), sep="\n")
@@ -163,9 +165,11 @@ def _order(options: Options, condition: str, number: int) -> Order:
 # -- what came of it --------------------------------------------------------------------------------------------
 
 
-def tables_of(records: Sequence[SessionRecord], found: Sequence[Finding], *, people: bool) -> list[Table]:
-    """Tables for the terminal and for summary.md."""
-    tables = [summary.overview(records)]
+def tables_of(
+    records: Sequence[SessionRecord], found: Sequence[Finding], ordered: Mapping[str, int], *, people: bool
+) -> list[Table]:
+    """Tables for the terminal and for summary.md. ordered: number of sessions by condition, played or not."""
+    tables = [summary.overview(records, ordered)]
     if people:
         tables.append(beside_table_2_1(records))
     if found:

@@ -1,7 +1,7 @@
 """Summary of sessions, as tables for a terminal and for Markdown."""
 
 from collections import Counter
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from statistics import mean, stdev
 from typing import get_args
 
@@ -75,10 +75,13 @@ def known(values: Iterable[float | None]) -> list[float]:
 # -- tables -----------------------------------------------------------------------------------------------------
 
 
-def overview(records: Sequence[SessionRecord]) -> Table:
-    """Table with a column for each condition, without rows that are empty in all of them."""
+def overview(records: Sequence[SessionRecord], ordered: Mapping[str, int] | None = None) -> Table:
+    """Table with a column for each condition, without rows that are empty in all of them.
+
+    ordered: number of sessions by condition that were to be played; None: as many as there are records.
+    """
     groups = by_condition(records)
-    ordered = Counter(record.condition for record in records)
+    ordered = ordered or Counter(record.condition for record in records)
     rows = [("finished", *(f"{len(group)} of {ordered[name]}" for name, group in groups.items()))]
     for title, digits, measure in _MEASURES:
         cells = (mean_and_deviation(known(map(measure, group)), digits) for group in groups.values())

@@ -40,6 +40,14 @@ def test_the_overview_counts_finished_sessions_only():
     assert rows["backchannel"] == ("5.0 ± 1.4", "-")
 
 
+def test_sessions_that_were_never_played_count_as_not_finished() -> None:
+    records = [session("operational", 0), session("operational", 1)]
+
+    rows = {row[0]: row[1:] for row in summary.overview(records, {"operational": 30}).rows}
+
+    assert rows["finished"] == ("2 of 30",)
+
+
 def test_what_nobody_measured_is_left_out():
     records = [session("human-human", 0, kind("backchannel", 4))]
 
