@@ -178,8 +178,6 @@ def customs(block: Block) -> list[tuple[str, str, float]]:
         if kind is not Synchronize or len({one, *others}) > 1  # to be one with itself does not constrain a point
         for name in (point(text, block)[0] for text in (one, *others))
     }
-    # but it names it.
-    mentioned = {point(text, block)[0].partition(":")[0] for _, one, others in said(block) for text in (one, *others)}
     lasting = {
         each.id
         for each in block.behaviors
@@ -196,8 +194,21 @@ def customs(block: Block) -> list[tuple[str, str, float]]:
     for behavior in block.behaviors:
         before = previous.get(type_of(behavior))
         previous[type_of(behavior)] = behavior.id
-        if before is not None and behavior.id not in mentioned:
+        if before is not None and behavior.id not in placed(block):
             found.append((f"{before}:{'stroke' if before in lasting else 'end'}", f"{behavior.id}:start", 0.0))
+    return found
+
+
+def placed(block: Block) -> set[str]:
+    """Behaviors of which it is said when they come: by their own timing, or as what a constraint speaks of."""
+    found = {each.id for each in block.behaviors if each.timing}
+    for constraint in block.constraints:
+        for each in constraint.operators:
+            ref, *others = (point(text, block)[0].partition(":")[0] for text in (each.ref, *each.syncs))
+            if isinstance(each, Synchronize):
+                found |= {ref, *others}
+            else:
+                found |= {ref if other == "0" else other for other in others}
     return found
 
 

@@ -1,6 +1,6 @@
 """Relations between points, assembled into a Petri net: the middle part of planning."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import reduce
 from itertools import pairwise
 from operator import or_
@@ -12,7 +12,7 @@ from engage_hri.schemas.behavior_types import TYPES
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.realizer.net.petri_net import Bound, PetriNet, Place, PlaceKind, Transition
 from engage_hri.services.realizer.plan.cycles import components
-from engage_hri.services.realizer.plan.handover import Arrangement
+from engage_hri.services.realizer.plan.handover import Arrangement, is_tied
 from engage_hri.services.realizer.plan.instants import Classes, Instant, instants
 from engage_hri.services.realizer.plan.numbering import numbered
 from engage_hri.services.realizer.plan.phases import Chain
@@ -46,12 +46,13 @@ class Assembly(Struct, frozen=True):
     """The behaviors' parts in each transition."""
 
     def waits(self, ties: Iterable[Place | Bound]) -> set[tuple[str, str]]:
-        """Waits among `ties` that only make sure of an order: pairs of transition names; the first fires first."""
+        """Waits among `ties` that only make sure of an order, or are mere custom: pairs of names of transitions."""
         names = [each.name for each in self.net.transitions]
         return {
             (names[tie.source], names[tie.target])
             for tie in ties
-            if tie.kind == "order" and tie.behavior and tie.source and tie.target != len(names) - 1
+            if (tie.kind == "order" and tie.behavior and tie.source and tie.target != len(names) - 1)
+            or (tie.kind == "series" and not tie.behavior)
         }
 
 
@@ -230,13 +231,17 @@ class Assembler:
             self.bounds.append(Bound("order", source, target, seconds, lines=lines))
 
     def _series(self) -> None:
-        """Put a behavior that nothing names after the previous of its type (thesis 4.5.2); nothing waits for it."""
-        named = {point.behavior for point in self.relations.named}
+        """Put a behavior of which nobody says when it comes after the previous of its type (thesis 4.5.2).
+
+        Nothing waits for it. Speeches share a voice: each follows those before it, whatever is said about them.
+        """
+        sharing = self._speak_in_turn()
         previous: dict[str, Chain] = {}
         for id, chain in self.chains.items():
             before = previous.get(chain.type)
             previous[chain.type] = chain
-            if before is None or id in named or performer(chain.behavior) == "recognition":
+            is_placed = id in self.relations.placed or id in sharing
+            if before is None or is_placed or performer(chain.behavior) == "recognition":
                 continue
             other = before.behavior.id
             sync, seconds = "end", 0.0
@@ -244,7 +249,27 @@ class Assembler:
                 # The previous one lasts until this one takes over, which is as soon as the previous is on target.
                 sync = "stroke"
                 seconds = sum(each.natural for each in before.segments if each.since in ("stroke", "stroke_end"))
-            self._follow(Point(other, sync), Point(id, "start"), seconds, lines=_lines(chain.behavior.line))
+            ends = Point(other, sync), Point(id, "start")
+            if (self._name(self.at[ends[0]]), self._name(self.at[ends[1]])) not in self.waived:
+                self._follow(*ends, seconds, lines=_lines(chain.behavior.line))
+
+    def _speak_in_turn(self) -> set[str]:
+        """Put each speech after the one before it on its voice. Returns those that share a voice."""
+        for earlier, later in self._neighbors(self.arrangement.spoken):
+            chain = self.chains[later]
+            if not is_tied(chain, self.chains[earlier], self.classes):
+                lines = _lines(chain.behavior.line)
+                self._follow(Point(earlier, "end"), chain.points[0], behavior=later, lines=lines)
+        speeches = [id for id, chain in self.chains.items() if chain.type == "speech"]
+        return {id for pair in self._neighbors(speeches) for id in pair}
+
+    def _neighbors(self, speeches: Iterable[str]) -> Iterator[tuple[str, str]]:
+        """Speeches of one voice, each with the next."""
+        last: dict[str, str] = {}
+        for id in speeches:
+            parts = self.chains[id].parts
+            yield from ((earlier, id) for earlier in dict.fromkeys(last[part] for part in parts if part in last))
+            last |= dict.fromkeys(parts, id)
 
     def _arranged(self) -> None:
         for later, earlier in self.arrangement.turns:

@@ -6,6 +6,7 @@ from math import inf
 from typing import NamedTuple
 
 from msgspec import Struct
+from msgspec.structs import replace
 
 from engage_hri.schemas.behaviors import Gesture, Hand, Pointing
 from engage_hri.schemas.syncref import SYNC_POINTS
@@ -34,6 +35,7 @@ class Arrangement(Struct, frozen=True):
     successors: for a behavior, the one that takes its part, and the first of its points that this brings about.
     cuts: number of the first segment that is not given its time, because a successor has the part by then.
     turns: behaviors that wait for a point of another before they take its part.
+    spoken: the speeches in the order in which they are said.
     """
 
     natural: frozenset[str] = frozenset()
@@ -41,6 +43,7 @@ class Arrangement(Struct, frozen=True):
     successors: Mapping[str, tuple[str, Point]] = {}
     cuts: Mapping[str, int] = {}
     turns: frozenset[Turn] = frozenset()
+    spoken: tuple[str, ...] = ()
 
 
 class Conflict(NamedTuple):
@@ -87,7 +90,7 @@ def arrange(
             # Either would come first if the other cut it short. So neither is cut: the one meant to be later waits.
             conflicts.append(Conflict((id, chains[successor].points[-1]), None))
             continue
-        if chain.type == "speech" and _is_tied(chains[successor], chain, classes):
+        if chain.type == "speech" and is_tied(chains[successor], chain, classes):
             continue
         taken = times[Point(successor, "start")]
         first = next((number for number, point in enumerate(chain.points) if times[point] > taken + EPSILON), 0)
@@ -113,7 +116,7 @@ def arrange(
             successors[id] = (successor, chain.points[first])
             cuts[id] = first - 1
     lasting = tuple(sorted(before.natural - successors.keys()))
-    return Arrangement(before.natural, lasting, successors, cuts, before.turns), conflicts
+    return replace(before, lasting=lasting, successors=successors, cuts=cuts), conflicts
 
 
 def entering(
@@ -146,7 +149,7 @@ def _not_given_up(
     return max(broken[-1], _STROKE_END) if chain.type in WITH_STROKE else broken[-1]
 
 
-def _is_tied(later: Chain, speech: Chain, classes: Classes) -> bool:
+def is_tied(later: Chain, speech: Chain, classes: Classes) -> bool:
     """True if the block itself says that `later` begins while the speech is spoken. The voice decides about that."""
     begins = classes.find(later.points[0])[0]
     return any(classes.find(point)[0] == begins for point in speech.points)

@@ -38,6 +38,7 @@ from engage_hri.services.realizer.plan.relations import (
     relation_steps,
 )
 from engage_hri.services.realizer.plan.schedule import EPSILON, Solution
+from engage_hri.services.realizer.plan.speaking_order import Misordered, SpeakingOrder
 from engage_hri.services.realizer.plan.steps import PORTION, Steps, finished, portions
 from engage_hri.services.realizer.points import ORIGIN, Point
 
@@ -128,6 +129,7 @@ class _Planner:
         self.overlaps: set[Turn] = set()
         """Turns that there is no time to wait for."""
         self.hands: dict[str, Hand] = {}
+        self.order = SpeakingOrder((), 0)
         self.chains: dict[str, Chain] = {}
 
     def read(self, elsewhere: Elsewhere | None) -> Steps[None]:
@@ -164,25 +166,34 @@ class _Planner:
 
     def plan(self) -> Steps[Plan]:
         """The plan; behaviors that cannot be on time are dropped until the rest can be."""
+        self.order = self._document_order()
         while True:
             present, classes = yield from self._present()
             try:
                 return (yield from self._plan(present, classes))
-            except Losses as found:
+            except Misordered:
                 self.turns = frozenset()
+            except Losses as found:
+                turns, self.turns = self.turns, frozenset()
                 for number, loss in enumerate(found.losses):
                     if not number % PORTION:
                         yield PORTION
-                    if loss.turn is not None and self._may_speak_at_once(loss.turn[1].behavior, present):
-                        self.overlaps.add(loss.turn)
+                    turn = loss.turn
+                    if turn and turn in turns and self._may_speak_at_once(turn[1].behavior, present):
+                        self.overlaps.add(turn)
                     else:
                         self._drop(loss.behavior, "IMPOSSIBLE_TO_SCHEDULE", loss.reason)
+                self.order.begin_anew(self.chains)
+
+    def _document_order(self) -> SpeakingOrder:
+        speeches = tuple(id for id, chain in self.chains.items() if chain.type == "speech")
+        return SpeakingOrder(speeches, len(self.chains))
 
     def _plan(self, present: Relations, classes: Classes) -> Steps[Plan]:
         """The plan of the behaviors that are left. Raises Losses: those that cannot be on time."""
         natural = natural_ends(self.chains, present)
         waited_for = frozenset(self.chains) - self._unawaited_events(present)
-        arrangement = Arrangement(natural=natural)
+        arrangement = Arrangement(natural=natural, spoken=self.order.current)
         assembler = yield from assembling(self.chains, present, classes, waited_for)
         mentioned = {point.behavior for point in present.constrained}
         while True:
@@ -203,7 +214,7 @@ class _Planner:
                     self._resolve(conflict)
                 yield 2 * len(part)
             if conflicts:
-                arrangement = Arrangement(natural=natural, turns=self.turns)
+                arrangement = Arrangement(natural=natural, turns=self.turns, spoken=arrangement.spoken)
             elif arranged == arrangement:
                 break
             else:
@@ -234,7 +245,7 @@ class _Planner:
 
         timed = self._timed
         equals = [
-            Equal(tuple(map(timed, kept)))
+            Equal(tuple(map(timed, kept)), equal.behavior)
             for equal in self.relations.equals
             if (kept := tuple(filter(is_left, equal.terms))) and (len(kept) > 1 or len(equal.terms) == 1)
         ]
@@ -245,7 +256,7 @@ class _Planner:
         orders = [each for each in self.relations.orders if is_left(each.earlier) and is_left(each.later)]
         present = Relations(
             tuple(equals),
-            tuple([Order(timed(each.earlier), timed(each.later)) for each in orders]),
+            tuple([Order(timed(each.earlier), timed(each.later), each.placed) for each in orders]),
             self.relations.required - self.dropped.keys(),
         )
         return present, classes
@@ -327,14 +338,19 @@ class _Planner:
             assembler = yield from assembling(self.chains, assembler.relations, classes, assembler.waited_for)
         try:
             solution = yield from predict(assembly.net, lambda ties: bool(assembly.waits(ties)))
+            if self.order.pass_alone():
+                raise Misordered
             return assembler, assembly, solution
         except Impossible as impossible:
+            if self.order.refute(impossible.circles, assembly.net):
+                raise Misordered from None
             if waits := assembly.waits(tie for circle in impossible.circles for tie, _ in circle):
                 assembler.waive(waits)
                 return (yield from self._solved(assembler, arrangement, classes))
             required = self.relations.required
+            turns = self.turns | self.order.turns
             raise (
-                yield from judge(impossible, assembly, self.chains, required, classes, self.block.id, self.turns)
+                yield from judge(impossible, assembly, self.chains, required, classes, self.block.id, turns)
             ) from None
 
     def _may_speak_at_once(self, id: str, present: Relations) -> bool:

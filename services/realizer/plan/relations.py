@@ -64,10 +64,11 @@ class Equal(Struct, frozen=True, gc=False):
 
 
 class Order(Struct, frozen=True, gc=False):
-    """`later` is no earlier than `earlier`."""
+    """`later` is no earlier than `earlier`. placed: the behavior of which this says when it comes."""
 
     earlier: Term
     later: Term
+    placed: str = ""
 
 
 DROPPED = "; the behavior is dropped"
@@ -103,6 +104,14 @@ class Relations(Struct, frozen=True, dict=True):
     def named(self) -> frozenset[Point]:
         """Every point that is written anywhere."""
         return self.constrained | {term.point for equal in self.equals for term in equal.terms}
+
+    @cached_property
+    def placed(self) -> frozenset[str]:
+        """Behaviors of which it is said when they come. Timing of another that names one says nothing of it."""
+        placed = {order.placed for order in self.orders}
+        for equal in self.equals:
+            placed |= {equal.behavior} if equal.behavior else {term.point.behavior for term in equal.terms}
+        return frozenset(placed)
 
     @cached_property
     def constrained(self) -> frozenset[Point]:
@@ -225,7 +234,8 @@ class _Reader:
         ref = terms.get(operator.ref)
         for text in operator.syncs:
             if ref is not None and (sync := terms.get(text)) is not None:
-                self.orders.append(Order(ref, sync) if isinstance(operator, After) else Order(sync, ref))
+                ends = (ref, sync) if isinstance(operator, After) else (sync, ref)
+                self.orders.append(Order(*ends, (ref if sync.point == ORIGIN else sync).point.behavior))
 
     def read_timing(self) -> Steps[None]:
         for portion in portions(self.block.behaviors):

@@ -1,0 +1,113 @@
+"""The order in which the speeches of a block are said: that of the document, or else the next one that is possible.
+
+Constraints come first. Where they leave no time for one speech after another, the two change places; a speech is lost
+only when no order serves all. So first it is made sure that the speeches are possible without any order.
+"""
+
+from collections.abc import Collection, Iterable, Sequence
+from itertools import pairwise
+from typing import Literal
+
+from engage_hri.services.realizer.net.petri_net import PetriNet
+from engage_hri.services.realizer.plan.prediction import Circle
+from engage_hri.services.realizer.points import Point
+
+WORK = 400
+"""Orders that are tried, times behaviors of the block."""
+LEAST = 4
+"""Orders that are tried of a large block."""
+
+
+class Misordered(Exception):
+    """Another order of the speeches is to be tried."""
+
+
+class SpeakingOrder:
+    """A search through the orders of some speeches. current: the order to plan with.
+
+    Stages: `document`, the order that is tried first. `alone`: no order, to see what is impossible by itself.
+    `search`: other orders. `last`: none is left; what is impossible in this one is lost.
+    """
+
+    def __init__(self, speeches: Sequence[str], size: int) -> None:
+        """Begin with the document's order.
+
+        speeches: in document order. size: behaviors of the block.
+        """
+        self.current: tuple[str, ...] = tuple(speeches)
+        self._stage: Literal["document", "alone", "search", "last"] = "document"
+        self._budget = max(LEAST, WORK // max(1, size))
+        self._start(self.current)
+
+    def _start(self, speeches: tuple[str, ...]) -> None:
+        self._first = speeches
+        self._seen = {speeches}
+        self._left: list[tuple[str, ...]] = []
+        self._refuted: dict[tuple[str, str], tuple[str, ...]] = {}
+        """Pairs of which the first cannot come before the second, whatever the others do, and in which order seen."""
+
+    def begin_anew(self, speeches: Collection[str]) -> None:
+        """Begin again with those that are left of the speeches."""
+        self._start(tuple(each for each in self._first if each in speeches))
+        if self._stage != "alone":
+            self.current = self._first
+            self._stage = "search" if self._budget else "last"
+
+    def pass_alone(self) -> bool:
+        """Take note that the block can be scheduled. True if that was without an order, which is to be tried now."""
+        if self._stage != "alone":
+            return False
+        self._stage, self.current = "search", self._first
+        return True
+
+    def refute(self, circles: Iterable[Circle], net: PetriNet) -> bool:
+        """Go on to the next order; False if these circles do not depend on the order, or none is left.
+
+        circles: of ties of the net that cannot be kept together.
+        """
+        if self._stage in ("alone", "last"):
+            return False
+        if self._stage == "document":
+            self._stage, self.current = "alone", ()
+            return bool(self._first)
+        ranked = [self._pairs(circle, net) for circle in circles]
+        if not all(ranked):
+            return False
+        single = (pairs[0] for pairs in ranked if len(pairs) == 1)
+        self._refuted = dict.fromkeys(single, self.current) | self._refuted
+        # The last of each circle changes places first: what comes earlier keeps the document's order.
+        for swapped in (*([pair] for pairs in ranked for pair in pairs), [pairs[-1] for pairs in ranked]):
+            if (other := self._swapped(swapped)) not in self._seen:
+                self._seen.add(other)
+                self._left.append(other)
+        if self._left and self._budget:
+            self._budget -= 1
+            self.current = self._left.pop()
+        else:
+            self._stage = "last"
+            hopeless = (order for (one, two), order in self._refuted.items() if (two, one) in self._refuted)
+            self.current = next(hopeless, self._first)
+        return True
+
+    @property
+    def turns(self) -> frozenset[tuple[str, Point]]:
+        """Each speech with the end of the one before it, for which it waits."""
+        return frozenset((later, Point(earlier, "end")) for earlier, later in pairwise(self.current))
+
+    def _pairs(self, circle: Circle, net: PetriNet) -> list[tuple[str, str]]:
+        """Speeches that follow one another in a circle by the current order alone; the first said comes first."""
+        place = {id: number for number, id in enumerate(self.current)}
+        found = set()
+        for tie, _ in circle:
+            if tie.kind == "series" and tie.behavior in place:
+                before = {point.behavior for point in net.transitions[tie.source].points} & place.keys()
+                found |= {(id, tie.behavior) for id in before if place[id] < place[tie.behavior]}
+        return sorted(found, key=lambda pair: place[pair[0]])
+
+    def _swapped(self, pairs: Iterable[tuple[str, str]]) -> tuple[str, ...]:
+        """The current order with the later of each pair right before the earlier."""
+        order = list(self.current)
+        for earlier, later in pairs:
+            order.remove(later)
+            order.insert(order.index(earlier), later)
+        return tuple(order)
