@@ -2,7 +2,7 @@
 
 A new type is a struct in behaviors.py and a row here. Its sync points, where it can wait, which of its points are one
 instant, who performs it, what it takes the place of, its XML namespace and its spelling in BML 1.0 follow from that;
-so does the contract of bodies. The table in docs/control.md is held to the rows by a test.
+so do the contract of bodies and, by `make generate`, the table in docs/control.md.
 Sources: BML 1.0, chapters 3 to 10; thesis 4.1.2.
 """
 

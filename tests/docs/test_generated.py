@@ -16,9 +16,19 @@ def test_the_page_on_configuration_is_not_stale(monkeypatch: pytest.MonkeyPatch)
     del sys.modules["configuration"]
 
 
+def test_the_table_of_behavior_types_is_not_stale(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.syspath_prepend(str(ROOT / "docs" / "site"))
+    import types_table
+
+    text = types_table.PAGE.read_text(encoding="utf-8")
+    assert types_table.page(text) == text, "make generate"
+    del sys.modules["types_table"]
+
+
 def test_make_generate_writes_all_of_it() -> None:
     """The schemas are compared in tests/schemas/test_export.py."""
     recipe = (ROOT / "Makefile").read_text(encoding="utf-8").partition("\ngenerate:")[2].partition("\n\n")[0]
 
     assert "engage_hri.schemas.export" in recipe
     assert "docs/site/configuration.py" in recipe
+    assert "docs/site/types_table.py" in recipe
