@@ -129,7 +129,6 @@ class _Planner:
         self.overlaps: set[Turn] = set()
         """Turns that there is no time to wait for."""
         self.hands: dict[str, Hand] = {}
-        self.order = SpeakingOrder((), 0)
         self.chains: dict[str, Chain] = {}
 
     def read(self, elsewhere: Elsewhere | None) -> Steps[None]:
@@ -140,6 +139,8 @@ class _Planner:
                 if behavior.id not in self.dropped:
                     self._read(behavior)
             yield 4 * len(portion)
+        speeches = [id for id, chain in self.chains.items() if chain.type == "speech"]
+        self.order = SpeakingOrder(speeches, len(self.chains))
 
     def _read(self, behavior: BlockBehavior) -> None:
         if isinstance(behavior, Unknown):
@@ -166,7 +167,6 @@ class _Planner:
 
     def plan(self) -> Steps[Plan]:
         """The plan; behaviors that cannot be on time are dropped until the rest can be."""
-        self.order = self._document_order()
         while True:
             present, classes = yield from self._present()
             try:
@@ -184,10 +184,6 @@ class _Planner:
                     else:
                         self._drop(loss.behavior, "IMPOSSIBLE_TO_SCHEDULE", loss.reason)
                 self.order.begin_anew(self.chains)
-
-    def _document_order(self) -> SpeakingOrder:
-        speeches = tuple(id for id, chain in self.chains.items() if chain.type == "speech")
-        return SpeakingOrder(speeches, len(self.chains))
 
     def _plan(self, present: Relations, classes: Classes) -> Steps[Plan]:
         """The plan of the behaviors that are left. Raises Losses: those that cannot be on time."""

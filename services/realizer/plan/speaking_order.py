@@ -26,7 +26,7 @@ class SpeakingOrder:
     """A search through the orders of some speeches. current: the order to plan with.
 
     Stages: `document`, the order that is tried first. `alone`: no order, to see what is impossible by itself.
-    `search`: other orders. `last`: none is left; what is impossible in this one is lost.
+    `search`: other orders. `last`: none is left, or there is only one; what is impossible in it is lost.
     """
 
     def __init__(self, speeches: Sequence[str], size: int) -> None:
@@ -35,7 +35,7 @@ class SpeakingOrder:
         speeches: in document order. size: behaviors of the block.
         """
         self.current: tuple[str, ...] = tuple(speeches)
-        self._stage: Literal["document", "alone", "search", "last"] = "document"
+        self._stage: Literal["document", "alone", "search", "last"] = "document" if len(speeches) > 1 else "last"
         self._budget = max(LEAST, WORK // max(1, size))
         self._start(self.current)
 
@@ -51,7 +51,8 @@ class SpeakingOrder:
         self._start(tuple(each for each in self._first if each in speeches))
         if self._stage != "alone":
             self.current = self._first
-            self._stage = "search" if self._budget else "last"
+        if self._stage == "last" and self._budget:
+            self._stage = "search"
 
     def pass_alone(self) -> bool:
         """Take note that the block can be scheduled. True if that was without an order, which is to be tried now."""
@@ -67,10 +68,10 @@ class SpeakingOrder:
         """
         if self._stage in ("alone", "last"):
             return False
-        if self._stage == "document":
-            self._stage, self.current = "alone", ()
-            return bool(self._first)
         ranked = [self._pairs(circle, net) for circle in circles]
+        if self._stage == "document" and any(ranked):
+            self._stage, self.current = "alone", ()
+            return True
         if not all(ranked):
             return False
         single = (pairs[0] for pairs in ranked if len(pairs) == 1)
