@@ -91,5 +91,10 @@ class WarningFeedback(Struct, frozen=True, kw_only=True, tag="warning", omit_def
     at: Stamp | None = None
     character_id: str = ""
 
+    @property
+    def place(self) -> str:
+        """Name of the thing that the warning is about: `block:behavior`, or the block alone."""
+        return ":".join(part for part in (self.block, self.behavior) if part)
+
 
 Feedback = BlockProgress | SyncPointProgress | PredictionFeedback | WarningFeedback

@@ -62,15 +62,14 @@ def _block(message: BlockProgress) -> Entry:
 
 
 def _warning(message: WarningFeedback) -> Entry:
-    place = ":".join(part for part in (message.block, message.behavior) if part)
-    return WARNING, f"block {place}: {message.kind}: {message.message}"
+    return WARNING, f"block {message.place}: {message.kind}: {message.message}"
 
 
 def _fragment(message: FragmentOutcome) -> Entry:
-    more = (
-        f": {message.fault}" if message.fault else f", replaced by {message.replaced_by}" * bool(message.replaced_by)
-    )
-    return INFO, f"fragment {message.fragment} of {message.requester}: {message.status}{more}"
+    text = f"fragment {message.fragment} of {message.requester}: {message.status}"
+    if message.fault:
+        return INFO, f"{text}: {message.fault}"
+    return INFO, f"{text}, replaced by {message.replaced_by}" if message.replaced_by else text
 
 
 def _turn(message: TurnClosed) -> Entry:

@@ -142,9 +142,8 @@ def feed(scene: Scene, message: Message, at: Seconds) -> Scene:
             return replace(scene, owner=owner, waiting=waiting)
         case Statistics(actor="", session=session):
             return replace(scene, session=session)
-        case WarningFeedback(block=block, behavior=behavior, kind=kind, message=text):
-            place = ":".join(part for part in (block, behavior) if part)
-            return _note(scene, f"{kind} {place}: {text}")
+        case WarningFeedback(kind=kind, message=text):
+            return _note(scene, f"{kind} {message.place}: {text}")
         case Fault():
             return _note(scene, f"{message.service or 'fault'}: {message}")
     return scene

@@ -70,8 +70,7 @@ def decision(event: ConnectionEvent) -> str:
 
 def warning(message: WarningFeedback) -> str:
     """Write a warning as `! NO_SUCH_TARGET block:behavior: what is wrong`."""
-    place = ":".join(part for part in (message.block, message.behavior) if part)
-    return f"! {message.kind} {place}: {message.message}"
+    return f"! {message.kind} {message.place}: {message.message}"
 
 
 def statistics(statistics: Statistics) -> str:
