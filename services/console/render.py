@@ -54,7 +54,7 @@ def _small(scene: Scene, width: int, height: int) -> list[RenderableType]:
     people = _people(scene)[: max(1, height // 4)]
     rest = height - 1 - len(people)
     words = min(3, rest // 3)
-    return [_title(scene), *people, _LastLines(_said(scene), words), _events(scene, width, rest - words)]
+    return [_title(scene), *people, _said(scene, words), _events(scene, width, rest - words)]
 
 
 def _framed(scene: Scene, width: int, height: int) -> list[RenderableType]:
@@ -64,7 +64,7 @@ def _framed(scene: Scene, width: int, height: int) -> list[RenderableType]:
     doing = min(max(5, len(people) + FRAME), upper // 2)
     left = Group(
         _panel(_LastLines(Group(*people[: doing - FRAME]), doing - FRAME), _title(scene)),
-        _panel(_LastLines(_said(scene), upper - doing - FRAME), Text("said")),
+        _panel(_said(scene, upper - doing - FRAME), Text("said")),
     )
     top = Table.grid(expand=True)
     top.add_column(ratio=4)
@@ -123,16 +123,16 @@ def _doing(scene: Scene, actor: Actor) -> Text:
     return doing
 
 
-def _said(scene: Scene) -> RenderableType:
-    """Utterances with their words; those of people have none."""
+def _said(scene: Scene, height: int) -> RenderableType:
+    """The last utterances with their words; those of people have none."""
     lines = []
-    for utterance in scene.said:
+    for utterance in scene.said[-max(1, height) :]:  # each takes a line at least
         text = Text(printable(f"{utterance.actor}: "), style=_style(scene, utterance.actor))
         text.append(printable(utterance.text) or "…", style="bold" if utterance.open else "dim")
         if utterance.open:
             text.append("▌", style="blink")
         lines.append(text)
-    return Group(*lines)
+    return _LastLines(Group(*lines), height)
 
 
 class _LastLines:
