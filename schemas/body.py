@@ -39,6 +39,8 @@ class PerformBehavior(Request, frozen=True, kw_only=True, tag="perform_behavior"
     pace: tuple[PlannedInstant, ...] = ()
     """Instants for coming sync points which the natural pace would miss. The body comes as near to them as it can, by
     moving faster, slower or less far. The newest request replaces all earlier instants; empty: natural pace."""
+    held: bool = False
+    """Wait at the next hold point, or between two words, though `through` is further; `pace` is void then."""
 
     @property
     def authority(self) -> str:

@@ -58,3 +58,34 @@ class Timer:
     def _rings(self) -> None:
         self._handle = None
         self._ring()
+
+
+class Afterwards:
+    """A call of `ring` a few turns of the loop after `set`: after all that is under way by then."""
+
+    TURNS = 3
+    """A task is woken in one turn and its message delivered in the next; its receiver is woken in the third."""
+
+    def __init__(self, ring: Callable[[], None]) -> None:
+        self._ring = ring
+        self._loop = asyncio.get_running_loop()
+        self._left = 0
+        self._handle: asyncio.Handle | None = None
+
+    def set(self) -> None:
+        if self._handle is None:
+            self._left = self.TURNS
+            self._handle = self._loop.call_soon(self._turn)
+
+    def stop(self) -> None:
+        if self._handle is not None:
+            self._handle.cancel()
+            self._handle = None
+
+    def _turn(self) -> None:
+        self._left -= 1
+        if self._left:
+            self._handle = self._loop.call_soon(self._turn)
+        else:
+            self._handle = None
+            self._ring()

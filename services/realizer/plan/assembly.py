@@ -19,20 +19,7 @@ from engage_hri.services.realizer.plan.phases import Chain
 from engage_hri.services.realizer.plan.relations import Order, Relations
 from engage_hri.services.realizer.plan.schedule import EPSILON
 from engage_hri.services.realizer.plan.steps import PORTION, Steps, portions
-from engage_hri.services.realizer.points import ORIGIN, WITH_STROKE, Gate, Point, gate, gate_point, performer
-
-
-class Member(Struct, frozen=True, gc=False):
-    """A behavior's part in an instant: how it can be made to wait there, and the point that is reported then."""
-
-    behavior: str
-    kind: Gate
-    point: Point
-
-    @property
-    def can_wait(self) -> bool:
-        """True if it can hold there, once begun."""
-        return self.kind in ("hold", "prompt")
+from engage_hri.services.realizer.points import ORIGIN, WITH_STROKE, Member, Point, gate, gate_point, performer
 
 
 class Assembly(Struct, frozen=True):

@@ -19,7 +19,7 @@ from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.feedback import WarningKind
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.realizer.net.petri_net import PetriNet
-from engage_hri.services.realizer.plan.assembly import Assembler, Assembly, Member, assembling
+from engage_hri.services.realizer.plan.assembly import Assembler, Assembly, assembling
 from engage_hri.services.realizer.plan.deadlocks import Losses, clashes, judge
 from engage_hri.services.realizer.plan.handover import Arrangement, Conflict, Turn, arrange, entering
 from engage_hri.services.realizer.plan.instants import Classes
@@ -40,7 +40,7 @@ from engage_hri.services.realizer.plan.relations import (
 from engage_hri.services.realizer.plan.schedule import EPSILON, Solution
 from engage_hri.services.realizer.plan.speaking_order import Misordered, SpeakingOrder
 from engage_hri.services.realizer.plan.steps import PORTION, Steps, finished, portions
-from engage_hri.services.realizer.points import ORIGIN, Point
+from engage_hri.services.realizer.points import ORIGIN, Member, Point
 
 
 class Plan(Struct, frozen=True, kw_only=True):
