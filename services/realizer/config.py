@@ -47,7 +47,7 @@ class RealizerConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
     blocks: int = 300
     event_grace: Seconds = 0.5
     event_patience: Seconds = 10.0
-    longest_hold: Seconds = 300.0
+    longest_hold: Seconds = 60.0
     most: int = 2000
     directed_gaze_limit: Seconds = 2.5
     mutual_facial_gaze_limit: Seconds = 1.9
