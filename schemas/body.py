@@ -123,14 +123,17 @@ class WordSpoken(Struct, frozen=True, kw_only=True, tag="word_spoken", omit_defa
 class BehaviorOutcome(Outcome, frozen=True, kw_only=True, tag="behavior_outcome", omit_defaults=True):
     """evt: terminal state of `PerformBehavior`.
 
-    status: `done`: its `end` was passed; `aborted`: it was ended before; `failed`: see `fault`.
+    status: `done`: its `end` was passed; `taken_over`: before that another behavior took one of its parts, at `at`;
+    `aborted`: it was ended before; `failed`: see `fault`.
+    passed: the last sync point that was passed; empty: none, or the body does not say.
     spoken: of a speech, the words that the voice has said.
     """
 
     block: str
     behavior: str
-    status: Literal["done", "aborted", "failed"]
+    status: Literal["done", "taken_over", "aborted", "failed"]
     at: Stamp
+    passed: str = ""
     spoken: str = ""
     fault: Fault | None = None
 

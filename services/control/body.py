@@ -19,6 +19,8 @@ from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.world import World
 
 AbortMode = Literal["relax", "freeze"]
+Revocation = Literal["relax", "freeze", "taken_over"]
+"""How a behavior ends early: by an abort, or since the body gives one of its parts to another behavior."""
 
 
 class Arrived(Struct, frozen=True):
@@ -66,11 +68,11 @@ class BodyFailed(EngageError):
 
 
 class Revoked(Exception):
-    """The behavior was aborted while it waited for its authority."""
+    """The authority of the behavior is gone: it was aborted or taken over."""
 
 
 class MovementAuthority:
-    """Permission for a behavior to move on up to a sync point. It is extended, never shrunk; revoking it aborts.
+    """Permission for a behavior to move on up to a sync point. It is extended, never shrunk; revoking it ends that.
 
     A simple body awaits `granted(sync)` before it leaves a hold point. One that plans ahead asks `covers` and
     is told of changes through `watch`.
@@ -93,7 +95,7 @@ class MovementAuthority:
         """
         self.points = sync_points(behavior)
         self.pace: Mapping[str, Seconds] = dict(pace or {})
-        self.revoked: AbortMode | None = None
+        self.revoked: Revocation | None = None
         self._through = self._index(through)
         self._watchers: list[Callable[[], None]] = []
 
@@ -133,10 +135,11 @@ class MovementAuthority:
             self.pace = dict(pace)
             self._tell()
 
-    def revoke(self, how: AbortMode = "relax") -> None:
+    def revoke(self, how: Revocation = "relax") -> None:
         """End the behavior now. A second call changes nothing.
 
-        how: go to the safe pose at once (`relax`), or stand still for a moment and then go (`freeze`).
+        how: go to the safe pose at once (`relax`), or stand still for a moment and then go (`freeze`); `taken_over`
+        by the body itself, as it gives a part of this behavior to another.
         """
         if self.revoked is None:
             self.revoked = how
@@ -218,8 +221,9 @@ class Body(ABC):
     def perform(self, behavior: BlockBehavior, authority: MovementAuthority) -> AsyncGenerator[Progress, None]:
         """Perform a behavior: yield every sync point once, in order, when reached, and never past the authority.
 
-        Ending after `end` means done; ending earlier means that the authority was revoked. However it ends, the parts
-        that it used go on to their safe pose by themselves.
+        Ending after `end` means done; ending earlier means that the authority was revoked: by an abort, or by the
+        body itself (`taken_over`), as another behavior takes a part. A point that the joints have not passed is never
+        reported, however it ends. Parts that no other behavior has go on to their safe pose by themselves.
 
         behavior: what is to be done.
         authority: how far it may go now; more is granted while it runs.

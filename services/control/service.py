@@ -89,7 +89,9 @@ class _LiveBehavior:
         self.id = id
         self.authority = authority
         self.position = 0
-        self.status: Literal["done", "aborted", "failed"] = "aborted"
+        self.status: Literal["done", "taken_over", "aborted", "failed"] = "aborted"
+        self.passed = ""
+        """The last sync point that it has passed."""
         self.aborts: list[str] = []
         """Ids of the abort requests that end with this behavior."""
 
@@ -247,6 +249,8 @@ class _Control:
             # An error of the driver ends this behavior. Nothing is known of where its parts are, so all go home.
             live.status, fault = "failed", self._bus.failed(error, f"behavior {live.label}")
             self._take_home(f"after {live.label} broke")
+        if live.status == "aborted" and live.authority.revoked == "taken_over":
+            live.status = "taken_over"
         del self._live[request.id]
         with self.desk.serving(request):
             self._end(live, fault)
@@ -259,7 +263,7 @@ class _Control:
         self._keep_publishing()
         outcome = BehaviorOutcome(
             id=request.id, block=request.block, behavior=request.behavior.id, status=live.status,
-            at=self._bus.stamp(at), spoken=live.spoken, fault=fault,
+            at=self._bus.stamp(at), passed=live.passed, spoken=live.spoken, fault=fault,
         )  # fmt: skip
         self.desk.end(outcome)
 
@@ -304,6 +308,7 @@ class _Control:
                     id=id, block=block, behavior=behavior, sync=sync, at=at, arrived=came, requester=requester
                 )
                 self._tell(reached)
+                live.passed = sync
                 live.status = "done" if sync == "end" else live.status
                 self._publish(self._actions.reached(request.id, live.label, request.behavior, progress))
                 self.note_look(live, progress.at)

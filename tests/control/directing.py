@@ -16,7 +16,7 @@ from engage_hri.services.control.config import ControlConfig
 from engage_hri.services.control.service import embody
 from engage_hri.services.requests.ends import Pending, Requester
 from engage_hri.services.runtime.service import running
-from tests.control.contract import WORLD
+from tests.control.suite import WORLD
 
 
 class Client:

@@ -21,8 +21,7 @@ STALL, OVERHEAT = "(stall)", "(overheat)"
 class Run:
     """A behavior that is being performed: `course` under `authority`.
 
-    bell: rings when the authority changes or another behavior takes over. cut_at: when a later behavior took its
-    parts. holding: it waits at a hold point, standing or still coming to a stop.
+    bell: rings when the authority changes. holding: it waits at a hold point, standing or still coming to a stop.
     """
 
     def __init__(
@@ -39,7 +38,8 @@ class Run:
         self.bell = Bell()
         self.pending: list[CoursePoint] = list(course.points)
         self.holding = False
-        self.cut_at: Seconds | None = None
+        self.is_beneath = False
+        """True for a shift of the head that a look lies over: it moves no more, and takes nothing from the look."""
         self.motion: Motion
         self.size = 1.0
         """Share of the full amplitude, 0 to 1."""
@@ -59,13 +59,8 @@ class Run:
         return any(point.sync == sync for point in self.pending)
 
     @property
-    def unreported(self) -> list[str]:
-        """Sync points still to be reported."""
-        return [point.sync for point in self.pending if point.sync not in (STALL, OVERHEAT)]
-
-    @property
     def is_over(self) -> bool:
-        return self.cut_at is not None or self.authority.revoked is not None
+        return self.is_beneath or self.authority.revoked is not None
 
     def play(self, motion: Motion) -> None:
         self.motion = motion
@@ -146,10 +141,19 @@ class Run:
                 legs = tuple(_marked(leg, point.sync, following) for leg in legs)
         return legs
 
-    def cut(self, now: Seconds) -> None:
-        """Note that a later behavior has taken over its parts."""
-        self.cut_at = now
-        self.bell.ring()
+    def lie_beneath(self) -> None:
+        """Note that a look lies over this shift of the head."""
+        self.is_beneath = True
+
+    def passed_by(self, at: Seconds) -> list[tuple[str, Seconds]]:
+        """Sync points that it has passed by then and not reported yet, each with its instant."""
+        passed: list[tuple[str, Seconds]] = []
+        for point in () if self.holding else self.pending:
+            due = None if point.sync in (STALL, OVERHEAT) else self.due(point)
+            if due is None or due > at or (point.held_with and not self.authority.covers(point.held_with)):
+                break
+            passed.append((point.sync, due))
+        return passed
 
     def _insert_fault(self, fault: str, before: str) -> None:
         """Put `fault` half-way to sync point `before`, on the leg that has it."""
