@@ -1,4 +1,4 @@
-"""What the contract suite is made of: a world, behaviors, and a stage where the test has the authority in its hand."""
+"""What the contract suite is made of: a world, behaviors, and a stage with the authority in the hand of the test."""
 
 import asyncio
 import math

@@ -1,13 +1,14 @@
 """The voice of the simulated body: it says one text at a time."""
 
-import asyncio
 from collections.abc import AsyncGenerator
 from contextlib import aclosing
+from math import inf
 
 from engage_hri.schemas.behaviors import Speech
 from engage_hri.schemas.faults import Fault
 from engage_hri.services.control.body import BehaviorRefused, MovementAuthority, Progress, Reached
 from engage_hri.services.control.voice import speaking
+from engage_hri.services.control.waiting import Bell
 
 
 class Voice:
@@ -20,7 +21,7 @@ class Voice:
         self.saying = ""
         self._is_mute = is_mute
         self._utterance: MovementAuthority | None = None
-        self._free = asyncio.Event()
+        self._waiting: list[Bell] = []
 
     @property
     def is_busy(self) -> bool:
@@ -33,12 +34,14 @@ class Voice:
 
     async def wait_for_silence(self, authority: MovementAuthority) -> None:
         """Wait until an aborted speech has finished its current word; return at once if `authority` is revoked."""
-        unwatch = authority.watch(self._free.set)
+        bell = Bell()
+        unwatch = authority.watch(bell.ring)
+        self._waiting.append(bell)
         try:
             while self._utterance is not None and self._utterance.revoked is not None and authority.revoked is None:
-                self._free.clear()
-                await self._free.wait()
+                await bell.wait(inf)
         finally:
+            self._waiting.remove(bell)
             unwatch()
 
     async def speak(
@@ -58,4 +61,5 @@ class Voice:
         finally:
             if self._utterance is authority:
                 self._utterance, self.saying = None, ""
-            self._free.set()
+            for bell in self._waiting:
+                bell.ring()

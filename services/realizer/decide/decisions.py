@@ -160,8 +160,7 @@ class Decisions(Expectations):
             if behavior in self.begun and not self.has_ended(behavior):
                 effects += self._extension(behavior, now)
         self._touched.clear()
-        # Of two that begin together on one part, the body leaves it to the later command: the plan has the order.
-        for behavior in sorted(beginning, key=self.plan.entering.index) if len(beginning) > 1 else beginning:
+        for behavior in beginning:
             through = self._furthest(behavior, now)
             self.paces[behavior] = pace(behavior, self, now)
             effects.append(Begin(behavior, self._points[behavior][through].sync, self.paces[behavior]))

@@ -23,6 +23,7 @@ from engage_hri.services.realizer.decide.effects import Begin, Effect, Extend
 from engage_hri.services.realizer.decide.lateness import Late, Stalled
 from engage_hri.services.realizer.perform.control_link import ControlLink
 from engage_hri.services.realizer.perform.feedback import Reporter
+from engage_hri.services.realizer.perform.handed_over import has_lost_nothing, loss
 from engage_hri.services.realizer.perform.live import Ending, Live
 from engage_hri.services.realizer.perform.recognition_link import RecognitionLink
 from engage_hri.services.realizer.perform.shared_context import SharedContext
@@ -328,16 +329,16 @@ class BlockPerformance:
         if not isinstance(outcome, BehaviorOutcome):
             self._lose(behavior.id, Fault(reason=f"control ended it with a {type(outcome).__name__}"))
             return
-        is_done = outcome.status == "done"
         self.spoken.end(outcome)
-        if is_done:
-            end = Point(behavior.id, sync_points(behavior)[-1])
-            at = self.decisions.plausible(end, self._bus.local(outcome.at), self._bus.now())
-            self._reach(end, at, by_body=True)
+        end = Point(behavior.id, sync_points(behavior)[-1])
+        at = self.decisions.plausible(end, self._bus.local(outcome.at), self._bus.now())
+        if outcome.status == "taken_over":  # its last report may be lost
+            self._reach(Point(behavior.id, outcome.passed), at, by_body=True)
+        if has_lost_nothing(self.decisions.plan, outcome, self.decisions.reached):
+            self._reach(end, at, by_body=outcome.status == "done")
             self._advance()
         else:
-            fault = outcome.fault or Fault(reason=f"the body {outcome.status} it")
-            self._lose(behavior.id, fault, at_rest=outcome.status == "aborted")
+            self._lose(behavior.id, loss(outcome), at_rest=outcome.status != "failed")
 
     def _send(self, behavior: BlockBehavior) -> Pending:
         pending = self._pending[behavior.id] = self._body.perform(behavior, self._asked[behavior.id])
