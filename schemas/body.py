@@ -3,8 +3,9 @@
 Movement authority. `PerformBehavior.through` names the last sync point that the body may pass without asking; it
 holds at the hold point before the next one and says so (`SyncPointArrived`). The realizer extends the authority by
 sending the request again, same id, with a later `through`; it lasts as long as `KeepAlive` renews it (decision 0001).
-Authority never shrinks. The hold points of each type are in docs/control.md: before and after the stroke of an arm or
-a nod; on target (`stroke` and `relax`) for a gaze, a face or a posture.
+Authority never shrinks; a behavior that is `held` waits all the same, and then goes on with it. The hold points of
+each type are in docs/control.md: before and after the stroke of an arm or a nod; on target (`stroke` and `relax`) for
+a gaze, a face or a posture.
 """
 
 from typing import ClassVar, Literal, Self
@@ -39,6 +40,10 @@ class PerformBehavior(Request, frozen=True, kw_only=True, tag="perform_behavior"
     pace: tuple[PlannedInstant, ...] = ()
     """Instants for coming sync points which the natural pace would miss. The body comes as near to them as it can, by
     moving faster, slower or less far. The newest request replaces all earlier instants; empty: natural pace."""
+    held: bool = False
+    """True to wait at the next place where the body can, whatever `through` says: a movement at its next hold point
+    (`SyncPointArrived`), a voice at the next word gap, mark or no mark. `pace` is void meanwhile. Sent again without
+    it, the behavior goes on as far as `through` says. One that can wait nowhere any more ends by itself."""
 
     @property
     def authority(self) -> str:

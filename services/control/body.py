@@ -78,8 +78,8 @@ class MovementAuthority:
     is told of changes through `watch`.
 
     points: the sync points of the behavior, in order.
-    pace: loop times in seconds at which the behavior is asked to reach its points, where its natural pace would miss
-    them. A body with one pace only ignores them; the estimates of other bodies say how far they can follow.
+    held: true while the behavior is to wait at the next place where it can. Nothing is covered meanwhile, so a body
+    that asks before it leaves a hold point waits there.
     revoked: how the behavior is to end, once `revoke` was called; None before.
     """
 
@@ -94,7 +94,8 @@ class MovementAuthority:
             ValueError: the behavior has no sync point `through`.
         """
         self.points = sync_points(behavior)
-        self.pace: Mapping[str, Seconds] = dict(pace or {})
+        self.held = False
+        self._pace: Mapping[str, Seconds] = dict(pace or {})
         self.revoked: Revocation | None = None
         self._through = self._index(through)
         self._watchers: list[Callable[[], None]] = []
@@ -104,8 +105,27 @@ class MovementAuthority:
         """The last sync point that may be passed without asking."""
         return self.points[self._through]
 
+    @property
+    def pace(self) -> Mapping[str, Seconds]:
+        """Loop times in seconds at which the behavior is asked to reach its points; none while it is held.
+
+        They are asked where its natural pace would miss them. A body with one pace only ignores them; the estimates
+        of other bodies say how far they can follow.
+        """
+        return {} if self.held else self._pace
+
     def covers(self, sync: str) -> bool:
         """True if `sync` may be passed now.
+
+        sync: a sync point of the behavior.
+
+        Raises:
+            ValueError: the behavior has no such point.
+        """
+        return not self.held and self.is_granted(sync)
+
+    def is_granted(self, sync: str) -> bool:
+        """True if `sync` may be passed as soon as the behavior is not held.
 
         sync: a sync point of the behavior.
 
@@ -131,8 +151,20 @@ class MovementAuthority:
 
         pace: loop times in seconds, by sync point.
         """
-        if dict(pace) != self.pace:
-            self.pace = dict(pace)
+        if dict(pace) != self._pace:
+            self._pace = dict(pace)
+            self._tell()
+
+    def hold(self) -> None:
+        """Wait at the next place where the behavior can, until `go_on`. A second call changes nothing."""
+        if not self.held:
+            self.held = True
+            self._tell()
+
+    def go_on(self) -> None:
+        """Go on as far as is granted."""
+        if self.held:
+            self.held = False
             self._tell()
 
     def revoke(self, how: Revocation = "relax") -> None:
@@ -159,7 +191,7 @@ class MovementAuthority:
         sync: a sync point of the behavior.
 
         Raises:
-            Revoked: the behavior is to end.
+            Revoked: the behavior is to end. Taken over just as it might pass, it passes.
             ValueError: the behavior has no such point.
         """
         changed = asyncio.Event()
@@ -170,7 +202,7 @@ class MovementAuthority:
                 await changed.wait()
         finally:
             unwatch()
-        if self.revoked is not None:
+        if self.revoked is not None and not (self.revoked == "taken_over" and self.covers(sync)):
             raise Revoked
 
     def _index(self, sync: str) -> int:

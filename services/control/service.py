@@ -194,6 +194,8 @@ class _Control:
             self.desk.refuse(request.id, Fault(reason=str(error), where=request.behavior.id, service="control"))
             return
         id = self.desk.asked(request.id).id
+        if request.held:
+            authority.hold()
         live = self._live[request.id] = _LiveBehavior(request, id, authority)
         self._tasks.create_task(self._perform(live), name=f"behavior {request.id}")
 
@@ -218,12 +220,16 @@ class _Control:
         return {planned.sync: self._bus.local(planned.at) for planned in request.pace}
 
     def _extend(self, live: _LiveBehavior, request: PerformBehavior) -> None:
+        if request.held:
+            live.authority.hold()
         live.authority.set_pace(self._pace(request))
         try:
             live.authority.extend(request.through)
         except ValueError as error:
             where = live.request.behavior.id
             self._bus.publish(keys.fault("control"), Fault(reason=str(error), where=where, service="control"))
+        if not request.held:
+            live.authority.go_on()
 
     async def _perform(self, live: _LiveBehavior) -> None:
         """Perform a behavior, from its request to the one terminal answer."""

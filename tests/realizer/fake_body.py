@@ -126,7 +126,7 @@ class Act(Struct, eq=False):
 
     def covers(self, sync: str) -> bool:
         points = points_of(self.perform.behavior)
-        return points.index(sync) <= points.index(self.perform.through)
+        return not self.perform.held and points.index(sync) <= points.index(self.perform.through)
 
 
 class FakeBody:
@@ -310,11 +310,18 @@ class FakeBody:
             self._pass(act, sync, now)
 
     async def _phase(self, act: Act, sync: str, natural: Seconds) -> None:
-        """As long as is natural, or as near to the planned instant as it can."""
+        """As long as is natural, or as near to the planned instant as it can; a voice is silent while it is held."""
         began = self.bus.now()
-        least, most = began + natural * self.elastic[0], began + natural * self.elastic[1]
         while True:
-            planned = {each.sync: self.bus.local(each.at) for each in act.perform.pace}
+            held = act.perform.held
+            if held and isinstance(act.perform.behavior, Speech):
+                since = self.bus.now()
+                act.changed.clear()
+                await act.changed.wait()
+                began += self.bus.now() - since
+                continue
+            least, most = began + natural * self.elastic[0], began + natural * self.elastic[1]
+            planned = {} if held else {each.sync: self.bus.local(each.at) for each in act.perform.pace}
             until = act.due = min(max(planned[sync], least), most) if sync in planned else began + natural
             if until <= self.bus.now():
                 return

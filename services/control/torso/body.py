@@ -232,14 +232,15 @@ class SimulatedBody(Body):
                 await run.bell.wait(inf if due is None else due)
             elif point.sync in (STALL, OVERHEAT):
                 await self._fail_or_stall(run, point)
-            elif point.held_with and (run.holding or not run.authority.covers(point.held_with)):
+            elif point.held_with and (run.holding or not run.may_pass(point.held_with)):
                 arrived = max(due, since)
-                if not run.authority.covers(point.held_with):
+                if not run.may_pass(point.held_with):
                     run.holding = True
                     yield Arrived(point.held_with, arrived)
-                while not run.authority.covers(point.held_with) and not run.is_over:
+                while not run.may_pass(point.held_with) and not run.is_over:
                     await run.bell.wait(inf)
-                if not run.is_over:
+                # What is taken over just as it may go on has passed the point, and goes no further.
+                if not run.is_over or (run.is_taken_over and run.may_pass(point.held_with)):
                     since = self._loop.time()
                     for sync in self._leave_hold(run, point.held_with):
                         yield Reached(sync, since, arrived)
@@ -247,7 +248,7 @@ class SimulatedBody(Body):
                 run.pending.pop(0)
                 self._attention.follow_run(run, self._loop.time())
                 yield Reached(point.sync, due, due)
-        if run.is_beneath or run.authority.revoked == "taken_over":
+        if run.is_beneath or run.is_taken_over:
             for sync, due in run.passed_by(self._loop.time()):
                 run.pending.pop(0)
                 yield Reached(sync, due, due)
@@ -256,7 +257,7 @@ class SimulatedBody(Body):
         """Let `run` go on from a hold point, on a new path if it stands still. Returns the sync points it passes."""
         now = self._loop.time()
         stood, passed = run.stands, run.leave(hold, now)
-        if stood and not run.holding:
+        if stood and not run.holding and not run.is_over:
             legs = run.motion.path.after(run.motion.s(now), [point.sync for point in run.pending])
             if run.course.parts == ("head",):
                 legs = (head.way_back(self._tracks["head"].angles(now), self._attention.angles),)
@@ -271,6 +272,7 @@ class SimulatedBody(Body):
         limit = run.limit(run.motion.path)
         is_extended = limit > run.motion.limit
         run.motion.extend(limit, now)
+        run.brake_for_hold(now)
         if run.keep_pace(now) or is_extended:
             self._attention.follow_run(run, now)
 
