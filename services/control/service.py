@@ -89,7 +89,9 @@ class _LiveBehavior:
         self.id = id
         self.authority = authority
         self.position = 0
-        self.status: Literal["done", "aborted", "failed"] = "aborted"
+        self.status: Literal["done", "taken_over", "aborted", "failed"] = "aborted"
+        self.passed = ""
+        """The last sync point that it has passed."""
         self.aborts: list[str] = []
         """Ids of the abort requests that end with this behavior."""
 
@@ -192,6 +194,8 @@ class _Control:
             self.desk.refuse(request.id, Fault(reason=str(error), where=request.behavior.id, service="control"))
             return
         id = self.desk.asked(request.id).id
+        if request.held:
+            authority.hold()
         live = self._live[request.id] = _LiveBehavior(request, id, authority)
         self._tasks.create_task(self._perform(live), name=f"behavior {request.id}")
 
@@ -216,12 +220,16 @@ class _Control:
         return {planned.sync: self._bus.local(planned.at) for planned in request.pace}
 
     def _extend(self, live: _LiveBehavior, request: PerformBehavior) -> None:
+        if request.held:
+            live.authority.hold()
         live.authority.set_pace(self._pace(request))
         try:
             live.authority.extend(request.through)
         except ValueError as error:
             where = live.request.behavior.id
             self._bus.publish(keys.fault("control"), Fault(reason=str(error), where=where, service="control"))
+        if not request.held:
+            live.authority.go_on()
 
     async def _perform(self, live: _LiveBehavior) -> None:
         """Perform a behavior, from its request to the one terminal answer."""
@@ -247,6 +255,8 @@ class _Control:
             # An error of the driver ends this behavior. Nothing is known of where its parts are, so all go home.
             live.status, fault = "failed", self._bus.failed(error, f"behavior {live.label}")
             self._take_home(f"after {live.label} broke")
+        if live.status == "aborted" and live.authority.revoked == "taken_over":
+            live.status = "taken_over"
         del self._live[request.id]
         with self.desk.serving(request):
             self._end(live, fault)
@@ -259,7 +269,7 @@ class _Control:
         self._keep_publishing()
         outcome = BehaviorOutcome(
             id=request.id, block=request.block, behavior=request.behavior.id, status=live.status,
-            at=self._bus.stamp(at), spoken=live.spoken, fault=fault,
+            at=self._bus.stamp(at), passed=live.passed, spoken=live.spoken, fault=fault,
         )  # fmt: skip
         self.desk.end(outcome)
 
@@ -304,6 +314,7 @@ class _Control:
                     id=id, block=block, behavior=behavior, sync=sync, at=at, arrived=came, requester=requester
                 )
                 self._tell(reached)
+                live.passed = sync
                 live.status = "done" if sync == "end" else live.status
                 self._publish(self._actions.reached(request.id, live.label, request.behavior, progress))
                 self.note_look(live, progress.at)

@@ -172,7 +172,9 @@ class Schemer:
             return InterruptBehavior(id="", block=self._word("block"), behavior=chance.choice(("b1", "b2", "b9")))
         if kind is SteerPerformance:
             to, block = chance.choice(("hold", "continue", "stop")), chance.choice(("", self._word("block")))
-            return SteerPerformance(id="", to=to, block=block, behavior=chance.choice(("", "", "b1")) if block else "")
+            return SteerPerformance(
+                id="", to=to, block=block, behavior=chance.choice(("", "", "b1")) if block else ""
+            )
         if kind is PerformBehavior:
             behavior = plausible.block(chance, name, self._entities).behaviors[0]
             through = chance.choice(("start", "end", "relax"))

@@ -28,6 +28,7 @@ from engage_hri.services.control.body import (
 )
 from engage_hri.services.control.config import Variability
 from engage_hri.services.control.torso import choreography, head, kinematics, tracks
+from engage_hri.services.control.torso.beneath import pass_end
 from engage_hri.services.control.torso.course import Course, CoursePoint, Impossible, Situation
 from engage_hri.services.control.torso.estimates import infeasible, motion_estimate, speech_estimate, wait_estimate
 from engage_hri.services.control.torso.head import Fixation
@@ -36,6 +37,7 @@ from engage_hri.services.control.torso.runs import OVERHEAT, STALL, Run
 from engage_hri.services.control.torso.tracks import Track
 from engage_hri.services.control.voice import speaking
 from engage_hri.services.control.voice.timeline import utter
+from engage_hri.services.control.voice.voice import Voice
 from engage_hri.services.control.waiting import Bell
 
 FREEZE: Seconds = 0.5
@@ -58,9 +60,9 @@ class SimulatedBody(Body):
         self._runs: dict[str, Run] = {}
         self._world = World(entities=())
         self._attention = Fixation()
-        self._utterance: MovementAuthority | None = None
-        self._saying = ""
-        self._voice_free = asyncio.Event()
+        self._base: MovementAuthority | None = None
+        """Authority of the shift that has set the base gaze."""
+        self._voice = Voice(is_mute=bool(self._deviations.mute))
         self._occasions = 0
 
     # -- the contract -------------------------------------------------------------------------------------------
@@ -84,14 +86,16 @@ class SimulatedBody(Body):
 
     async def home(self, parts: tuple[str, ...] = ()) -> None:
         going = {part for part in self._tracks if not parts or part.replace("nod", "head") in parts}
-        if self._utterance is not None and (not parts or "voice" in parts):
-            self._utterance.revoke()
+        if not parts or "voice" in parts:
+            self._voice.hush()
         for run in dict.fromkeys(run for part, run in self._runs.items() if part in going):
             going.update(run.course.parts)
             self._release(run)
             run.authority.revoke()
         if "head" in going:
             self._attention.stay(tracks.HOME["head"])
+            if self._base is not None:
+                self._base.revoke()
         self._relax(tuple(sorted(going)))
         bell = Bell()
         while not bell.is_past(until := max((self._tracks[part].motion.end for part in going), default=0.0)):
@@ -103,8 +107,8 @@ class SimulatedBody(Body):
         return BodyState(
             pose=kinematics.pose_message(pose), gaze=kinematics.gaze(pose), left_arm=kinematics.arm(pose, "left"),
             right_arm=kinematics.arm(pose, "right"),
-            moving=self._utterance is not None or any(track.is_moving(now) for track in self._tracks.values()),
-            looking_at=self._attention.fixated(now), speaking=self._saying,
+            moving=self._voice.is_busy or any(track.is_moving(now) for track in self._tracks.values()),
+            looking_at=self._attention.fixated(now), speaking=self._voice.saying,
         )  # fmt: skip
 
     def see(self, world: World) -> None:
@@ -172,6 +176,11 @@ class SimulatedBody(Body):
             async with aclosing(self._pass_points(run)) as points:
                 async for progress in points:
                     yield progress
+            if run.is_beneath and run.pending:
+                run.pending.clear()
+                async with aclosing(pass_end(authority)) as points:
+                    async for progress in points:
+                        yield progress
             if authority.revoked == "freeze" and self._owns(run):
                 await self._freeze(run)
         finally:
@@ -184,17 +193,20 @@ class SimulatedBody(Body):
 
     def _take_over(self, run: Run, path: Path) -> None:
         """Make `run` the owner of its parts, cut the runs that had them, and start its motion."""
-        now = self._loop.time()
         for joint in run.course.joints:
             self._misbelieved.pop(joint, None)
         for earlier in dict.fromkeys(self._runs[part] for part in run.course.parts if part in self._runs):
             self._release(earlier)
-            earlier.cut(now)
+            if head.is_shift(earlier.behavior) and isinstance(run.behavior, Gaze):
+                earlier.lie_beneath()
+            else:
+                earlier.authority.revoke("taken_over")
+            earlier.bell.ring()
             self._relax(tuple(part for part in earlier.course.parts if part not in run.course.parts))
         for part in run.course.parts:
             self._runs[part] = run
         if head.is_shift(run.behavior):
-            self._attention.shift(run.behavior, run.course)
+            self._set_base(run.behavior, run.course, run.authority)
         self._play(run, path)
         if run.course.parts == ("torso",):
             self._follow()
@@ -220,14 +232,15 @@ class SimulatedBody(Body):
                 await run.bell.wait(inf if due is None else due)
             elif point.sync in (STALL, OVERHEAT):
                 await self._fail_or_stall(run, point)
-            elif point.held_with and (run.holding or not run.authority.covers(point.held_with)):
+            elif point.held_with and (run.holding or not run.may_pass(point.held_with)):
                 arrived = max(due, since)
-                if not run.authority.covers(point.held_with):
+                if not run.may_pass(point.held_with):
                     run.holding = True
                     yield Arrived(point.held_with, arrived)
-                while not run.authority.covers(point.held_with) and not run.is_over:
+                while not run.may_pass(point.held_with) and not run.is_over:
                     await run.bell.wait(inf)
-                if not run.is_over:
+                # What is taken over just as it may go on has passed the point, and goes no further.
+                if not run.is_over or (run.is_taken_over and run.may_pass(point.held_with)):
                     since = self._loop.time()
                     for sync in self._leave_hold(run, point.held_with):
                         yield Reached(sync, since, arrived)
@@ -235,16 +248,16 @@ class SimulatedBody(Body):
                 run.pending.pop(0)
                 self._attention.follow_run(run, self._loop.time())
                 yield Reached(point.sync, due, due)
-        if run.cut_at is not None:
-            for sync in run.unreported:
-                yield Reached(sync, run.cut_at, run.cut_at)
-            run.pending.clear()
+        if run.is_beneath or run.is_taken_over:
+            for sync, due in run.passed_by(self._loop.time()):
+                run.pending.pop(0)
+                yield Reached(sync, due, due)
 
     def _leave_hold(self, run: Run, hold: str) -> list[str]:
         """Let `run` go on from a hold point, on a new path if it stands still. Returns the sync points it passes."""
         now = self._loop.time()
         stood, passed = run.stands, run.leave(hold, now)
-        if stood and not run.holding:
+        if stood and not run.holding and not run.is_over:
             legs = run.motion.path.after(run.motion.s(now), [point.sync for point in run.pending])
             if run.course.parts == ("head",):
                 legs = (head.way_back(self._tracks["head"].angles(now), self._attention.angles),)
@@ -259,6 +272,7 @@ class SimulatedBody(Body):
         limit = run.limit(run.motion.path)
         is_extended = limit > run.motion.limit
         run.motion.extend(limit, now)
+        run.brake_for_hold(now)
         if run.keep_pace(now) or is_extended:
             self._attention.follow_run(run, now)
 
@@ -275,7 +289,7 @@ class SimulatedBody(Body):
         run.motion.brake(self._loop.time())
         self._attention.expect("", 0.0, self._loop.time())
         until = run.motion.end + FREEZE
-        while run.cut_at is None and self._owns(run) and not run.bell.is_past(until):
+        while self._owns(run) and not run.bell.is_past(until):
             await run.bell.wait(until)
 
     def _owns(self, run: Run) -> bool:
@@ -313,21 +327,23 @@ class SimulatedBody(Body):
     ) -> AsyncGenerator[Progress, None]:
         """Change the base gaze while a `Gaze` lies over it: nothing moves until that ends. `end` comes as asked."""
         try:
-            self._attention.shift(behavior, choreography.plan(behavior, self._situation(self._world)))
+            course = choreography.plan(behavior, self._situation(self._world))
         except Impossible as impossible:
             raise BehaviorRefused(_fault(behavior, impossible.reason)) from impossible
+        self._set_base(behavior, course, authority)
         now = self._loop.time()
         yield Reached("start", now, now)
-        bell = Bell()
-        unwatch = authority.watch(bell.ring)
-        try:
-            while authority.revoked is None and not bell.is_past(due := authority.pace.get("end", now)):
-                await bell.wait(due)
-        finally:
-            unwatch()
-        if authority.revoked is None:
-            now = self._loop.time()
-            yield Reached("end", now, now)
+        async with aclosing(pass_end(authority)) as points:
+            async for progress in points:
+                yield progress
+
+    def _set_base(self, behavior: BlockBehavior, course: Course, authority: MovementAuthority) -> None:
+        """Make the goal of a shift the direction to which the head returns. A shift before it that has not ended is
+        taken over."""
+        if self._base is not None:
+            self._base.revoke("taken_over")
+        self._attention.shift(behavior, course)
+        self._base = authority
 
     def _follow(self) -> None:
         """Turn the head to follow the entity that it looks at, or is about to look at."""
@@ -352,34 +368,14 @@ class SimulatedBody(Body):
     async def _speak(self, behavior: Speech, authority: MovementAuthority) -> AsyncGenerator[Progress, None]:
         if self._deviations.mute == "refuse":
             raise BehaviorRefused(_fault(behavior, "the voice is mute"))
-        await self._wait_for_silence(authority)
+        await self._voice.wait_for_silence(authority)
         if authority.revoked is not None:
             return
-        if self._utterance is not None:
-            raise BehaviorRefused(_fault(behavior, f"the voice is busy with {self._saying!r}"))
         self._occasions += 1
         pace = 1.0 / variability.rate(self._deviations, ("voice",), behavior.id, self._occasions)
-        self._utterance, self._saying = authority, "" if self._deviations.mute else behavior.text
-        try:
-            async with aclosing(speaking.speak(behavior, authority, pace)) as utterance:
-                async for progress in utterance:
-                    if isinstance(progress, Reached) and progress.sync == "end":
-                        self._utterance, self._saying = None, ""
-                    yield progress
-        finally:
-            if self._utterance is authority:
-                self._utterance, self._saying = None, ""
-            self._voice_free.set()
-
-    async def _wait_for_silence(self, authority: MovementAuthority) -> None:
-        """Wait until an aborted speech has finished its current word; return at once if `authority` is revoked."""
-        unwatch = authority.watch(self._voice_free.set)
-        try:
-            while self._utterance is not None and self._utterance.revoked is not None and authority.revoked is None:
-                self._voice_free.clear()
-                await self._voice_free.wait()
-        finally:
-            unwatch()
+        async with aclosing(self._voice.speak(behavior, authority, pace)) as utterance:
+            async for progress in utterance:
+                yield progress
 
 
 def _fault(behavior: BlockBehavior, reason: str) -> Fault:

@@ -153,8 +153,7 @@ class Decisions:
         for behavior in sorted(touched.difference(beginning)):
             if behavior in self.facts.begun and not self.facts.has_ended(behavior):
                 effects += self._extension(behavior, now)
-        # Of two that begin together on one part, the body leaves it to the later command: the plan has the order.
-        for behavior in sorted(beginning, key=self.plan.entering.index) if len(beginning) > 1 else beginning:
+        for behavior in beginning:
             through = self.grants.extend(behavior, now)
             pace = self.foresight.paces[behavior] = self.foresight.pace(behavior, now, self.grants.may_pass)
             effects.append(Begin(behavior, self.plan.chains[behavior].points[through].sync, pace))

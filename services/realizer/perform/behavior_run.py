@@ -14,6 +14,7 @@ from engage_hri.services.realizer.decide.decisions import Decisions
 from engage_hri.services.realizer.decide.effects import Begin, Extend
 from engage_hri.services.realizer.perform.control_link import ControlLink
 from engage_hri.services.realizer.perform.futures import SyncPointFutures
+from engage_hri.services.realizer.perform.handed_over import has_lost_nothing, loss
 from engage_hri.services.realizer.perform.recognition_link import RecognitionLink
 from engage_hri.services.realizer.perform.spoken import Spoken
 from engage_hri.services.realizer.plan.planner import Plan
@@ -135,13 +136,14 @@ class BehaviorRun:
             block.lose(self.id, Fault(reason=f"control ended it with a {type(outcome).__name__}"))
             return
         block.spoken.end(outcome)
-        if outcome.status == "done":
-            end = Point(self.id, sync_points(behavior)[-1])
-            at = block.decisions.facts.plausible(end, block.bus.local(outcome.at), block.bus.now())
-            block.reach(end, at, by_body=True)
+        facts, end = block.decisions.facts, Point(self.id, sync_points(behavior)[-1])
+        at = facts.plausible(end, block.bus.local(outcome.at), block.bus.now())
+        if outcome.status == "taken_over":  # its last report may be lost
+            block.reach(Point(self.id, outcome.passed), at, by_body=True)
+        if has_lost_nothing(block.decisions.plan, outcome, facts.reached):
+            block.reach(end, at, by_body=outcome.status == "done")
         else:
-            fault = outcome.fault or Fault(reason=f"the body {outcome.status} it")
-            block.lose(self.id, fault, at_rest=outcome.status == "aborted")
+            block.lose(self.id, loss(outcome), at_rest=outcome.status != "failed")
 
     def _at_once(self) -> None:
         now = self._block.bus.now()

@@ -21,7 +21,7 @@ from engage_hri.schemas.units import Seconds
 from engage_hri.services.realizer.net.petri_net import PetriNet
 from engage_hri.services.realizer.plan.assembly import Assembler, Assembly, assembling
 from engage_hri.services.realizer.plan.deadlocks import Losses, clashes, judge
-from engage_hri.services.realizer.plan.handover import Arrangement, Conflict, Turn, arrange, entering
+from engage_hri.services.realizer.plan.handover import Arrangement, Conflict, Turn, arrange, kept_points
 from engage_hri.services.realizer.plan.instants import Classes
 from engage_hri.services.realizer.plan.phases import Chain, chain, natural_ends
 from engage_hri.services.realizer.plan.prediction import Impossible, predict
@@ -49,7 +49,8 @@ class Plan(Struct, frozen=True, kw_only=True):
     schedule: of each transition of the net, seconds from the block's start, if all goes as estimated.
     block: with a hand for each gesture that must use a certain one. critical: the transitions that make the block as
     long as it is, from first to last.
-    entering: behaviors in the order in which they take their parts: of two that begin at one instant, too.
+    kept: for each behavior, the last point that it must pass itself. Who takes its part, in whatever block, may save
+    it the rest.
     behaviors: those that will be performed, in document order. dropped: those that will not, with `problems`.
     natural: behaviors that end when something takes their place, or with the block.
     waited_for: behaviors that the end of the block waits for.
@@ -66,7 +67,7 @@ class Plan(Struct, frozen=True, kw_only=True):
     natural: frozenset[str]
     required: frozenset[str]
     waited_for: frozenset[str]
-    entering: tuple[str, ...]
+    kept: Mapping[str, Point]
     critical: tuple[int, ...] = ()
     dropped: tuple[str, ...] = ()
     problems: tuple[Problem, ...] = ()
@@ -191,7 +192,6 @@ class _Planner:
         waited_for = frozenset(self.chains) - self._unawaited_events(present)
         arrangement = Arrangement(natural=natural, spoken=self.order.current)
         assembler = yield from assembling(self.chains, present, classes, waited_for)
-        mentioned = {point.behavior for point in present.constrained}
         while True:
             assembler, assembly, solution = yield from self._solved(assembler, arrangement, classes)
             times = {point: solution.times[transition] for point, transition in assembly.at.items()}
@@ -227,7 +227,7 @@ class _Planner:
             natural=natural,
             required=present.required,
             waited_for=waited_for,
-            entering=entering(self.chains, mentioned, times, rounds),
+            kept=kept_points(self.chains, present, arrangement.handovers),
             critical=_critical(solution),
             dropped=tuple(self.dropped),
             problems=tuple(self.problems),
@@ -344,7 +344,7 @@ class _Planner:
                 assembler.waive(waits)
                 return (yield from self._solved(assembler, arrangement, classes))
             required = self.relations.required
-            turns = self.turns | self.order.turns
+            turns = self.turns | self.order.turns | set(arrangement.handovers.values())
             raise (
                 yield from judge(impossible, assembly, self.chains, required, classes, self.block.id, turns)
             ) from None
