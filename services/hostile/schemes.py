@@ -171,10 +171,10 @@ class Schemer:
         if kind is InterruptBehavior:
             return InterruptBehavior(id="", block=self._word("block"), behavior=chance.choice(("b1", "b2", "b9")))
         if kind is SteerPerformance:
-            to, block = chance.choice(("hold", "continue", "stop")), chance.choice(("", self._word("block")))
-            return SteerPerformance(
-                id="", to=to, block=block, behavior=chance.choice(("", "", "b1")) if block else ""
-            )
+            block = chance.choice(("", self._word("block")))
+            behavior = chance.choice(("", "", "b1")) if block else ""
+            wishes: tuple[Literal["hold", "continue", "stop"], ...] = ("hold", "continue", "stop")
+            return SteerPerformance(id="", to=chance.choice(wishes), block=block, behavior=behavior)
         if kind is PerformBehavior:
             behavior = plausible.block(chance, name, self._entities).behaviors[0]
             through = chance.choice(("start", "end", "relax"))

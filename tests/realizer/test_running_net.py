@@ -2,6 +2,7 @@
 
 import random
 from collections.abc import Mapping
+from math import inf
 
 import pytest
 from hypothesis import given, settings
@@ -24,8 +25,8 @@ def fired_by(plan: Plan, began: float, reached: Mapping[Point, float], now: floa
     """When each transition has fired, by the definition: all its behaviors, and all ripe tokens before it."""
     end = len(plan.net.transitions) - 1
     fired = {0: began}
-    leading = {end}
-    while more := {each.source for each in plan.net.places if each.kind != "idle" and each.target in leading} - leading:
+    leading, arcs = {end}, [(each.source, each.target) for each in plan.net.places if each.kind != "idle"]
+    while more := {source for source, target in arcs if target in leading} - leading:
         leading |= more
     changed = True
     while changed:
@@ -39,8 +40,8 @@ def fired_by(plan: Plan, began: float, reached: Mapping[Point, float], now: floa
                 times = [reached.get(member.point) for member in plan.members[transition]]
                 for place in plan.net.places:
                     if place.target == transition and place.kind in ("order", "delay", "series"):
-                        source = fired.get(place.source)
-                        times.append(None if source is None or source + place.lag > now + 1e-6 else source + place.lag)
+                        ripe = fired.get(place.source, inf) + place.lag
+                        times.append(ripe if ripe <= now + 1e-6 else None)
             if None not in times:
                 fired[transition] = max(each for each in times if each is not None)
                 changed = True
