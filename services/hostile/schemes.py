@@ -172,9 +172,9 @@ class Schemer:
             return InterruptBehavior(id="", block=self._word("block"), behavior=chance.choice(("b1", "b2", "b9")))
         if kind is SteerPerformance:
             block = chance.choice(("", self._word("block")))
-            behavior = chance.choice(("", "", "b1")) if block else ""
+            named = chance.choice(("", "", "b1")) if block else ""
             wishes: tuple[Literal["hold", "continue", "stop"], ...] = ("hold", "continue", "stop")
-            return SteerPerformance(id="", to=chance.choice(wishes), block=block, behavior=behavior)
+            return SteerPerformance(id="", to=chance.choice(wishes), block=block, behavior=named)
         if kind is PerformBehavior:
             behavior = plausible.block(chance, name, self._entities).behaviors[0]
             through = chance.choice(("start", "end", "relax"))
