@@ -61,21 +61,30 @@ class Timer:
 
 
 class Afterwards:
-    """A call of `ring` a few turns of the loop after `set`: after all that is under way by then."""
+    """A call of `ring` a few turns of the loop after the last `set`: after all that is under way by then.
 
-    TURNS = 3
-    """A task is woken in one turn and its message delivered in the next; its receiver is woken in the third."""
+    Nor later than `LONGEST` after the first.
+    """
+
+    TURNS = 5
+    """Turns until the answer to a message is here if it is made at once: a task is woken, the message is delivered, its
+    receiver is woken, the answer is delivered."""
+    LONGEST: Seconds = 0.005
 
     def __init__(self, ring: Callable[[], None]) -> None:
         self._ring = ring
         self._loop = asyncio.get_running_loop()
         self._left = 0
+        self._since: Seconds = 0.0
         self._handle: asyncio.Handle | None = None
 
     def set(self) -> None:
         if self._handle is None:
-            self._left = self.TURNS
+            self._since = self._loop.time()
             self._handle = self._loop.call_soon(self._turn)
+        elif self._loop.time() > self._since + self.LONGEST:
+            return
+        self._left = self.TURNS
 
     def stop(self) -> None:
         if self._handle is not None:

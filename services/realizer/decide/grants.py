@@ -108,7 +108,8 @@ class Grants:
         missing = [member for member in members if member.kind != "start" and not self._is_there(member)]
         may_pass = missing[0] if len(missing) == 1 and missing[0].can_wait else None
         ripe = max(self._facts.began, self._net.ripe_at(transition))
-        due = self._foresight.due(transition, ripe)
+        # Where all are there, and no bound holds them back, what was measured says enough.
+        due = self._foresight.due(transition, ripe) if missing or self._foresight.minds(transition) else ripe
         for member in missing:
             if member.point in self._pauses:
                 self._decide_pause(transition, member, due, now)

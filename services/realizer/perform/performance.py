@@ -37,6 +37,10 @@ from engage_hri.services.realizer.points import FINISH, Point
 from engage_hri.services.runtime.alarm import Afterwards, Timer
 
 
+NET_EVERY: Seconds = 0.05
+"""Least time between two messages about the marking of a net: nobody sees more of it."""
+
+
 class News(NamedTuple):
     """A sync point that is yet to be told: in feedback, and to other blocks."""
 
@@ -69,6 +73,7 @@ class BlockPerformance:
         self.futures = SyncPointFutures()
         self._held = held
         self._net = NetStream(shared.bus, plan.block.id)
+        self._net_timer = Timer(self._net.changed)
         self._report = Reporter(shared.bus, plan.block.id, shared.config.skew)
         self._runs = {id: BehaviorRun(self, id) for id in plan.chains}
         self._tasks: dict[str, asyncio.Task[None]] = {}
@@ -233,6 +238,7 @@ class BlockPerformance:
 
     def _close(self) -> None:
         self._timer.set(None)
+        self._net_timer.set(None)
         self._afterwards.stop()
         self._tell()
         for id in self._runs:
@@ -262,7 +268,8 @@ class BlockPerformance:
             self._report.expect(self.decisions.plan, self.decisions.began, foresight.expected(self.bus.now()))
         self._shared.live_blocks.foresee(self.plan.block.id, foresight.ahead)
         self._timer.set(None if self._ending.done() else self.decisions.deadline)
-        self._net.changed()
+        if self._net_timer.at is None:
+            self._net_timer.set(self.bus.now() + NET_EVERY)
 
     def _apply(self, effect: Effect) -> bool:
         """Carry out one decision; True if there is more to be decided then."""
@@ -303,10 +310,11 @@ class BlockPerformance:
 
     def reach(self, point: Point, at: Seconds, *, arrived: Seconds | None = None, by_body: bool = False) -> None:
         """Take the news that a behavior has passed `point`."""
-        for each in self.decisions.reach(point, at):
-            self._untold.append(News(each, at, arrived if each == point else None, by_body))
-            self.spoken.reach(each)
-        self._hurry()
+        if news := self.decisions.reach(point, at):
+            self._untold += [News(each, at, arrived if each == point else None, by_body) for each in news]
+            for each in news:
+                self.spoken.reach(each)
+            self._hurry()
 
     def _hurry(self) -> None:
         """Command at once what measured events alone release; all else follows soon."""
