@@ -67,8 +67,8 @@ class Afterwards:
     """
 
     TURNS = 5
-    """Turns until the answer to a message is here if it is made at once: a task is woken, the message is delivered, its
-    receiver is woken, the answer is delivered."""
+    """Turns until the answer to a message is here if it is made at once: a task is woken, the message is delivered,
+    its receiver is woken, the answer is delivered."""
     LONGEST: Seconds = 0.005
 
     def __init__(self, ring: Callable[[], None]) -> None:

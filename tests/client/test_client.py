@@ -12,7 +12,15 @@ from msgspec.structs import replace
 from engage_hri.schemas import keys
 from engage_hri.schemas.attention import Inhibit, InhibitionEnded
 from engage_hri.schemas.behaviors import Speech
-from engage_hri.schemas.blocks import BehaviorInterrupted, InterruptBehavior, PerformanceSteered, SteerPerformance
+from engage_hri.schemas.blocks import (
+    BehaviorInterrupted,
+    Block,
+    BlockOutcome,
+    InterruptBehavior,
+    PerformanceSteered,
+    PerformBlock,
+    SteerPerformance,
+)
 from engage_hri.schemas.faults import Fault, InputRefused, NoReply, RunFailed
 from engage_hri.schemas.fragments import FragmentOutcome, PerformFragment, TurnClosed, TurnFragment
 from engage_hri.schemas.recognition import ConnectionEvent, Statistics, WindowStatistics

@@ -36,7 +36,6 @@ from engage_hri.services.realizer.plan.relations import DROPPED
 from engage_hri.services.realizer.points import FINISH, Point
 from engage_hri.services.runtime.alarm import Afterwards, Timer
 
-
 NET_EVERY: Seconds = 0.05
 """Least time between two messages about the marking of a net: nobody sees more of it."""
 
