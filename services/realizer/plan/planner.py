@@ -6,7 +6,6 @@ between equals; any other permutation of a block gives the same net.
 """
 
 from collections.abc import Collection, Container, Iterable, Mapping, Sequence
-from typing import get_args
 
 from msgspec import Struct
 from msgspec.structs import replace
@@ -19,6 +18,7 @@ from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.feedback import WarningKind
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.realizer.net.petri_net import PetriNet
+from engage_hri.services.realizer.plan import unsupported
 from engage_hri.services.realizer.plan.assembly import Assembler, Assembly, Member, assembling
 from engage_hri.services.realizer.plan.deadlocks import Losses, clashes, judge
 from engage_hri.services.realizer.plan.handover import Arrangement, Conflict, Turn, arrange, entering
@@ -144,12 +144,13 @@ class _Planner:
 
     def _read(self, behavior: BlockBehavior) -> None:
         if isinstance(behavior, Unknown):
-            self._drop(behavior.id, "BEHAVIOR_TYPE_NOT_SUPPORTED", f"unknown element <{behavior.element}>")
+            self._drop(behavior.id, *unsupported.unknown(behavior))
         elif behavior.id in self.relations.unusable:
             self._refuse_if_required(behavior.id, "its timing names a sync point it does not have", "PARSING_FAILURE")
             self.dropped[behavior.id] = None
         elif (estimate := self.estimates.get(behavior.id)) and not estimate.feasible:
-            self._drop(behavior.id, _kind(estimate.warning), str(estimate.fault or "the body cannot do it"))
+            kind = unsupported.kind_of(estimate.warning)
+            self._drop(behavior.id, kind, str(estimate.fault or "the body cannot do it"))
         else:
             self.chains[behavior.id] = chain(behavior, estimate)
 
@@ -371,10 +372,6 @@ class _Planner:
             replace(each, mode=hand) if (hand := self.hands.get(each.id)) else each for each in self.block.behaviors
         ]
         return replace(self.block, behaviors=tuple(chosen))
-
-
-def _kind(warning: str) -> WarningKind:
-    return warning if warning in get_args(WarningKind) else "CANNOT_CREATE_BEHAVIOR"  # type: ignore[return-value]
 
 
 def _rounds(assembly: Assembly, times: Sequence[Seconds]) -> dict[Point, int]:

@@ -186,6 +186,7 @@ class _Reader:
             is_there = ref.block in self.elsewhere
         else:
             is_there = behavior is not None and sync in sync_points(behavior) and ref.repetition < 2
+            is_there |= isinstance(behavior, Unknown)  # It is dropped there, and the tie with it.
         if not is_there:
             advice = "the block it names must be running when this one comes"
             raise self.refusal(f"{text!r} is not a point of a live block", where, line, advice)
