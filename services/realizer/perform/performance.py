@@ -7,8 +7,6 @@ import asyncio
 from collections.abc import Callable, Iterable, Mapping
 from functools import partial
 
-from msgspec.structs import replace
-
 from engage_hri.schemas.behavior_types import sync_points
 from engage_hri.schemas.behaviors import BlockBehavior, Event, TurnSignal, Wait
 from engage_hri.schemas.blocks import Block, BlockOutcome
@@ -24,6 +22,7 @@ from engage_hri.services.realizer.decide.lateness import Late, Stalled
 from engage_hri.services.realizer.perform.control_link import ControlLink
 from engage_hri.services.realizer.perform.feedback import Reporter
 from engage_hri.services.realizer.perform.live import Ending, Live
+from engage_hri.services.realizer.perform.outcome import completed
 from engage_hri.services.realizer.perform.recognition_link import RecognitionLink
 from engage_hri.services.realizer.perform.shared_context import SharedContext
 from engage_hri.services.realizer.perform.spoken import Spoken
@@ -107,15 +106,11 @@ class BlockPerformance:
                     task.cancel()
         finally:
             self._close()
-        self._report.ended(ending.status, began)
+        ended, spoken = self._live.outcome, self.spoken.texts
+        outcome = completed(ended, self.plan.block, spoken, self._dropped, self._interrupted)
+        self._report.ended(outcome.status, began)
         self._shared.live_blocks.reach(self.plan.block.id, Point(BLOCK_ITSELF, "end"), self._bus.now())
-        return replace(
-            self._live.outcome,
-            spoken=self.spoken.texts,
-            dropped=tuple(id for id in self._dropped if id not in self._interrupted),
-            reasons=tuple(why for id, why in self._dropped.items() if id not in self._interrupted),
-            interrupted=tuple(id for id in self._dropped if id in self._interrupted),
-        )
+        return outcome
 
     def is_going_on(self, behavior: str) -> bool:
         """True if the behavior is of this block and has neither ended nor been dropped."""
