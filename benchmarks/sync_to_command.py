@@ -165,7 +165,7 @@ async def measure(laps: int, trips: int, links: int, as_json: bool) -> None:
 
 
 async def measure_inside(laps: int, trips: int, links: int, as_json: bool) -> None:
-    async with MemoryHub() as hub, running(hub, {"realizer": partial(realize, config=RealizerConfig())}):
+    async with MemoryHub(decodes=False) as hub, running(hub, {"realizer": partial(realize, config=RealizerConfig())}):
         report(await compare([Body(hub.join("control"), links)], laps, trips), as_json)
     for behaviors in (3, 50):
         size = await memory_per_block(behaviors)
@@ -175,7 +175,7 @@ async def measure_inside(laps: int, trips: int, links: int, as_json: bool) -> No
 
 async def memory_per_block(behaviors: int, blocks: int = 100) -> float:
     """kB that a realizer keeps for a block whose first behavior runs: plan, authority, tasks, requests."""
-    async with MemoryHub() as hub, running(hub, {"realizer": partial(realize, config=RealizerConfig())}):
+    async with MemoryHub(decodes=False) as hub, running(hub, {"realizer": partial(realize, config=RealizerConfig())}):
         bus = hub.join("control")
         desk, requests = RequestDesk(bus, "control", lambda cancel: None), Requester(bus)
         bus.answer(keys.ESTIMATE, estimate)
