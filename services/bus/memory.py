@@ -28,8 +28,8 @@ class Past(NamedTuple):
 
 
 DOCUMENTS = (PerformBlock, PerformFragment)
-"""Messages that are decoded in any case: a client may send one document twice, and one that is performed is known as the
-object that it is. They come once a block, and so cost nothing."""
+"""Messages that are decoded in any case: a client may send one document twice, and one that is performed is known as
+the object that it is. They come once a block, and so cost nothing."""
 
 
 class MemoryHub(Hub):

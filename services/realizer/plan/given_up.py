@@ -87,7 +87,7 @@ class Times:
 
 
 def times_of(speeches: Container[str], relations: Relations) -> Steps[Times]:
-    """What places these speeches. Nothing else of the relations can be given up."""
+    """Relations that place these speeches: nothing else can be given up."""
     times = Times(relations)
     yield from times.read(speeches)
     return times
