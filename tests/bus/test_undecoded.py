@@ -10,7 +10,7 @@ from msgspec import Struct
 from engage_hri.schemas import keys
 from engage_hri.schemas.behaviors import Gesture, Speech, Timing
 from engage_hri.schemas.blocks import Block, PerformBlock
-from engage_hri.schemas.feedback import WarningFeedback
+from engage_hri.schemas.feedback import SyncPointProgress, WarningFeedback
 from engage_hri.schemas.fragments import TurnFragment
 from engage_hri.schemas.messages import Message, published
 from engage_hri.schemas.status import AskStatus
@@ -108,9 +108,9 @@ async def test_what_cannot_be_sent_is_refused_at_its_sender(decodes: bool) -> No
         bus.answer(keys.ESTIMATE, lambda message: message)
         with bus.subscribe(keys.FEEDBACK) as inbox:
             for bad in (object(), "\udc80"):
-                warning = WarningFeedback(block="b", kind="LATE", message=bad)  # type: ignore[arg-type]
+                point = SyncPointProgress(block="b", behavior=bad, sync="end", at=bus.stamp(), time=0.0)  # type: ignore[arg-type]
                 with pytest.raises((TypeError, UnicodeEncodeError)):
-                    bus.publish(keys.FEEDBACK, warning)
+                    bus.publish(keys.FEEDBACK, point)
             assert len(inbox) == 0
 
 
