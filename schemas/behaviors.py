@@ -238,10 +238,13 @@ class TurnSignal(Behavior, frozen=True, kw_only=True, tag="turn", omit_defaults=
 
 
 class Unknown(Behavior, frozen=True, kw_only=True, tag="unknown", omit_defaults=True):
-    """A behavior of a type that is not known here: dropped with a warning; if it is required, the block fails."""
+    """A behavior of a type that is not known here: dropped with a warning; if it is required, the block fails.
+
+    element: name of its element, with the prefix that it has there. namespace: empty, unless it is not BML's.
+    """
 
     element: str
-    """Name of its element."""
+    namespace: str = ""
 
 
 class SpeechOption(Struct, frozen=True, kw_only=True, omit_defaults=True):

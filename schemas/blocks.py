@@ -120,7 +120,7 @@ class BlockOutcome(Outcome, frozen=True, kw_only=True, tag="block_outcome", omit
     """evt: realizer -> requester: the end of a block. Exactly one for each accepted block.
 
     replaced_by: the block whose `REPLACE` ended it, if its status is `interrupted` for that reason.
-    fault: why it failed.
+    fault: why it failed; also if it had behaviors and every one was dropped.
     """
 
     block: str

@@ -8,10 +8,12 @@ from engage_hri.schemas.units import Seconds, Stamp
 
 WarningKind = Literal[
     "PARSING_FAILURE", "NO_SUCH_TARGET", "IMPOSSIBLE_TO_SCHEDULE", "BEHAVIOR_TYPE_NOT_SUPPORTED",
+    "CUSTOM_BEHAVIOR_NOT_SUPPORTED", "CUSTOM_ATTRIBUTE_NOT_SUPPORTED",
     "CANNOT_CREATE_BEHAVIOR", "EXECUTION_FAILURE", "LATE", "POLICY",
     "INTERRUPTED",
 ]  # fmt: skip
-"""INTERRUPTED: a behavior was ended on request.
+"""CUSTOM_BEHAVIOR_NOT_SUPPORTED, CUSTOM_ATTRIBUTE_NOT_SUPPORTED: it is of a namespace that is not BML's.
+INTERRUPTED: a behavior was ended on request.
 POLICY: generation performs a fragment otherwise than it asks, for example with a less reliable reference."""
 
 

@@ -15,7 +15,17 @@ from lxml import etree
 
 from engage_hri.schemas import behaviors as of
 from engage_hri.schemas.behavior_types import TYPES, BehaviorType
-from engage_hri.schemas.documents.xml_source import CORE, EBML, bml_children, children_named, local_name, split
+from engage_hri.schemas.documents.xml_source import (
+    CORE,
+    EBML,
+    bml_children,
+    children_named,
+    foreign_attributes,
+    foreign_children,
+    local_name,
+    prefixed_name,
+    split,
+)
 from engage_hri.schemas.syncref import SYNC_POINTS
 
 AnyStruct = TypeVar("AnyStruct", bound=msgspec.Struct)
@@ -55,7 +65,8 @@ LISTS = {
 }  # fmt: skip
 """Fields that are a list of elements: the element of an item, and the attribute with its value."""
 _OTHER_ATTRIBUTES = {
-    "bml": ("composition", "characterId"), "face": ("overshoot",), "sync": ("ref",),
+    "bml": ("composition", "characterId"), "face": ("overshoot",),
+    "sync": ("ref",), "mark": ("name", "ref"), "tm": ("name", "ref"),
     **dict.fromkeys(OPERATORS, ("ref",)),
 }  # fmt: skip
 
@@ -123,6 +134,15 @@ def misplaced(element: etree._Element) -> Iterator[tuple[etree._Element, str, st
             yield child, name, holder
         elif name not in _FREE:
             yield from misplaced(child)
+
+
+def foreign_parts(element: etree._Element) -> Iterator[str]:
+    """Find what other namespaces add to an element and to those inside it, but not inside a <description>."""
+    yield from foreign_attributes(element)
+    yield from (f"<{prefixed_name(child)}>" for child, _ in foreign_children(element))
+    for child, _, name in bml_children(element):
+        if name != "description":
+            yield from foreign_parts(child)
 
 
 def behaviors_inside(speech: etree._Element, *, is_strict: bool) -> Iterator[etree._Element]:

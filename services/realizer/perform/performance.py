@@ -9,8 +9,6 @@ from collections.abc import Callable, Collection, Iterable, Mapping
 from functools import partial
 from typing import NamedTuple
 
-from msgspec.structs import replace
-
 from engage_hri.schemas.blocks import Block, BlockOutcome
 from engage_hri.schemas.body import SyncPointArrived, SyncPointReached
 from engage_hri.schemas.faults import Fault, InputRefused
@@ -28,6 +26,7 @@ from engage_hri.services.realizer.perform.feedback import Reporter
 from engage_hri.services.realizer.perform.futures import SyncPointFutures
 from engage_hri.services.realizer.perform.live import Ending, Live
 from engage_hri.services.realizer.perform.net_stream import NetStream
+from engage_hri.services.realizer.perform.outcome import completed
 from engage_hri.services.realizer.perform.recognition_link import RecognitionLink
 from engage_hri.services.realizer.perform.shared_context import SharedContext
 from engage_hri.services.realizer.perform.spoken import Spoken
@@ -130,15 +129,10 @@ class BlockPerformance:
                     task.cancel()
         finally:
             self._close()
-        self._report.ended(ending.status, began)
+        outcome = completed(self._live.outcome, self.plan.block, self.spoken.texts, self._dropped, self._interrupted)
+        self._report.ended(outcome.status, began)
         self._shared.live_blocks.reach(block, Point(BLOCK_ITSELF, "end"), self.bus.now())
-        return replace(
-            self._live.outcome,
-            spoken=self.spoken.texts,
-            dropped=tuple(id for id in self._dropped if id not in self._interrupted),
-            reasons=tuple(why for id, why in self._dropped.items() if id not in self._interrupted),
-            interrupted=tuple(id for id in self._dropped if id in self._interrupted),
-        )
+        return outcome
 
     def _observers(self, plan: Plan, net: RunningNet, began: Seconds) -> tuple[Observer, ...]:
         self._net.planned(plan, net, began)
