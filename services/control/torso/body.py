@@ -32,6 +32,7 @@ from engage_hri.services.control.torso.course import Course, CoursePoint, Imposs
 from engage_hri.services.control.torso.estimates import infeasible, motion_estimate, speech_estimate, wait_estimate
 from engage_hri.services.control.torso.head import Fixation
 from engage_hri.services.control.torso.motion import Motion, Path, resting
+from engage_hri.services.control.torso.repertoire import BUILT_IN, Repertoire
 from engage_hri.services.control.torso.runs import OVERHEAT, STALL, Run
 from engage_hri.services.control.torso.tracks import Track
 from engage_hri.services.control.voice import speaking
@@ -45,12 +46,18 @@ FREEZE: Seconds = 0.5
 class SimulatedBody(Body):
     """A simulated torso with a voice. Behaviors take as long as `estimate` says, but for `deviations`."""
 
-    def __init__(self, zones: tuple[NoPointZone, ...] = (), deviations: Variability | None = None) -> None:
+    def __init__(
+        self,
+        zones: tuple[NoPointZone, ...] = (),
+        deviations: Variability | None = None,
+        repertoire: Repertoire = BUILT_IN,
+    ) -> None:
         self.capabilities = Capabilities(
             body="simulated", types=tuple(map(type_name, choreography.TYPES)), parts=(*kinematics.PARTS, "voice"),
             joints=kinematics.JOINTS, reach=kinematics.REACH, no_point_zones=zones,
         )  # fmt: skip
         self._deviations = deviations or Variability()
+        self._repertoire = repertoire
         self._loop = asyncio.get_running_loop()
         displaced = {joint.joint: radians(joint.angle) for joint in self._deviations.displaced}
         self._misbelieved = {joint: kinematics.HOME[joint] for joint in displaced}
@@ -116,7 +123,8 @@ class SimulatedBody(Body):
     def _situation(self, world: World, pose: BodyPose | None = None, *, real: bool = False) -> Situation:
         """Describe what a course starts from. real: with the true joint angles, not those that the body believes."""
         now = self._loop.time()
-        here: dict[str, float] = {}
+        here = {"neck_roll": 0.0}
+        """A tilt is on top of the gaze, like a nod: it is no part of where the head is."""
         for part, track in self._tracks.items():
             if part != "nod":
                 # Head and arms aim for where the torso is going to be.
@@ -126,7 +134,8 @@ class SimulatedBody(Body):
             here.update(self._misbelieved)
         rest = {**kinematics.HOME, **dict(zip(tracks.NECK, self._attention.angles, strict=True))}
         zones = self.capabilities.no_point_zones
-        return Situation(tracks.updated(here, pose), rest, world, zones, tuple(self._runs))
+        busy = tuple(self._runs)
+        return Situation(tracks.updated(here, pose), rest, world, zones, busy, self._repertoire)
 
     def _path(self, course: Course, situation: Situation | None = None) -> Path:
         """Lay a path along `course`. Raises Impossible.

@@ -1,6 +1,7 @@
 """Tracks: the motion of each part of the simulated torso, and the pose they add up to. Pure: time is an argument.
 
 The head has two tracks: gaze, and a nod on top of it. They share the neck's limits, so that their sum keeps them.
+Only the nod tilts the head.
 """
 
 from collections.abc import Mapping, Sequence
@@ -10,8 +11,9 @@ import numpy as np
 
 from engage_hri.schemas.body import BodyPose, JointLimit
 from engage_hri.schemas.units import Seconds
-from engage_hri.services.control.torso import choreography, kinematics
+from engage_hri.services.control.torso import kinematics
 from engage_hri.services.control.torso.motion import JointMotion, Leg, Motion, Path, resting
+from engage_hri.services.control.torso.pace import return_time, turning_time
 
 NECK = ("neck_yaw", "neck_pitch")
 GAZE_SHARE = 0.7
@@ -25,7 +27,7 @@ def _neck_limits(share: float, reserve: float | None) -> tuple[JointLimit, ...]:
     """
     limits = []
     for limit in (kinematics.LIMIT[joint] for joint in NECK):
-        low, high = -choreography.NOD_RESERVE, choreography.NOD_RESERVE
+        low, high = -kinematics.NOD_RESERVE, kinematics.NOD_RESERVE
         if reserve is not None:
             low, high = limit.low + reserve, limit.high - reserve
         limits.append(
@@ -37,8 +39,8 @@ def _neck_limits(share: float, reserve: float | None) -> tuple[JointLimit, ...]:
 
 
 LIMITS: Mapping[str, tuple[JointLimit, ...]] = {
-    "head": _neck_limits(GAZE_SHARE, choreography.NOD_RESERVE),
-    "nod": _neck_limits(1.0 - GAZE_SHARE, None),
+    "head": _neck_limits(GAZE_SHARE, kinematics.NOD_RESERVE),
+    "nod": (*_neck_limits(1.0 - GAZE_SHARE, None), kinematics.LIMIT["neck_roll"]),
     **{
         part: tuple(kinematics.LIMIT[joint] for joint in kinematics.joints_of(part))
         for part in ("torso", "left_arm", "right_arm", "face")
@@ -82,7 +84,7 @@ class Track:
     def return_to(self, goal: tuple[float, ...], now: Seconds) -> None:
         """Leave the current motion and go to rest at `goal`, by a path that is clear of the table."""
         start = self.at(now)
-        time = choreography.turning_time if self.part in ("head", "nod") else choreography.return_time
+        time = turning_time if self.part in ("head", "nod") else return_time
         seconds = time(self.angles(now), goal)
         direct = Path(start, (Leg(goal=goal, seconds=seconds),), LIMITS[self.part])
         if not meets_table(direct, self.joints):

@@ -152,6 +152,9 @@ class _Planner:
             self._drop(behavior.id, _kind(estimate.warning), str(estimate.fault or "the body cannot do it"))
         else:
             self.chains[behavior.id] = chain(behavior, estimate)
+            if estimate and estimate.degraded:
+                line = self.lines[behavior.id]
+                self.problems.append(Problem("DEGRADED", at_line(line, estimate.degraded), behavior.id))
 
     def _refuse_if_required(self, id: str, reason: str, kind: WarningKind) -> None:
         if id in self.relations.required:
@@ -230,7 +233,9 @@ class _Planner:
             entering=entering(self.chains, mentioned, times, rounds),
             critical=_critical(solution),
             dropped=tuple(self.dropped),
-            problems=tuple(self.problems),
+            problems=tuple(
+                one for one in self.problems if one.kind != "DEGRADED" or one.behavior not in self.dropped
+            ),
         )
 
     def _present(self) -> Steps[tuple[Relations, Classes]]:
