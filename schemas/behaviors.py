@@ -189,8 +189,9 @@ class Pose(Behavior, frozen=True, kw_only=True, tag="pose", omit_defaults=True):
 
 def posed(behavior: Posture | PostureShift | Pose) -> tuple[PartPose, ...]:
     """List the poses of a posture, be they one or several."""
-    several = () if isinstance(behavior, Pose) else behavior.poses
-    return several or (PartPose(lexeme=behavior.lexeme, part=behavior.part),)
+    further = () if isinstance(behavior, Pose) else behavior.poses
+    is_given = behavior.lexeme or behavior.part or not further
+    return (*([PartPose(lexeme=behavior.lexeme, part=behavior.part)] if is_given else ()), *further)
 
 
 def expressed(behavior: Face | FaceLexeme | FaceFacs | FaceShift) -> tuple[Expression, ...]:
@@ -201,7 +202,7 @@ def expressed(behavior: Face | FaceLexeme | FaceFacs | FaceShift) -> tuple[Expre
         case FaceFacs(au=au, side=side):
             return (Expression(au=au, side=side),)
         case FaceShift(lexeme=lexeme, au=au, side=side) if lexeme or au:
-            return (Expression(lexeme=lexeme, au=au, side=side),)
+            return (Expression(lexeme=lexeme, au=au, side=side), *behavior.expressions)
     return behavior.expressions
 
 

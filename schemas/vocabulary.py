@@ -11,7 +11,6 @@ from functools import cache
 
 from msgspec import Struct
 
-from engage_hri.schemas.behavior_types import TYPES
 from engage_hri.schemas.blocks import Dialect
 
 Values = tuple[str, ...]
@@ -135,9 +134,10 @@ def definition(element: str, attribute: str = "") -> str:
     return ""
 
 
-def is_behavior(element: str) -> bool:
-    """Tell whether an element is a behavior of a dialect that no struct of ours has."""
-    return bool(definition(element)) and element not in TYPES and element not in ("lexeme", "facs", "stance")
+def unperformed(element: str) -> str:
+    """Reason why a behavior that no struct of ours has is dropped: nobody knows it, or no body performs it."""
+    dialect = definition(element)
+    return f"<{element}>, which {dialect} has, is performed by no body" if dialect else f"unknown element <{element}>"
 
 
 def is_defined(table: str, lexeme: str) -> bool:
@@ -150,7 +150,7 @@ def _lexemes() -> Mapping[str, frozenset[str]]:
     face, gesture, head = DRAFT["face"], DRAFT["gesture"], DRAFT["head"]
     return {
         "gesture": frozenset({*BML_1_0["gesture"]["lexeme"], *gesture["type"]} - {"POINT", "LEXICALIZED"}),
-        "head": frozenset({*BML_1_0["head"]["lexeme"], *head["rotation"], *head["orientation"]}),
+        "head": frozenset({*BML_1_0["head"]["lexeme"], *head["rotation"], *head["orientation"]} - {*"XYZ"}),
         "face": frozenset({*_FACES, *face["type"], *(shape for each in SHAPES for shape in shapes(each))} - {"FACS"}),
         "facs": frozenset(_UNITS),
         "pose": frozenset(BML_1_0["pose"]["lexeme"]),

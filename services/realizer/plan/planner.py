@@ -18,6 +18,7 @@ from engage_hri.schemas.body import Estimate
 from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.feedback import WarningKind
 from engage_hri.schemas.units import Seconds
+from engage_hri.schemas.vocabulary import unperformed
 from engage_hri.services.realizer.net.petri_net import PetriNet
 from engage_hri.services.realizer.plan.assembly import Assembler, Assembly, Member, assembling
 from engage_hri.services.realizer.plan.deadlocks import Losses, clashes, judge
@@ -144,7 +145,7 @@ class _Planner:
 
     def _read(self, behavior: BlockBehavior) -> None:
         if isinstance(behavior, Unknown):
-            self._drop(behavior.id, "BEHAVIOR_TYPE_NOT_SUPPORTED", f"unknown element <{behavior.element}>")
+            self._drop(behavior.id, "BEHAVIOR_TYPE_NOT_SUPPORTED", unperformed(behavior.element))
         elif behavior.id in self.relations.unusable:
             self._refuse_if_required(behavior.id, "its timing names a sync point it does not have", "PARSING_FAILURE")
             self.dropped[behavior.id] = None
