@@ -72,7 +72,8 @@ def test_each_standard_type_is_in_the_inventory() -> None:
 @pytest.mark.parametrize(
     ("table", "lexeme", "is_defined"),
     [
-        ("gesture", "beat", True), ("gesture", "CONDUIT", True), ("gesture", "POINT", False), ("gesture", "WAVE", False),
+        ("gesture", "beat", True), ("gesture", "CONDUIT", True), ("gesture", "POINT", False),
+        ("gesture", "WAVE", False),
         ("head", "up-left", True), ("head", "X", False), ("face", "EYEBROWS_POINT_UP", True), ("face", "FACS", False),
         ("facs", "12", True), ("facs", "99", False), ("stance", "LYING", True), ("pose", "LEGS_OPEN", True),
     ],
