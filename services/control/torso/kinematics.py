@@ -73,9 +73,9 @@ def _arm_joints(side: Side, inward: int) -> list[tuple[JointLimit, float]]:
 _TABLE = [
     _joint("torso_turn", "torso", -30, 30, 60, 300),
     _joint("torso_lean", "torso", -15, 25, 60, 300),
-    _joint("neck_yaw", "head", -85, 85, 400, 6000),
-    _joint("neck_pitch", "head", -80, 40, 400, 6000),
-    _joint("neck_roll", "head", -20, 20, 120, 1800),
+    _joint("neck_yaw", "head", -85, 85, 500, 10_000),
+    _joint("neck_pitch", "head", -80, 40, 500, 10_000),
+    _joint("neck_roll", "head", -20, 20, 150, 3000),
     *_arm_joints("left", inward=-1),
     *_arm_joints("right", inward=1),
     _face_joint("left_brow", -1.0),
