@@ -88,7 +88,7 @@ DRAFT: Mapping[str, Attributes] = {
     },
     "lips": {"viseme": FREE, "articulation": FREE, "flapping": FREE},
     "torso": {}, "body": {}, "legs": {},
-    "speech": {"type": FREE},
+    "speech": {},
     "emit": {"event": FREE},
     "wait": {"duration": FREE},
 }  # fmt: skip

@@ -11,7 +11,6 @@ from typing import Literal, NamedTuple
 from engage_hri.schemas.behaviors import Emit, Speech, Unknown, Wait
 from engage_hri.schemas.documents.xml_decode import decode_xml
 from engage_hri.schemas.documents.xml_source import BML_1_0, DRAFT
-from engage_hri.schemas.references import type_name
 from engage_hri.schemas.vocabulary import NAMES, Term, terms
 from engage_hri.schemas.world import Entity, World
 from engage_hri.services.control.torso import kinematics
@@ -22,50 +21,70 @@ PAGE = Path(__file__).resolve().parents[2] / "docs" / "vocabulary.md"
 HEAD = """\
 # What the simulated body does with BML
 
-Everything that BML 1.0 and the draft of 2007 define, as `schemas/vocabulary.py` lists it: elements, attributes, and the
-values of attributes. Performed is what needs no warning. What is degraded is performed with one warning (`DEGRADED`)
-that names what was asked and what is done instead. What is dropped costs the behavior, with one warning. A repertoire file
-([control.md](control.md)) changes it: lexemes of yours, or others for these. This page is made from the code: `make generate`.
+Everything that BML 1.0 and the draft of 2007 define, as `schemas/vocabulary.py` lists it: elements, attributes, and
+the values of attributes. What is performed needs no warning. What is degraded is performed with one warning
+(`DEGRADED`) that names what was asked and what is done instead; an attribute that is ignored costs only itself. What
+is dropped costs the behavior, with one warning. Your repertoire file ([control.md](control.md)) adds lexemes, or does
+others for these. This page is made from the code: `make generate`.
 """
+COLUMNS = "| element | attribute | performed | degraded | dropped |\n|---|---|---|---|---|"
 WORLD = World(
     entities=(
         Entity(id="human", kind="person", position=(1.3, 0.0, 1.2)),
         Entity(id="cup", kind="object", position=(0.45, -0.25, 0.73), radius=0.03),
     )
 )
-SAMPLES: Mapping[str, str] = {
+VALUES: Mapping[str, str] = {
     "target": "cup", "offsetAngle": "10", "amount": "0.6", "overshoot": "0.2", "repetition": "2", "repeats": "2",
-    "duration": "0.5", "event": "e", "proximity": "1", "velocity": "1", "dynamic": "true", "facing": "LEFT",
-    "lexeme": "BEAT", "offset": "0.5", "separation": "0.5", "viseme": "A", "articulation": "0.5", "flapping": "true",
-    "au": "12", "side": "LEFT",
+    "duration": "0.5", "event": "e", "dynamic": "true", "facing": "LEFT", "lexeme": "BEAT", "viseme": "A",
+    "flapping": "true", "au": "12", "side": "LEFT",
 }  # fmt: skip
-"""Values of attributes that may have any."""
-NEEDED: Mapping[str, str] = {
-    "gaze": 'target="cup"', "gazeShift": 'target="cup"', "gesture": 'lexeme="BEAT"', "pointing": 'target="cup"',
-    "head": 'lexeme="NOD"', "headDirectionShift": 'target="cup"', "faceLexeme": 'lexeme="SMILE"',
-    "faceFacs": 'au="12"', "locomotion": 'target="cup"', "emit": 'event="e"', "wait": 'duration="0.5"',
-    "lexeme": 'lexeme="SMILE"', "facs": 'au="12"', "stance": 'type="STANDING"', "pose": 'lexeme="ARMS_OPEN"',
+"""Values of attributes that may have any; others get the number 1."""
+NEEDED: Mapping[str, Mapping[str, str]] = {
+    "gaze": {"target": "cup"}, "gazeShift": {"target": "cup"}, "gesture": {"lexeme": "BEAT"},
+    "pointing": {"target": "cup"}, "head": {"lexeme": "NOD"}, "headDirectionShift": {"target": "cup"},
+    "faceLexeme": {"lexeme": "SMILE"}, "faceFacs": {"au": "12"}, "locomotion": {"target": "cup"},
+    "emit": {"event": "e"}, "wait": {"duration": "0.5"}, "lexeme": {"lexeme": "SMILE"}, "facs": {"au": "12"},
+    "stance": {"type": "STANDING"}, "pose": {"lexeme": "ARMS_OPEN"},
 }  # fmt: skip
 """Attributes without which an element says nothing."""
-INSIDE: Mapping[str, tuple[str, str]] = {
-    "lexeme": ('<face id="x">', "</face>"), "facs": ('<face id="x">', "</face>"),
-    "stance": ('<posture id="x">', "</posture>"), "pose": ('<posture id="x">', "</posture>"),
-}  # fmt: skip
-"""Elements that stand in others."""
 CONTENT: Mapping[str, str] = {
     "face": '<lexeme lexeme="SMILE"/>', "faceShift": '<lexeme lexeme="SMILE"/>', "speech": "<text>Hello.</text>",
     "posture": '<pose part="ARMS" lexeme="ARMS_OPEN"/>', "postureShift": '<pose part="ARMS" lexeme="ARMS_OPEN"/>',
 }  # fmt: skip
-"""Content without which an element says nothing."""
-TOGETHER: Mapping[tuple[str, str], str] = {
-    ("gaze", "offsetDirection"): 'offsetAngle="10"', ("gaze", "offsetAngle"): 'offsetDirection="UP"',
-    ("gazeShift", "offsetDirection"): 'offsetAngle="10"', ("gazeShift", "offsetAngle"): 'offsetDirection="UP"',
-    ("face", "eyebrow"): 'type="EYEBROWS"', ("face", "eyelid"): 'type="EYELIDS"', ("face", "mouth"): 'type="MOUTH"',
-    ("face", "au"): 'type="FACS"', ("face", "side"): 'type="FACS" au="12"', ("face", "amount"): 'type="MOUTH"',
-    ("face", "separation"): 'type="EYEBROWS"', ("face", "overshoot"): "",
-}  # fmt: skip
-"""What an attribute only makes sense with."""
-_MEANS_LEXEME = ("lexeme", "type", "action", "rotation", "orientation")
+"""Elements without which an element says nothing."""
+INSIDE: Mapping[str, str] = {"lexeme": "face", "facs": "face", "stance": "posture", "pose": "posture"}
+"""Elements that stand in others."""
+WRITTEN: Mapping[tuple[str, str], str] = {
+    ("lexeme", "lexeme"): '<lexeme lexeme="SMILE"/>',
+    ("gaze", "offsetAngle"): '<gaze id="x" target="cup" offsetAngle="{}" offsetDirection="UP"/>',
+    ("gaze", "offsetDirection"): '<gaze id="x" target="cup" offsetAngle="10" offsetDirection="{}"/>',
+    ("gazeShift", "offsetAngle"): '<gazeShift id="x" target="cup" offsetAngle="{}" offsetDirection="UP"/>',
+    ("gazeShift", "offsetDirection"): '<gazeShift id="x" target="cup" offsetAngle="10" offsetDirection="{}"/>',
+    ("gesture", "type"): '<gesture id="x" type="{}"/>',
+    ("gesture", "type=POINT"): '<gesture id="x" type="{}" target="cup"/>',
+    ("gesture", "type=LEXICALIZED"): '<gesture id="x" type="{}" lexeme="WAVE"/>',
+    ("gesture", "target"): '<gesture id="x" type="POINT" target="{}"/>',
+    ("head", "action=ROTATION"): '<head id="x" action="{}" rotation="NOD"/>',
+    ("head", "action=ORIENTATION"): '<head id="x" action="{}" orientation="UP"/>',
+    ("head", "rotation"): '<head id="x" action="ROTATION" rotation="{}"/>',
+    ("head", "orientation"): '<head id="x" action="ORIENTATION" orientation="{}"/>',
+    ("face", "type"): '<face id="x" type="{}"/>',
+    ("face", "type=FACS"): '<face id="x" type="{}" au="12"/>',
+    ("face", "eyebrow"): '<face id="x" type="EYEBROWS" eyebrow="{}"/>',
+    ("face", "eyelid"): '<face id="x" type="EYELIDS" eyelid="{}"/>',
+    ("face", "mouth"): '<face id="x" type="MOUTH" mouth="{}"/>',
+    ("face", "separation"): '<face id="x" type="EYEBROWS" separation="{}"/>',
+    ("face", "au"): '<face id="x" type="FACS" au="{}"/>',
+    ("face", "side"): '<face id="x" type="FACS" au="12" side="{}"/>',
+    ("posture", "stance"): '<posture id="x" stance="{}"/>',
+    ("pose", "part=LEGS"): '<pose part="{}" lexeme="LEGS_CROSSED"/>',
+    ("pose", "part=LEFT_LEG"): '<pose part="{}" lexeme="LEGS_CROSSED"/>',
+    ("pose", "part=RIGHT_LEG"): '<pose part="{}" lexeme="LEGS_CROSSED"/>',
+    ("pose", "part=HEAD"): '<pose part="{}" lexeme="LEANING_FORWARD"/>',
+    ("pose", "part=WHOLEBODY"): '<pose part="{}" lexeme="LEANING_FORWARD"/>',
+}
+"""Elements that need something else beside an attribute, or beside one value of it."""
 Outcome = Literal["performed", "degraded", "dropped"]
 
 
@@ -78,38 +97,18 @@ class Told(NamedTuple):
 
 def sample(term: Term) -> str:
     """Write a block with one behavior `x` that uses the term."""
-    given = f'{term.attribute}="{term.value or SAMPLES.get(term.attribute, "1")}"' if term.attribute else ""
-    beside = TOGETHER.get((term.element, term.attribute), "")
-    if (term.element, term.attribute, term.value) == ("face", "type", "FACS"):
-        beside = 'au="12"'
-    if term.element == "gesture" and term.attribute in ("type", "target"):
-        beside = _beside_type(term)
-    if (term.element, term.attribute) == ("pose", "part"):
-        beside = 'lexeme="ARMS_OPEN"' if "ARM" in term.value else 'lexeme="LEANING_FORWARD"'
-        beside = 'lexeme="LEGS_CROSSED"' if "LEG" in term.value else beside
-    if (term.element, term.attribute, term.value) == ("head", "action", "ROTATION"):
-        beside = 'rotation="NOD"'
-    if (term.element, term.attribute, term.value) == ("head", "action", "ORIENTATION"):
-        beside = 'orientation="UP"'
-    needed = NEEDED.get(term.element, "")
-    is_said = needed.partition("=")[0] in f"{given} {beside}" or term.attribute in _MEANS_LEXEME or "type=" in beside
-    attributes = " ".join(filter(None, ("" if is_said and needed else needed, beside, given)))
-    is_whole = term.element in INSIDE
-    id, content = ("" if is_whole else ' id="x"'), "" if "type=" in attributes else CONTENT.get(term.element, "")
-    if term.element == "speech":
-        content = CONTENT["speech"]
-    if (term.element, term.attribute) == ("posture", "stance"):
-        content = ""
-    before, after = INSIDE.get(term.element, ("", ""))
-    namespace = BML_1_0 if term.dialect == "bml-1.0" else DRAFT
-    element = f"<{term.element}{id} {attributes}>{content}</{term.element}>"
-    return f'<bml xmlns="{namespace}" id="b">{before}{element}{after}</bml>'
-
-
-def _beside_type(term: Term) -> str:
-    if term.value == "POINT" or term.attribute == "target":
-        return 'type="POINT"' if term.attribute == "target" else 'target="cup"'
-    return 'lexeme="WAVE"' if term.value == "LEXICALIZED" else ""
+    element, attribute = term.element, term.attribute
+    value = term.value or VALUES.get(attribute, "1")
+    written = WRITTEN.get((element, f"{attribute}={value}")) or WRITTEN.get((element, attribute))
+    if written is None:
+        given = {**NEEDED.get(element, {}), **({attribute: value} if attribute else {})}
+        id = "" if element in INSIDE else ' id="x"'
+        attributes = "".join(f' {name}="{said}"' for name, said in given.items())
+        written = f"<{element}{id}{attributes}>{CONTENT.get(element, '')}</{element}>"
+    xml = written.format(value)
+    if around := INSIDE.get(element):
+        xml = f'<{around} id="x">{xml}</{around}>'
+    return f'<bml xmlns="{BML_1_0 if term.dialect == "bml-1.0" else DRAFT}" id="b">{xml}</bml>'
 
 
 def told(term: Term) -> Told:
@@ -140,18 +139,19 @@ def _rows() -> Iterator[str]:
     for (name, element, attribute), found in groups.items():
         if name != dialect:
             dialect = name
-            yield f"\n## {name[0].upper()}{name[1:]}\n\n| element | attribute | performed | degraded | dropped |\n|---|---|---|---|---|"
+            yield f"\n## {name[0].upper()}{name[1:]}\n\n{COLUMNS}"
         cells = [_cell(found, outcome) for outcome in ("performed", "degraded", "dropped")]
         yield f"| `{element}` | {f'`{attribute}`' if attribute else ''} | {' | '.join(cells)} |"
 
 
 def _cell(found: list[tuple[Term, Told]], outcome: Outcome) -> str:
-    """The values with an outcome; `yes` where an element or an attribute has no values."""
+    """List the values with an outcome; `yes` where an element or an attribute has no values."""
     words = []
     for term, became in found:
         if became.outcome == outcome:
-            instead = became.warning.rpartition("; it ")[2] if "; it " in became.warning else ""
-            words.append((term.value or "yes") + (f" ({instead})" if instead and outcome == "degraded" else ""))
+            _, _, instead = became.warning.rpartition("; it ") if outcome == "degraded" else ("", "", "")
+            instead = instead.removeprefix("is ").removesuffix(", the nearest").replace("'", "")
+            words.append((term.value or "yes") + (f" ({instead})" if instead else ""))
     return ", ".join(words)
 
 

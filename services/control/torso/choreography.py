@@ -174,7 +174,6 @@ def _point(entity: Entity, mode: str | None, situation: Situation) -> Course:
         if math.dist(zone.center, entity.position) <= zone.radius:
             raise Impossible("CANNOT_CREATE_BEHAVIOR", f"{entity.id!r} is in a no-point zone")
     arms = sides(mode, lambda side: math.dist(kinematics.SHOULDER[side], entity.position), situation)
-    note = f"this body does not point with {mode!r}; it points with one hand, the nearest"
     reasons = []
     for side in arms:
         try:
@@ -182,6 +181,8 @@ def _point(entity: Entity, mode: str | None, situation: Situation) -> Course:
         except Unreachable as error:
             reasons.append(str(error))
             continue
+        hand = f"{side.upper()}_HAND"
+        note = f"this body does not point with {mode!r}; it points with its {hand!r}, the nearest"
         return replace(_point_with(side, aim, situation), note=note if mode == "BOTH_HANDS" else "")
     raise Impossible("CANNOT_CREATE_BEHAVIOR", f"cannot point at {entity.id!r}: {'; '.join(reasons)}")
 
