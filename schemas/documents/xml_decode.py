@@ -203,7 +203,7 @@ class _Document:
         for field, value in grammar.of_drafts(plain, local):
             raw[field] = raw.get(field) or value
         if local == "head" and str(raw.get("amount", "")).strip().startswith("-"):
-            reason = f"amount {raw['amount']!r} of <head>: this head begins on its own side"
+            reason = f"the sign of amount {raw['amount']!r}: a head begins on its own side"
             self._note(reason, element, raw["id"], "DEGRADED")
             raw["amount"] = str(raw["amount"]).strip().removeprefix("-")
         if local == "emit":

@@ -49,9 +49,7 @@ from tests.schemas.test_xml_codec import BML_1_0, DRAFT, behavior, block
         ),
         (
             '<head id="h" lexeme="NOD" amount="-0.5"/>',
-            Unread(
-                message="amount '-0.5' of <head>: this head begins on its own side", behavior="h", kind="DEGRADED"
-            ),
+            Unread(message="the sign of amount '-0.5': a head begins on its own side", behavior="h", kind="DEGRADED"),
         ),
         (
             "<lips/>",

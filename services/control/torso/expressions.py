@@ -245,7 +245,8 @@ def _note(notes: Sequence[str], absences: Sequence[Impossible], asked: int) -> s
     """Join the notes, with what has to be left out. Raises Impossible if that is all."""
     if absences and len(absences) == asked:
         raise absences[0]
-    return "; ".join(filter(None, [*notes, *(f"{absence.reason}; the rest is performed" for absence in absences)]))
+    rest = [*(absence.reason for absence in absences), "the rest is performed"] if absences else []
+    return "; ".join(filter(None, [*notes, *rest]))
 
 
 def _listed(parts: Sequence[str]) -> str:

@@ -226,7 +226,7 @@ class Repertoire:
         if is_defined(table, lexeme):
             return f"{what}: BML defines it, but this body has nothing near it"
         known = self.lexemes(table)
-        close = get_close_matches(normal(lexeme), known, n=3, cutoff=0.5)
+        close = get_close_matches(normal(lexeme), known, n=3, cutoff=0.5) if table != "facs" else []
         there = f"do you mean {' or '.join(close)}?" if close else f"there are {', '.join(known)}."
         return f"{what}: {there} A repertoire file can add it (docs/control.md)"
 

@@ -116,8 +116,19 @@ def _loss(
     if turn or quick or is_timed or len([id for id in slow or touched if id in chains]) == 1:
         for group in ({turn[0], turn[1].behavior},) if turn else (slow, quick, touched):
             if free := group & rank.keys():
-                return Loss(max(free, key=rank.__getitem__), f"cannot be on time: {_route(net, circle)}", turn)
+                lost = max(free, key=rank.__getitem__)
+                return Loss(lost, f"cannot be on time: {_shortage(net, circle, lost)}{_route(net, circle)}", turn)
     return None
+
+
+def _shortage(net: PetriNet, circle: Circle, lost: str) -> str:
+    """Explain what takes more time than there is, if phases of the lost behavior do; else nothing."""
+    took = [(tie, seconds) for tie, seconds in circle if tie.kind == "phase" and tie.behavior == lost and seconds > 0]
+    if not took:
+        return ""
+    needed, excess = sum(seconds for _, seconds in took), sum(seconds for _, seconds in circle)
+    since, to = (net.transitions[end].name for end in (took[0][0].source, took[-1][0].target))
+    return f"from {since} to {to} it takes {needed:.2f} s at least, and there are {max(0.0, needed - excess):.2f} s: "
 
 
 def _touched(circle: Circle, net: PetriNet) -> set[str]:
@@ -138,7 +149,7 @@ def _deadlock(circle: Circle, net: PetriNet, classes: Classes, block: str) -> Bl
 
 
 def _route(net: PetriNet, circle: Circle) -> str:
-    steps = [f"{net.transitions[tie.source].name} ({seconds:+g} s)" for tie, seconds in circle]
+    steps = [f"{net.transitions[tie.source].name} ({round(seconds, 3) + 0.0:+g} s)" for tie, seconds in circle]
     return " -> ".join((*steps, net.transitions[circle[0][0].source].name))
 
 
