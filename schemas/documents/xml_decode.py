@@ -218,9 +218,6 @@ class _Document:
 
     def _speech(self, element: etree._Element, raw: dict[str, Any]) -> list[of.Timing]:
         self._leave_out_strays(element, raw["id"])
-        if (words := element.get("text")) and not "".join(map(str, element.itertext())).strip():
-            element.text = words
-            del element.attrib["text"]
         said = spoken(self._source, element, raw["id"])
         raw["text"], raw["marks"] = said.text, said.marks
         raw["markup"] = said.markup or raw.get("markup", "")
@@ -244,7 +241,6 @@ class _Document:
         for each in speech.iter():
             if local_name(each) in MARKS:
                 self._only(each, id)
-                self._note_attributes(each, id)
 
     def _parts(self, element: etree._Element, local: str, raw: dict[str, Any]) -> None:
         """Read the elements inside a face (its expressions) or a posture (a stance and its poses)."""

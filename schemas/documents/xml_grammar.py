@@ -62,7 +62,7 @@ LISTS = {
 }  # fmt: skip
 """Fields that are a list of elements: the element of an item, and the attribute with its value."""
 _OTHER_ATTRIBUTES = {
-    "bml": ("composition", "characterId"), "sync": ("ref",), "mark": ("name",),
+    "bml": ("composition", "characterId"), "sync": ("ref",),
     **dict.fromkeys(OPERATORS, ("ref",)),
 }  # fmt: skip
 

@@ -41,8 +41,8 @@ async def test_each_term_is_performed_degraded_or_dropped_as_the_page_says(term:
     reached = [each.sync for each in seen.feedback if isinstance(each, SyncPointProgress)]
 
     assert outcome is not None
-    assert outcome.status == "done"
     expected = table.told(term)
+    assert outcome.status == "done" or expected.outcome == "dropped"
     if expected.outcome == "performed":
         assert warnings == []
     else:

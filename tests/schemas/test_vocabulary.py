@@ -15,7 +15,6 @@ from engage_hri.schemas.behaviors import (
     PartPose,
     Pose,
     Posture,
-    Speech,
     expressed,
     posed,
 )
@@ -44,7 +43,6 @@ from tests.schemas.test_xml_codec import behavior
         ('<face id="x" type="MOUTH" mouth="smile"/>', FaceLexeme(id="x", lexeme="MOUTH_SMILE")),
         ('<face id="x" type="EYEBROWS"/>', FaceLexeme(id="x", lexeme="EYEBROWS")),
         ('<gesture id="x" type="LEXICALIZED" lexeme="WAVE"/>', Gesture(id="x", lexeme="WAVE")),
-        ('<speech id="x" text="Hi there"/>', Speech(id="x", text="Hi there")),
     ],
 )
 def test_what_is_rare_is_read_too(xml: str, expected: Behavior) -> None:

@@ -28,10 +28,6 @@ from tests.schemas.test_xml_codec import BML_1_0, DRAFT, behavior, block
             Unread(message="more than one <stance> in a posture", behavior="p"),
         ),
         (
-            '<speech id="s">One <sync id="m" time="0.42"/>two</speech>',
-            Unread(message="<sync> has no attribute 'time'", behavior="s"),
-        ),
-        (
             '<gesture id="g" lexeme="BEAT" trajectory="CURVED"/>',
             Unread(
                 message="attribute 'trajectory' of <gesture>, which the draft of 2007 has, is performed by no body",
