@@ -12,6 +12,7 @@ from engage_hri.schemas.behaviors import (
     Face,
     FaceFacs,
     FaceLexeme,
+    FaceShift,
     Gesture,
     Head,
     PartPose,
@@ -105,6 +106,30 @@ async def test_several_poses_and_a_stance_are_one_posture() -> None:
     assert there["torso_lean"] == pytest.approx(0.209, abs=0.001)
     assert there["left_shoulder_yaw"] > 0.5
     assert there["right_shoulder_yaw"] == home["right_shoulder_yaw"]
+
+
+async def test_what_a_shift_of_face_or_posture_has_changed_is_gone_back_to():
+    body = body_with()
+    await performed(body, FaceShift(id="face", lexeme="SMILE"))
+    await performed(body, PostureShift(id="torso", lexeme="LEAN_FORWARD"))
+    await performed(body, PostureShift(id="arms", lexeme="ARMS_OPEN"))
+    shifted = pose(body)
+    estimate = body.estimate(Gesture(id="beat", lexeme="BEAT"), None, WORLD)
+    for behavior in (
+        FaceLexeme(id="f", lexeme="ANGER"),
+        Posture(id="o", lexeme="TURN_LEFT"),
+        Gesture(id="g", lexeme="BEAT", mode="BOTH_HANDS"),
+    ):
+        at = times(await performed(body, behavior))
+
+    assert pose(body) == pytest.approx(shifted, abs=1e-6)
+    assert at["end"] - at["start"] == pytest.approx(sum(phase.natural for phase in estimate.phases), abs=1e-6)
+    stage = Stage(body, FaceShift(id="gone", lexeme="FROWN"))
+    await asyncio.sleep(0.05)
+    stage.authority.revoke()
+    await stage.over()
+    await body.home()
+    assert pose(body) == pytest.approx(pose(body_with()), abs=1e-6)
 
 
 async def test_several_expressions_are_one_face_each_with_its_side_and_amount() -> None:

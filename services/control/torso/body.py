@@ -97,6 +97,7 @@ class SimulatedBody(Body):
             going.update(run.course.parts)
             self._release(run)
             run.authority.revoke()
+        tracks.rebase(self._tracks, [part for part in going if part != "nod"])
         if "head" in going:
             self._attention.stay(tracks.HOME["head"])
         self._relax(tuple(sorted(going)))
@@ -132,7 +133,7 @@ class SimulatedBody(Body):
                 here.update(zip(track.joints, track.angles(at), strict=True))
         if not real:
             here.update(self._misbelieved)
-        rest = {**kinematics.HOME, **dict(zip(tracks.NECK, self._attention.angles, strict=True))}
+        rest = {**tracks.bases(self._tracks), **dict(zip(tracks.NECK, self._attention.angles, strict=True))}
         zones = self.capabilities.no_point_zones
         busy = tuple(self._runs)
         return Situation(tracks.updated(here, pose), rest, world, zones, busy, self._repertoire)
@@ -204,6 +205,8 @@ class SimulatedBody(Body):
             self._runs[part] = run
         if head.is_shift(run.behavior):
             self._attention.shift(run.behavior, run.course)
+        elif isinstance(run.behavior, choreography.SETTLING):
+            tracks.rebase(self._tracks, run.course.parts, run.course.on_target)
         self._play(run, path)
         if run.course.parts == ("torso",):
             self._follow()
@@ -300,13 +303,15 @@ class SimulatedBody(Body):
             self._attention.stay(head.brake(run.motion, self._loop.time()))
             self._attention.expect("", 0.0, self._loop.time())
         else:
+            if isinstance(run.behavior, choreography.SETTLING):
+                tracks.rebase(self._tracks, run.course.parts)
             self._relax(run.course.parts)
 
     def _relax(self, parts: tuple[str, ...]) -> None:
         now = self._loop.time()
         for part in parts:
             track = self._tracks[part]
-            track.return_to(self._attention.angles if part == "head" else tracks.HOME[part], now)
+            track.return_to(self._attention.angles if part == "head" else track.base, now)
             if part == "head":
                 self._attention.expect(self._attention.entity, track.motion.end, now)
         if "torso" in parts:

@@ -56,6 +56,8 @@ OFFSETS: Mapping[str, tuple[int, int]] = {
     "UPLEFT": (-1, 1), "DOWNRIGHT": (1, -1), "DOWNLEFT": (-1, -1),
 }  # fmt: skip
 """Directions of a gaze's offset: shares of its angle to the right and up."""
+SETTLING = (FaceShift, PostureShift, Pose)
+"""Shifts of what a face or a posture goes back to."""
 TYPES: tuple[type[BlockBehavior], ...] = (
     Gaze, GazeShift, HeadDirectionShift, Pointing, Gesture, Head, Face, FaceLexeme, FaceFacs, FaceShift, Posture,
     PostureShift, Pose, Speech, Wait,

@@ -59,10 +59,14 @@ def home_of(part: str, displaced: Mapping[str, float]) -> tuple[float, ...]:
 
 
 class Track:
-    """The motion of one part. Two arms that move as one share a motion, each with its columns of it."""
+    """The motion of one part. Two arms that move as one share a motion, each with its columns of it.
+
+    base: angles to which the part goes back; those of the safe pose until a shift changes them.
+    """
 
     def __init__(self, part: str, angles: Sequence[float]) -> None:
         self.part = part
+        self.base = HOME[part]
         self.joints = tuple(limit.joint for limit in LIMITS[part])
         self.motion = Motion(Path(resting(angles), (), LIMITS[part]), 0.0)
         self._column = 0
@@ -96,6 +100,21 @@ class Track:
         above = (yaw, min(max(pitch, 0.2) + 0.2, limits[1].high), min(elbow + 0.4, limits[2].high))
         legs = (Leg(goal=above, seconds=0.4), Leg(goal=goal, seconds=max(seconds, 0.4)))
         self.play(Motion(Path(start, legs, limits), now))
+
+
+def bases(tracks: Mapping[str, Track]) -> dict[str, float]:
+    """Angles of all joints to which their parts go back."""
+    based = {part: track for part, track in tracks.items() if part != "nod"}
+    return {
+        **kinematics.HOME,
+        **{joint: angle for track in based.values() for joint, angle in zip(track.joints, track.base, strict=True)},
+    }
+
+
+def rebase(tracks: Mapping[str, Track], parts: Sequence[str], angles: Mapping[str, float] = kinematics.HOME) -> None:
+    """Change the angles to which parts go back; by default to those of the safe pose."""
+    for track in (tracks[part] for part in parts):
+        track.base = tuple(angles.get(joint, angle) for joint, angle in zip(track.joints, track.base, strict=True))
 
 
 def limits_of(parts: Sequence[str]) -> tuple[JointLimit, ...]:
