@@ -16,12 +16,12 @@ from engage_hri.services.control.torso.motion import JointMotion, Leg, Motion, P
 from engage_hri.services.control.torso.pace import return_time, turning_time
 
 NECK = ("neck_yaw", "neck_pitch")
-GAZE_SHARE = 0.7
-"""Share of the neck's speed and acceleration for gaze; the rest is for nods."""
+GAZE_SHARES = (0.56, 0.42)
+"""Shares of the neck's speed and of its acceleration for gaze; the rest is for nods, which are short and quick."""
 
 
-def _neck_limits(share: float, reserve: float | None) -> tuple[JointLimit, ...]:
-    """Limits of the neck's joints for one track, with a share of speed and acceleration.
+def _neck_limits(speed: float, acceleration: float, reserve: float | None) -> tuple[JointLimit, ...]:
+    """Limits of the neck's joints for one track. speed, acceleration: its shares.
 
     reserve: kept free at both ends of the range; None: the range is `NOD_RESERVE` around 0.
     """
@@ -32,15 +32,15 @@ def _neck_limits(share: float, reserve: float | None) -> tuple[JointLimit, ...]:
             low, high = limit.low + reserve, limit.high - reserve
         limits.append(
             msgspec.structs.replace(
-                limit, low=low, high=high, speed=share * limit.speed, acceleration=share * limit.acceleration
+                limit, low=low, high=high, speed=speed * limit.speed, acceleration=acceleration * limit.acceleration
             )
         )
     return tuple(limits)
 
 
 LIMITS: Mapping[str, tuple[JointLimit, ...]] = {
-    "head": _neck_limits(GAZE_SHARE, kinematics.NOD_RESERVE),
-    "nod": (*_neck_limits(1.0 - GAZE_SHARE, None), kinematics.LIMIT["neck_roll"]),
+    "head": _neck_limits(*GAZE_SHARES, kinematics.NOD_RESERVE),
+    "nod": (*_neck_limits(1.0 - GAZE_SHARES[0], 1.0 - GAZE_SHARES[1], None), kinematics.LIMIT["neck_roll"]),
     **{
         part: tuple(kinematics.LIMIT[joint] for joint in kinematics.joints_of(part))
         for part in ("torso", "left_arm", "right_arm", "face")
