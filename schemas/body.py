@@ -197,6 +197,9 @@ class Estimate(Struct, frozen=True, kw_only=True, omit_defaults=True):
     warning: str = ""
     """Type of the warning when not feasible: NO_SUCH_TARGET, BEHAVIOR_TYPE_NOT_SUPPORTED, CANNOT_CREATE_BEHAVIOR
     ..."""
+    degraded: str = ""
+    """What is performed in place of what was asked, in words, if the body has only something near it. The realizer
+    warns of it, and performs the behavior."""
     parts: tuple[str, ...] = ()
     phases: tuple[Phase, ...] = ()
     """Phases from `start` to `end`, without gaps, in the drafts' spelling. Of a repeated movement also `stroke:2` and

@@ -21,6 +21,7 @@ import msgspec
 from lxml import etree
 
 from engage_hri.schemas import behaviors as of
+from engage_hri.schemas import vocabulary
 from engage_hri.schemas.behavior_types import TYPES
 from engage_hri.schemas.blocks import Block, Unread
 from engage_hri.schemas.check import check
@@ -140,6 +141,9 @@ class _Document:
         for name in grammar.unknown_attributes(plain, local, kind):
             if kind and _is_reference(plain[name]):
                 timing.append(of.Timing(name, plain[name]))
+            elif dialect := vocabulary.definition(local, name):
+                reason = f"attribute {name!r} of <{local}>, which {dialect} has, is performed by no body"
+                self._note(reason, element, behavior, "DEGRADED")
             else:
                 self._note(f"<{local}> has no attribute {name!r}", element, behavior)
         return timing
@@ -179,7 +183,8 @@ class _Document:
             elif self._is_strict or not element.get("id"):
                 advice = f"known: {', '.join(grammar.STANDARD)}, constraint"
                 kind: WarningKind = "BEHAVIOR_TYPE_NOT_SUPPORTED"
-                self._leave_out(f"unknown element <{local}>", element, required=required, advice=advice, kind=kind)
+                reason = vocabulary.unperformed(local)
+                self._leave_out(reason, element, required=required, advice=advice, kind=kind)
             else:
                 self._behaviors.append(self._unknown(element, local, required))
 
@@ -225,9 +230,12 @@ class _Document:
             self._only(element, raw["id"])
             timing += _ties(element)
         self._parts(element, local, raw)
-        for name, field in grammar.DRAFTS.get(local, {}).items():
-            if name in plain and not raw.get(field) and (local, plain[name].upper()) != ("head", "ROTATION"):
-                raw[field] = plain[name].upper()
+        for field, value in grammar.of_drafts(plain, local):
+            raw[field] = raw.get(field) or value
+        if local == "head" and str(raw.get("amount", "")).strip().startswith("-"):
+            reason = f"the sign of amount {raw['amount']!r}: a head begins on its own side"
+            self._note(reason, element, raw["id"], "DEGRADED")
+            raw["amount"] = str(raw["amount"]).strip().removeprefix("-")
         if local == "emit":
             said = ((child.text or child.get("id") or "").strip() for child in children_named(element, "event"))
             raw.setdefault("event", next(said, None))
@@ -273,21 +281,33 @@ class _Document:
                 noted.update((local, name) for name in unknown)
 
     def _parts(self, element: etree._Element, local: str, raw: dict[str, Any]) -> None:
-        """Read the elements inside a face (one expression) or a posture (one element of each kind)."""
-        family, seen = TYPES[local].family, set()
-        for child, _, name in bml_children(element):
-            if name not in grammar.PARTS.keys() & grammar.CHILDREN.get(local, ()):
-                continue
-            sort = "expression" if family == "face" else f"<{name}>"
-            if sort in seen:
-                reason, is_required = f"more than one {sort} in a {family}", _says_yes(raw.get("required"))
-                self._leave_out(reason, child, raw["id"], required=is_required, advice="one element for each")
-                continue
-            seen.add(sort)
+        """Read the elements inside a face (its expressions) or a posture (a stance and its poses)."""
+        found: list[dict[str, Any]] = []
+        elements = [
+            (child, name)
+            for child, _, name in bml_children(element)
+            if name in grammar.PARTS.keys() & grammar.CHILDREN.get(local, ())
+        ]
+        for child, name in elements:
             self._note_attributes(child, raw["id"])
-            for each, field in grammar.PARTS[name].items():
-                if each in child.attrib or family == "posture":
-                    raw[field] = child.get(each, "")
+            parts = {field: child.get(each) for each, field in grammar.PARTS[name].items()}
+            if name != "stance":
+                found.append({field: value for field, value in parts.items() if value is not None})
+            elif "stance" in raw:
+                reason, is_required = f"more than one <{name}> in a posture", _says_yes(raw.get("required"))
+                self._leave_out(reason, child, raw["id"], required=is_required, advice="one element for each")
+            else:
+                raw["stance"] = parts["stance"] or ""
+        if len(found) == 1:
+            raw.update(found[0])
+        elif found:
+            kind = of.Expression if TYPES[local].family == "face" else of.PartPose
+            children = [child for child, name in elements if name != "stance"]
+            parts_of = "expressions" if kind is of.Expression else "poses"
+            raw[parts_of] = [
+                msgspec.to_builtins(self._converted(child, each, kind))
+                for child, each in zip(children, found, strict=True)
+            ]
 
     def _options(self, element: etree._Element, raw: dict[str, Any]) -> list[of.SpeechOption] | None:
         """Phrases of a reference; None if the author leaves them to generation."""

@@ -3,6 +3,7 @@
 import asyncio
 from contextlib import aclosing
 from math import inf
+from pathlib import Path
 from typing import Literal
 
 from engage_hri.schemas import keys
@@ -30,6 +31,7 @@ from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.messages import Message
 from engage_hri.schemas.requests import Cancel, Request
 from engage_hri.schemas.units import Seconds
+from engage_hri.schemas.utf8 import utf8
 from engage_hri.schemas.world import World
 from engage_hri.services.bus.interface import Bus, Received, is_asked_to_stop
 from engage_hri.services.control import variability
@@ -58,8 +60,9 @@ async def embody(
     bus: Bus, ready: Ready, config: ControlConfig, body: Body | None = None, *, covered_for: Seconds = COVERED_FOR
 ) -> None:
     """Serve until cancelled. body: the simulated one unless given. covered_for: see `CoveredObjects`."""
+    body = body or _simulated(config)
     async with asyncio.TaskGroup() as tasks:
-        control = _Control(bus, config, body or _simulated(config), tasks, CoveredObjects(covered_for))
+        control = _Control(bus, config, body, tasks, CoveredObjects(covered_for))
         with bus.subscribe(*RequestDesk.patterns("control"), keys.WORLD) as inbox:
             bus.answer(keys.ESTIMATE, control.estimate)
             bus.answer(keys.DESCRIBE, control.describe)
@@ -74,10 +77,20 @@ async def embody(
 
 
 def _simulated(config: ControlConfig) -> Body:
-    """Create the simulated torso. Imported here: a robot with a body of its own never loads it."""
+    """Create the simulated torso. Imported here: a robot with its own body never loads it. Raises InputRefused."""
     from engage_hri.services.control.torso.body import SimulatedBody
+    from engage_hri.services.control.torso.repertoire import BUILT_IN, extended
 
-    return SimulatedBody(config.no_point_zones, config.variability)
+    repertoire = extended(BUILT_IN, [(file, _read(file)) for file in config.repertoire_files])
+    return SimulatedBody(config.no_point_zones, config.variability, repertoire)
+
+
+def _read(file: str) -> str:
+    try:
+        return utf8(Path(file).read_bytes(), file)
+    except OSError as error:
+        advice = "it is in `control.repertoire`; a relative path counts from the folder of the process"
+        raise InputRefused(Fault(reason=error.strerror or str(error), where=file, advice=advice)) from error
 
 
 class _LiveBehavior:

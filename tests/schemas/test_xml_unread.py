@@ -24,12 +24,35 @@ from tests.schemas.test_xml_codec import BML_1_0, DRAFT, behavior, block
         ('<speech id="s" text="?">Hi</speech>', Unread(message="<speech> has no attribute 'text'", behavior="s")),
         ('<constraint><during ref="1"/></constraint>', Unread(message="unknown element <during> in a constraint")),
         (
-            '<face id="f"><lexeme lexeme="SMILE"/><facs au="1"/></face>',
-            Unread(message="more than one expression in a face", behavior="f"),
+            '<posture id="p"><stance type="SITTING"/><stance type="STANDING"/></posture>',
+            Unread(message="more than one <stance> in a posture", behavior="p"),
         ),
         (
-            '<posture id="p"><pose part="ARMS" lexeme="X"/><pose part="LEGS" lexeme="Y"/></posture>',
-            Unread(message="more than one <pose> in a posture", behavior="p"),
+            '<gesture id="g" lexeme="BEAT" trajectory="CURVED"/>',
+            Unread(
+                message="attribute 'trajectory' of <gesture>, which the draft of 2007 has, is performed by no body",
+                behavior="g",
+                kind="DEGRADED",
+            ),
+        ),
+        (
+            '<face id="f" overshoot="0.3"><lexeme lexeme="SMILE"/></face>',
+            Unread(
+                message="attribute 'overshoot' of <face>, which BML 1.0 has, is performed by no body",
+                behavior="f",
+                kind="DEGRADED",
+            ),
+        ),
+        (
+            '<head id="h" lexeme="NOD" amount="-0.5"/>',
+            Unread(message="the sign of amount '-0.5': a head begins on its own side", behavior="h", kind="DEGRADED"),
+        ),
+        (
+            "<lips/>",
+            Unread(
+                message="<lips>, which the draft of 2007 has, is performed by no body",
+                kind="BEHAVIOR_TYPE_NOT_SUPPORTED",
+            ),
         ),
     ],
 )

@@ -33,6 +33,7 @@ from engage_hri.services.control.torso.course import Course, CoursePoint, Imposs
 from engage_hri.services.control.torso.estimates import infeasible, motion_estimate, speech_estimate, wait_estimate
 from engage_hri.services.control.torso.head import Fixation
 from engage_hri.services.control.torso.motion import Motion, Path, resting
+from engage_hri.services.control.torso.repertoire import BUILT_IN, Repertoire
 from engage_hri.services.control.torso.runs import OVERHEAT, STALL, Run
 from engage_hri.services.control.torso.tracks import Track
 from engage_hri.services.control.voice import speaking
@@ -47,12 +48,18 @@ FREEZE: Seconds = 0.5
 class SimulatedBody(Body):
     """A simulated torso with a voice. Behaviors take as long as `estimate` says, but for `deviations`."""
 
-    def __init__(self, zones: tuple[NoPointZone, ...] = (), deviations: Variability | None = None) -> None:
+    def __init__(
+        self,
+        zones: tuple[NoPointZone, ...] = (),
+        deviations: Variability | None = None,
+        repertoire: Repertoire = BUILT_IN,
+    ) -> None:
         self.capabilities = Capabilities(
             body="simulated", types=tuple(map(type_name, choreography.TYPES)), parts=(*kinematics.PARTS, "voice"),
             joints=kinematics.JOINTS, reach=kinematics.REACH, no_point_zones=zones,
         )  # fmt: skip
         self._deviations = deviations or Variability()
+        self._repertoire = repertoire
         self._loop = asyncio.get_running_loop()
         displaced = {joint.joint: radians(joint.angle) for joint in self._deviations.displaced}
         self._misbelieved = {joint: kinematics.HOME[joint] for joint in displaced}
@@ -92,6 +99,7 @@ class SimulatedBody(Body):
             going.update(run.course.parts)
             self._release(run)
             run.authority.revoke()
+        tracks.rebase(self._tracks, [part for part in going if part != "nod"])
         if "head" in going:
             self._attention.stay(tracks.HOME["head"])
             if self._base is not None:
@@ -120,7 +128,8 @@ class SimulatedBody(Body):
     def _situation(self, world: World, pose: BodyPose | None = None, *, real: bool = False) -> Situation:
         """Describe what a course starts from. real: with the true joint angles, not those that the body believes."""
         now = self._loop.time()
-        here: dict[str, float] = {}
+        here = {"neck_roll": 0.0}
+        """A tilt is on top of the gaze, like a nod: it is no part of where the head is."""
         for part, track in self._tracks.items():
             if part != "nod":
                 # Head and arms aim for where the torso is going to be.
@@ -128,9 +137,10 @@ class SimulatedBody(Body):
                 here.update(zip(track.joints, track.angles(at), strict=True))
         if not real:
             here.update(self._misbelieved)
-        rest = {**kinematics.HOME, **dict(zip(tracks.NECK, self._attention.angles, strict=True))}
+        rest = {**tracks.bases(self._tracks), **dict(zip(tracks.NECK, self._attention.angles, strict=True))}
         zones = self.capabilities.no_point_zones
-        return Situation(tracks.updated(here, pose), rest, world, zones, tuple(self._runs))
+        busy = tuple(self._runs)
+        return Situation(tracks.updated(here, pose), rest, world, zones, busy, self._repertoire)
 
     def _path(self, course: Course, situation: Situation | None = None) -> Path:
         """Lay a path along `course`. Raises Impossible.
@@ -207,6 +217,8 @@ class SimulatedBody(Body):
             self._runs[part] = run
         if head.is_shift(run.behavior):
             self._set_base(run.behavior, run.course, run.authority)
+        elif isinstance(run.behavior, choreography.SETTLING):
+            tracks.rebase(self._tracks, run.course.parts, run.course.on_target)
         self._play(run, path)
         if run.course.parts == ("torso",):
             self._follow()
@@ -305,13 +317,15 @@ class SimulatedBody(Body):
             self._attention.stay(head.brake(run.motion, self._loop.time()))
             self._attention.expect("", 0.0, self._loop.time())
         else:
+            if isinstance(run.behavior, choreography.SETTLING):
+                tracks.rebase(self._tracks, run.course.parts)
             self._relax(run.course.parts)
 
     def _relax(self, parts: tuple[str, ...]) -> None:
         now = self._loop.time()
         for part in parts:
             track = self._tracks[part]
-            track.return_to(self._attention.angles if part == "head" else tracks.HOME[part], now)
+            track.return_to(self._attention.angles if part == "head" else track.base, now)
             if part == "head":
                 self._attention.expect(self._attention.entity, track.motion.end, now)
         if "torso" in parts:

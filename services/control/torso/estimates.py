@@ -38,6 +38,7 @@ def motion_estimate(behavior: BlockBehavior, course: Course, path: Path, pose: B
     return Estimate(
         behavior=behavior.id,
         feasible=True,
+        degraded=course.note,
         parts=("head",) if course.parts == ("nod",) else course.parts,
         phases=_phases(course.points, path.marks, quickest(course, path), SLOWEST),
         head_degrees=course.degrees if is_gaze else 0.0,

@@ -42,6 +42,14 @@ class Assembly(Struct, frozen=True):
             or (tie.kind == "series" and not tie.behavior)
         }
 
+    def rounds(self, times: Sequence[Seconds]) -> dict[Point, int]:
+        """Number of measured events in a row that each point waits for at its own time: an order of equal times."""
+        rounds = [0] * len(times)
+        for place in sorted(self.net.places, key=lambda place: place.source):  # numbered in firing order
+            if place.kind != "idle" and place.source and times[place.target] - times[place.source] < EPSILON:
+                rounds[place.target] = max(rounds[place.target], rounds[place.source] + 1)
+        return {point: rounds[transition] for point, transition in self.at.items()}
+
 
 class Assembler:
     """Makes the net of a block; `assembling` prepares one.

@@ -131,9 +131,19 @@ def _loss(
                     (id for id in touched & rank.keys() if chains[id].type == "speech"), key=rank.__getitem__
                 )
                 points = [point for id in speeches for point in chains[id].points if point in among]
-                reason = f"cannot be on time: {_route(net, circle)}"
+                reason = f"cannot be on time: {_shortage(net, circle, lost)}{_route(net, circle)}"
                 return Loss(lost, reason, tuple(points) if lost in speeches else (), among, turn)
     return None
+
+
+def _shortage(net: PetriNet, circle: Circle, lost: str) -> str:
+    """Explain what takes more time than there is, if phases of the lost behavior do; else nothing."""
+    took = [(tie, seconds) for tie, seconds in circle if tie.kind == "phase" and tie.behavior == lost and seconds > 0]
+    if not took:
+        return ""
+    needed, excess = sum(seconds for _, seconds in took), sum(seconds for _, seconds in circle)
+    since, to = (net.transitions[end].name for end in (took[0][0].source, took[-1][0].target))
+    return f"from {since} to {to} it takes {needed:.2f} s at least, and there are {max(0.0, needed - excess):.2f} s: "
 
 
 def _touched(circle: Circle, net: PetriNet) -> set[str]:
@@ -154,7 +164,7 @@ def _deadlock(circle: Circle, net: PetriNet, classes: Classes, block: str) -> Bl
 
 
 def _route(net: PetriNet, circle: Circle) -> str:
-    steps = [f"{net.transitions[tie.source].name} ({seconds:+g} s)" for tie, seconds in circle]
+    steps = [f"{net.transitions[tie.source].name} ({round(seconds, 3) + 0.0:+g} s)" for tie, seconds in circle]
     return " -> ".join((*steps, net.transitions[circle[0][0].source].name))
 
 

@@ -5,7 +5,7 @@ each with a warning: behaviors that the body cannot do, and those that cannot be
 between equals; any other permutation of a block gives the same net.
 """
 
-from collections.abc import Collection, Container, Iterable, Mapping, Sequence
+from collections.abc import Collection, Container, Iterable, Mapping
 
 from msgspec import Struct
 from msgspec.structs import replace
@@ -38,7 +38,7 @@ from engage_hri.services.realizer.plan.relations import (
     at_line,
     relation_steps,
 )
-from engage_hri.services.realizer.plan.schedule import EPSILON, Solution, critical_path
+from engage_hri.services.realizer.plan.schedule import Solution, critical_path
 from engage_hri.services.realizer.plan.speaking_order import Misordered, SpeakingOrder
 from engage_hri.services.realizer.plan.steps import PORTION, Steps, finished, portions
 from engage_hri.services.realizer.points import ORIGIN, Member, Point
@@ -158,6 +158,9 @@ class _Planner:
             self._drop(behavior.id, kind, str(estimate.fault or "the body cannot do it"))
         else:
             self.chains[behavior.id] = chain(behavior, estimate)
+            if estimate and estimate.degraded:
+                line = self.lines[behavior.id]
+                self.problems.append(Problem("DEGRADED", at_line(line, estimate.degraded), behavior.id))
 
     def _refuse_if_required(self, id: str, reason: str, kind: WarningKind) -> None:
         if id in self.relations.required:
@@ -212,7 +215,7 @@ class _Planner:
             assembler, assembly, solution = yield from self._solved(assembler, arrangement, classes)
             times = {point: solution.times[transition] for point, transition in assembly.at.items()}
             yield len(times) // 4
-            rounds = _rounds(assembly, solution.times)
+            rounds = assembly.rounds(solution.times)
             yield len(times) // 4
             arranged, conflicts = yield from arrange(
                 self.chains, present, classes, arrangement, times, rounds, self.barred
@@ -247,7 +250,9 @@ class _Planner:
             critical=critical_path(solution),
             dropped=tuple(self.dropped),
             given_up=tuple(self.given_up),
-            problems=tuple(self.problems),
+            problems=tuple(
+                one for one in self.problems if one.kind != "DEGRADED" or one.behavior not in self.dropped
+            ),
         )
 
     def _present(self) -> Steps[tuple[Relations, Classes]]:
@@ -388,12 +393,3 @@ class _Planner:
             replace(each, mode=hand) if (hand := self.hands.get(each.id)) else each for each in self.block.behaviors
         ]
         return replace(self.block, behaviors=tuple(chosen))
-
-
-def _rounds(assembly: Assembly, times: Sequence[Seconds]) -> dict[Point, int]:
-    """Number of measured events in a row that each point waits for at its own time. It orders simultaneous points."""
-    rounds = [0] * len(times)
-    for place in sorted(assembly.net.places, key=lambda place: place.source):  # numbered in firing order
-        if place.kind != "idle" and place.source and times[place.target] - times[place.source] < EPSILON:
-            rounds[place.target] = max(rounds[place.target], rounds[place.source] + 1)
-    return {point: rounds[transition] for point, transition in assembly.at.items()}

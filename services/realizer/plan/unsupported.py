@@ -4,13 +4,14 @@ from typing import get_args
 
 from engage_hri.schemas.behaviors import Unknown
 from engage_hri.schemas.feedback import WarningKind
+from engage_hri.schemas.vocabulary import unperformed
 
 
 def unknown(behavior: Unknown) -> tuple[WarningKind, str]:
     """Kind and reason of the warning about a behavior of a type that nobody here knows."""
     if behavior.namespace:
         return "CUSTOM_BEHAVIOR_NOT_SUPPORTED", f"<{behavior.element}> is of namespace {behavior.namespace!r}"
-    return "BEHAVIOR_TYPE_NOT_SUPPORTED", f"unknown element <{behavior.element}>"
+    return "BEHAVIOR_TYPE_NOT_SUPPORTED", unperformed(behavior.element)
 
 
 def kind_of(warning: str) -> WarningKind:
