@@ -17,7 +17,7 @@ LAWS: Mapping[str, str] = {
     "words": "other words were told than heard",
     "broken": "a constraint within a block was broken in silence",
     "broken across blocks": "a constraint with a point of another block was broken in silence",
-    "broken, point was past": "the same, with a point that was reached before the block began",
+    "broken, point was past": "the same, where that point asks for a time before the block began",
     "pointless": "a stroke, or an arrival on target, was told without its motion",
     "unmade end of a stroke": "the end of a stroke was told without motion since the stroke",
     "parts": "two behaviors had one part at one time",

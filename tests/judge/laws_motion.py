@@ -180,29 +180,35 @@ def _span(done: Done) -> Span | None:
 
 
 def _attributed(case: Case, spans: Sequence[Span]) -> list[set[str]]:
-    """The parts of each. Who names no hand has the arm that is on target, or else the one that nobody else has."""
-    used = [_parts(case, span) for span in spans]
+    """The parts of each. Who names no hand has an arm that shows it and that nobody else has; else both."""
+    used = [_parts(done) for _, _, done in spans]
     for number, (since, until, done) in enumerate(spans):
-        if done.asked.type != "gesture" or done.asked.hand:
+        if done.asked.type not in ("gesture", "pointing") or done.asked.hand:
             continue
         taken: set[str] = set()
-        for span, parts in zip(spans, used, strict=True):
-            if min(until, span[1]) - max(since, span[0]) > TOGETHER and span[2] is not done:
+        for other, parts in zip(spans, used, strict=True):
+            if min(until, other[1]) - max(since, other[0]) > TOGETHER and other[2] is not done:
                 taken |= parts
-        free = [side for side in ARMS if f"{side} arm" not in taken]
-        ways = {side: case.record.way(case.record.columns(f"{side}_"), since, until) for side in free}
-        used[number] = {f"{max(ways, key=ways.__getitem__)} arm"} if ways else {f"{side} arm" for side in ARMS}
+        shown = _sides_shown(case, done, since, until)
+        free = [side for side in shown if f"{side} arm" not in taken]
+        used[number] = {f"{side} arm" for side in (free[:1] or ARMS)}
     return used
 
 
-def _parts(case: Case, span: Span) -> set[str]:
-    """The parts that a behavior names, or shows; none for a gesture that names no hand."""
-    done = span[2]
+def _sides_shown(case: Case, done: Done, since: float, until: float) -> list[str]:
+    """The arms that have made a motion, the likeliest first."""
+    entity = case.entity(done.asked.attributes.get("target", ""))
+    if done.asked.type == "pointing" and entity is not None:
+        rays = dict(zip(ARMS, case.record.sample(until).arms, strict=True))
+        on_target = [side for side in ARMS if _beside(rays[side], entity.position) < POINTING_RADIUS + entity.radius]
+        return on_target or list(ARMS)
+    ways = {side: case.record.way(case.record.columns(f"{side}_"), since, until) for side in ARMS}
+    return sorted(ARMS, key=ways.__getitem__, reverse=True)
+
+
+def _parts(done: Done) -> set[str]:
+    """The parts that a behavior names; none for one that leaves the hand open."""
     type, hand = done.asked.type, done.asked.hand
-    if type == "pointing" and not hand:
-        rays, entity = case.record.sample(span[1]).arms, case.entity(done.asked.attributes.get("target", ""))
-        beside = [_beside(ray, entity.position) if entity else 0.0 for ray in rays]
-        return {f"{ARMS[beside.index(min(beside))]} arm"}
     if type in ("pointing", "gesture"):
         return {f"{side} arm" for side in ARMS if hand in (side, "both")}
     return {_PART[type]} if type in _PART else set()

@@ -62,8 +62,10 @@ def _law(relation: Relation, one: Term, other: Term, block: str, case: Case) -> 
     abroad = [term for term in (one, other) if term.place.block != block]
     if not abroad:
         return "broken"
-    began = case.times[Place(block, "", "start")]
-    is_past = any(case.times[term.place] <= began + EXACT for term in abroad)
+    # Where the other block's point puts ours; before our block began, nothing could be done about it.
+    own = other if abroad[0] is one else one
+    meant = case.times[abroad[0].place] + abroad[0].offset - own.offset
+    is_past = meant < case.times[Place(block, "", "start")] - EXACT
     return "broken, point was past" if is_past else "broken across blocks"
 
 
@@ -123,11 +125,20 @@ def surprises(case: Case, block: str) -> list[tuple[float, str]]:
 
 
 def foreseeable(case: Case) -> list[str]:
-    """Blocks whose points an exact body could have foreseen: performed whole, and nothing was disturbed."""
+    """Blocks whose points an exact body could have foreseen: nothing was disturbed, or lost on the way."""
     if not case.is_exact or case.story.is_disturbed:
         return []
-    lost = {block for block, _ in case.lost}
-    return [block for block in case.blocks if case.record.status(block) == "done" and block not in lost]
+    return [
+        block for block in case.blocks if case.record.status(block) == "done" and not _lost_on_the_way(case, block)
+    ]
+
+
+def _lost_on_the_way(case: Case, block: str) -> bool:
+    began = case.times[Place(block, "", "start")]
+    return any(
+        each.kind != "LATE" and (block, each.behavior) in case.lost and (each.at is None or each.at.seconds > began)
+        for each in case.record.warnings(block)
+    )
 
 
 def misses(case: Case) -> list[float]:

@@ -73,6 +73,8 @@ class Player:
         self.requests = requests
         self.record = record
         self.pending: dict[str, Pending] = {}
+        self.is_over = False
+        """True once nobody waits for ends any more."""
         self._number = 0
 
     def do(self, deed: Deed) -> None:
@@ -94,7 +96,7 @@ class Player:
                 self.requests.send(keys.BLOCK, deeds)
 
     def _ended(self, block: str, future: "asyncio.Future[object]") -> None:
-        if future.cancelled():
+        if future.cancelled() or self.is_over:
             return
         now, error = asyncio.get_running_loop().time(), future.exception()
         if isinstance(error, RequestRefused):
@@ -117,6 +119,7 @@ async def _play(story: Story, record: Record, *, asks: bool) -> None:
             player.do(deed)
         outcomes = [each.outcome for each in player.pending.values()]
         await asyncio.wait(outcomes, timeout=BOUND)
+        player.is_over = True
         await asyncio.sleep(SETTLING)
 
 
