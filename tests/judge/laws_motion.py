@@ -182,9 +182,13 @@ def _span(done: Done) -> Span | None:
 def _attributed(case: Case, spans: Sequence[Span]) -> list[set[str]]:
     """The parts of each. Who names no hand has an arm that shows it and that nobody else has; else both."""
     used = [_parts(done) for _, _, done in spans]
-    for number, (since, until, done) in enumerate(spans):
-        if done.asked.type not in ("gesture", "pointing") or done.asked.hand:
-            continue
+    open_ = [
+        (number, span)
+        for type in ("pointing", "gesture")  # where a pointing goes is clearer
+        for number, span in enumerate(spans)
+        if span[2].asked.type == type and not span[2].asked.hand
+    ]
+    for number, (since, until, done) in open_:
         taken: set[str] = set()
         for other, parts in zip(spans, used, strict=True):
             if min(until, other[1]) - max(since, other[0]) > TOGETHER and other[2] is not done:
