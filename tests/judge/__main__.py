@@ -24,13 +24,18 @@ DIGITS = 3
 
 
 class Run(Struct):
-    """What came of one story. off: seconds by which each block that could be foreseen missed its predictions."""
+    """What came of one story.
+
+    dropped: behaviors, by the outcomes. unmade: behaviors of which something was told that was not made.
+    off: seconds by which each block that could be foreseen missed its predictions.
+    """
 
     number: int
     blocks: int
     behaviors: int
     statuses: dict[str, int]
     dropped: list[str]
+    unmade: list[str]
     off: list[float]
     findings: list[Finding]
     seconds: float
@@ -42,14 +47,15 @@ def run(number: int, *, seed: int, kind: Kind, faults: bool) -> Run:
     story = generate.story(seed, number, kind, faults=faults)
     record = playing.play(story, asks=kind == "sentences")
     case = Case(story, record)
+    findings = judge(story, record)
     dropped = [
         f"{block}:{id}" for block in case.blocks if (end := record.outcome(block)) is not None for id in end.dropped
     ]
     return Run(
         number, len(case.blocks), sum(len(block.behaviors) for block in case.blocks.values()),
         Counter(record.status(block) or "none" for block in case.blocks), dropped,
-        [round(seconds, DIGITS) for seconds in laws_time.misses(case)],
-        judge(story, record), time.process_time() - began,
+        sorted({f"{each.block}:{each.behavior}" for each in findings if each.law == "pointless"}),
+        [round(seconds, DIGITS) for seconds in laws_time.misses(case)], findings, time.process_time() - began,
     )  # fmt: skip
 
 
@@ -76,7 +82,7 @@ def table(runs: list[Run]) -> str:
     lines = [
         f"{len(runs)} stories, {sum(each.blocks for each in runs)} blocks, {count} behaviors",
         f"ended: {', '.join(f'{name} {number}' for name, number in sorted(statuses.items()))}",
-        f"behaviors dropped: {dropped}",
+        f"behaviors dropped: {dropped}; told without having been made: {sum(len(each.unmade) for each in runs)}",
         f"blocks off their predictions by more than 10 ms: {late} of {len(off)} ({share:.1f} %)",
     ]
     broken = Counter(law for each in runs for law in {finding.law for finding in each.findings})
@@ -86,13 +92,17 @@ def table(runs: list[Run]) -> str:
 
 
 def compared(runs: list[Run], before: dict[str, Any]) -> str:
-    """Behaviors that are dropped or refused now, in stories where they were not before; and the other way."""
+    """Behaviors that are lost now, in stories where they were made before; and the other way.
+
+    Lost is what was dropped, and what was told without having been made.
+    """
     were = {each["number"]: each for each in before["runs"]}
     more, fewer = [], []
     for each in runs:
         if (then := were.get(each.number)) is not None:
-            more += [f"{each.number} {name}" for name in sorted(set(each.dropped) - set(then["dropped"]))]
-            fewer += [f"{each.number} {name}" for name in sorted(set(then["dropped"]) - set(each.dropped))]
+            now, once = {*each.dropped, *each.unmade}, {*then["dropped"], *then["unmade"]}
+            more += [f"{each.number} {name}" for name in sorted(now - once)]
+            fewer += [f"{each.number} {name}" for name in sorted(once - now)]
             refused = each.statuses.get("refused", 0) - then["statuses"].get("refused", 0)
             (more if refused > 0 else fewer).extend([f"{each.number} refused"] * abs(refused))
     return f"lost now and not then: {len(more)} {more[:20]}\nlost then and not now: {len(fewer)} {fewer[:20]}"

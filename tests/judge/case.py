@@ -12,11 +12,12 @@ from tests.judge.story import WORLD, Story
 
 
 class Finding(Struct, frozen=True):
-    """Something that is not as it must be. law: a name of `laws.LAWS`."""
+    """Something that is not as it must be. law: a name of `laws.LAWS`. behavior: if it is about one."""
 
     law: str
     block: str
     text: str
+    behavior: str = ""
 
     def __str__(self) -> str:
         return f"{self.law}: {self.block}: {self.text}"
@@ -92,11 +93,12 @@ class Case:
     @property
     def is_exact(self) -> bool:
         """True if the body does what it has estimated."""
-        return not self.story.faults
+        return not self.story.faults and not self.story.lies
 
     @property
-    def loses_reports(self) -> bool:
-        return bool(self.story.faults.get("lost"))
+    def is_told_true(self) -> bool:
+        """True if what is told of the body is what it did, all of it, and at the right time."""
+        return not self.story.faults.get("lost") and not self.story.lies
 
     def entity(self, id: str) -> Entity | None:
         return WORLD.entity(id)

@@ -69,7 +69,12 @@ def story(seed: int, number: int, kind: Kind, *, faults: bool = False) -> Story:
     name = f"{seed}/{kind}/{number}"
     chance = Random(name)
     make = {"alone": _alone, "streams": _stream, "sentences": _sentences}[kind]
-    return Story(make(chance), _faults(chance) if faults else {}, name)
+    deeds = make(chance)
+    if not faults:
+        return Story(deeds, seed=name)
+    if chance.random() < 0.4:
+        return Story(deeds, lies=_lies(chance), seed=name)
+    return Story(deeds, _faults(chance), seed=name)
 
 
 # -- stories ---------------------------------------------------------------------------------------------------------
@@ -152,6 +157,19 @@ def _faults(chance: Random) -> dict[str, Any]:
     if chance.random() < 0.2:
         faults["lost"] = 0.2
     return faults
+
+
+def _lies(chance: Random) -> dict[str, Any]:
+    """What goes wrong with the reports of the body, as `lying.Lies` has it."""
+    lies: dict[str, Any] = {"seed": chance.randrange(1000)}
+    for name in ("twice", "never", "mistimed", "foreign", "deaf", "refuse", "fail"):
+        if chance.random() < 0.4:
+            lies[name] = chance.choice((0.1, 0.3))
+    if chance.random() < 0.25:
+        lies["gone"] = round(chance.uniform(0.0, 4.0), 2)
+        if chance.random() < 0.6:
+            lies["back"] = round(lies["gone"] + chance.choice((0.3, 2.0, 8.0)), 2)
+    return lies
 
 
 # -- blocks ----------------------------------------------------------------------------------------------------------

@@ -87,7 +87,7 @@ def losses(case: Case) -> Iterator[Finding]:
 
 def words(case: Case) -> Iterator[Finding]:
     """What the outcome says was said is what the voice has said: all, or the words before it was ended."""
-    if case.story.faults.get("mute") or case.loses_reports:
+    if case.story.faults.get("mute") or not case.is_told_true:
         return
     heard: dict[tuple[str, str], int] = {}
     for word in case.record.words:

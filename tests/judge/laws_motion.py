@@ -37,13 +37,13 @@ NECK = ("neck",)
 
 def motion(case: Case) -> Iterator[Finding]:
     """No point is told without its motion."""
-    if case.loses_reports:
+    if not case.is_told_true:
         return
     for done in case.done:
         check = _CHECKS.get(done.asked.type)
         if check is not None:
             for text in check(case, done):
-                yield Finding("pointless", done.block, f"{done.name}: {text}")
+                yield Finding("pointless", done.block, f"{done.name}: {text}", done.asked.id)
         if done.asked.type in WITH_STROKE:
             yield from _stroke_end(case, done)
 
@@ -158,7 +158,10 @@ _SAME: Mapping[str, tuple[str, ...]] = {"faceShift": _FACES, "postureShift": ("p
 
 def parts(case: Case) -> Iterator[Finding]:
     """No two behaviors make their strokes, or their ways to the target, with one part at one time."""
+    if not case.is_told_true:
+        return
     spans = [span for done in case.done if (span := _span(done)) is not None and span[1] - span[0] > TOGETHER]
+    spans = [span for span in spans if not _is_beneath(case, span)]
     used = _attributed(case, spans)
     for (one, ours), (other, theirs) in combinations(zip(spans, used, strict=True), 2):
         since, until = max(one[0], other[0]), min(one[1], other[1])
@@ -225,6 +228,11 @@ _PART = {
 }  # fmt: skip
 
 
+def _is_beneath(case: Case, span: Span) -> bool:
+    """True for a shift of the eyes that begins under a look: it moves nothing until that ends."""
+    return span[2].asked.type in ("gazeShift", "headDirectionShift") and _under_way(case, span[0], "gaze")
+
+
 def _overlaid(one: Done, other: Done) -> bool:
     """True for a shift and what lies over it."""
     return (one.asked.type in SHIFTS) != (other.asked.type in SHIFTS)
@@ -236,7 +244,7 @@ def _overlaid(one: Done, other: Done) -> bool:
 def home(case: Case) -> Iterator[Finding]:
     """Once everything has ended, the arms are where they were in the beginning, and nothing moves."""
     record = case.record
-    if not record.samples or any(not record.ends.get(block) for block in case.blocks):
+    if case.story.lies or not record.samples or any(not record.ends.get(block) for block in case.blocks):
         return
     last = record.samples[-1]
     displaced = {each["joint"] for each in case.story.faults.get("displaced", [])}

@@ -27,8 +27,9 @@ from engage_hri.services.control.torso.body import SimulatedBody
 from engage_hri.services.realizer.config import RealizerConfig
 from engage_hri.services.realizer.service import realize
 from engage_hri.services.requests.ends import Pending, Requester
-from engage_hri.services.runtime.service import running
+from engage_hri.services.runtime.service import Service, running, serve
 from engage_hri.services.runtime.virtual_time import VirtualTimeLoop
+from tests.judge.lying import Lies, LyingBody
 from tests.judge.record import End, Record, Sample, Told
 from tests.judge.story import WORLD, Deed, Story
 
@@ -129,16 +130,19 @@ async def _robot(story: Story, record: Record) -> AsyncIterator[tuple[Bus, Reque
     async with MemoryHub() as hub:
         eyes, bus = hub.join("simulation"), hub.join("judge")
         eyes.publish(keys.WORLD, WORLD)
-        body = SimulatedBody(deviations=variability)
+        lies = msgspec.convert(story.lies, Lies)
+        body = LyingBody(SimulatedBody(deviations=variability), lies)
         record.joints = tuple(angle.joint for angle in body.state().pose.joints)
+        control = partial(embody, config=ControlConfig(variability=variability, state_rate=1.0), body=body)
         services = {
-            "control": partial(embody, config=ControlConfig(variability=variability, state_rate=1.0), body=body),
+            "control": control,
             "realizer": partial(realize, config=RealizerConfig()),
         }
         async with running(hub, services), Requester(bus) as requests:
             tasks = [
                 asyncio.create_task(_listen(bus, body, record), name="listen"),
                 asyncio.create_task(_measure(body, record), name="measure"),
+                asyncio.create_task(_vanish(hub, control, lies), name="vanish"),
             ]
             try:
                 yield bus, requests
@@ -148,6 +152,17 @@ async def _robot(story: Story, record: Record) -> AsyncIterator[tuple[Bus, Reque
                 await asyncio.gather(*tasks, return_exceptions=True)
         await bus.leave()
         await eyes.leave()
+
+
+async def _vanish(hub: MemoryHub, control: Service, lies: Lies) -> None:
+    """Take the body from the bus for a while, as if its process had died."""
+    if lies.gone is None:
+        return
+    await asyncio.sleep(lies.gone)
+    hub.kill("control")
+    if lies.back is not None:
+        await asyncio.sleep(lies.back - lies.gone)
+        await serve(hub, "control", control)
 
 
 async def _ask(story: Story, bus: Bus, record: Record) -> None:

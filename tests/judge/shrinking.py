@@ -40,6 +40,8 @@ def _smaller(story: Story) -> Iterator[Story]:
             yield replace(story, deeds=tuple(each for each in story.deeds if each is not deed))
     for key in story.faults:
         yield replace(story, faults={name: value for name, value in story.faults.items() if name != key})
+    for key in story.lies:
+        yield replace(story, lies={name: value for name, value in story.lies.items() if name != key})
     for number, deed in enumerate(story.deeds):
         for smaller in _smaller_deeds(deed):
             yield replace(story, deeds=(*story.deeds[:number], smaller, *story.deeds[number + 1 :]))

@@ -38,10 +38,14 @@ class Deed(Struct, frozen=True, omit_defaults=True):
 
 
 class Story(Struct, frozen=True, omit_defaults=True):
-    """Deeds in order of time. faults: of the simulated body, as `[control.variability]` has them; empty: none."""
+    """Deeds in order of time.
+
+    faults: of the simulated body, as `[control.variability]` has them; empty: none. lies: `lying.Lies`; empty: none.
+    """
 
     deeds: tuple[Deed, ...]
     faults: dict[str, Any] = {}
+    lies: dict[str, Any] = {}
     seed: str = ""
 
     @property
