@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterator, Mapping
 
-from tests.judge import laws_feedback, laws_motion, laws_time
+from tests.judge import laws_custom, laws_feedback, laws_motion, laws_time
 from tests.judge.case import Case, Finding
 from tests.judge.record import Record
 from tests.judge.story import Story
@@ -18,6 +18,9 @@ LAWS: Mapping[str, str] = {
     "broken": "a constraint within a block was broken in silence",
     "broken across blocks": "a constraint with a point of another block was broken in silence",
     "broken, point was past": "the same, where that point asks for a time before the block began",
+    "wrong length": "a wait did not take its time",
+    "left too early": "a look, a face or a posture did not last",
+    "out of turn": "a behavior of which nothing is said began before the one before it had ended",
     "pointless": "a stroke, or an arrival on target, was told without its motion",
     "unmade end of a stroke": "the end of a stroke was told without motion since the stroke",
     "parts": "two behaviors had one part at one time",
@@ -30,7 +33,8 @@ LAWS: Mapping[str, str] = {
 
 CHECKS: tuple[Callable[[Case], Iterator[Finding]], ...] = (
     laws_feedback.one_end, laws_feedback.points, laws_feedback.losses, laws_feedback.words, laws_time.constraints,
-    laws_time.predictions, laws_time.spoken_order, laws_motion.motion, laws_motion.parts, laws_motion.home,
+    laws_custom.customs, laws_time.predictions, laws_time.spoken_order, laws_motion.motion, laws_motion.parts,
+    laws_motion.home,
 )  # fmt: skip
 
 

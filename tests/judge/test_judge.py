@@ -17,8 +17,8 @@ from tests.judge.shrinking import shrink
 from tests.judge.story import Deed, Story
 
 ENFORCED = (
-    "hang", "crash", "end", "points", "losses", "required", "words", "parts", "in the air", "spoken order",
-    "needless loss",
+    "hang", "crash", "end", "points", "losses", "required", "words", "wrong length", "out of turn", "parts",
+    "in the air", "spoken order", "needless loss",
 )  # fmt: skip
 """Laws that no story may break."""
 SEED = 12

@@ -24,6 +24,7 @@ EVERYTHING = f"""<bml id="b" xmlns="{reading.BML_1_0}">
 <speech id="t"><text>And then that.</text></speech>
 <constraint><after ref="n:end"><sync ref="w:start"/></after></constraint>
 <wait id="w" duration="0.5"/>
+<wait id="v" duration="0.7"/>
 <gaze id="lost" target="nothing"/>
 </bml>"""
 LATER = f"""<bml id="c" xmlns="{reading.BML_1_0}">
@@ -211,6 +212,9 @@ TAMPERED = [
     ("a face has never moved", still("brows", "lids", "mouth"), "pointless"),
     ("a torso has never moved", still("torso"), "pointless"),
     ("the end of a stroke comes with the stroke", shifted("q:strokeEnd", -0.29), "unmade end of a stroke"),
+    ("a wait takes longer", shifted("v:end", 0.3), "wrong length"),
+    ("a face does not last", shifted("f:relax", -1.0), "left too early"),
+    ("a wait does not wait for the one before it", shifted("v", -1.0), "out of turn"),
     ("two speeches are said at once", shifted("t", -0.8), "parts"),
     ("an arm is still raised in the end", raised, "in the air"),
     ("a bug was logged", lambda record: replace(record, errors=["KeyError"]), "crash"),
