@@ -87,10 +87,12 @@ def _alone(chance: Random) -> tuple[Deed, ...]:
 def _stream(chance: Random) -> tuple[Deed, ...]:
     deeds: list[Deed] = []
     made: list[Made] = []
-    at, dialect = 0.0, _dialect(chance)
+    at, gap, dialect = 0.0, 0.0, _dialect(chance)
     for number in range(chance.randint(2, 5)):
         composition = chance.choices(("MERGE", "APPEND", "REPLACE"), (7, 2, 1))[0] if number else "MERGE"
-        block = _block(chance, f"b{number}", dialect, composition, made)
+        # The longer ago, the likelier the others have ended: then the block would be refused for naming them.
+        live = made[-2:] if chance.random() > gap / 3.0 else ()
+        block = _block(chance, f"b{number}", dialect, composition, live)
         follows = (chance.choice(made).id,) if made and composition != "REPLACE" and chance.random() < 0.12 else ()
         deeds.append(Deed(round(at, 2), "perform", block.id, block.xml(), follows=follows))
         made.append(block)
@@ -99,7 +101,8 @@ def _stream(chance: Random) -> tuple[Deed, ...]:
                 behavior = chance.choice(block.elements).id if kind == "interrupt" else ""
                 moment = round(at + chance.uniform(0.0, 3.5), 2)
                 deeds.append(Deed(moment, kind, block.id, behavior=behavior))
-        at += chance.choice((0.0, 0.1, 0.3, 0.8, 1.5, 2.5, chance.uniform(0.0, 4.0)))
+        gap = chance.choice((0.0, 0.1, 0.3, 0.8, 1.5, 2.5, chance.uniform(0.0, 4.0)))
+        at += gap
     return tuple(sorted(deeds, key=lambda deed: deed.at))
 
 
@@ -302,7 +305,7 @@ def _later(chance: Random, block: Made, number: int, others: Sequence[Made]) -> 
 
 def _ref(chance: Random, block: Made, number: int, others: Sequence[Made]) -> str:
     """A time, or a point of another behavior: an earlier one, mostly."""
-    if others and chance.random() < 0.3:
+    if others and chance.random() < 0.25:
         return _abroad(chance, others)
     choice = [each for each in block.elements[:number] if each is not block.elements[number]]
     if chance.random() < 0.15:
@@ -315,7 +318,7 @@ def _ref(chance: Random, block: Made, number: int, others: Sequence[Made]) -> st
 
 
 def _abroad(chance: Random, others: Sequence[Made]) -> str:
-    other = chance.choice(others[-2:])
+    other = chance.choice(others)
     if chance.random() < 0.25:
         return _offset(chance, f"{other.id}:bml:{chance.choice(('end', 'end', 'start'))}")
     one = chance.choice(other.elements)

@@ -26,15 +26,15 @@ def customs(case: Case) -> Iterator[Finding]:
     for id, block in case.blocks.items():
         if case.record.status(id) != "done":
             continue
-        block = _without_the_lost(case, block)
+        left = _without_the_lost(case, block)
         done = {
             each.asked.id: each for each in case.done if each.block == id and (id, each.asked.id) not in case.lost
         }
         for each in done.values():
             if each.asked.type == "wait" and not _is_named(block, each.asked, "end"):
                 yield from _length(each)
-            if each.asked.type in LASTING and not _is_named(block, each.asked, *LEAVING):
-                yield from _lasts(case, block, each, done)
+            if each.asked.type in LASTING and not _is_named(left, each.asked, *LEAVING):
+                yield from _lasts(case, left, each, done)
         yield from _rows(block, done)
 
 
