@@ -27,7 +27,7 @@ class Run(Struct):
     """What came of one story.
 
     dropped: behaviors, by the outcomes. unmade: behaviors of which something was told that was not made.
-    off: seconds by which each block that could be foreseen missed its predictions.
+    late: blocks with a LATE warning. off: seconds by which each block that could be foreseen missed its predictions.
     """
 
     number: int
@@ -36,6 +36,7 @@ class Run(Struct):
     statuses: dict[str, int]
     dropped: list[str]
     unmade: list[str]
+    late: int
     off: list[float]
     findings: list[Finding]
     seconds: float
@@ -55,6 +56,7 @@ def run(number: int, *, seed: int, kind: Kind, faults: bool) -> Run:
         number, len(case.blocks), sum(len(block.behaviors) for block in case.blocks.values()),
         Counter(record.status(block) or "none" for block in case.blocks), dropped,
         sorted({f"{each.block}:{each.behavior}" for each in findings if each.law == "pointless"}),
+        sum(any(it.kind == "LATE" for it in record.warnings(block)) for block in case.blocks),
         [round(seconds, DIGITS) for seconds in laws_time.misses(case)], findings, time.process_time() - began,
     )  # fmt: skip
 
@@ -83,6 +85,7 @@ def table(runs: list[Run]) -> str:
         f"{len(runs)} stories, {sum(each.blocks for each in runs)} blocks, {count} behaviors",
         f"ended: {', '.join(f'{name} {number}' for name, number in sorted(statuses.items()))}",
         f"behaviors dropped: {dropped}; told without having been made: {sum(len(each.unmade) for each in runs)}",
+        f"blocks with something LATE: {sum(each.late for each in runs)}",
         f"blocks off their predictions by more than 10 ms: {late} of {len(off)} ({share:.1f} %)",
     ]
     broken = Counter(law for each in runs for law in {finding.law for finding in each.findings})
