@@ -6,10 +6,12 @@ rays that the body publishes; how the body makes its motions is not known here.
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import partial
 from itertools import combinations
 
 from engage_hri.schemas.body import Ray
 from engage_hri.schemas.units import Vector
+from engage_hri.schemas.world import Entity
 from tests.judge.case import Case, Done, Finding
 from tests.judge.reading import SHIFTS, WITH_STROKE
 
@@ -71,23 +73,33 @@ def _pointing(case: Case, done: Done) -> Iterator[str]:
     if entity is None:
         yield "a stroke at something that there is not"
         return
-    rays = case.record.sample(at).arms
-    sides = [number for number, side in enumerate(ARMS) if done.asked.hand in ("", side)]
-    off = min(_beside(rays[side], entity.position) for side in sides)
+    yield from _with_some_hand(done, partial(_points_with, case, done, entity, at))
+
+
+def _points_with(case: Case, done: Done, entity: Entity, at: float, side: int) -> Iterator[str]:
+    off = _beside(case.record.sample(at).arms[side], entity.position)
     if off > POINTING_RADIUS + entity.radius:
         yield f"at its stroke, {at:.3f}, the forearm passes {off:.2f} m beside {entity.id}{_torso(case, at)}"
-    yield from _stroke(case, done, min(sides, key=lambda side: _beside(rays[side], entity.position)))
+    yield from _stroke(case, done, side)
 
 
 def _gesture(case: Case, done: Done) -> Iterator[str]:
-    if (at := done.time("stroke")) is None:
-        return
-    away = [case.record.away(case.record.columns(f"{side}_"), at) for side in ARMS]
-    sides = [number for number, side in enumerate(ARMS) if done.asked.hand in ("both", side)]
-    for side in sides or [max((0, 1), key=away.__getitem__)]:
-        if away[side] < RAISED:
-            yield f"at its stroke, {at:.3f}, the {ARMS[side]} arm is {away[side]:.2f} rad from rest"
-        yield from _stroke(case, done, side)
+    if (at := done.time("stroke")) is not None:
+        yield from _with_some_hand(done, partial(_gestures_with, case, done, at))
+
+
+def _gestures_with(case: Case, done: Done, at: float, side: int) -> Iterator[str]:
+    away = case.record.away(case.record.columns(f"{ARMS[side]}_"), at)
+    if away < RAISED:
+        yield f"at its stroke, {at:.3f}, the {ARMS[side]} arm is {away:.2f} rad from rest"
+    yield from _stroke(case, done, side)
+
+
+def _with_some_hand(done: Done, check: Callable[[int], Iterator[str]]) -> list[str]:
+    """What is wrong with the hand that it names, with both, or with the better one if the body has chosen."""
+    hand = done.asked.hand
+    found = [list(check(side)) for side in range(len(ARMS)) if hand in ("", "both", ARMS[side])]
+    return [text for each in found for text in each] if hand else min(found, key=len)
 
 
 def _stroke(case: Case, done: Done, side: int) -> Iterator[str]:
