@@ -215,14 +215,15 @@ def _attributed(case: Case, spans: Sequence[Span]) -> list[set[str]]:
 
 
 def _sides_shown(case: Case, done: Done, since: float, until: float) -> list[str]:
-    """The arms that have made a motion, the likeliest first."""
+    """The arms that have moved or are on target, the likeliest first: on target, then the longer way."""
+    ways = {side: case.record.way(case.record.columns(f"{side}_"), since, until) for side in ARMS}
+    on_target = dict.fromkeys(ARMS, False)
     entity = case.entity(done.asked.attributes.get("target", ""))
     if done.asked.type == "pointing" and entity is not None:
-        rays = dict(zip(ARMS, case.record.sample(until).arms, strict=True))
-        on_target = [side for side in ARMS if _beside(rays[side], entity.position) < POINTING_RADIUS + entity.radius]
-        return on_target or list(ARMS)
-    ways = {side: case.record.way(case.record.columns(f"{side}_"), since, until) for side in ARMS}
-    return sorted(ARMS, key=ways.__getitem__, reverse=True)
+        rays = zip(ARMS, case.record.sample(until).arms, strict=True)
+        on_target = {side: _beside(ray, entity.position) < POINTING_RADIUS + entity.radius for side, ray in rays}
+    sides = [side for side in ARMS if on_target[side] or ways[side] > MOVED]
+    return sorted(sides, key=lambda side: (on_target[side], ways[side]), reverse=True)
 
 
 def _parts(done: Done) -> set[str]:
