@@ -29,11 +29,12 @@ from engage_hri.services.control.body import (
 )
 from tests.control.contract_holding import HoldingContract
 from tests.control.contract_takeovers import TakeoverContract
+from tests.control.contract_truth import TruthContract
 from tests.control.motions import recorded, violations
 from tests.control.suite import HOLDS, ONE_INSTANT, Stage, default, performed, poses_agree, times
 
 
-class BodyContract(TakeoverContract, HoldingContract):
+class BodyContract(TakeoverContract, HoldingContract, TruthContract):
     """Subclass it, and say in `make` how to make the body. tolerance: stated error of its estimates, seconds."""
 
     async def test_reports_every_sync_point_once_and_in_order(self, body: Body):

@@ -320,7 +320,9 @@ class FakeBody:
                 await act.changed.wait()
                 began += self.bus.now() - since
                 continue
-            least, most = began + natural * self.elastic[0], began + natural * self.elastic[1]
+            # A shift under a look moves nothing: its end is whenever it is asked for.
+            is_beneath = type_of(act.perform.behavior) in SHIFTS and not natural
+            least, most = began + natural * self.elastic[0], inf if is_beneath else began + natural * self.elastic[1]
             planned = {} if held else {each.sync: self.bus.local(each.at) for each in act.perform.pace}
             until = act.due = min(max(planned[sync], least), most) if sync in planned else began + natural
             if until <= self.bus.now():

@@ -143,6 +143,16 @@ def test_if_the_later_has_time_it_waits_for_its_turn(behaviors: Sequence[BlockBe
     assert at(made, f"{second.id}:start") >= made.predicted(made.kept[first.id]) > 0.0
 
 
+@pytest.mark.parametrize("behaviors", [behaviors for behaviors, _ in AT_ONE_INSTANT])
+def test_one_of_which_nobody_says_when_it_comes_waits_for_one_with_a_time(behaviors: Sequence[BlockBehavior]) -> None:
+    first, second = behaviors
+    made = plan(block((timed(second, start="0.5"), timed(first))))
+
+    assert made.problems == ()
+    assert at(made, f"{second.id}:start") == 0.5
+    assert at(made, f"{first.id}:start") >= made.predicted(made.kept[second.id]) > 0.5
+
+
 def test_a_gesture_at_the_instant_of_another_uses_the_other_arm_if_it_names_none() -> None:
     made = plan(block((timed(POINT, start="1"), timed(Gesture(id="g", lexeme="BEAT"), start="1"))))
 

@@ -9,6 +9,8 @@ from collections.abc import AsyncGenerator
 from contextlib import aclosing
 from math import inf, radians
 
+from msgspec.structs import replace
+
 from engage_hri.schemas.behaviors import BlockBehavior, Gaze, GazeShift, HeadDirectionShift, Speech, Wait
 from engage_hri.schemas.body import BodyPose, Capabilities, Estimate, NoPointZone
 from engage_hri.schemas.faults import Fault
@@ -258,12 +260,23 @@ class SimulatedBody(Body):
                         yield Reached(sync, since, arrived)
             else:
                 run.pending.pop(0)
+                if point.sync == "relax" and isinstance(run.behavior, Gaze):
+                    self._turn_home(run)
                 self._attention.follow_run(run, self._loop.time())
                 yield Reached(point.sync, due, due)
         if run.is_beneath or run.is_taken_over:
             for sync, due in run.passed_by(self._loop.time()):
                 run.pending.pop(0)
-                yield Reached(sync, due, due)
+                yield Reached(sync, at := max(due, since), at)
+
+    def _turn_home(self, run: Run) -> None:
+        """Lay the way home of a look anew if a shift has set another base since it began."""
+        track, base = self._tracks["head"], self._attention.angles
+        if head.differ(run.course.legs[-1].goal, base):
+            now = self._loop.time()
+            back = head.way_back(track.angles(now), base)
+            run.course = replace(run.course, legs=(*run.course.legs[:-1], back))
+            self._play(run, Path(track.at(now), run.with_faults((back,)), tracks.LIMITS["head"]))
 
     def _leave_hold(self, run: Run, hold: str) -> list[str]:
         """Let `run` go on from a hold point, on a new path if it stands still. Returns the sync points it passes."""
@@ -345,6 +358,7 @@ class SimulatedBody(Body):
         except Impossible as impossible:
             raise BehaviorRefused(_fault(behavior, impossible.reason)) from impossible
         self._set_base(behavior, course, authority)
+        self._follow()
         now = self._loop.time()
         yield Reached("start", now, now)
         async with aclosing(pass_end(authority)) as points:

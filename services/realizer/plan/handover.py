@@ -116,6 +116,10 @@ def arrange(
             is_asked = successor in mentioned or _is_overlaid(chain, chains[successor])
             last = _not_given_up(chain, first, [*kept, least], is_natural, is_asked=is_asked)
             turn = (successor, chain.points[last]) if last is not None else None
+            if turn is not None and chain.type != "speech" and id not in mentioned and successor in mentioned:
+                # Nobody has said when the earlier one comes: it is what waits.
+                number = _STROKE if successor in before.natural else len(chains[successor].points) - 1
+                turn = (id, chains[successor].points[number])
             if turn is not None:
                 # A behavior that has made its stroke hands over; for one that has not, a free other arm is better.
                 conflicts.append(Conflict(turn, _free_hand((successor, id), chains, times, barred)))
