@@ -331,8 +331,7 @@ class Decisions(Expectations):
         if self.forecast is None:
             self.replan(self.plan)
             return
-        for point in self._followed & self.plan.at.keys():
-            self.forecast.require(self.plan.at[point])
+        self._require_followed(self.forecast)
 
 
 def pace(behavior: str, decisions: "Decisions", now: Seconds) -> Pace:

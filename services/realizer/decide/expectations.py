@@ -9,6 +9,7 @@ from engage_hri.services.realizer.decide.experience import Experience
 from engage_hri.services.realizer.decide.facts import Facts
 from engage_hri.services.realizer.decide.forecast import Forecast, full_forecast
 from engage_hri.services.realizer.plan.assembly import Member
+from engage_hri.services.realizer.plan.known import BLOCK_END, BLOCK_START
 from engage_hri.services.realizer.plan.planner import Plan
 from engage_hri.services.realizer.plan.schedule import EPSILON
 from engage_hri.services.realizer.points import Point, performer
@@ -32,7 +33,7 @@ class Expectations(Facts):
         self.experience = Experience(plan.estimates)
         self.paces: dict[str, Pace] = {}
         self.not_before: dict[str, Seconds] = {}
-        self.foreseen: dict[Point, Seconds] = {}
+        self.foreseen = {point: began + plan.predicted(point) for point in plan.foreign}
         self.is_surprised = False
         self._followed: set[Point] = set()
         """Points of this block that other blocks are tied to."""
@@ -46,8 +47,12 @@ class Expectations(Facts):
         self.forecast = None
         if self._index.is_predictive or self._followed:
             self.forecast = Forecast(self.plan, self.began, self.experience.factor, self.foreseen)
-            for point in self._followed & self.plan.at.keys():
-                self.forecast.require(self.plan.at[point])
+            self._require_followed(self.forecast)
+
+    def _require_followed(self, forecast: Forecast) -> None:
+        for point in self._followed:
+            if (transition := self.plan.transition(point)) is not None:
+                forecast.require(transition)
 
     # -- other blocks --------------------------------------------------------------------------------------------
 
@@ -64,8 +69,9 @@ class Expectations(Facts):
         """Expected times of the points that other blocks are tied to and that are still to come."""
         if not self._followed or self.forecast is None:
             return {}
-        at, times = self.plan.at, self.forecast.times
-        return {point: times[at[point]] for point in self._followed if point in at and point not in self.reached}
+        times = self.forecast.times
+        coming = {point: self.plan.transition(point) for point in self._followed - self.reached.keys()}
+        return {point: times[transition] for point, transition in coming.items() if transition is not None}
 
     @property
     def _next_lateness_check(self) -> Seconds | None:
@@ -143,21 +149,27 @@ class Expectations(Facts):
 
     def expected(self, now: Seconds) -> dict[Point, Seconds]:
         """Expected times of all points of the block that are still to come, in seconds from the block's start."""
-        forecast = self.from_scratch()
-        for transition in range(len(self.plan.members)):
-            forecast.overdue(transition, now)
-        forecast.update()
+        forecast = self.from_scratch(now)
         coming = {point for points in self._points.values() for point in points} - self.reached.keys()
         self._expected |= {point: max(now, forecast.times[self.plan.at[point]]) for point in coming}
         self.is_surprised = False
         return {point: self._expected[point] - self.began for point in coming}
 
-    def times(self) -> dict[Point, Seconds]:
-        """Time of each point of the plan, measured or expected, by the clock of the loop."""
-        forecast = self.from_scratch()
-        return {point: self.reached.get(point, forecast.times[at]) for point, at in self.plan.at.items()}
+    def times(self, now: Seconds) -> dict[Point, Seconds]:
+        """Time of each point of the plan and of the end of the block, measured or expected, by the loop's clock."""
+        forecast = self.from_scratch(now)
+        times = {point: self.reached.get(point, forecast.times[at]) for point, at in self.plan.at.items()}
+        return {**times, BLOCK_START: self.began, BLOCK_END: forecast.times[len(self.plan.members) - 1]}
 
-    def from_scratch(self) -> Forecast:
-        """A forecast of all instants; for those that the kept forecast has, it says the same."""
+    def from_scratch(self, now: Seconds | None = None) -> Forecast:
+        """A forecast of all instants; for those that the kept forecast has, it says the same.
+
+        now: what has not come is expected no earlier.
+        """
         facts = (self.foreseen, self.reached, self.arrived, self._instants)
-        return full_forecast(self.plan, self.began, self.experience.factor, *facts)
+        forecast = full_forecast(self.plan, self.began, self.experience.factor, *facts)
+        if now is not None:
+            for transition in range(len(self.plan.members)):
+                forecast.overdue(transition, now)
+            forecast.update()
+        return forecast

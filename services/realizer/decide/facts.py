@@ -4,6 +4,7 @@ Bodies report late, twice, out of order, and about what was never asked of them.
 changes nothing.
 """
 
+from collections.abc import Iterator
 from math import isfinite
 
 from engage_hri.schemas.units import Seconds
@@ -85,3 +86,24 @@ class Facts:
     def member(self, point: Point) -> Member:
         """The behavior's part in the instant of `point`. Raises KeyError if that is in no instant."""
         return self._index.members[point]
+
+
+def too_early(facts: Facts, foreign: Point) -> Iterator[tuple[Point, Seconds]]:
+    """Points that came before a point of another block allowed it, now that this is reached, and by how much.
+
+    They were met by prediction, which was wrong, or were fixed by other times.
+    """
+    at, plan = facts.reached[foreign], facts.plan
+    if (here := plan.at.get(foreign)) is None:
+        return
+    ties = [(here, 0.0)]
+    ties += [
+        (place.target, place.lag)
+        for place in plan.net.places
+        if place.source == here and place.kind in ("delay", "order") and place.target < len(plan.members)
+    ]
+    for transition, lag in ties:
+        for member in plan.members[transition]:
+            came = facts.reached.get(member.point)
+            if came is not None and member.behavior in plan.chains:
+                yield member.point, at + lag - came

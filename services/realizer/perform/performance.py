@@ -27,6 +27,7 @@ from engage_hri.services.realizer.perform.live import Ending, Live
 from engage_hri.services.realizer.perform.recognition_link import RecognitionLink
 from engage_hri.services.realizer.perform.shared_context import SharedContext
 from engage_hri.services.realizer.perform.spoken import Spoken
+from engage_hri.services.realizer.perform.ties import Ties
 from engage_hri.services.realizer.plan.planner import Plan, plan_block
 from engage_hri.services.realizer.plan.relations import DROPPED
 from engage_hri.services.realizer.points import Point, performer
@@ -48,7 +49,7 @@ class BlockPerformance:
         self._config = shared.config
         self._recognition = RecognitionLink(shared.bus, shared.requests, shared.config, shared.peers)
         self._body = ControlLink(shared.bus, shared.requests, live.request.id, plan.block.id)
-        self._report = Reporter(shared.bus, plan.block.id, shared.config.skew)
+        self.report = Reporter(shared.bus, plan.block.id, shared.config.skew)
         self._begun: dict[str, asyncio.Future[None]] = {id: loop.create_future() for id in plan.chains}
         self._asked: dict[str, Begin | Extend] = {}
         """The last command to each behavior."""
@@ -59,15 +60,12 @@ class BlockPerformance:
         """Behaviors that were dropped, each with the reason."""
         self._interrupted: set[str] = set()
         """Behaviors that are ended on request."""
-        self._elsewhere = elsewhere
-        self._foreign = frozenset(plan.foreign)
-        self._vanished: set[str] = set()
-        """Behaviors of other blocks of which some point will never be reached."""
+        self.ties = Ties(self, shared.others, shared.live_blocks, elsewhere)
         self._performed: dict[str, BlockBehavior] = {}
         """Behaviors as they were begun: a later plan may have chosen another hand."""
         self.spoken = Spoken(plan.block.behaviors)
         self._ending = live.ending
-        self._timer = Timer(self._take_in)
+        self._timer = Timer(self.take_in)
         self._needs_replan = False
 
     def containing(self) -> Containing:
@@ -84,9 +82,9 @@ class BlockPerformance:
         """Perform the block to its end, whatever that is. Ends everything it began."""
         began = self._bus.now()
         self.decisions = Decisions(self.plan, began, self._config)
-        self._report.started(self.plan, began)
+        self.report.started(self.plan, began)
         for problem in self.plan.problems:
-            self._report.warn(problem.kind, problem.message, problem.behavior)
+            self.report.warn(problem.kind, problem.message, problem.behavior)
         for behavior in self.plan.dropped:
             self._shared.live_blocks.lose(self.plan.block.id, behavior)
         self._shared.live_blocks.reach(self.plan.block.id, Point(BLOCK_ITSELF, "start"), began)
@@ -99,7 +97,8 @@ class BlockPerformance:
                     for behavior in self.plan.behaviors
                 }
                 self._shared.live_blocks.perform(self.plan.block.id, self)
-                with self._shared.live_blocks.followed(self, self._foreign, self._elsewhere):
+                with self._shared.live_blocks.followed(self.ties, set(self.ties.foreign), self.ties.blocks):
+                    self.ties.take_over()
                     self._advance()
                     ending = await asyncio.shield(self._ending)  # others wait for it, too
                     await self._end_behaviors(ending)
@@ -107,7 +106,7 @@ class BlockPerformance:
                     task.cancel()
         finally:
             self._close()
-        self._report.ended(ending.status, began)
+        self.report.ended(ending.status, began)
         self._shared.live_blocks.reach(self.plan.block.id, Point(BLOCK_ITSELF, "end"), self._bus.now())
         return replace(
             self._live.outcome,
@@ -151,30 +150,22 @@ class BlockPerformance:
 
     # -- other blocks ------------------------------------------------------------------------------------------------
 
-    def hear(self, point: Point, at: Seconds) -> None:
-        """Note that a point of another block is reached."""
-        if point in self._foreign:
-            self._take_in(partial(self.decisions.reach, point, at))
+    @property
+    def is_ending(self) -> bool:
+        """True if its behaviors are being ended, whatever was planned."""
+        return self._ending.done()
 
-    def foresee(self, point: Point, at: Seconds) -> None:
-        """Note that a point of another block is expected at `at` now."""
-        if point in self._foreign:
-            self._take_in(partial(self.decisions.foresee, point, at))
+    def fail(self, behavior: str, fault: Fault) -> None:
+        """End the block as failed, and say that it is because of this behavior."""
+        self.report.warn("EXECUTION_FAILURE", str(fault), behavior)
+        self._live.fail(Fault(reason=fault.reason, where=f"{self.plan.block.id}: {behavior}"))
 
     def follow(self, points: Iterable[Point]) -> None:
         """Tell from now on when these points are expected: other blocks are tied to them."""
         if points:
-            self._take_in(partial(self.decisions.follow, points))
+            self.take_in(partial(self.decisions.follow, points))
 
-    def miss(self, behaviors: Iterable[str]) -> None:
-        """Plan without these behaviors of other blocks if a point of them is needed that is not reached."""
-        lost = {point.behavior for point in self._foreign - self.decisions.reached.keys()}.intersection(behaviors)
-        lost -= self._vanished
-        if lost:
-            self._vanished |= lost
-            self._take_in(self._replan)
-
-    def _take_in(self, news: Callable[[], object] = lambda: None) -> None:
+    def take_in(self, news: Callable[[], object] = lambda: None) -> None:
         """Take in `news`, and do what follows from it, unless the block is ending."""
         if not self._ending.done():
             with self.containing():
@@ -212,13 +203,13 @@ class BlockPerformance:
 
     def _advance(self) -> None:
         if self._needs_replan and not self._ending.done():
-            self._replan()
+            self.replan()
         again = True
         while again and not self._ending.done():
             made_facts = [self._apply(effect) for effect in self.decisions.advance(self._bus.now())]
             again = any(made_facts)
-        if self.decisions.is_surprised and self._report.may_expect() and not self._ending.done():
-            self._report.expect(self.decisions.plan, self.decisions.began, self.decisions.expected(self._bus.now()))
+        if self.decisions.is_surprised and self.report.may_expect() and not self._ending.done():
+            self.report.expect(self.decisions.plan, self.decisions.began, self.decisions.expected(self._bus.now()))
         self._shared.live_blocks.foresee(self.plan.block.id, self.decisions.ahead)
         if self.decisions.is_over:
             self._live.stop(Ending("done"))
@@ -241,7 +232,7 @@ class BlockPerformance:
             case Late(behavior=id, sync=sync, overdue=overdue):
                 if not self._shared.peers.has_left("control"):
                     instant = self.decisions.member(Point(id, sync)).point
-                    self._report.late(instant, f"{sync} is {overdue:.1f} s overdue")
+                    self.report.late(instant, f"{sync} is {overdue:.1f} s overdue")
                 self.decisions.is_surprised = True
             case Stalled(behavior=id, sync=sync, overdue=overdue):
                 self._body.abort(id)
@@ -252,7 +243,7 @@ class BlockPerformance:
     def _reach(self, point: Point, at: Seconds, *, arrived: Seconds | None = None, by_body: bool = False) -> None:
         for each in self.decisions.reach(point, at):
             came = self.decisions.arrived.get(each, arrived if each == point else None)
-            self._report.reached(self.plan, self.decisions, each, arrived=came, by_body=by_body)
+            self.report.reached(self.decisions, each, arrived=came, by_body=by_body)
             self.spoken.reach(each)
             self._shared.live_blocks.reach(self.plan.block.id, each, at)
 
@@ -263,26 +254,27 @@ class BlockPerformance:
         self._dropped[id] = str(fault)
         if id in self._interrupted:
             # Its parts go home by themselves: the body does not need to be told, nor to forget what it looked at.
-            self._report.interrupted(id, self.spoken.of(id))
+            self.report.interrupted(id, self.spoken.of(id))
         else:
-            self._report.warn(kind, str(fault), id)
+            self.report.warn(kind, str(fault), id)
             if id in self.decisions.begun and not at_rest:
                 self._go_home(self._parts(id), id)
             if id in self.plan.required:
-                self._live.stop(Ending("failed", Fault(reason=fault.reason, where=f"{self.plan.block.id}: {id}")))
+                self._live.fail(Fault(reason=fault.reason, where=f"{self.plan.block.id}: {id}"))
         self._needs_replan = True  # later and once, for all that is lost in one go
-        asyncio.get_running_loop().call_soon(self._take_in)
+        asyncio.get_running_loop().call_soon(self.take_in)
 
-    def _replan(self) -> None:
+    def replan(self) -> None:
         """Go on as if what was dropped, or vanished elsewhere, had never been written."""
         self._needs_replan = False
-        gone = (*self._dropped, *self._vanished)
+        gone = (*self._dropped, *self.ties.vanished)
         try:
-            plan = plan_block(self.plan.block, self.plan.estimates.values(), dropped=gone, elsewhere=self._elsewhere)
+            plan = plan_block(self.plan.block, self.plan.estimates.values(), dropped=gone, known=self.ties.known())
         except InputRefused as error:
             self._live.stop(Ending("failed", error.fault))
             return
         self.decisions.replan(plan)
+        self.ties.renew()
         for id in self._dropped:  # Told only now that the block goes on: its followers would end with it.
             self._shared.live_blocks.lose(self.plan.block.id, id)
         for problem in plan.problems:
@@ -322,7 +314,7 @@ class BlockPerformance:
             self._pending.pop(behavior.id)
             fault = Fault(reason=error.fault.reason, where=self.plan.block.id)
             if not self._ending.done():
-                self._report.warn("EXECUTION_FAILURE", str(fault))
+                self.report.warn("EXECUTION_FAILURE", str(fault))
             self._live.stop(Ending("failed", fault))
             return
         if not isinstance(outcome, BehaviorOutcome):

@@ -36,6 +36,7 @@ class Arrangement(Struct, frozen=True):
     cuts: number of the first segment that is not given its time, because a successor has the part by then.
     turns: behaviors that wait for a point of another before they take its part.
     spoken: the speeches in the order in which they are said.
+    takes: behaviors of other blocks, by `block:behavior`, of which one of this block takes a part over.
     """
 
     natural: frozenset[str] = frozenset()
@@ -44,6 +45,7 @@ class Arrangement(Struct, frozen=True):
     cuts: Mapping[str, int] = {}
     turns: frozenset[Turn] = frozenset()
     spoken: tuple[str, ...] = ()
+    takes: Mapping[str, str] = {}
 
 
 class Conflict(NamedTuple):
@@ -64,10 +66,12 @@ def arrange(
     times: Mapping[Point, Seconds],
     rounds: Mapping[Point, int],
     barred: Container[tuple[str, Hand]] = (),
+    given: Mapping[str, Chain] = {},
 ) -> Steps[tuple[Arrangement, list[Conflict]]]:
     """The arrangement for a schedule that was made with `before`, and conflicts where it breaks what was asked for.
 
-    rounds: order of points that come at one time. barred: hands with which a behavior cannot be done.
+    rounds: order of points that come at one time. barred: hands with which a behavior cannot be done. given:
+    behaviors of other blocks that have parts, with their `times`.
     """
     held = relations.held
     awaited: dict[str, set[Point]] = {}
@@ -104,8 +108,8 @@ def arrange(
             turn = (successor, chain.points[last]) if last is not None else None
             # A behavior that has made its stroke hands over; for one that has not, a free other arm is better.
             is_worth_it = turn is not None or first <= _STROKE_END
-            hand = _free_hand((successor, id), chains, times, barred) if is_worth_it else None
-            yield 1 + len(chains) // 32  # `_free_hand` has looked at all others
+            hand = free_hand((successor, id), {**chains, **given}, times, barred) if is_worth_it else None
+            yield 1 + len(chains) // 32  # `free_hand` has looked at all others
             if turn or hand:
                 conflicts.append(Conflict(turn, hand))
         if id in successors:
@@ -202,13 +206,13 @@ def _overlaid(
                 yield id
 
 
-def _free_hand(
-    rivals: tuple[str, str],
+def free_hand(
+    rivals: tuple[str, ...],
     chains: Mapping[str, Chain],
     times: Mapping[Point, Seconds],
     barred: Container[tuple[str, Hand]],
 ) -> tuple[str, Hand] | None:
-    """The one of the two that can use the other arm, since it names none and the arm is free all the while."""
+    """The one of these that can use the other arm, since it names none and the arm is free all the while."""
     for id in rivals:
         chain = chains[id]
         other = _OTHER.get(chain.parts[0]) if len(chain.parts) == 1 else None
