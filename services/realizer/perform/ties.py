@@ -11,7 +11,7 @@ from engage_hri.services.realizer.decide.decisions import Decisions
 from engage_hri.services.realizer.perform.feedback import Reporter
 from engage_hri.services.realizer.perform.knowledge import Asker, Performed, knowledge, parts_of
 from engage_hri.services.realizer.perform.live_blocks import LiveBlocks
-from engage_hri.services.realizer.plan.known import Known
+from engage_hri.services.realizer.plan.known import Known, block_of
 from engage_hri.services.realizer.plan.planner import Plan
 from engage_hri.services.realizer.plan.relations import needing
 from engage_hri.services.realizer.points import Point
@@ -69,7 +69,8 @@ class Ties:
         decisions = self._owner.decisions
         if point not in decisions.reached:
             decisions.reach(point, at)
-            self._owner.report.heard(decisions, point)
+            if point in decisions.reached:  # else it was named by an earlier plan only
+                self._owner.report.heard(decisions, point)
 
     def foresee(self, point: Point, at: Seconds) -> None:
         """Note that a point of another block is expected at `at` now."""
@@ -115,6 +116,11 @@ class Ties:
         asker = Asker(plan.block.id, decisions.began, now, self.foreign, parts, self.blocks)
         found = knowledge(asker, earlier, self._live_blocks)
         points = dict(found.points)
+        performances = {each.decisions.plan.block.id: each for each in self._others()}
+        for taker in self.given.values():
+            if (other := performances.get(block_of(taker))) is not None:
+                start = Point(taker.behavior.partition(":")[2], taker.sync)
+                points[taker] = other.decisions.times(now).get(start, now) - decisions.began
         for point in self.foreign:
             if (at := decisions.reached.get(point, decisions.foreseen.get(point))) is not None:
                 points.setdefault(point, at - decisions.began)
@@ -142,13 +148,12 @@ class Ties:
         if self.given.get(behavior) != taker and behavior in owner.decisions.plan.chains:
             self.given[behavior] = taker
             self.blocks[block.id] = block
-            self.foreign.add(taker)
-            owner.take_in(lambda: self._live_blocks.follow(self, [taker], self.blocks))
             owner.take_in(owner.replan)
 
     def renew(self) -> None:
         """Follow the points of other blocks that a new plan names, and tell whose parts it takes."""
-        if fresh := set(self._owner.decisions.plan.foreign) - self.foreign:
-            self.foreign |= fresh
-            self._live_blocks.follow(self, fresh, self.blocks)
+        decisions = self._owner.decisions
+        fresh = set(decisions.plan.foreign) - decisions.reached.keys()
+        self.foreign |= fresh
+        self._live_blocks.follow(self, fresh, self.blocks)
         self.take_over()
