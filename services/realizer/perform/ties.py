@@ -140,14 +140,14 @@ class Ties:
         for name, taker in plan.takes.items():
             block, _, behavior = name.partition(":")
             if (other := performances.get(block)) is not None:
-                other.ties.give(behavior, Point(f"{plan.block.id}:{taker}", "start"), plan.block)
+                other.ties.give(behavior, Point(f"{plan.block.id}:{taker}", "start"))
 
-    def give(self, behavior: str, taker: Point, block: Block) -> None:
+    def give(self, behavior: str, taker: Point) -> None:
         """Plan to hand over the part of a behavior at `taker`, a point of another block."""
         owner = self._owner
         if self.given.get(behavior) != taker and behavior in owner.decisions.plan.chains:
             self.given[behavior] = taker
-            self.blocks[block.id] = block
+            self.blocks[block_of(taker)] = self._live_blocks.blocks[block_of(taker)]
             owner.take_in(owner.replan)
 
     def renew(self) -> None:
