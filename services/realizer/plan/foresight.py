@@ -15,7 +15,7 @@ from engage_hri.services.realizer.points import Point
 
 
 def foreseen(assembly: Assembly, known: Known, doubted: Collection[Point]) -> dict[int, Seconds]:
-    """When transitions come, as far as that is known beforehand, at the earliest. doubted: points not to count on."""
+    """Earliest times of transitions, as far as they are known beforehand. doubted: points not to count on."""
     found: dict[int, Seconds] = {}
     if known.points:
         for point, transition in assembly.at.items():
