@@ -78,7 +78,9 @@ def test_own_block_and_no_block_name_the_same_point() -> None:
 def test_a_point_of_another_block_is_a_transition_of_its_own() -> None:
     example = block((GAZE, SPEECH), after("other:x:end+1", "s:start"))
     other = block((Speech(id="x", text="so"),), id="other")
-    made = plan_block(example, [FakeBody().estimate(each) for each in example.behaviors], known=Known(blocks={"other": other}))
+    made = plan_block(
+        example, [FakeBody().estimate(each) for each in example.behaviors], known=Known(blocks={"other": other})
+    )
 
     assert at(made, "s:start") == 1.0
     assert is_live(made.net)

@@ -77,7 +77,9 @@ async def test_an_arm_that_another_block_moves_is_not_sent_home() -> None:
         first = body.ask(bml(POINT, id="one"))
         await body.told("p", block="one")
         body.reach("p", "start", block="one")
-        tied = '<speech id="t"><text>so</text></speech><pointing id="p" target="x" mode="RIGHT_HAND" start="t:start"/>'
+        tied = (
+            '<speech id="t"><text>so</text></speech><pointing id="p" target="x" mode="RIGHT_HAND" start="t:start"/>'
+        )
         second = body.ask(bml(tied, id="two"))
         body.reach("p", "ready", "stroke_start", "stroke", "stroke_end", block="one")  # on its way home
         await body.told("p", block="two")

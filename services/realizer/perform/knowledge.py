@@ -1,6 +1,6 @@
 """Knowledge about other live blocks, gathered for the planning of one: points, parts, and who depends on whom."""
 
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from typing import Protocol
 
 from msgspec import Struct
@@ -73,7 +73,7 @@ def knowledge(asker: Asker, others: Iterable[Performed], live_blocks: LiveBlocks
         if not each.is_ending:
             over = {id for id in plan.chains if decisions.has_ended(id) or f"{block}:{id}" in dependent}
             kept = plan.kept | live_blocks.named(block)
-            holders |= holders_of(block, plan.chains, plan.estimates, plan.natural, kept, over)
+            holders |= holders_of(block, plan.chains, plan.estimates, plan.natural, kept, over, decisions.next_number)
     return Known(blocks=asker.blocks, points=points, holders=holders)
 
 
@@ -99,24 +99,10 @@ def _dependents(block: str, plans: Sequence[Plan]) -> set[str]:
                 if is_foreign(point.behavior) and (block_of(point) == block or point.behavior in found)
             ]
             if sources:
-                found |= {f"{plan.block.id}:{id}" for id in _reachable(plan, sources)}
+                later = plan.net.later(sources)
+                found |= {f"{plan.block.id}:{point.behavior}" for point, at in plan.at.items() if at in later}
         if len(found) == before:
             return found
-
-
-def _reachable(plan: Plan, sources: Iterable[int]) -> Iterator[str]:
-    """Behaviors of a plan that come after one of these transitions with any of their points."""
-    out: dict[int, list[int]] = {}
-    for place in plan.net.places:
-        if place.kind != "idle":
-            out.setdefault(place.source, []).append(place.target)
-    todo = list(sources)
-    seen = set(todo)
-    while todo:
-        fresh = set(out.get(todo.pop(), ())) - seen
-        seen |= fresh
-        todo += fresh
-    return (id for id, each in plan.chains.items() if any(plan.at[point] in seen for point in each.points))
 
 
 def parts_of(behaviors: Iterable[BlockBehavior], estimates: Iterable[Estimate]) -> set[str]:

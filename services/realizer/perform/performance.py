@@ -98,7 +98,7 @@ class BlockPerformance:
                 }
                 self._shared.live_blocks.perform(self.plan.block.id, self)
                 with self._shared.live_blocks.followed(self.ties, set(self.ties.foreign), self.ties.blocks):
-                    self.ties.take_over()
+                    self.ties.begin()
                     self._advance()
                     ending = await asyncio.shield(self._ending)  # others wait for it, too
                     await self._end_behaviors(ending)

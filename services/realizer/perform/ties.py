@@ -11,7 +11,7 @@ from engage_hri.services.realizer.decide.decisions import Decisions
 from engage_hri.services.realizer.perform.feedback import Reporter
 from engage_hri.services.realizer.perform.knowledge import Asker, Performed, knowledge, parts_of
 from engage_hri.services.realizer.perform.live_blocks import LiveBlocks
-from engage_hri.services.realizer.plan.known import Known, block_of
+from engage_hri.services.realizer.plan.known import Known, block_of, is_named_in
 from engage_hri.services.realizer.plan.planner import Plan
 from engage_hri.services.realizer.plan.relations import needing
 from engage_hri.services.realizer.points import Point
@@ -38,7 +38,7 @@ class Tied(Performed, Protocol):
 class Ties:
     """Ties of one performance.
 
-    foreign: points of other blocks that are followed. vanished: behaviors of other blocks of which some point will
+    foreign: points of other blocks that are followed. foreign_ties: those that the block itself names. vanished: behaviors of other blocks of which some point will
     never be reached. given: behaviors whose parts another block takes by its plan, and the start of the one there.
     """
 
@@ -55,6 +55,7 @@ class Ties:
         self._live_blocks = live_blocks
         self.blocks = dict(blocks)
         self.foreign = set(owner.plan.foreign)
+        self.foreign_ties = frozenset(point for point in owner.plan.foreign if point in owner.plan.kept)
         self.vanished: set[str] = set()
         self.given: dict[str, Point] = {}
 
@@ -106,11 +107,11 @@ class Ties:
         """Blocks that began earlier, and what of this one has begun, as known now. Times from this block's start."""
         owner, decisions = self._owner, self._owner.decisions
         plan = decisions.plan
-        earlier = []
+        earlier, is_later = [], False
         for each in self._others():
-            if each is owner:
-                break
-            earlier.append(each)
+            is_later = is_later or each is owner
+            if each is not owner and (not is_later or is_named_in(each.decisions.plan.block.id, self.foreign_ties)):
+                earlier.append(each)
         parts = parts_of(plan.block.behaviors, plan.estimates.values())
         now = owner.report.now()
         asker = Asker(plan.block.id, decisions.began, now, self.foreign, parts, self.blocks)
@@ -132,6 +133,13 @@ class Ties:
             given={id: point for id, point in self.given.items() if point not in decisions.reached},
             begun=frozenset(decisions.begun),
         )
+
+    def begin(self) -> None:
+        """Tell other blocks that this one has begun: those that are tied to it can be planned now."""
+        for each in self._others():
+            if each is not self._owner and is_named_in(self._owner.plan.block.id, each.ties.foreign_ties):
+                each.take_in(each.replan)
+        self.take_over()
 
     def take_over(self) -> None:
         """Tell other blocks which of their behaviors this one takes a part from by plan."""

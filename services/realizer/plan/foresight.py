@@ -71,3 +71,10 @@ def unkept(late: Container[Point], known: Known) -> list[Problem]:
         for point in sorted(known.points)
         if point in late and is_foreign(point.behavior)
     ]
+
+
+def without_date(assembly: Assembly, known: Known) -> set[str]:
+    """Behaviors that come after points of other blocks of which it is not known when they come."""
+    unknown = [at for point, at in assembly.at.items() if is_foreign(point.behavior) and point not in known.points]
+    later = assembly.net.later(unknown)
+    return {point.behavior for point, at in assembly.at.items() if at in later}

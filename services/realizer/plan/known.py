@@ -1,6 +1,6 @@
 """Other live blocks, as known when a block is planned: when their points come, and who has which part when."""
 
-from collections.abc import Container, Iterable, Iterator, Mapping
+from collections.abc import Callable, Container, Iterable, Iterator, Mapping
 
 from msgspec import Struct
 from msgspec.structs import replace
@@ -18,12 +18,14 @@ class Holder(Struct, frozen=True):
 
     chain: its points are named as other blocks name them. is_natural: it ends when something takes its place, or with
     its block. kept: points that it cannot be deprived of, since something waits for them. estimate: of the body.
+    reached: number of its points that have been.
     """
 
     chain: Chain
     is_natural: bool
     kept: frozenset[Point]
     estimate: Estimate | None = None
+    reached: int = 0
 
 
 class Known(Struct, frozen=True, kw_only=True):
@@ -73,16 +75,18 @@ def holders_of(
     natural: Container[str],
     kept: frozenset[Point],
     over: Container[str],
+    reached: Callable[[str], int],
 ) -> Iterator[tuple[str, Holder]]:
     """Behaviors of a live block that have parts of the body or will have them, by `block:behavior`.
 
-    kept: points that something waits for. over: behaviors that have ended or do not count.
+    kept: points that something waits for. over: behaviors that have ended or do not count. reached: number of points
+    of a behavior that have been.
     """
     for id, chain in chains.items():
         if chain.parts and id not in over:
             renamed = replace(chain, points=tuple([qualified(block, point) for point in chain.points]))
             held = frozenset(qualified(block, point) for point in kept.intersection(chain.points))
-            yield f"{block}:{id}", Holder(renamed, id in natural, held, estimates.get(id))
+            yield f"{block}:{id}", Holder(renamed, id in natural, held, estimates.get(id), reached(id))
 
 
 BLOCK_END = Point(BLOCK_ITSELF, "end")

@@ -20,7 +20,7 @@ from engage_hri.schemas.units import Seconds
 from engage_hri.services.realizer.net.petri_net import PetriNet
 from engage_hri.services.realizer.plan.assembly import Assembler, Assembly, Member, assembling
 from engage_hri.services.realizer.plan.deadlocks import Losses, clashes, judge
-from engage_hri.services.realizer.plan.foresight import foreseen, losses_to_others, too_late, unkept
+from engage_hri.services.realizer.plan.foresight import foreseen, losses_to_others, too_late, unkept, without_date
 from engage_hri.services.realizer.plan.handover import Arrangement, Conflict, Turn, arrange, entering
 from engage_hri.services.realizer.plan.instants import Classes
 from engage_hri.services.realizer.plan.known import BLOCK_END, NOTHING, Known, is_foreign
@@ -219,7 +219,10 @@ class _Planner:
             arranged, conflicts = yield from arrange(
                 self.chains, present, classes, arrangement, {**self.known.points, **times}, rounds, self.barred, given
             )
-            arranged, others = yield from share(self.chains, present, self.known, arranged, times, self.barred)
+            undated = without_date(assembly, self.known) if given else ()
+            arranged, others = yield from share(
+                self.chains, present, self.known, arranged, times, self.barred, undated
+            )
             conflicts = [each for each in (*conflicts, *others) if each.hand or each.turn not in self.overlaps]
             turns = [each.turn for each in conflicts if each.turn and not (each.hand or waits_elsewhere(each.turn))]
             if losses := (yield from clashes(turns, self.chains, self.relations.required, classes)):

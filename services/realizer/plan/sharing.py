@@ -29,10 +29,12 @@ def share(
     arranged: Arrangement,
     times: Mapping[Point, Seconds],
     barred: Container[tuple[str, Hand]] = (),
+    undated: Container[str] = (),
 ) -> Steps[tuple[Arrangement, list[Conflict]]]:
     """The arrangement with the handovers from and to behaviors of other live blocks, and the conflicts with them.
 
-    times: of the points of this block, in the schedule that `arranged` is for.
+    times: of the points of this block, in the schedule that `arranged` is for. undated: behaviors that wait for points
+    of blocks that have not begun: nobody knows when they come; they are planned again once it is known.
     """
     if not known.holders and not known.given:
         return arranged, []
@@ -41,7 +43,7 @@ def share(
     for id in chains:
         yield 2 + len(known.holders) // 8
         shared.give(id)
-        for name in shared.rivals(id):
+        for name in shared.rivals(id) if id not in undated else ():
             shared.settle(id, name)
     lasting = tuple(sorted(arranged.natural - shared.successors.keys()))
     return (
@@ -68,6 +70,7 @@ class _Sharing:
         self.successors = dict(arranged.successors)
         self.cuts = dict(arranged.cuts)
         self.takes = dict(arranged.takes)
+        self.turns = arranged.turns
         self.conflicts: list[Conflict] = []
         self.held = relations.constrained
         self.mentioned = {point.behavior for point in relations.constrained}
@@ -112,6 +115,8 @@ class _Sharing:
         elif (first := self._first_after(holder.chain, start)) is not None and id not in self.known.begun:
             if (point := self._needed(id, holder, first)) is not None:
                 self._wait(id, point)
+            elif (point := self._needed(id, holder, holder.reached)) is not None and (id, point) not in self.turns:
+                self.conflicts.append(Conflict((id, point), None))  # by plan it comes first; it may turn out slow
             elif name not in self.takes or start < self.times[self.chains[self.takes[name]].points[0]] - EPSILON:
                 self.takes[name] = id
 
