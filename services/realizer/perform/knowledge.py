@@ -25,6 +25,7 @@ from engage_hri.services.realizer.plan.known import (
 from engage_hri.services.realizer.plan.phases import chain
 from engage_hri.services.realizer.plan.planner import Plan
 from engage_hri.services.realizer.plan.relations import Elsewhere
+from engage_hri.services.realizer.plan.sharing import needed_points
 from engage_hri.services.realizer.points import Point, performer
 
 _ARMS = ("left_arm", "right_arm")
@@ -88,7 +89,10 @@ def concerns(block: str, named: Iterable[Point], parts: Collection[str], other: 
 
 
 def _dependents(block: str, plans: Sequence[Plan]) -> set[str]:
-    """Behaviors, by `block:behavior`, that wait for points of a block, or for others that do: they are not given."""
+    """Behaviors, by `block:behavior`, that wait for points of a block, or for others that do: they are not given.
+
+    The end of a look that waits to be taken over by that block does not count.
+    """
     found: set[str] = set()
     while True:
         before = len(found)
@@ -100,7 +104,10 @@ def _dependents(block: str, plans: Sequence[Plan]) -> set[str]:
             ]
             if sources:
                 later = plan.net.later(sources)
-                found |= {f"{plan.block.id}:{point.behavior}" for point, at in plan.at.items() if at in later}
+                for id, each in plan.chains.items():
+                    needed = (*each.points[: needed_points(each, is_natural=id in plan.natural)], *plan.kept)
+                    if any(point.behavior == id and plan.at[point] in later for point in needed):
+                        found.add(f"{plan.block.id}:{id}")
         if len(found) == before:
             return found
 

@@ -167,16 +167,18 @@ def _not_given_up(chain: Chain, first: int, kept: Container[Point], *, is_natura
 
     These are its stroke, the arrival of a look, words, and what others wait for. is_free: it loses nothing by it.
     """
-    last = len(chain.points) - 1
-    needed = [number for number in range(first, last + 1) if chain.points[number] in kept]
-    if chain.type in WITH_STROKE:
-        needed.append(_STROKE_END)
-    elif is_natural or last >= _RELAX:
-        needed.append(_STROKE)
-    elif not is_free:
-        needed.append(last)
+    needed = [number for number in range(first, len(chain.points)) if chain.points[number] in kept]
+    if not is_free:
+        needed.append(needed_points(chain, is_natural=is_natural) - 1)
     furthest = max(needed, default=-1)
     return furthest if furthest >= first else None
+
+
+def needed_points(chain: Chain, *, is_natural: bool) -> int:
+    """Number of points that a behavior must have passed before its part can be taken over, whatever waits for it."""
+    if chain.type in WITH_STROKE:
+        return _STROKE_END + 1
+    return _STROKE + 1 if is_natural or len(chain.points) > _RELAX else len(chain.points)
 
 
 def _is_overlaid(shift: Chain, other: Chain) -> bool:
