@@ -135,7 +135,7 @@ async def test_who_has_a_fixed_time_for_a_part_that_is_taken_is_dropped_and_told
     assert (warning.block, warning.behavior, warning.kind) == ("two", "q", "IMPOSSIBLE_TO_SCHEDULE")
     assert "one:p has the right arm until one:p:end, 5.50 s after" in warning.message
     assert [each.dropped for each in outcomes] == [(), ("q",)]
-    assert [each for each in seen.progress("one")][-1].time == 6.0
+    assert seen.progress("one")[-1].time == 6.0
 
 
 async def test_who_must_not_be_dropped_takes_nothing_either_his_block_is_refused() -> None:

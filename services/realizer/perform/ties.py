@@ -38,8 +38,9 @@ class Tied(Performed, Protocol):
 class Ties:
     """Ties of one performance.
 
-    foreign: points of other blocks that are followed. foreign_ties: those that the block itself names. vanished: behaviors of other blocks of which some point will
-    never be reached. given: behaviors whose parts another block takes by its plan, and the start of the one there.
+    foreign: points of other blocks that are followed. foreign_ties: those that the block itself names. vanished:
+    behaviors of other blocks of which some point will never be reached. given: behaviors whose parts another block
+    takes by its plan, and the start of the one there.
     """
 
     def __init__(

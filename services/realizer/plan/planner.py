@@ -217,7 +217,7 @@ class _Planner:
             rounds = _rounds(assembly, solution.times)
             yield len(times) // 4
             arranged, conflicts = yield from arrange(
-                self.chains, present, classes, arrangement, {**self.known.points, **times}, rounds, self.barred, given
+                self.chains, present, classes, arrangement, {**times, **self.known.points}, rounds, self.barred, given
             )
             undated = without_date(assembly, self.known) if given else ()
             arranged, others = yield from share(

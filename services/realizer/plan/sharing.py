@@ -33,12 +33,13 @@ def share(
 ) -> Steps[tuple[Arrangement, list[Conflict]]]:
     """The arrangement with the handovers from and to behaviors of other live blocks, and the conflicts with them.
 
-    times: of the points of this block, in the schedule that `arranged` is for. undated: behaviors that wait for points
-    of blocks that have not begun: nobody knows when they come; they are planned again once it is known.
+    times: of the points of this block, in the schedule that `arranged` is for. undated: behaviors that wait for
+    points of blocks that have not begun: nobody knows when they come; they are planned again once it is known.
     """
     if not known.holders and not known.given:
         return arranged, []
-    everywhere = {**known.points, **times}
+    # Others come when they come, also where this block would need them later.
+    everywhere = {**known.points, **{point: at for point, at in times.items() if not is_foreign(point.behavior)}}
     shared = _Sharing(chains, relations, known, arranged, everywhere, barred)
     for id in chains:
         yield 2 + len(known.holders) // 8
@@ -158,6 +159,8 @@ class _Sharing:
 
     def _wait(self, id: str, point: Point) -> None:
         turn: Turn = (id, point)
+        if turn in self.turns:
+            return
         others = {**self.chains, **{name: holder.chain for name, holder in self.known.holders.items()}}
         self.conflicts.append(Conflict(turn, free_hand((id,), others, self.times, self.barred)))
 
