@@ -27,8 +27,9 @@ from engage_hri.schemas.behaviors import (
 )
 from engage_hri.schemas.blocks import Block
 from engage_hri.schemas.body import PerformBehavior
-from engage_hri.schemas.feedback import SyncPointProgress
+from engage_hri.schemas.feedback import SyncPointProgress, WarningFeedback
 from engage_hri.schemas.syncref import SyncRef
+from engage_hri.services.control.config import Variability
 from engage_hri.services.requests.ends import RequestRefused
 from engage_hri.services.runtime.virtual_time import run_virtual
 from tests.realizer.fake_body import FakeBody, parts_of, type_of
@@ -41,9 +42,9 @@ KINDS: tuple[BlockBehavior, ...] = (
     Gesture(id="r", lexeme="BEAT", mode="RIGHT_HAND"),
     Gesture(id="o", lexeme="WAVE"),
     Gesture(id="b", lexeme="BEAT", mode="BOTH_HANDS"),
-    Pointing(id="p", target="can", mode="LEFT_HAND"),
-    Gaze(id="g", target="can"),
-    Gaze(id="h", target="cup"),
+    Pointing(id="p", target="a", mode="LEFT_HAND"),
+    Gaze(id="g", target="a"),
+    Gaze(id="h", target="b"),
     Head(id="n", lexeme="NOD"),
     FaceLexeme(id="f", lexeme="SMILE"),
     Posture(id="u", stance="STANDING"),
@@ -200,9 +201,10 @@ def test_nobody_loses_a_part_to_another_block_in_silence(story: tuple[Sent, ...]
 @given(streams())
 def test_blocks_share_the_simulated_body(story: tuple[Sent, ...]) -> None:
     async def main() -> None:
-        async with robot({}) as seen:
+        async with robot(Variability()) as seen:
             await sent(story, seen)
-            warned = {(each.block or "", each.behavior) for each in seen.warnings()}
+            said = [each for each in seen.feedback if isinstance(each, WarningFeedback)]
+            warned = {(each.block or "", each.behavior) for each in said}
             times = with_ends(seen)
         sent_out = {
             (sent.block.id, each.id): each for sent in story for each in sent.block.behaviors if each.id != "o"
