@@ -55,7 +55,11 @@ def instants(seen: Stage) -> dict[str, float]:
 def mispredicted(seen: Stage) -> list[str]:
     """Points that came at another time than feedback had said."""
     said = [each for each in seen.feedback if isinstance(each, SyncPointProgress)]
-    return [f"{each.block}:{each.behavior}:{each.sync}" for each in said if abs(each.time - each.predicted) > 1e-6]
+    return [
+        f"{each.block}:{each.behavior}:{each.sync}"
+        for each in said
+        if abs(each.time - (each.predicted or 0.0)) > 1e-6
+    ]
 
 
 def warned(seen: Stage) -> list[tuple[str | None, str, str]]:
@@ -248,10 +252,14 @@ async def test_a_block_that_waited_for_its_turn_still_knows_the_one_before() -> 
 
 
 async def test_a_point_that_is_expected_after_a_fixed_time_is_not_waited_for() -> None:
-    both = timed(MORE, start="1", end="one:s:end")
-    seen, _ = await told((0.0, block((WORDS,), id="one")), (0.0, block((both,), id="two", composition="MERGE")))
+    short = FaceLexeme(id="f", lexeme="SMILE")
+    tied = block((timed(short, start="1", relax="1.5", stroke="one:s:end"),), id="two")
+    seen, outcomes = await told((0.0, block((WORDS,), id="one")), (0.0, tied))
 
-    assert warned(seen)[0][2] in ("LATE", "IMPOSSIBLE_TO_SCHEDULE")
+    planned = seen.warnings()[0]
+    assert (planned.block, planned.kind) == ("two", "LATE")
+    assert "one:s:end is not waited for: expected 4.00 s after the start of the block" in planned.message
+    assert outcomes[1].dropped == ()
 
 
 @pytest.mark.parametrize("is_required", [True, False])

@@ -6,6 +6,7 @@ The oracle knows no plans: it looks at what was sent, at what the body was made 
 import asyncio
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import combinations
+from typing import Literal
 
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -34,7 +35,7 @@ from engage_hri.services.requests.ends import RequestRefused
 from engage_hri.services.runtime.virtual_time import run_virtual
 from tests.realizer.fake_body import FakeBody, parts_of, type_of
 from tests.realizer.stage import Stage, stage
-from tests.realizer.test_simulated_body import robot
+from tests.realizer.test_simulated_body import Robot, robot
 
 KINDS: tuple[BlockBehavior, ...] = (
     Speech(id="s", text="one two", marks=(Mark("m", 3),)),
@@ -84,7 +85,7 @@ def streams(draw: st.DrawFn) -> tuple[Sent, ...]:
             points = [sync for sync in sync_points(kind) if sync in ("start", "stroke")]
             sync = draw(st.sampled_from(points))
             behaviors.append(replace(kind, timing=(Timing(sync, ref),) if ref else ()))
-        composition = draw(st.sampled_from(("MERGE", "MERGE", "MERGE", "APPEND")))
+        composition: Literal["MERGE", "APPEND"] = draw(st.sampled_from(("MERGE", "MERGE", "MERGE", "APPEND")))
         block = Block(id=f"b{number}", behaviors=tuple(behaviors), composition=composition)
         story.append(Sent(at, block))
         at += draw(st.sampled_from((0.0, 0.25, 1.0, 2.5)))
@@ -110,7 +111,7 @@ class Watched(FakeBody):
         super()._take_over(perform)
 
 
-async def sent(story: Sequence[Sent], seen: Stage) -> None:
+async def sent(story: Sequence[Sent], seen: Stage | Robot) -> None:
     """All blocks, each at its time, to their ends."""
     now, pending = 0.0, []
     for each in story:
@@ -171,7 +172,7 @@ def untied(story: Sequence[Sent], times: Times, warned: set[tuple[str, str]]) ->
                     yield f"{one.block.id}:{each.id}:{timing.sync} at {own}, {timing.ref} at {other}"
 
 
-def with_ends(seen: Stage) -> Times:
+def with_ends(seen: Stage | Robot) -> Times:
     ends = {(each.block, "bml", "end"): each.at.seconds for each in seen.ends()}
     return times_of(seen.feedback) | ends  # type: ignore[return-value]
 

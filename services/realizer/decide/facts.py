@@ -68,6 +68,14 @@ class Facts:
         )
         return max((0.0, *late))
 
+    def earliness(self, point: Point) -> Seconds:
+        """Seconds by which a point was reached before the time that the block fixes for it; 0 if it fixes none."""
+        at = self.reached.get(point)
+        if at is None or point not in self.plan.at:
+            return 0.0
+        fixed = (lag for source, lag in self._index.waits_for[self.plan.at[point]] if source == 0)
+        return max(0.0, self.began + max(fixed, default=0.0) - at)
+
     def holds(self, point: Point) -> bool:
         """True if the behavior has arrived at the instant of `point`.
 

@@ -114,6 +114,8 @@ class Reporter:
             )
         if (late := max(skew, decisions.lateness(point))) > self._tolerance:
             self.late(decisions.member(point).point, f"{point.sync} came {late:.2f} s later than it should")
+        elif (early := decisions.earliness(point)) > self._tolerance:
+            self.late(decisions.member(point).point, f"{point.sync} came {early:.2f} s earlier than its fixed time")
 
     def heard(self, decisions: Decisions, foreign: Point) -> None:
         """Warn if a point of another block, reached now, is one that points of this block should have waited for."""

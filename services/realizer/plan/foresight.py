@@ -67,7 +67,7 @@ def too_late(impossible: Impossible, assembly: Assembly) -> set[Point]:
 def unkept(late: Container[Point], known: Known) -> list[Problem]:
     """Warnings about ties to points of other blocks that leave no time for what is fixed in this block."""
     return [
-        Problem("LATE", f"{point} is not waited for: it is expected{_when(point, known)}, after times that are fixed")
+        Problem("LATE", f"{point} is not waited for: expected{_when(point, known)[1:]}, after times that are fixed")
         for point in sorted(known.points)
         if point in late and is_foreign(point.behavior)
     ]
