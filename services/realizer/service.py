@@ -1,13 +1,13 @@
 """The realizer on the bus: takes blocks, answers each exactly once, and performs any number of them at a time."""
 
 import asyncio
-from collections.abc import Coroutine, Iterable, Mapping
+from collections.abc import Collection, Coroutine, Iterable, Mapping
 from typing import Any, TypeVar
 
 from msgspec.structs import replace
 
 from engage_hri.schemas import keys
-from engage_hri.schemas.behaviors import Gesture, Hand, Pointing, Speech
+from engage_hri.schemas.behaviors import Hand, Speech
 from engage_hri.schemas.blocks import (
     BehaviorInterrupted,
     Block,
@@ -35,13 +35,16 @@ from engage_hri.schemas.requests import Cancel, Outcome, Request, Unreadable
 from engage_hri.services.bus.interface import Bus, Received
 from engage_hri.services.realizer.config import RealizerConfig
 from engage_hri.services.realizer.perform.control_link import LONGEST_WAY
+from engage_hri.services.realizer.perform.knowledge import Asker, knowledge, may_share, parts_of
 from engage_hri.services.realizer.perform.live import Ending, Live
 from engage_hri.services.realizer.perform.live_blocks import LiveBlocks
 from engage_hri.services.realizer.perform.performance import BlockPerformance
 from engage_hri.services.realizer.perform.shared_context import Moving, Presence, SharedContext
 from engage_hri.services.realizer.perform.steering import Steering
+from engage_hri.services.realizer.plan.handover import hands_refused
+from engage_hri.services.realizer.plan.known import Known, is_foreign, is_named_in
 from engage_hri.services.realizer.plan.planner import Plan, plan_steps
-from engage_hri.services.realizer.plan.poses import poses_before, poses_left
+from engage_hri.services.realizer.plan.poses import poses_before
 from engage_hri.services.realizer.plan.relations import BlockRefused, extent, relation_steps
 from engage_hri.services.realizer.plan.steps import Steps, T
 from engage_hri.services.realizer.points import Point, performer
@@ -173,9 +176,14 @@ class _Realizer:
             fault = Fault(reason=f"it follows {', '.join(sorted(absent))}: no such live block", where=block.id)
             self._refuse(live, BlockRefused(fault))
             return
+        if live.request.follows and block.composition == "REPLACE":
+            advice = "leave out one of the two: REPLACE ends all that runs, and a block ends with those it follows"
+            fault = Fault(reason="it follows blocks that it replaces", where=block.id, advice=advice)
+            self._refuse(live, BlockRefused(fault))
+            return
         with self.live_blocks.opened(block):
             try:
-                plan = await _result_or_stopped(live.ending, self._plan(block, elsewhere))
+                plan = await _result_or_stopped(live.ending, self._plan(live, elsewhere))
             except EngageError as error:
                 self._refuse(live, error)
                 return
@@ -185,18 +193,19 @@ class _Realizer:
             if plan is None:
                 await self._end(live, live.outcome)
                 return
-            named = {point.behavior.partition(":")[0] for point in plan.foreign}
-            tied_to = {id: elsewhere[id] for id in named}
+            there = {**self.live_blocks.blocks, **elsewhere}
             performance = self.performances[live.request.id] = BlockPerformance(
-                live, plan, self.shared, tied_to, self.steering.held(block.id)
+                live, plan, self.shared, there, self.steering.held(block.id)
             )
+            live.settle()
             await self._end(live, await performance.run())
 
-    async def _plan(self, block: Block, elsewhere: Mapping[str, Block]) -> Plan:
+    async def _plan(self, live: Live, elsewhere: Mapping[str, Block]) -> Plan:
         """The plan of a block.
 
         The body is asked again from where it will be by then, and about the hands that the plan has chosen.
         """
+        block = live.request.block
         for each in block.behaviors:
             if isinstance(each, Speech) and len(each.text) > self.config.utterance:
                 reason = f"{len(each.text)} characters of speech, at most {self.config.utterance} are said in one go"
@@ -208,35 +217,39 @@ class _Realizer:
             reason = f"{held} behaviors, marks and sync references; at most {self.config.most} can be planned in time"
             advice = "send several (blocks with APPEND, fragments of one turn); `realizer.most` is the limit"
             raise BlockRefused(Fault(reason=reason, where=block.id, advice=advice))
-        await unhurried(relation_steps(block, elsewhere))  # Finds a bad reference before the body is asked.
+        relations = await unhurried(relation_steps(block, elsewhere))  # Bad references: before the body is asked.
+        named = frozenset(point for point in relations.named if is_foreign(point.behavior))
         block = validated(block)
         barred: set[tuple[str, Hand]] = set()
         chosen, estimates = block, await self._estimates(block, {})
         first, is_asked_again = estimates, False
+        await self._earlier(live, named)
         while True:
-            plan = await unhurried(plan_steps(chosen, estimates, elsewhere=elsewhere, barred=barred))
-            before = poses_before(plan, self._left_for(plan))
+            known = self._known(block, elsewhere, named, estimates)
+            plan = await unhurried(plan_steps(chosen, estimates, known=known, barred=barred))
+            before = poses_before(plan, known)
             if plan.block is chosen and (is_asked_again or not before):
                 return plan
             chosen, is_asked_again = plan.block, True
             estimates = await self._estimates(chosen, before)
-            if refused := _hands_refused(block, chosen, estimates):
+            if refused := hands_refused(block, chosen, estimates):
                 barred |= refused
                 chosen, estimates, is_asked_again = block, first, False
 
-    def _left_for(self, plan: Plan) -> dict[str, BodyPose]:
-        """Poses in which the blocks that `plan` is tied to leave the body for it, by part; the last tie says when."""
-        others = {each.plan.block.id: each.decisions for each in self.performing()}
-        named = {point: point.behavior.partition(":")[0::2] for point in plan.foreign}
-        times = {block: others[block].foresight.times() for block, _ in named.values() if block in others}
-        ties = [
-            times[block].get(Point(id, point.sync), 0.0) for point, (block, id) in named.items() if block in times
-        ]
-        poses: dict[str, BodyPose] = {}
-        for block in others:
-            if block in times:
-                poses |= poses_left(others[block].plan, times[block], max(ties))
-        return poses
+    async def _earlier(self, live: Live, named: Iterable[Point]) -> None:
+        """Wait until those of the earlier blocks are planned that this one is to be planned with in mind."""
+        block = live.request.block
+        for other in live.earlier:
+            id = other.request.block.id
+            if not other.settled.done() and (is_named_in(id, named) or may_share(block, other.request.block)):
+                await asyncio.wait([other.settled])
+
+    def _known(
+        self, block: Block, elsewhere: Mapping[str, Block], named: Collection[Point], estimates: Iterable[Estimate]
+    ) -> Known:
+        now = self.bus.now()
+        parts = parts_of(block.behaviors, estimates)
+        return knowledge(Asker(block.id, now, now, named, parts, elsewhere), self.performing(), self.live_blocks)
 
     async def _estimates(self, block: Block, before: Mapping[str, BodyPose]) -> tuple[Estimate, ...]:
         """Estimates of the body. before: poses in which behaviors start; without one, from where the body is now."""
@@ -271,6 +284,7 @@ class _Realizer:
         if replaces:
             for other in earlier:
                 other.stop(Ending("interrupted", replaced_by=block))
+        live.settle()
         if earlier:
             await asyncio.wait([other.ended for other in earlier])
         if replaces:
@@ -280,9 +294,12 @@ class _Realizer:
                 _, lost = await asyncio.wait(self.homing, timeout=self.config.abort)
                 self.homing -= lost
         try:
+            live.unsettle()
             # Asked again: the body is elsewhere by now.
-            estimates = await self._estimates(plan.block, poses_before(plan))
-            return await unhurried(plan_steps(plan.block, estimates, elsewhere=elsewhere))
+            known = self._known(plan.block, elsewhere, plan.foreign, plan.estimates.values())
+            estimates = await self._estimates(plan.block, poses_before(plan, known))
+            known = self._known(plan.block, elsewhere, plan.foreign, estimates)
+            return await unhurried(plan_steps(plan.block, estimates, known=known))
         except EngageError as error:
             self._warn(live, error)
             live.stop(Ending("failed", error.fault))
@@ -322,6 +339,7 @@ class _Realizer:
         del self.live[live.request.id]
         self.steering.forget(live.request.block.id)
         self.performances.pop(live.request.id, None)
+        live.settle()
         live.ended.set_result(None)
 
 
@@ -340,19 +358,6 @@ async def _result_or_stopped(stopped: asyncio.Future[Ending], work: Coroutine[An
 def unread(block: str, fault: Fault) -> WarningFeedback:
     """The warning about a message that came as a block and could not be read. block: its id; empty: not known."""
     return WarningFeedback(block=block or None, kind="PARSING_FAILURE", message=str(fault))
-
-
-def _hands_refused(block: Block, chosen: Block, estimates: Iterable[Estimate]) -> set[tuple[str, Hand]]:
-    """Hands that `block` leaves open and `chosen` does not, with which the body cannot perform a behavior."""
-    impossible = {each.behavior for each in estimates if not each.feasible}
-    return {
-        (after.id, after.mode)
-        for before, after in zip(block.behaviors, chosen.behaviors, strict=True)
-        if after is not before
-        and isinstance(after, Pointing | Gesture)
-        and after.mode is not None
-        and after.id in impossible
-    }
 
 
 async def realize(bus: Bus, ready: Ready, config: RealizerConfig) -> None:
