@@ -221,8 +221,8 @@ class Foresight:
     def pace(self, behavior: str, now: Seconds, may_pass: Callable[[Point], bool]) -> Pace:
         """Instants for the behavior's points up to the next where it must ask; empty if it comes to them anyway."""
         forecast, plan, facts = self.forecast, self.plan, self._facts
-        if forecast is None or behavior not in plan.chains:
-            return ()
+        if forecast is None or behavior not in self._minded:
+            return ()  # No bound can make it hurry, or wait on its way.
         points = plan.chains[behavior].points
         number = facts.next_number(behavior)
         at = facts.reached[points[number - 1]] if number else now
