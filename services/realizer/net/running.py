@@ -272,6 +272,7 @@ class RunningNet:
         target = place.target
         if target in self.instants and place.kind != "idle":
             return  # Only where the target does not wait for it.
+        assert not self._tokens[number], f"{place.kind} place {number} would hold two tokens"
         self._set(number, TOKEN if place.lag > 0.0 else RIPE)
         if place.kind in ("handover", "idle") or target == self.end:
             return
