@@ -257,10 +257,9 @@ class RunningNet:
 
     def _fire_one(self, transition: int, at: Seconds) -> None:
         self.instants[transition] = at
-        for number in self._inputs[transition]:
-            place = self.net.places[number]
-            if place.kind != "idle" or not place.source or place.source not in self.instants:
-                self._set(number, EMPTY)
+        for place in self._inputs[transition]:
+            if self.net.places[place].source not in self.instants or self.net.places[place].kind != "idle":
+                self._set(place, EMPTY)
         for observer in self.observers:
             observer.on_fired(transition, at)
         for place in self._outputs[transition]:
