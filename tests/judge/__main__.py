@@ -42,10 +42,10 @@ class Run(Struct):
     seconds: float
 
 
-def run(number: int, *, seed: int, kind: Kind, faults: bool) -> Run:
+def run(number: int, *, seed: int, kind: Kind, faults: bool, holds: bool = False) -> Run:
     """Perform and judge one story."""
     began = time.process_time()
-    story = generate.story(seed, number, kind, faults=faults)
+    story = generate.story(seed, number, kind, faults=faults, holds=holds)
     record = playing.play(story, asks=kind == "sentences")
     case = Case(story, record)
     findings = judge(story, record)
@@ -119,7 +119,9 @@ def show(runs: list[Run], options: argparse.Namespace) -> None:
         if failing:
             print(f"\n{law}: stories {', '.join(str(each.number) for each in failing[:40])}")
         for each in failing[: options.examples]:
-            story = generate.story(options.seed, each.number, options.kind, faults=options.faults)
+            story = generate.story(
+                options.seed, each.number, options.kind, faults=options.faults, holds=options.holds
+            )
             smallest = shrink(story, lambda one, law=law: breaks(one, law, asks=asks))  # type: ignore[misc]
             folder = Path(options.save) / f"{law.replace(' ', '-').replace(',', '')}-{options.kind}-{each.number}"
             write(smallest, folder)
@@ -156,6 +158,7 @@ def parsed(arguments: list[str]) -> argparse.Namespace:
     kinds.add_argument("--sentences", dest="kind", action="store_const", const="sentences", help="untimed sentences")
     parser.set_defaults(kind="alone")
     parser.add_argument("--faults", action="store_true", help="a body that is slow, stalls, fails, loses reports")
+    parser.add_argument("--holds", action="store_true", help="parts of the stories are held for a while")
     parser.add_argument("--jobs", type=int, default=1, help="processes")
     parser.add_argument("--examples", type=int, default=1, help="failures of each law that are shrunk and shown")
     parser.add_argument("--save", default="build/judge", help="folder for the failures")
@@ -169,7 +172,7 @@ def main(arguments: list[str]) -> int:
     options = parsed(arguments)
     if options.story:
         return replay(Path(options.story))
-    one = partial(run, seed=options.seed, kind=cast(Kind, options.kind), faults=options.faults)
+    one = partial(run, seed=options.seed, kind=cast(Kind, options.kind), faults=options.faults, holds=options.holds)
     numbers = range(options.first, options.first + options.runs)
     if options.jobs > 1:
         with ProcessPoolExecutor(options.jobs) as pool:
@@ -178,7 +181,7 @@ def main(arguments: list[str]) -> int:
         runs = [one(number) for number in numbers]
     print(table(runs))
     if options.json:
-        numbers_told = {"seed": options.seed, "kind": options.kind, "faults": options.faults}
+        numbers_told = {"seed": options.seed, "kind": options.kind, "faults": options.faults, "holds": options.holds}
         Path(options.json).write_text(
             json.dumps({**numbers_told, "runs": msgspec.to_builtins(runs)}), encoding="utf-8"
         )

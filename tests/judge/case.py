@@ -1,6 +1,7 @@
 """A story and what was seen of it, side by side, as the laws ask for it."""
 
-from collections.abc import Iterator, Mapping
+import math
+from collections.abc import Iterable, Iterator, Mapping
 from functools import cached_property
 
 from msgspec import Struct
@@ -90,6 +91,16 @@ class Case:
                 if times:
                     yield Done(id, asked, times)
 
+    def holds(self, block: str, behavior: str | None = None) -> list[tuple[float, float]]:
+        """Times, apart from each other, in which the behavior is held; None: anything of the block."""
+        found: list[tuple[float, float]] = []
+        for number, hold in enumerate(self.record.steered):
+            concerned = hold.block in ("", block) and (behavior is None or hold.behavior in ("", behavior))
+            if hold.is_held and concerned:
+                later = (each.at for each in self.record.steered[number:] if not each.is_held and each.covers(hold))
+                found.append((hold.at, next(later, math.inf)))
+        return merged(found)
+
     @property
     def is_exact(self) -> bool:
         """True if the body does what it has estimated."""
@@ -102,3 +113,19 @@ class Case:
 
     def entity(self, id: str) -> Entity | None:
         return WORLD.entity(id)
+
+
+def merged(times: Iterable[tuple[float, float]]) -> list[tuple[float, float]]:
+    """The same times, with no two that touch."""
+    found: list[tuple[float, float]] = []
+    for since, until in sorted(times):
+        if found and since <= found[-1][1]:
+            found[-1] = (found[-1][0], max(found[-1][1], until))
+        else:
+            found.append((since, until))
+    return found
+
+
+def within(times: Iterable[tuple[float, float]], since: float, until: float) -> float:
+    """Seconds of these times between two instants."""
+    return sum(max(0.0, min(until, last) - max(since, first)) for first, last in times)

@@ -30,6 +30,8 @@ WEIGHTS = {
 }  # fmt: skip
 DISTURBANCES: tuple[DeedKind, ...] = ("cancel", "interrupt")
 """What may come from outside while blocks run. A new kind of request is named here and in `playing.Player.do`."""
+HELD = (0.05, 0.2, 0.6, 1.5, 4.0)
+"""Seconds for which something is held."""
 
 
 class Element(Struct):
@@ -65,11 +67,14 @@ class Made(Struct):
         return f'<bml id="{self.id}"{space}{composed}>\n  {content}\n</bml>'
 
 
-def story(seed: int, number: int, kind: Kind, *, faults: bool = False) -> Story:
+def story(seed: int, number: int, kind: Kind, *, faults: bool = False, holds: bool = False) -> Story:
+    """A story. holds: the same, and parts of it are held for a while."""
     name = f"{seed}/{kind}/{number}"
     chance = Random(name)
     make = {"alone": _alone, "streams": _stream, "sentences": _sentences}[kind]
     deeds = make(chance)
+    if holds:
+        deeds = _with_holds(Random(f"{name}/holds"), deeds)
     if not faults:
         return Story(deeds, seed=name)
     if chance.random() < 0.4:
@@ -135,6 +140,24 @@ def _sentences(chance: Random) -> tuple[Deed, ...]:
             f'<constraint><after ref="{first.id}:end"><sync ref="{second.id}:start"/></after></constraint>'
         )
     return (Deed(0.0, "perform", "b0", Made("b0", "bml-1.0", "MERGE", elements, constraints).xml()),)
+
+
+def _with_holds(chance: Random, deeds: Sequence[Deed]) -> tuple[Deed, ...]:
+    """Hold behaviors, blocks and the robot, and let them go again, by the same name or by a wider one."""
+    blocks = [deed for deed in deeds if deed.kind == "perform"]
+    steered: list[Deed] = []
+    for _ in range(chance.choice((1, 1, 2, 3))):
+        deed = chance.choice(blocks)
+        block = chance.choice((deed.block, deed.block, ""))
+        behaviors = [*reading.read(deed.xml).behaviors]
+        behavior = chance.choice(behaviors) if block and behaviors and chance.random() < 0.6 else ""
+        since = round(deed.at + chance.uniform(0.0, 4.0), 2)
+        until = round(since + chance.choice(HELD), 2)
+        wider = chance.choice(((block, behavior), (block, behavior), (block, ""), ("", "")))
+        steered.append(Deed(since, "hold", block, behavior=behavior))
+        steered.append(Deed(until, "continue", wider[0], behavior=wider[1]))
+    last = max(deed.at for deed in steered)
+    return tuple(sorted((*deeds, *steered, Deed(last, "continue", "")), key=lambda deed: deed.at))
 
 
 def _faults(chance: Random) -> dict[str, Any]:

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterator, Mapping
 
-from tests.judge import laws_custom, laws_feedback, laws_motion, laws_time
+from tests.judge import laws_custom, laws_feedback, laws_held, laws_motion, laws_time
 from tests.judge.case import Case, Finding
 from tests.judge.record import Record
 from tests.judge.story import Story
@@ -26,6 +26,8 @@ LAWS: Mapping[str, str] = {
     "parts": "two behaviors had one part at one time",
     "in the air": "in the end the arms are not home, or something moves",
     "off its prediction": "a point came more than 10 ms off the last prediction before it, and nothing was disturbed",
+    "moves though held": "what was held has begun, or has gone on speaking",
+    "late for a hold": "something was late that is not, if nothing is held",
     "spoken order": "sentences came in another order than they could",
     "needless loss": "something was dropped or refused that an order of the sentences can serve",
 }
@@ -34,7 +36,7 @@ LAWS: Mapping[str, str] = {
 CHECKS: tuple[Callable[[Case], Iterator[Finding]], ...] = (
     laws_feedback.one_end, laws_feedback.points, laws_feedback.losses, laws_feedback.words, laws_time.constraints,
     laws_custom.customs, laws_time.predictions, laws_time.spoken_order, laws_motion.motion, laws_motion.parts,
-    laws_motion.home,
+    laws_motion.home, laws_held.held, laws_held.late,
 )  # fmt: skip
 
 

@@ -5,7 +5,7 @@ from itertools import pairwise
 
 from msgspec.structs import replace
 
-from tests.judge.case import Case, Done, Finding
+from tests.judge.case import Case, Done, Finding, within
 from tests.judge.laws_time import EXACT
 from tests.judge.reading import LASTING, SHIFTS, WITH_STROKE, Asked, Reading
 
@@ -32,7 +32,7 @@ def customs(case: Case) -> Iterator[Finding]:
         }
         for each in done.values():
             if each.asked.type == "wait" and not _is_named(block, each.asked, "end"):
-                yield from _length(each)
+                yield from _length(case, each)
             if each.asked.type in LASTING and not _is_named(left, each.asked, *LEAVING):
                 yield from _lasts(case, left, each, done)
         yield from _rows(block, done)
@@ -48,11 +48,16 @@ def _without_the_lost(case: Case, block: Reading) -> Reading:
     return replace(block, relations=tuple(relations))
 
 
-def _length(done: Done) -> Iterator[Finding]:
+def _length(case: Case, done: Done) -> Iterator[Finding]:
+    """A wait takes the seconds that it names; the time in which it is held does not count."""
     start, end = done.time("start"), done.time("end")
     asked = float(done.asked.attributes.get("duration", "0"))
-    if start is not None and end is not None and abs(end - start - asked) > EXACT:
-        yield Finding("wrong length", done.block, f"{done.name} took {end - start:.3f} s", done.asked.id)
+    if start is None or end is None:
+        return
+    held = within(case.holds(done.block, done.asked.id), start, end)
+    if abs(end - start - held - asked) > EXACT:
+        text = f"{done.name} took {end - start:.3f} s" + (f", held for {held:.3f} s of it" if held else "")
+        yield Finding("wrong length", done.block, text, done.asked.id)
 
 
 def _lasts(case: Case, block: Reading, one: Done, done: dict[str, Done]) -> Iterator[Finding]:

@@ -6,7 +6,8 @@ from collections.abc import Iterator
 from engage_hri.schemas.feedback import BlockProgress, SyncPointProgress
 from tests.judge.case import Case, Finding
 
-RESOLUTION = 1e-6
+HARMLESS = ("LATE", "DEGRADED")
+"""Kinds of warnings with which a behavior is made all the same."""
 
 
 def one_end(case: Case) -> Iterator[Finding]:
@@ -29,6 +30,9 @@ def one_end(case: Case) -> Iterator[Finding]:
             yield Finding("end", block, "refused after it began, or without a warning")
         if ends[0].status == "done" and not starts:
             yield Finding("end", block, "done, and never begun")
+        outcome, asked = ends[0].outcome, case.blocks[block].behaviors
+        if outcome is not None and outcome.status == "done" and asked and set(outcome.dropped) >= set(asked):
+            yield Finding("end", block, "done, and every behavior was dropped")
     for error in record.errors:
         yield Finding("crash", "", error)
 
@@ -73,7 +77,7 @@ def losses(case: Case) -> Iterator[Finding]:
         outcome = record.outcome(id)
         if outcome is None:
             continue
-        grave = Counter(each.behavior for each in record.warnings(id) if each.kind != "LATE")
+        grave = _of_losses(case, id)
         for behavior in (*outcome.dropped, *outcome.interrupted):
             if grave[behavior] != 1:
                 yield Finding("losses", id, f"{behavior} is lost, with {grave[behavior]} warnings")
@@ -83,6 +87,24 @@ def losses(case: Case) -> Iterator[Finding]:
         required = {each.id for each in block.behaviors.values() if each.required} | named
         for behavior in sorted(required.intersection(outcome.dropped)):
             yield Finding("required", id, f"{behavior} was dropped, and the block is done")
+
+
+def _of_losses(case: Case, block: str) -> Counter[str]:
+    """How many warnings of a loss there are, by behavior.
+
+    A speech that gives up a time is told with the kind of what cannot be scheduled; it may be lost later, for another
+    reason.
+    """
+    kinds: dict[str, list[str]] = {}
+    for each in case.record.warnings(block):
+        if each.kind not in HARMLESS:
+            kinds.setdefault(each.behavior, []).append(each.kind)
+    counts: Counter[str] = Counter()
+    for behavior, all in kinds.items():
+        is_speech = behavior in case.blocks[block].speeches
+        others = [kind for kind in all if kind != "IMPOSSIBLE_TO_SCHEDULE"]
+        counts[behavior] = len(others) if is_speech and others else len(all)
+    return counts
 
 
 def words(case: Case) -> Iterator[Finding]:

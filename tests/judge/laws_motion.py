@@ -33,7 +33,10 @@ TOGETHER = 0.002
 """Seconds by which one motion may reach into the next."""
 ARMS = ("left", "right")
 TORSO = ("torso",)
-FACE = ("brows", "lids", "mouth")
+FACE = (
+    "left_brow", "right_brow", "brow_slant", "left_lid", "right_lid", "left_mouth_corner", "right_mouth_corner",
+    "lips", "jaw",
+)  # fmt: skip
 NECK = ("neck",)
 
 
@@ -50,13 +53,18 @@ def motion(case: Case) -> Iterator[Finding]:
             yield from _stroke_end(case, done)
 
 
+def _arm(side: str) -> tuple[str, str]:
+    """How the names of the joints of an arm begin."""
+    return f"{side}_shoulder", f"{side}_elbow"
+
+
 def _stroke_end(case: Case, done: Done) -> Iterator[Finding]:
     """The end of a stroke is no more told without motion than the stroke."""
     stroke, end = done.time("stroke"), done.time("stroke_end", "strokeEnd")
     if stroke is None or end is None:
         return
     sides = ARMS if done.asked.hand in ("", "both") else (done.asked.hand,)
-    prefixes = NECK if done.asked.type == "head" else tuple(f"{side}_" for side in sides)
+    prefixes = NECK if done.asked.type == "head" else tuple(joint for side in sides for joint in _arm(side))
     way = case.record.way(case.record.columns(*prefixes), stroke, end)
     if end - stroke < LEAST or way < MOVED / 3:
         where = f"{done.name}: {way:.3f} rad from stroke to its end, {stroke:.3f} to {end:.3f}"
@@ -89,7 +97,7 @@ def _gesture(case: Case, done: Done) -> Iterator[str]:
 
 
 def _gestures_with(case: Case, done: Done, at: float, side: int) -> Iterator[str]:
-    away = case.record.away(case.record.columns(f"{ARMS[side]}_"), at)
+    away = case.record.away(case.record.columns(*_arm(ARMS[side])), at)
     if away < RAISED:
         yield f"at its stroke, {at:.3f}, the {ARMS[side]} arm is {away:.2f} rad from rest"
     yield from _stroke(case, done, side)
@@ -104,7 +112,7 @@ def _with_some_hand(done: Done, check: Callable[[int], Iterator[str]]) -> list[s
 
 def _stroke(case: Case, done: Done, side: int) -> Iterator[str]:
     """The arm has moved up to the stroke."""
-    columns = case.record.columns(f"{ARMS[side]}_")
+    columns = case.record.columns(*_arm(ARMS[side]))
     start, stroke = done.time("start"), done.time("stroke")
     assert start is not None
     assert stroke is not None
@@ -165,6 +173,9 @@ _FACES = ("face", "faceLexeme", "faceFacs")
 _SAME: Mapping[str, tuple[str, ...]] = {"faceShift": _FACES, "postureShift": ("posture",)}
 
 
+_POSED = ("postureShift", "pose")
+
+
 # -- who has which part ----------------------------------------------------------------------------------------------
 
 
@@ -216,7 +227,7 @@ def _attributed(case: Case, spans: Sequence[Span]) -> list[set[str]]:
 
 def _sides_shown(case: Case, done: Done, since: float, until: float) -> list[str]:
     """The arms that have moved or are on target, the likeliest first: on target, then the longer way."""
-    ways = {side: case.record.way(case.record.columns(f"{side}_"), since, until) for side in ARMS}
+    ways = {side: case.record.way(case.record.columns(*_arm(side)), since, until) for side in ARMS}
     on_target = dict.fromkeys(ARMS, False)
     entity = case.entity(done.asked.attributes.get("target", ""))
     if done.asked.type == "pointing" and entity is not None:
@@ -255,16 +266,28 @@ def _overlaid(one: Done, other: Done) -> bool:
 
 
 def home(case: Case) -> Iterator[Finding]:
-    """Once everything has ended, the arms are where they were in the beginning, and nothing moves."""
+    """Once everything has ended, arms and torso are where they belong, and nothing moves.
+
+    They belong where they were in the beginning, or where a shift of the posture has left them.
+    """
     record = case.record
     if case.story.lies or not record.samples or any(not record.ends.get(block) for block in case.blocks):
         return
     last = record.samples[-1]
     displaced = {each["joint"] for each in case.story.faults.get("displaced", [])}
-    for side in ARMS:
-        columns = [each for each in record.columns(f"{side}_") if record.joints[each] not in displaced]
-        if (away := record.away(columns, last.at)) > 0.01:
-            yield Finding("in the air", "", f"the {side} arm is {away:.2f} rad from home in the end")
+    shifted = [each.times["end"] for each in case.done if each.asked.type in _POSED and "end" in each.times]
+    is_hidden = any(_under_way(case, at, "posture", *WITH_STROKE) for at in shifted)
+    """True if what a shift says was not to be seen at its end."""
+    places = [record.samples[0], *map(record.sample, shifted)]
+    parts = {f"{side} arm": _arm(side) for side in ARMS} | {"torso": TORSO}
+    for part, joints in parts.items():
+        columns = [each for each in record.columns(*joints) if record.joints[each] not in displaced]
+        away = min(
+            max(abs(last.joints[each] - place.joints[each]) for each in columns) if columns else 0.0
+            for place in places
+        )
+        if away > 0.01 and not is_hidden:
+            yield Finding("in the air", "", f"the {part} is {away:.2f} rad from where it belongs in the end")
     if last.is_moving:
         yield Finding("in the air", "", "something moves in the end")
 

@@ -3,11 +3,14 @@
 from collections.abc import Iterator, Mapping
 from itertools import combinations, pairwise, permutations
 
-from tests.judge.case import Case, Finding
+from engage_hri.schemas.feedback import WarningFeedback
+from tests.judge.case import Case, Finding, merged, within
 from tests.judge.reading import Place, Reading, Relation, Term
 
 EXACT = 0.0101
 """Seconds: how much an exact body may miss an instant, or a prediction."""
+STANDING = 0.5
+"""Seconds in which a body comes to stand once it is held, and gets under way again."""
 NOTICEABLE = 0.12
 """Seconds by which a body with faults may miss an instant untold: what people notice is 0.1."""
 
@@ -21,14 +24,14 @@ def constraints(case: Case) -> Iterator[Finding]:
         if case.record.began(id) is None:
             continue
         instants = _instants(block)
-        warned = {(id, each.behavior) for each in case.record.warnings(id) if each.kind == "LATE"}
+        warned = {(id, each.behavior) for each in case.record.warnings(id) if _excuses(each, case)}
         for relation in block.relations:
             terms = [term for term in relation.terms if _counts(term.place, id, case)]
             for one, other in combinations(terms, 2):
                 if relation.kind != "same" and one is not relation.terms[0]:
                     continue
                 gap = _gap(relation, case.times[one.place] + one.offset, case.times[other.place] + other.offset)
-                if gap <= tolerance:
+                if gap <= tolerance + _held(case, relation, one.place, other.place):
                     continue
                 group = {(each.block, each.behavior) for each in _touched(instants, one.place, other.place)}
                 if group & warned or _was_late_abroad(group, id, case):
@@ -50,6 +53,14 @@ def _counts(place: Place, block: str, case: Case) -> bool:
     # A point of a block that was broken off: whoever waits for the end of that block is set free.
     is_whole = case.record.status(place.block) == "done" or place.behavior != ""
     return is_whole and not (ends and ends[0].at <= asked[block])
+
+
+def _held(case: Case, relation: Relation, *places: Place) -> float:
+    """Seconds that a relation may be off since something of these blocks was held between its points, or near."""
+    times = [case.times[place] for place in places]
+    held = merged(span for block in {place.block for place in places} for span in case.holds(block))
+    seconds = within(held, min(times) - STANDING, max(times))
+    return seconds + STANDING if seconds else 0.0
 
 
 def _gap(relation: Relation, one: float, other: float) -> float:
@@ -92,8 +103,14 @@ def _was_late_abroad(group: set[tuple[str, str]], block: str, case: Case) -> boo
         (other, each.behavior) in group
         for other in {other for other, _ in group} - {block}
         for each in case.record.warnings(other)
-        if each.kind == "LATE"
+        if _excuses(each, case)
     )
+
+
+def _excuses(warning: WarningFeedback, case: Case) -> bool:
+    """True if a warning says that a time is not kept: something is late, or a speech gives it up for its words."""
+    is_lost = (warning.block, warning.behavior) in case.lost
+    return warning.kind == "LATE" or (warning.kind == "IMPOSSIBLE_TO_SCHEDULE" and not is_lost)
 
 
 def _shown(term: Term, case: Case) -> str:

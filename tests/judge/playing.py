@@ -13,7 +13,7 @@ from functools import partial
 import msgspec
 
 from engage_hri.schemas import keys
-from engage_hri.schemas.blocks import Block, BlockOutcome, InterruptBehavior, PerformBlock
+from engage_hri.schemas.blocks import Block, BlockOutcome, InterruptBehavior, PerformBlock, SteerPerformance
 from engage_hri.schemas.body import EstimateBehaviors, EstimateItem, Estimates, SyncPointReached, WordSpoken
 from engage_hri.schemas.documents.xml_decode import decode_xml
 from engage_hri.schemas.faults import EngageError, RequestRefused
@@ -30,7 +30,7 @@ from engage_hri.services.requests.ends import Pending, Requester
 from engage_hri.services.runtime.service import Service, running, serve
 from engage_hri.services.runtime.virtual_time import VirtualTimeLoop
 from tests.judge.lying import Lies, LyingBody
-from tests.judge.record import End, Record, Sample, Told
+from tests.judge.record import End, Record, Sample, Steered, Told
 from tests.judge.story import WORLD, Deed, Story
 
 STEP = 0.02
@@ -42,8 +42,14 @@ SETTLING = 5.0
 
 
 def play(story: Story, *, asks: bool = False) -> Record:
-    """Perform a story. asks: ask the body first what each behavior would take."""
+    """Perform a story. asks: ask the body first what each behavior would take.
+
+    If parts of it are held, it is performed without the holds as well, to see what is late for them alone.
+    """
     record = Record()
+    if story.is_held:
+        calm = play(story.let_go())
+        record.late_anyhow = {(it.block, it.behavior) for block in calm.ends for it in calm.late(block)}
     bugs = _Bugs(record)
     LOG.addHandler(bugs)
     before, LOG.propagate = LOG.propagate, False
@@ -95,6 +101,18 @@ class Player:
                 id = f"i-{self._number}"
                 deeds = InterruptBehavior(id=id, requester="judge", block=deed.block, behavior=deed.behavior)
                 self.requests.send(keys.BLOCK, deeds)
+            case "hold" | "continue":
+                self._number += 1
+                steer = SteerPerformance(
+                    id=f"s-{self._number}", requester="judge", to=deed.kind, block=deed.block, behavior=deed.behavior
+                )
+                asked = self.requests.send(keys.BLOCK, steer)
+                asked.outcome.add_done_callback(partial(self._steered, deed))
+
+    def _steered(self, deed: Deed, future: "asyncio.Future[object]") -> None:
+        if not future.cancelled() and future.exception() is None:
+            now = asyncio.get_running_loop().time()
+            self.record.steered.append(Steered(now, deed.kind == "hold", deed.block, deed.behavior))
 
     def _ended(self, block: str, future: "asyncio.Future[object]") -> None:
         if future.cancelled() or self.is_over:

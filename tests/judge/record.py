@@ -43,8 +43,25 @@ class Sample(Struct, frozen=True):
     is_moving: bool
 
 
+class Steered(Struct, frozen=True):
+    """A hold, or its end (`is_held` is false), once it was answered. Names as of `story.Deed`."""
+
+    at: float
+    is_held: bool
+    block: str
+    behavior: str
+
+    def covers(self, other: "Steered") -> bool:
+        """True if the other is of the same thing, or of a part of it."""
+        is_within = not self.behavior or self.behavior == other.behavior
+        return not self.block or (self.block == other.block and is_within)
+
+
 class Record(Struct):
-    """Everything seen. ends: of each block. asked: when each block was asked for."""
+    """Everything seen. ends: of each block. asked: when each block was asked for.
+
+    late_anyhow: behaviors that are late without holds, too; by block.
+    """
 
     joints: tuple[str, ...] = ()
     samples: list[Sample] = field(default_factory=list)
@@ -54,6 +71,8 @@ class Record(Struct):
     asked: dict[str, float] = field(default_factory=dict)
     ends: dict[str, list[End]] = field(default_factory=dict)
     errors: list[str] = field(default_factory=list)
+    steered: list[Steered] = field(default_factory=list)
+    late_anyhow: set[tuple[str, str]] = field(default_factory=set)
     natural: dict[tuple[str, str], tuple[tuple[str, str, float, bool], ...]] = field(default_factory=dict)
     """What the body says of a behavior, asked before the story began: phases as (since, to, seconds, may wait)."""
 
@@ -72,6 +91,9 @@ class Record(Struct):
             for each in self.told
             if isinstance(each.message, WarningFeedback) and each.message.block == block
         ]
+
+    def late(self, block: str) -> list[WarningFeedback]:
+        return [each for each in self.warnings(block) if each.kind == "LATE"]
 
     def progress(self, block: str, which: str) -> list[BlockProgress]:
         return [

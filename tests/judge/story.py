@@ -6,10 +6,12 @@ from typing import Any, Literal
 
 import msgspec
 from msgspec import Struct
+from msgspec.structs import replace
 
 from engage_hri.schemas.world import Entity, World
 
-DeedKind = Literal["perform", "cancel", "interrupt"]
+DeedKind = Literal["perform", "cancel", "interrupt", "hold", "continue"]
+STEERING: tuple[DeedKind, ...] = ("hold", "continue")
 
 WORLD = World(
     entities=(
@@ -26,7 +28,7 @@ class Deed(Struct, frozen=True, omit_defaults=True):
     """Something that the client does.
 
     at: seconds from the beginning. block: id of the block. xml: of a block to perform. follows: blocks of the same
-    turn. behavior: the one to interrupt.
+    turn. behavior: the one to interrupt or hold; empty: the block. An empty block: the robot.
     """
 
     at: float
@@ -51,6 +53,15 @@ class Story(Struct, frozen=True, omit_defaults=True):
     @property
     def blocks(self) -> tuple[Deed, ...]:
         return tuple(deed for deed in self.deeds if deed.kind == "perform")
+
+    @property
+    def is_held(self) -> bool:
+        """True if something is held for a while."""
+        return any(deed.kind in STEERING for deed in self.deeds)
+
+    def let_go(self) -> "Story":
+        """The same without holds."""
+        return replace(self, deeds=tuple(deed for deed in self.deeds if deed.kind not in STEERING))
 
     @property
     def is_disturbed(self) -> bool:

@@ -1,8 +1,13 @@
 """Several behaviors of one block that move the same part."""
 
+import pytest
 from msgspec.structs import replace
 
 from engage_hri.schemas.behaviors import Gaze, Gesture, Head
+from engage_hri.services.realizer.plan.known import Known
+from engage_hri.services.realizer.plan.planner import plan_block
+from engage_hri.services.realizer.points import Point
+from tests.realizer.fake_body import FakeBody
 from tests.realizer.planning import GAZE, LEFT, LEFT_TOO, SPEECH, at, plan, timed, warnings
 from tests.realizer.stage import after, block, together
 
@@ -70,3 +75,15 @@ def test_a_gaze_that_must_last_is_not_taken_over_before() -> None:
     made = plan(block((timed(GAZE, end="5"), Gaze(id="h", target="cup"), SPEECH), together("h:start", "s:start")))
 
     assert at(made, "h:start") == at(made, "s:start") >= 4.5
+
+
+@pytest.mark.parametrize("tie", [{}, {"start": "p:stroke_start"}])
+def test_who_has_begun_waits_for_nobody_any_more(tie: dict[str, str]) -> None:
+    one, other = Gesture(id="p", lexeme="BEAT", mode="LEFT_HAND"), Gesture(id="q", lexeme="BEAT", mode="LEFT_HAND")
+    example = block((one, timed(other, **tie)))
+    points = {Point("p", "start"): 0.0, Point("q", "start"): 0.1}
+    known = Known(points=points, begun=frozenset({"p", "q"}))
+
+    made = plan_block(example, [FakeBody().estimate(each) for each in example.behaviors], known=known)
+
+    assert (made.dropped, made.problems) == ((), ())

@@ -242,7 +242,7 @@ class _Planner:
             arranged, others = yield from share(
                 self.chains, present, self.known, arranged, times, self.barred, undated
             )
-            conflicts = [each for each in (*conflicts, *others) if each.hand or each.turn not in self.overlaps]
+            conflicts = [each for each in (*conflicts, *others) if self._is_open(each)]
             turns = [each.turn for each in conflicts if each.turn and not (each.hand or waits_elsewhere(each.turn))]
             if losses := (yield from clashes(turns, self.chains, self.relations.required, classes)):
                 raise Losses(losses)
@@ -279,6 +279,13 @@ class _Planner:
                 one for one in self.problems if one.kind != "DEGRADED" or one.behavior not in self.dropped
             ),
         )
+
+    def _is_open(self, conflict: Conflict) -> bool:
+        """Whether anything can be done about a conflict: who has begun waits no more, and uses the arm that it has."""
+        if conflict.hand:
+            return conflict.hand[0] not in self.known.begun
+        assert conflict.turn is not None
+        return conflict.turn[0] not in self.known.begun and conflict.turn not in self.overlaps
 
     def _unawaited_events(self, present: Relations) -> frozenset[str]:
         """Events with a decision that nothing in the block waits for."""
