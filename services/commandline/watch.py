@@ -41,9 +41,7 @@ class Options(Connected):
         list[str] | None,
         typer.Option(metavar="WHAT", help="events, statistics, feedback, head or faults; may be repeated."),
     ] = None
-    net: Annotated[bool, typer.Option("--net", help="The Petri nets of live blocks, and where their tokens are.")] = (
-        False
-    )
+    net: Annotated[bool, typer.Option("--net", help="Petri nets of live blocks, and where their tokens are.")] = False
     actor: Annotated[str, typer.Option(metavar="ID", help="Only what goes on with this person.")] = ""
     kind: Annotated[
         list[str] | None, typer.Option(metavar="KIND", help="Only these connection events; may be repeated.")
@@ -97,9 +95,8 @@ def main(options: Options) -> int:
     wanted = Wanted(tuple(options.only or ()), options.actor, tuple(options.kind or ()))
     wanted.check()
     if options.net and not wanted.is_everything:
-        raise InputRefused(
-            Fault(reason="--net shows nets and nothing else", advice="leave out --only, --actor, --kind")
-        )
+        reason, advice = "shows nets and nothing else", "leave out --only, --actor and --kind"
+        raise InputRefused(Fault(reason=reason, where="--net", advice=advice))
     run_until_signal(_watch_nets(options, config) if options.net else _watch(options, config, wanted))
     return DONE
 

@@ -30,7 +30,7 @@ class _Picture(ABC):
 
     @abstractmethod
     def _picture(self) -> RenderableType:
-        """What is to be seen now."""
+        """Draw how things are now."""
 
     def _draw_soon(self, delay: Seconds = REDRAW) -> None:
         if self._due is None:
@@ -41,7 +41,7 @@ class _Picture(ABC):
         self._live.update(self._picture(), refresh=True)
 
     def __enter__(self) -> Self:
-        self._live.start()
+        self._live.start(refresh=True)
         return self
 
     def __exit__(self, *raised: object) -> None:

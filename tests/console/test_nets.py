@@ -1,12 +1,17 @@
 """Nets of live blocks as text: drawings and lines are values, the same for the same messages."""
 
+import asyncio
+from io import StringIO
+
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from rich.cells import cell_len
+from rich.console import Console
 
 from engage_hri.schemas.nets import Fired, NetMarked, NetPlace, NetPlanned, NetPoint, NetTransition
 from engage_hri.schemas.units import Stamp
 from engage_hri.services.console import nets
+from engage_hri.services.console.live import LiveNets, NetLog
 from engage_hri.services.console.net_drawing import drawing, legend, picture
 from engage_hri.services.console.nets import NetInView, feed, in_view, told
 
@@ -244,3 +249,55 @@ def test_blocks_of_the_robot_itself_are_drawn_last() -> None:
 
     assert titles == ["block new", "block old", "block response-1"]
     assert picture((), 80, 24, 0.0).plain == "no block runs"
+
+
+def started(*fired: int) -> NetMarked:
+    return NetMarked(block="b", fired=tuple(Fired(transition=one, time=0.5) for one in fired))
+
+
+async def test_a_terminal_is_drawn_anew_as_tokens_move_and_cleared_in_the_end() -> None:
+    screen = StringIO()
+    console = Console(file=screen, force_terminal=True, width=80, height=24, color_system=None)
+
+    def drawn() -> str:
+        text = screen.getvalue()
+        screen.seek(0)
+        screen.truncate()
+        return text
+
+    with LiveNets(console) as view:
+        assert "no block runs" in drawn()
+        view(FIGURE_4_8, 0.0)
+        view(started(0), 0.0)
+        assert drawn() == ""  # many messages make one picture
+        await asyncio.sleep(0.15)
+        assert "1 of 13 instants have fired, 1 ●" in drawn()
+        view(started(1), 0.0)
+        await asyncio.sleep(0.6)
+        assert "2 of 13 instants have fired, 1 ●" in drawn()
+        view(NetMarked(block="b", is_over=True), 0.0)
+        await asyncio.sleep(0.6)
+        assert "block b: over" in drawn()
+        await asyncio.sleep(2.0)
+        assert "no block runs" in drawn()
+        await asyncio.sleep(5.0)
+        assert drawn() == ""
+
+
+async def test_without_a_terminal_each_change_is_a_line() -> None:
+    out = StringIO()
+    log = NetLog(Console(file=out, width=80), asyncio.get_running_loop().time())
+
+    log(FIGURE_4_8, 0.0)
+    await asyncio.sleep(1.5)
+    log(started(0), 0.0)
+    log(FIGURE_4_8, 0.0)  # told again, nothing new
+    log(NetMarked(block="b", is_over=True), 0.0)
+    log(NetMarked(block="other", put=(3,)), 0.0)
+
+    assert out.getvalue().splitlines() == [
+        "  0:00.0  b: net of 13 instants and 20 places",
+        "  0:00.0  b: ● b at rest",
+        "  0:01.5  b: bml:start fired at 0.50 s (planned 0.00 s)",
+        "  0:01.5  b: over",
+    ]
