@@ -195,13 +195,15 @@ class Estimate(Struct, frozen=True, kw_only=True, omit_defaults=True):
     on, if the body reports them; strokes that it does not report are expected at equal distances up to
     `stroke_end`."""
     head_degrees: Degrees = 0.0
-    """Rotations of the head's joints from the starting pose to the target, added up. Cg of thesis 3.3.2."""
+    """Rotations of the head's joints on their way from the pose to the target, added up. Cg of thesis 3.3.2."""
     arm_degrees: Degrees = 0.0
     """The same for the arm used. Cp of thesis 3.3.2."""
     ray: Ray | None = None
     """Gaze axis or forearm once on target."""
     pose_after: BodyPose | None = None
     """Pose on target (for a sequence of references), joints as in `BodyPose`."""
+    pose_end: BodyPose | None = None
+    """Pose at the end, once its parts have gone back to rest; of a shift the same as on target. None: not known."""
 
 
 class EstimateItem(Struct, frozen=True, kw_only=True, omit_defaults=True):

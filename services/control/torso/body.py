@@ -153,8 +153,12 @@ class SimulatedBody(Body):
                 return wait_estimate(behavior, duration or 0.0, kinematics.pose_message(situation.pose))
         course = choreography.plan(behavior, situation)
         path = self._path(course, None if moving and not self._misbelieved else situation)
-        on_target = kinematics.pose_message({**situation.pose, **course.on_target})
-        return motion_estimate(behavior, course, path, on_target)
+        # A nod is on top of the gaze, and leaves the neck where that has it.
+        moved = () if course.parts == ("nod",) else zip(course.joints, course.legs[-1].goal, strict=True)
+        on_target, end = {**situation.pose, **course.on_target}, {**situation.pose, **dict(moved)}
+        return motion_estimate(
+            behavior, course, path, kinematics.pose_message(on_target), kinematics.pose_message(end)
+        )
 
     # -- motion -------------------------------------------------------------------------------------------------
 

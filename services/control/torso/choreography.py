@@ -146,7 +146,7 @@ def _glance(goal: tuple[float, float], situation: Situation) -> Course:
         Leg(goal=base, seconds=back, marks=_marks(1.0, "end")),
     )
     ray = kinematics.gaze({**situation.pose, **dict(zip(joints, goal, strict=True))})
-    return _course(("head",), joints, legs, _held_on_target("stroke"), goal, situation, ray)
+    return _course(("head",), joints, legs, _held_on_target("stroke"), goal, ray)
 
 
 def _shift(joints: tuple[str, ...], goal: tuple[float, ...], situation: Situation) -> Course:
@@ -158,7 +158,7 @@ def _shift(joints: tuple[str, ...], goal: tuple[float, ...], situation: Situatio
     on_target = {**situation.pose, **dict(zip(joints, goal, strict=True))}
     points = (CoursePoint("start"), CoursePoint("end"))
     ray = kinematics.gaze(on_target) if part == "head" else None
-    return _course((part,), joints, legs, points, goal, situation, ray)
+    return _course((part,), joints, legs, points, goal, ray)
 
 
 def _point(entity: Entity, mode: str | None, situation: Situation) -> Course:
@@ -202,7 +202,7 @@ def _point_with(side: Side, aim: kinematics.ArmAim, situation: Situation) -> Cou
         Leg(goal=home, seconds=back, marks=(("relax", 0.1 / back), ("end", 1.0))),
     )
     ray = kinematics.arm({**situation.pose, **dict(zip(joints, aim.held, strict=True))}, side)
-    return _course((f"{side}_arm",), joints, legs, _held_around_stroke(), aim.held, situation, ray)
+    return _course((f"{side}_arm",), joints, legs, _held_around_stroke(), aim.held, ray)
 
 
 def _gesture(lexeme: str, mode: str | None, situation: Situation) -> Course:
@@ -238,7 +238,7 @@ def _gesture(lexeme: str, mode: str | None, situation: Situation) -> Course:
         Leg(goal=home, seconds=seconds[3], marks=(("relax", 0.1 / seconds[3]), ("end", 1.0))),
     )  # fmt: skip
     parts = tuple(f"{side}_arm" for side in sides)
-    course = _course(parts, joints, legs, _held_around_stroke(), stroke, situation, None)
+    course = _course(parts, joints, legs, _held_around_stroke(), stroke, None)
     return replace(course, is_resizable=True)
 
 
@@ -267,7 +267,7 @@ def _nod(lexeme: str, repetition: int, amount: float) -> Course:
     legs.append(Leg(goal=(0.0, 0.0), seconds=0.3, marks=(("relax", 0.15), ("end", 1.0))))
     return Course(
         parts=("nod",), joints=("neck_yaw", "neck_pitch"), legs=tuple(legs), points=_held_around_stroke(strokes),
-        degrees=math.degrees(size), is_resizable=True,
+        is_resizable=True,
     )  # fmt: skip
 
 
@@ -286,16 +286,15 @@ def _excursion(part: str, goal: tuple[float, ...], situation: Situation) -> Cour
         Leg(goal=after, velocity=drift, seconds=settle, marks=_marks(1.0, "stroke_end", "relax")),
         Leg(goal=rest, seconds=back, marks=_marks(1.0, "end")),
     )
-    return _course((part,), joints, legs, _held_on_target("ready", "stroke_start", "stroke"), goal, situation, None)
+    return _course((part,), joints, legs, _held_on_target("ready", "stroke_start", "stroke"), goal, None)
 
 
 def _course(
     parts: tuple[str, ...], joints: tuple[str, ...], legs: tuple[Leg, ...], points: tuple[CoursePoint, ...],
-    goal: tuple[float, ...], situation: Situation, ray: Ray | None,
+    goal: tuple[float, ...], ray: Ray | None,
 ) -> Course:  # fmt: skip
     return Course(
-        parts=parts, joints=joints, legs=legs, points=points, on_target=dict(zip(joints, goal, strict=True)),
-        degrees=kinematics.degrees_between(_angles(joints, situation.pose), goal), ray=ray,
+        parts=parts, joints=joints, legs=legs, points=points, on_target=dict(zip(joints, goal, strict=True)), ray=ray,
     )  # fmt: skip
 
 

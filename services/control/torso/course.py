@@ -6,7 +6,6 @@ from msgspec import Struct
 
 from engage_hri.schemas.body import NoPointZone, Ray
 from engage_hri.schemas.feedback import WarningKind
-from engage_hri.schemas.units import Degrees
 from engage_hri.schemas.world import World
 from engage_hri.services.control.torso.motion import Leg
 
@@ -40,8 +39,6 @@ class Course(Struct, frozen=True, kw_only=True):
     points: tuple[CoursePoint, ...]
     on_target: Mapping[str, float] = {}
     """Joint angles at the stroke, or at the end of a shift."""
-    degrees: Degrees = 0.0
-    """Degrees of joint motion from the start to there."""
     ray: Ray | None = None
     is_resizable: bool = False
     """True if it may be made smaller for want of time; false for a motion with a target."""

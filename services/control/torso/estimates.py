@@ -1,5 +1,6 @@
 """Estimates of the simulated body, from the paths that it then moves along: without deviations they are exact."""
 
+import math
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
 
@@ -24,26 +25,32 @@ def speech_estimate(behavior: Speech, utterance: Utterance, pose: BodyPose) -> E
     times["end"] = utterance.seconds
     gaps = {mark.id for mark in behavior.marks if utterance.is_gap(mark.position)}
     phases = _phases([CoursePoint(sync, sync if sync in gaps else "") for sync in sync_points(behavior)], times)
-    return Estimate(behavior=behavior.id, feasible=True, parts=("voice",), phases=phases, pose_after=pose)
+    return Estimate(
+        behavior=behavior.id, feasible=True, parts=("voice",), phases=phases, pose_after=pose, pose_end=pose
+    )
 
 
 def wait_estimate(behavior: Wait, duration: Seconds, pose: BodyPose) -> Estimate:
     phases = _phases((CoursePoint("start"), CoursePoint("end", "end")), {"start": 0.0, "end": duration})
-    return Estimate(behavior=behavior.id, feasible=True, phases=phases, pose_after=pose)
+    return Estimate(behavior=behavior.id, feasible=True, phases=phases, pose_after=pose, pose_end=pose)
 
 
-def motion_estimate(behavior: BlockBehavior, course: Course, path: Path, pose: BodyPose) -> Estimate:
-    """Estimate a behavior that moves along `path`. pose: joint angles on target."""
+def motion_estimate(
+    behavior: BlockBehavior, course: Course, path: Path, pose: BodyPose, pose_end: BodyPose
+) -> Estimate:
+    """Estimate a behavior that moves along `path`. pose, pose_end: joint angles on target, and at the end."""
     is_gaze, is_arm = course.parts == ("head",), course.parts[0].endswith("_arm")
+    degrees = math.degrees(path.travel(path.marks.get("stroke", path.length))) if is_gaze or is_arm else 0.0
     return Estimate(
         behavior=behavior.id,
         feasible=True,
         parts=("head",) if course.parts == ("nod",) else course.parts,
         phases=_phases(course.points, path.marks, quickest(course, path), SLOWEST),
-        head_degrees=course.degrees if is_gaze else 0.0,
-        arm_degrees=course.degrees if is_arm else 0.0,
+        head_degrees=degrees if is_gaze else 0.0,
+        arm_degrees=degrees if is_arm else 0.0,
         ray=course.ray,
         pose_after=pose,
+        pose_end=pose_end,
     )
 
 

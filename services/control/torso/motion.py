@@ -138,6 +138,12 @@ class Path:
             legs[:1] = [replace(first, marks=(*missed, *first.marks))]
         return tuple(legs)
 
+    def travel(self, s: Seconds) -> float:
+        """Way of all joints from the start to s, there and back counted twice; in their units."""
+        parts = [(each, min(each.seconds, s - each.start)) for each in self._segments if each.start < s]
+        ways = [_evaluated(each.coefficients, (SAMPLES * seconds)[:, None])[0] for each, seconds in parts]
+        return sum(float(np.sum(np.abs(np.diff(way, axis=0)))) for way in ways)
+
     @property
     def fastest(self) -> float:
         """The highest steady rate that the limits permit; at least 1."""
