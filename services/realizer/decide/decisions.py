@@ -20,7 +20,7 @@ from engage_hri.services.realizer.decide.lateness import LatenessWatch
 from engage_hri.services.realizer.plan.assembly import Member
 from engage_hri.services.realizer.plan.planner import Plan
 from engage_hri.services.realizer.plan.schedule import EPSILON
-from engage_hri.services.realizer.points import Point, performer
+from engage_hri.services.realizer.points import SHIFTS, Point, performer
 
 NOTICEABLE: Seconds = 0.02
 """Seconds; planned instants that differ by less are not worth a message."""
@@ -340,15 +340,18 @@ def pace(behavior: str, decisions: "Decisions", now: Seconds) -> Pace:
     forecast, plan = decisions.forecast, decisions.plan
     if forecast is None or behavior not in plan.chains:
         return ()
-    points = plan.chains[behavior].points
+    points, segments = plan.chains[behavior].points, plan.chains[behavior].segments
+    is_moving = plan.chains[behavior].type not in SHIFTS  # a shift beneath a look takes no time, and moves nothing
     number = decisions.next_number(behavior)
     at = decisions.reached[points[number - 1]] if number else now
     is_paced = forecast.is_hurried(behavior)
     planned: list[tuple[str, Seconds]] = []
     before = plan.at[points[number - 1]] if number else -1
-    for point in points[number:]:
+    for index, point in enumerate(points[number:], start=number):
         here = plan.at[point]
         if here != before:
+            if is_moving and index and forecast.phase(behavior, here) == 0.0 < segments[index - 1].natural:
+                break  # another takes its part before this point: it need not hurry there
             natural, latest = at + forecast.phase(behavior, here), at + forecast.longest(behavior, here)
             if point is points[number] and not decisions.paces.get(behavior):
                 natural = max(natural, decisions.not_before.get(behavior, natural))  # overdue, not slower on purpose

@@ -83,8 +83,11 @@ class Expectations(Facts):
         if chain is None or number == 0 or chain.points[number] != point or self.paces.get(point.behavior):
             return
         if performer(chain.behavior) == "body":
-            took = at - self.reached[chain.points[number - 1]]
-            changed = self.experience.learn(point.behavior, chain.segments[number - 1].natural, took)
+            before, natural = chain.points[number - 1], chain.segments[number - 1].natural
+            if self.plan.predicted(point) - self.plan.predicted(before) < natural - EPSILON:
+                return  # it was to be cut short
+            took = at - self.reached[before]
+            changed = self.experience.learn(point.behavior, natural, took)
             if self.forecast is not None:
                 self.forecast.relearn(changed)
 

@@ -90,13 +90,15 @@ class BlockPerformance:
         for behavior in self.plan.dropped:
             self._shared.live_blocks.lose(self.plan.block.id, behavior)
         self._shared.live_blocks.reach(self.plan.block.id, Point(BLOCK_ITSELF, "start"), began)
+        rank = {id: number for number, id in enumerate(self.plan.entering)}
         try:
             async with asyncio.TaskGroup() as tasks:
+                # Those that begin with the block do so in this order.
                 self._running = {
                     behavior.id: tasks.create_task(
                         self._perform(behavior), name=f"{self.plan.block.id}/{behavior.id}"
                     )
-                    for behavior in self.plan.behaviors
+                    for behavior in sorted(self.plan.behaviors, key=lambda each: rank.get(each.id, len(rank)))
                 }
                 self._shared.live_blocks.perform(self.plan.block.id, self)
                 with self._shared.live_blocks.followed(self, self._foreign, self._elsewhere):
