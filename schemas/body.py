@@ -15,7 +15,7 @@ from msgspec.structs import replace
 from engage_hri.schemas.behaviors import BlockBehavior
 from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.requests import Outcome, Request
-from engage_hri.schemas.units import Degrees, Duration, Meters, Radians, Stamp, Vector
+from engage_hri.schemas.units import Degrees, Duration, Meters, Radians, Seconds, Stamp, Vector
 
 
 class PlannedInstant(Struct, frozen=True, kw_only=True, omit_defaults=True):
@@ -206,12 +206,23 @@ class Estimate(Struct, frozen=True, kw_only=True, omit_defaults=True):
     """Pose at the end, once its parts have gone back to rest; of a shift the same as on target. None: not known."""
 
 
+class PlannedTime(Struct, frozen=True, kw_only=True, omit_defaults=True):
+    """Time planned for a sync point. at: seconds from now."""
+
+    sync: str
+    at: Seconds
+
+
 class EstimateItem(Struct, frozen=True, kw_only=True, omit_defaults=True):
     """A behavior to be estimated."""
 
     behavior: BlockBehavior
     pose: BodyPose | None = None
     """Pose to start from; None: the present one."""
+    times: tuple[PlannedTime, ...] = ()
+    """Times of its start, of the hold points at which it has to wait, and of points that it has to reach faster or
+    slower than by itself; empty: it is estimated by itself. The items of one question that have times are one plan: a
+    body that can rehearse it estimates each from where the others will have brought its parts by then."""
 
 
 class EstimateBehaviors(Struct, frozen=True, kw_only=True, tag="estimate_behaviors", omit_defaults=True):

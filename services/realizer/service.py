@@ -16,6 +16,7 @@ from engage_hri.schemas.body import (
     EstimateItem,
     Estimates,
     GoHome,
+    PlannedTime,
     SyncPointArrived,
     SyncPointReached,
     WordSpoken,
@@ -33,7 +34,7 @@ from engage_hri.services.realizer.perform.live_blocks import LiveBlocks
 from engage_hri.services.realizer.perform.performance import BlockPerformance
 from engage_hri.services.realizer.perform.shared_context import Moving, Presence, SharedContext
 from engage_hri.services.realizer.plan.planner import Plan, plan_steps
-from engage_hri.services.realizer.plan.poses import poses_before, poses_left
+from engage_hri.services.realizer.plan.poses import changed, planned_times, poses_before, poses_left
 from engage_hri.services.realizer.plan.relations import BlockRefused, extent, relation_steps
 from engage_hri.services.realizer.plan.steps import Steps, T
 from engage_hri.services.realizer.points import Point, performer
@@ -43,6 +44,8 @@ from engage_hri.services.runtime.service import Ready
 Result = TypeVar("Result")
 SLICE = 512
 """Elements that are worked on in one go (see `steps`): one to five milliseconds. Counted: equal runs stay equal."""
+ROUNDS = 3
+"""How often the body is asked about a plan anew, at most: each answer may make another plan."""
 
 
 class _Realizer:
@@ -199,17 +202,19 @@ class _Realizer:
         block = validated(block)
         barred: set[tuple[str, Hand]] = set()
         chosen, estimates = block, await self._estimates(block, {})
-        first, is_asked_again = estimates, False
+        first, rounds = estimates, 0
         while True:
             plan = await unhurried(plan_steps(chosen, estimates, elsewhere=elsewhere, barred=barred))
-            before = poses_before(plan, self._left_for(plan))
-            if plan.block is chosen and (is_asked_again or not before):
+            before, times = poses_before(plan, self._left_for(plan)), planned_times(plan)
+            if plan.block is chosen and (rounds >= ROUNDS or not (before or times)):
                 return plan
-            chosen, is_asked_again = plan.block, True
-            estimates = await self._estimates(chosen, before)
+            known, estimates = estimates, await self._estimates(plan.block, before, times)
+            if plan.block is chosen and not changed(known, estimates):
+                return plan
+            chosen, rounds = plan.block, rounds + 1
             if refused := _hands_refused(block, chosen, estimates):
                 barred |= refused
-                chosen, estimates, is_asked_again = block, first, False
+                chosen, estimates, rounds = block, first, 0
 
     def _left_for(self, plan: Plan) -> dict[str, BodyPose]:
         """Poses in which the blocks that `plan` is tied to leave the body for it, by part; the last tie says when."""
@@ -225,12 +230,22 @@ class _Realizer:
                 poses |= poses_left(others[block].plan, times[block], max(ties))
         return poses
 
-    async def _estimates(self, block: Block, before: Mapping[str, BodyPose]) -> tuple[Estimate, ...]:
-        """Estimates of the body. before: poses in which behaviors start; without one, from where the body is now."""
+    async def _estimates(
+        self, block: Block, before: Mapping[str, BodyPose], times: Mapping[str, tuple[PlannedTime, ...]] = {}
+    ) -> tuple[Estimate, ...]:
+        """Estimates of the body. before: poses in which behaviors start; without one, from where the body is now.
+
+        times: when they are planned to begin and to wait, in the order in which they begin.
+        """
         behaviors = [behavior for behavior in block.behaviors if performer(behavior) == "body"]
         if not behaviors:
             return ()
-        items = (EstimateItem(behavior=behavior, pose=before.get(behavior.id)) for behavior in behaviors)
+        rank = {id: number for number, id in enumerate(times)}
+        behaviors.sort(key=lambda behavior: rank.get(behavior.id, len(rank)))
+        items = (
+            EstimateItem(behavior=behavior, pose=before.get(behavior.id), times=times.get(behavior.id, ()))
+            for behavior in behaviors
+        )
         question = EstimateBehaviors(items=tuple(items))
         try:
             answer = await self.bus.query(keys.ESTIMATE, question, timeout=self.config.estimate)
@@ -268,7 +283,7 @@ class _Realizer:
                 self.homing -= lost
         try:
             # Asked again: the body is elsewhere by now.
-            estimates = await self._estimates(plan.block, poses_before(plan))
+            estimates = await self._estimates(plan.block, poses_before(plan), planned_times(plan))
             return await unhurried(plan_steps(plan.block, estimates, elsewhere=elsewhere))
         except EngageError as error:
             self._warn(live, error)

@@ -5,12 +5,12 @@ next sync point, or until its authority changes. So a part needs no task to go h
 """
 
 import asyncio
-from collections.abc import AsyncGenerator
+from collections.abc import AsyncGenerator, Sequence
 from contextlib import aclosing
 from math import inf, radians
 
 from engage_hri.schemas.behaviors import BlockBehavior, Gaze, GazeShift, HeadDirectionShift, Speech, Wait
-from engage_hri.schemas.body import BodyPose, Capabilities, Estimate, NoPointZone
+from engage_hri.schemas.body import BodyPose, Capabilities, Estimate, EstimateItem, NoPointZone
 from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.references import type_name
 from engage_hri.schemas.units import Seconds
@@ -32,6 +32,7 @@ from engage_hri.services.control.torso.course import Course, CoursePoint, Imposs
 from engage_hri.services.control.torso.estimates import infeasible, motion_estimate, speech_estimate, wait_estimate
 from engage_hri.services.control.torso.head import Fixation
 from engage_hri.services.control.torso.motion import Motion, Path, resting
+from engage_hri.services.control.torso.rehearsal import Clock, beside, rehearsed
 from engage_hri.services.control.torso.runs import OVERHEAT, STALL, Run
 from engage_hri.services.control.torso.tracks import Track
 from engage_hri.services.control.voice import speaking
@@ -70,6 +71,12 @@ class SimulatedBody(Body):
             return self._estimate(behavior, self._situation(world, pose), moving=pose is None)
         except Impossible as impossible:
             return infeasible(behavior, impossible.kind, _fault(behavior, impossible.reason))
+
+    def rehearse(self, items: Sequence[EstimateItem], world: World) -> Sequence[Estimate]:
+        if self._misbelieved or not any(item.times for item in items):
+            return super().rehearse(items, world)
+        clock = Clock(self._loop.time())
+        return rehearsed(beside(self, clock, world), clock, items)
 
     def perform(self, behavior: BlockBehavior, authority: MovementAuthority) -> AsyncGenerator[Progress, None]:
         match behavior:
@@ -119,9 +126,12 @@ class SimulatedBody(Body):
         here: dict[str, float] = {}
         for part, track in self._tracks.items():
             if part != "nod":
-                # Head and arms aim for where the torso is going to be.
-                at = max(now, track.motion.end) if part == "torso" else now
-                here.update(zip(track.joints, track.angles(at), strict=True))
+                here.update(zip(track.joints, track.angles(now), strict=True))
+        # Head and arms aim for where the torso is going to be.
+        torso, leaning = self._tracks["torso"], self._runs.get("torso")
+        here.update(zip(torso.joints, torso.angles(max(now, torso.motion.end)), strict=True))
+        if leaning is not None and leaning.is_setting_out and torso.is_moving(now):
+            here.update(leaning.course.on_target)
         if not real:
             here.update(self._misbelieved)
         rest = {**kinematics.HOME, **dict(zip(tracks.NECK, self._attention.angles, strict=True))}

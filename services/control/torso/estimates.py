@@ -3,6 +3,7 @@
 import math
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
+from math import inf
 
 from engage_hri.schemas.behavior_types import sync_points
 from engage_hri.schemas.behaviors import BlockBehavior, Speech, Wait
@@ -45,7 +46,7 @@ def motion_estimate(
         behavior=behavior.id,
         feasible=True,
         parts=("head",) if course.parts == ("nod",) else course.parts,
-        phases=_phases(course.points, path.marks, quickest(course, path), SLOWEST),
+        phases=_phases(course.points, path.marks, quickest(course, path), SLOWEST, path.gentlest_brake),
         head_degrees=degrees if is_gaze else 0.0,
         arm_degrees=degrees if is_arm else 0.0,
         ray=course.ray,
@@ -59,10 +60,12 @@ def _phases(
     times: Mapping[str, Seconds],
     quickest: Mapping[str, Seconds] | None = None,
     slowest: float = 1.0,
+    brake: float = inf,
 ) -> tuple[Phase, ...]:
     """Phases from each sync point to the next. One that ends at a hold point or takes no time has no longest time.
 
-    times: of the points, at natural pace. quickest: in the greatest hurry.
+    times: of the points, at natural pace. quickest: in the greatest hurry. slowest: the least rate. brake: how fast
+    the rate may change, in 1/s: who passes a hold point without a stop cannot dawdle right behind it.
     """
     least = times if quickest is None else quickest
     return tuple(
@@ -71,8 +74,15 @@ def _phases(
             to=to.sync,
             shortest=min(least[to.sync] - least[since.sync], natural := times[to.sync] - times[since.sync]),
             natural=natural,
-            longest=None if to.held_with or not natural else natural / slowest,
+            longest=None
+            if to.held_with or not natural
+            else _longest(natural, slowest, brake if since.held_with else inf),
             hold=to.held_with == to.sync,
         )
         for since, to in pairwise(points)
     )
+
+
+def _longest(natural: Seconds, slowest: float, brake: float) -> Seconds:
+    """Seconds for a phase that is entered at the natural rate. A short one is over before the motion is slow."""
+    return natural if 2 * brake * natural < 1.0 else natural / slowest

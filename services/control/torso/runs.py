@@ -59,6 +59,11 @@ class Run:
         return any(point.sync == sync for point in self.pending)
 
     @property
+    def is_setting_out(self) -> bool:
+        """True if it has not left its target yet. A shift never does."""
+        return self.awaits("stroke_end") or len(self.course.points) == 2
+
+    @property
     def unreported(self) -> list[str]:
         """Sync points still to be reported."""
         return [point.sync for point in self.pending if point.sync not in (STALL, OVERHEAT)]
