@@ -34,6 +34,7 @@ generate: $(READY)
 	@$(BIN)/python -m engage_hri.schemas.export
 	@$(BIN)/python docs/site/configuration.py
 	@$(BIN)/python docs/site/types_table.py
+	@$(BIN)/python docs/site/vocabulary_table.py
 
 bench: $(READY)
 	@for file in $$(grep -l __main__ benchmarks/*.py); do echo "== $$file"; $(BIN)/python "$$file" $(ARGS) || exit 1; done

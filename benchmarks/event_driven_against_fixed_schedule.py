@@ -24,6 +24,7 @@ from msgspec import Struct
 from engage_hri.schemas import keys
 from engage_hri.schemas.behaviors import (
     After,
+    Before,
     BlockBehavior,
     Constraint,
     Gaze,
@@ -61,7 +62,7 @@ WORLD = World(
 PARTS = ("head", "left_arm", "right_arm")
 
 
-def block(id: str, behaviors: Sequence[BlockBehavior], *ties: Synchronize | After) -> Block:
+def block(id: str, behaviors: Sequence[BlockBehavior], *ties: Synchronize | After | Before) -> Block:
     return Block(id=id, behaviors=tuple(behaviors), constraints=(Constraint(operators=ties),))
 
 

@@ -7,8 +7,12 @@ the end of the one before. A trip begins when the body publishes `SyncPointReach
 next `PerformBehavior` has come. It contains, at the realizer: the Petri net's step, the feedback about it, and the
 new request. The first row is a raw Zenoh ping-pong of the same payload between two processes, in the same run.
 
-With `--inside` there is one process and a bus in memory: what is left is the realizer. And the memory that it keeps
-for each of 100 live blocks, as `tracemalloc` counts it.
+The last row is the honest trip: the same, while recognition serves on that bus and a client follows the feedback, the
+sync points, the actions and the connection events, each in a process of its own.
+
+With `--inside` there is one process and a bus in memory: what is left is the realizer; in the second row with
+recognition and such a client, which take their turns on the same loop. And the memory that it keeps for each of 100
+live blocks, as `tracemalloc` counts it.
 """
 
 import argparse
@@ -44,10 +48,13 @@ from engage_hri.services.bus.interface import Bus
 from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.bus.zenoh.hub import open_hub
 from engage_hri.services.commandline.process import run, run_until_signal
+from engage_hri.services.console.follow import following
 from engage_hri.services.realizer.config import RealizerConfig
 from engage_hri.services.realizer.service import realize
+from engage_hri.services.recognition.config import RecognitionConfig
+from engage_hri.services.recognition.service import recognize
 from engage_hri.services.requests.ends import RequestDesk, Requester
-from engage_hri.services.runtime.service import running, serve
+from engage_hri.services.runtime.service import Ready, Service, running, serve
 
 ROBOT = "benchmark"
 NATURAL: Seconds = 0.001
@@ -76,9 +83,8 @@ def estimate(question: Message) -> Message:
 class Body:
     """Performs every behavior in no time, and measures how soon the next one is asked for."""
 
-    name = "sync point -> realizer -> next command"
-
-    def __init__(self, bus: Bus, links: int) -> None:
+    def __init__(self, bus: Bus, links: int, name: str = "sync point -> realizer -> next command") -> None:
+        self.name = name
         self._bus = bus
         self._links = links
         self._blocks = itertools.count()
@@ -140,33 +146,78 @@ class Body:
 
 async def serve_realizer(endpoint: str) -> None:
     async with await open_hub(ROBOT, listen=[endpoint]) as hub:
-        await serve(hub, "realizer", partial(realize, config=RealizerConfig()), stands)
+        await serve(hub, "realizer", REALIZER, stands)
 
 
-SERVERS = {"raw": serve_raw, "bus": serve_bus, "realizer": serve_realizer}
+async def serve_recognition(endpoints: str) -> None:
+    """endpoints: its own, and that of the realizer."""
+    own, *others = endpoints.split(",")
+    async with await open_hub(ROBOT, listen=[own], connect=others) as hub:
+        await serve(hub, "recognition", RECOGNITION, stands)
+
+
+async def serve_client(endpoints: str) -> None:
+    """endpoints: its own, that of the realizer, and that of recognition."""
+    own, *others = endpoints.split(",")
+    async with await open_hub(ROBOT, listen=[own], connect=others) as hub:
+        await serve(hub, "client", client, stands)
+
+
+async def client(bus: Bus, ready: Ready) -> None:
+    """Follow all that a manager or a console follows."""
+    async with following(bus, (lambda message, at: None,)):
+        ready()
+        await asyncio.get_running_loop().create_future()
+
+
+REALIZER = partial(realize, config=RealizerConfig())
+RECOGNITION = partial(recognize, config=RecognitionConfig())
+HONEST = "the same, recognition and a client listening"
+SERVERS = {
+    "raw": serve_raw, "bus": serve_bus, "realizer": serve_realizer, "recognition": serve_recognition,
+    "client": serve_client,
+}  # fmt: skip
 
 
 async def measure(laps: int, trips: int, links: int, as_json: bool) -> None:
-    raw_end, bus_end, realizer_end = free_endpoint(), free_endpoint(), free_endpoint()
+    raw_end, bus_end, realizer_end, other_end, seen_end, client_end = (free_endpoint() for _ in range(6))
     with (
         OtherSide(__file__, "raw", raw_end),
         OtherSide(__file__, "bus", bus_end),
         OtherSide(__file__, "realizer", realizer_end),
+        OtherSide(__file__, "realizer", other_end),
+        OtherSide(__file__, "recognition", f"{seen_end},{other_end}"),
+        OtherSide(__file__, "client", f"{client_end},{other_end},{seen_end}"),
     ):
         session = await connected(raw_end)
-        async with await open_hub(ROBOT, connect=[bus_end, realizer_end]) as hub:
-            bus, body = hub.join("this"), hub.join("control")
-            with bus.subscribe(keys.ANY_ALIVE) as who:
-                for _ in range(2):
-                    await who.next()
-            contenders: list[Contender] = [RawPings(session), BusPings(bus), Body(body, links)]
+        quiet = await open_hub(ROBOT, connect=[bus_end, realizer_end])
+        honest = await open_hub(ROBOT, connect=[other_end, seen_end, client_end])
+        async with quiet, honest:
+            bus = quiet.join("this")
+            await _all_there(bus, 2)
+            await _all_there(honest.join("this"), 3)
+            bodies = [Body(quiet.join("control"), links), Body(honest.join("control"), links, HONEST)]
+            contenders: list[Contender] = [RawPings(session), BusPings(bus), *bodies]
             report(await compare(contenders, laps, trips), as_json)
         session.close()  # type: ignore[no-untyped-call]
 
 
+async def _all_there(bus: Bus, others: int) -> None:
+    with bus.subscribe(keys.ANY_ALIVE) as who:
+        for _ in range(others):
+            await who.next()
+
+
 async def measure_inside(laps: int, trips: int, links: int, as_json: bool) -> None:
-    async with MemoryHub() as hub, running(hub, {"realizer": partial(realize, config=RealizerConfig())}):
-        report(await compare([Body(hub.join("control"), links)], laps, trips), as_json)
+    listeners: dict[str, Service] = {"realizer": REALIZER, "recognition": RECOGNITION, "client": client}
+    async with (
+        MemoryHub(decodes=False) as quiet,
+        running(quiet, {"realizer": REALIZER}),
+        MemoryHub(decodes=False) as honest,
+        running(honest, listeners),
+    ):
+        bodies = [Body(quiet.join("control"), links), Body(honest.join("control"), links, HONEST)]
+        report(await compare(bodies, laps, trips), as_json)
     for behaviors in (3, 50):
         size = await memory_per_block(behaviors)
         print(json.dumps({"live_block_kB": size, "behaviors": behaviors}) if as_json else
@@ -175,7 +226,7 @@ async def measure_inside(laps: int, trips: int, links: int, as_json: bool) -> No
 
 async def memory_per_block(behaviors: int, blocks: int = 100) -> float:
     """kB that a realizer keeps for a block whose first behavior runs: plan, authority, tasks, requests."""
-    async with MemoryHub() as hub, running(hub, {"realizer": partial(realize, config=RealizerConfig())}):
+    async with MemoryHub(decodes=False) as hub, running(hub, {"realizer": partial(realize, config=RealizerConfig())}):
         bus = hub.join("control")
         desk, requests = RequestDesk(bus, "control", lambda cancel: None), Requester(bus)
         bus.answer(keys.ESTIMATE, estimate)

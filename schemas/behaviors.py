@@ -15,6 +15,7 @@ Action = Literal["look", "point", "nod", "shake", "speak", "act"]
 EventKind = Literal["directed_gaze", "mutual_facial_gaze", "adjacency_pair", "backchannel"]
 Cause = Literal["turn", "reference", "response", "maintenance", "human"]
 Hand = Literal["LEFT_HAND", "RIGHT_HAND", "BOTH_HANDS"]
+Side = Literal["LEFT", "RIGHT", "BOTH"]
 
 
 class Timing(Struct, frozen=True, omit_defaults=True):
@@ -86,9 +87,9 @@ class Gesture(Behavior, frozen=True, kw_only=True, tag="gesture", omit_defaults=
 
 
 class Head(Behavior, frozen=True, kw_only=True, tag="head", omit_defaults=True):
-    """Nod or shake the head; it keeps its direction.
+    """Nod, shake, tilt or turn the head on top of the gaze, to which it comes back.
 
-    lexeme: `NOD` or `SHAKE`. repetition: how many times. amount: how large, of the largest.
+    lexeme: `NOD`, `SHAKE`, `TILT`, `UP` and so on. repetition: how many times. amount: how large, of the largest.
     """
 
     lexeme: str
@@ -102,11 +103,24 @@ class HeadDirectionShift(Behavior, frozen=True, kw_only=True, tag="headDirection
     target: str
 
 
+class Expression(Struct, frozen=True, kw_only=True, omit_defaults=True):
+    """One expression of a face that has several: a lexeme, or an action unit. amount: None: that of the face."""
+
+    lexeme: str = ""
+    au: int = 0
+    side: Side = "BOTH"
+    amount: Probability | None = None
+
+
 class Face(Behavior, frozen=True, kw_only=True, tag="face", omit_defaults=True):
-    """Show an expression of the face, until it relaxes. The element holds a `FaceLexeme` or a `FaceFacs`."""
+    """Show several expressions of the face as one, until it relaxes. One alone is a `FaceLexeme` or a `FaceFacs`.
+
+    overshoot: how much farther the face goes at the peak of its attack, as a share.
+    """
 
     amount: Probability = 0.5
     overshoot: float = 0.0
+    expressions: tuple[Expression, ...] = ()
 
 
 class FaceLexeme(Behavior, frozen=True, kw_only=True, tag="faceLexeme", omit_defaults=True):
@@ -120,36 +134,50 @@ class FaceFacs(Behavior, frozen=True, kw_only=True, tag="faceFacs", omit_default
     """Move one action unit of the face (Facial Action Coding System), until it relaxes. au: its number."""
 
     au: int
-    side: Literal["LEFT", "RIGHT", "BOTH"] = "BOTH"
+    side: Side = "BOTH"
     amount: Probability = 0.5
 
 
 class FaceShift(Behavior, frozen=True, kw_only=True, tag="faceShift", omit_defaults=True):
-    """Change the expression to which the face returns, by name or by action unit. Ends on arrival."""
+    """Change the expression to which the face returns, by name or by action unit. Ends on arrival.
+
+    expressions: if there are several; `lexeme` and `au` are empty then.
+    """
 
     lexeme: str = ""
     au: int = 0
-    side: Literal["LEFT", "RIGHT", "BOTH"] = "BOTH"
+    side: Side = "BOTH"
     amount: Probability = 0.5
+    expressions: tuple[Expression, ...] = ()
+
+
+class PartPose(Struct, frozen=True, kw_only=True, omit_defaults=True):
+    """One pose of a posture that has several. lexeme: its name. part: its part of the body."""
+
+    lexeme: str = ""
+    part: str = ""
 
 
 class Posture(Behavior, frozen=True, kw_only=True, tag="posture", omit_defaults=True):
     """Take a posture until it relaxes.
 
     stance: of the whole body. lexeme: a pose by name. part: its part of the body.
+    poses: if there are several; `lexeme` and `part` are empty then.
     """
 
     stance: str = ""
     lexeme: str = ""
     part: str = ""
+    poses: tuple[PartPose, ...] = ()
 
 
 class PostureShift(Behavior, frozen=True, kw_only=True, tag="postureShift", omit_defaults=True):
-    """Change the posture to which the body returns. Ends on arrival. stance, lexeme, part: as in `Posture`."""
+    """Change the posture to which the body returns. Ends on arrival. stance, lexeme, part, poses: as in `Posture`."""
 
     stance: str = ""
     lexeme: str = ""
     part: str = ""
+    poses: tuple[PartPose, ...] = ()
 
 
 class Pose(Behavior, frozen=True, kw_only=True, tag="pose", omit_defaults=True):
@@ -157,6 +185,25 @@ class Pose(Behavior, frozen=True, kw_only=True, tag="pose", omit_defaults=True):
 
     lexeme: str = ""
     part: str = ""
+
+
+def posed(behavior: Posture | PostureShift | Pose) -> tuple[PartPose, ...]:
+    """List the poses of a posture, be they one or several."""
+    further = () if isinstance(behavior, Pose) else behavior.poses
+    is_given = behavior.lexeme or behavior.part or not further
+    return (*([PartPose(lexeme=behavior.lexeme, part=behavior.part)] if is_given else ()), *further)
+
+
+def expressed(behavior: Face | FaceLexeme | FaceFacs | FaceShift) -> tuple[Expression, ...]:
+    """List the expressions of a face, be they one or several."""
+    match behavior:
+        case FaceLexeme(lexeme=lexeme):
+            return (Expression(lexeme=lexeme),)
+        case FaceFacs(au=au, side=side):
+            return (Expression(au=au, side=side),)
+        case FaceShift(lexeme=lexeme, au=au, side=side) if lexeme or au:
+            return (Expression(lexeme=lexeme, au=au, side=side), *behavior.expressions)
+    return behavior.expressions
 
 
 class Locomotion(Behavior, frozen=True, kw_only=True, tag="locomotion", omit_defaults=True):
@@ -238,10 +285,13 @@ class TurnSignal(Behavior, frozen=True, kw_only=True, tag="turn", omit_defaults=
 
 
 class Unknown(Behavior, frozen=True, kw_only=True, tag="unknown", omit_defaults=True):
-    """A behavior of a type that is not known here: dropped with a warning; if it is required, the block fails."""
+    """A behavior of a type that is not known here: dropped with a warning; if it is required, the block fails.
+
+    element: name of its element, with the prefix that it has there. namespace: empty, unless it is not BML's.
+    """
 
     element: str
-    """Name of its element."""
+    namespace: str = ""
 
 
 class SpeechOption(Struct, frozen=True, kw_only=True, omit_defaults=True):

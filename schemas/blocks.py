@@ -81,6 +81,33 @@ class BehaviorInterrupted(Outcome, frozen=True, kw_only=True, tag="behavior_inte
     was_done: bool = False
 
 
+class SteerPerformance(Request, frozen=True, kw_only=True, tag="steer_performance", omit_defaults=True):
+    """cmd: anyone -> realizer: hold what is performed, let it continue, or stop it. Ends in `PerformanceSteered`.
+
+    to: `hold`: every behavior waits where it next can, at a hold point or between two words; nothing begins, clocks
+    stop, nothing counts as late for it. `continue`: it goes on from there, whoever held it. `stop`: it ends safely;
+    blocks end as interrupted.
+    block: id of a live block; empty: all that the robot performs, and what comes while it is held. behavior: of that
+    block; empty: all of it.
+
+    To continue a block lets all its behaviors go, too, and to continue the robot lets everything go. What is held for
+    longer than `realizer.longest_hold` is stopped.
+    """
+
+    to: Literal["hold", "continue", "stop"]
+    block: str = ""
+    behavior: str = ""
+
+
+class PerformanceSteered(Outcome, frozen=True, kw_only=True, tag="performance_steered", omit_defaults=True):
+    """evt: realizer -> requester: what was asked for has been commanded; of a stop, it has ended.
+
+    blocks: ids of the live blocks that it concerns.
+    """
+
+    blocks: tuple[str, ...] = ()
+
+
 class SpokenText(Struct, frozen=True, kw_only=True, omit_defaults=True):
     """Words of a speech that were said: all of them, or those before the interruption."""
 
@@ -93,7 +120,7 @@ class BlockOutcome(Outcome, frozen=True, kw_only=True, tag="block_outcome", omit
     """evt: realizer -> requester: the end of a block. Exactly one for each accepted block.
 
     replaced_by: the block whose `REPLACE` ended it, if its status is `interrupted` for that reason.
-    fault: why it failed.
+    fault: why it failed; also if it had behaviors and every one was dropped.
     """
 
     block: str

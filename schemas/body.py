@@ -3,8 +3,9 @@
 Movement authority. `PerformBehavior.through` names the last sync point that the body may pass without asking; it
 holds at the hold point before the next one and says so (`SyncPointArrived`). The realizer extends the authority by
 sending the request again, same id, with a later `through`; it lasts as long as `KeepAlive` renews it (decision 0001).
-Authority never shrinks. The hold points of each type are in docs/control.md: before and after the stroke of an arm or
-a nod; on target (`stroke` and `relax`) for a gaze, a face or a posture.
+Authority never shrinks; a behavior that is `held` waits all the same, and then goes on with it. The hold points of
+each type are in docs/control.md: before and after the stroke of an arm or a nod; on target (`stroke` and `relax`) for
+a gaze, a face or a posture.
 """
 
 from typing import ClassVar, Literal, Self
@@ -39,6 +40,10 @@ class PerformBehavior(Request, frozen=True, kw_only=True, tag="perform_behavior"
     pace: tuple[PlannedInstant, ...] = ()
     """Instants for coming sync points which the natural pace would miss. The body comes as near to them as it can, by
     moving faster, slower or less far. The newest request replaces all earlier instants; empty: natural pace."""
+    held: bool = False
+    """True to wait at the next place where the body can, whatever `through` says: a movement at its next hold point
+    (`SyncPointArrived`), a voice at the next word gap, mark or no mark. `pace` is void meanwhile. Sent again without
+    it, the behavior goes on as far as `through` says. One that can wait nowhere any more ends by itself."""
 
     @property
     def authority(self) -> str:
@@ -123,14 +128,17 @@ class WordSpoken(Struct, frozen=True, kw_only=True, tag="word_spoken", omit_defa
 class BehaviorOutcome(Outcome, frozen=True, kw_only=True, tag="behavior_outcome", omit_defaults=True):
     """evt: terminal state of `PerformBehavior`.
 
-    status: `done`: its `end` was passed; `aborted`: it was ended before; `failed`: see `fault`.
+    status: `done`: its `end` was passed; `taken_over`: before that another behavior took one of its parts, at `at`;
+    `aborted`: it was ended before; `failed`: see `fault`.
+    passed: the last sync point that was passed; empty: none, or the body does not say.
     spoken: of a speech, the words that the voice has said.
     """
 
     block: str
     behavior: str
-    status: Literal["done", "aborted", "failed"]
+    status: Literal["done", "taken_over", "aborted", "failed"]
     at: Stamp
+    passed: str = ""
     spoken: str = ""
     fault: Fault | None = None
 
@@ -189,6 +197,9 @@ class Estimate(Struct, frozen=True, kw_only=True, omit_defaults=True):
     warning: str = ""
     """Type of the warning when not feasible: NO_SUCH_TARGET, BEHAVIOR_TYPE_NOT_SUPPORTED, CANNOT_CREATE_BEHAVIOR
     ..."""
+    degraded: str = ""
+    """What is performed in place of what was asked, in words, if the body has only something near it. The realizer
+    warns of it, and performs the behavior."""
     parts: tuple[str, ...] = ()
     phases: tuple[Phase, ...] = ()
     """Phases from `start` to `end`, without gaps, in the drafts' spelling. Of a repeated movement also `stroke:2` and

@@ -45,6 +45,7 @@ WORLD = f"{PREFIX}/state/perception/world"
 HEAD_OWNER = f"{PREFIX}/state/generation/head_owner"
 
 ROBOT_STATE = f"{PREFIX}/stream/control/robot_state"
+NET = f"{PREFIX}/stream/realizer/net"
 ANY_HEAD_POSE = f"{PREFIX}/stream/perception/head/*"
 ANY_VOICE_ACTIVITY = f"{PREFIX}/stream/perception/voice/*"
 

@@ -9,7 +9,14 @@ import msgspec
 from engage_hri.schemas import keys
 from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost
 from engage_hri.schemas.attention import HeadOwner, Inhibit, InhibitionEnded
-from engage_hri.schemas.blocks import BehaviorInterrupted, BlockOutcome, InterruptBehavior, PerformBlock
+from engage_hri.schemas.blocks import (
+    BehaviorInterrupted,
+    BlockOutcome,
+    InterruptBehavior,
+    PerformanceSteered,
+    PerformBlock,
+    SteerPerformance,
+)
 from engage_hri.schemas.body import (
     AbortBehavior,
     BehaviorAborted,
@@ -29,6 +36,7 @@ from engage_hri.schemas.body import (
 from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.feedback import BlockProgress, PredictionFeedback, SyncPointProgress, WarningFeedback
 from engage_hri.schemas.fragments import FragmentOutcome, PerformFragment, TurnClosed
+from engage_hri.schemas.nets import NetMarked, NetPlanned
 from engage_hri.schemas.perception import HeadPose, VoiceActivity
 from engage_hri.schemas.presence import PeerAlive, PeerGone
 from engage_hri.schemas.recognition import (
@@ -49,7 +57,8 @@ MAJOR = 1
 Message = (
     Heard | Accepted | Outdated | Refused | Cancel | KeepAlive | Unreadable | Fault
     | PerformFragment | FragmentOutcome | TurnClosed | Inhibit | InhibitionEnded | HeadOwner
-    | PerformBlock | BlockOutcome | InterruptBehavior | BehaviorInterrupted
+    | PerformBlock | BlockOutcome | InterruptBehavior | BehaviorInterrupted | SteerPerformance | PerformanceSteered
+    | NetPlanned | NetMarked
     | BlockProgress | SyncPointProgress | PredictionFeedback | WarningFeedback
     | PerformBehavior | AbortBehavior | BehaviorAborted | GoHome | HomeReached | BehaviorOutcome
     | SyncPointArrived | SyncPointReached | WordSpoken | RobotState
@@ -63,7 +72,7 @@ Message = (
 COMMANDS: Mapping[str, tuple[type[Request], ...]] = {
     keys.FRAGMENT: (PerformFragment,),
     keys.INHIBIT: (Inhibit,),
-    keys.BLOCK: (PerformBlock, InterruptBehavior),
+    keys.BLOCK: (PerformBlock, InterruptBehavior, SteerPerformance),
     keys.EVENT: (RequestEvent,),
     keys.TURN: (SignalTurn,),
     keys.BEHAVIOR: (PerformBehavior, AbortBehavior, GoHome),

@@ -35,6 +35,10 @@ SHELLS = {
     "services/realizer/perform/recognition_link.py",  # asks recognition
     "services/realizer/perform/feedback.py",  # publishes feedback
     "services/realizer/perform/shared_context.py",  # what performances share: the bus, too
+    "services/realizer/perform/behavior_run.py",  # awaits sync points
+    "services/realizer/perform/futures.py",  # resolves them
+    "services/realizer/perform/net_stream.py",  # publishes the marking
+    "services/realizer/perform/steering.py",  # holds, continues and stops
     "services/realizer/perform/live.py",  # resolved when a block has ended
     "services/generation/body_link.py",  # asks the body
     "services/generation/fragment_runner.py",  # awaits the blocks of fragments
@@ -62,7 +66,7 @@ LAYERS = {
     "services/control": "service > torso > voice > actions waiting > body > variability > config",
     "services/generation": "service > fragment_runner > performance > body_link fragment_check pipeline > block head"
     " > references turns > permits > config",
-    "services/realizer": "export service > perform > decide > plan > net > config points",
+    "services/realizer": "export service > perform > decide > foresee > plan > net > config points",
     "services/recognition": "service > recognizer > perceive statistics > events > config",
 }
 """What lies above what within a folder: its files and folders by name, `*` for all others. Each may import what

@@ -1,17 +1,18 @@
 """Reading of BML blocks and EBML turn fragments in XML, in every dialect. Errors have the line and an advice.
 
 Dialects: the thesis' draft (namespace `org.mindmakers.bml`), the same without a namespace, BML 1.0. A turn fragment
-is an `ebml:ebml` (namespace `edu.wpi.ebml`) around the elements of any of these. Elements of other namespaces are
-ignored. One block in two dialects is decoded to equal structs, but for `dialect` and the names of sync points, which
-stay as written (see `canonical_sync` of schemas/behavior_types.py); in fragments they are those of the draft.
+is an `ebml:ebml` (namespace `edu.wpi.ebml`) around the elements of any of these. One block in two dialects is decoded
+to equal structs, but for `dialect` and the names of sync points, which stay as written (see `canonical_sync` of
+schemas/behavior_types.py); in fragments they are those of the draft.
 
 Blocks are written by people, and read leniently: an unknown part is left out and noted in `Block.unread`, an unknown
-behavior becomes `Unknown`; the realizer warns of both. Fragments are written by programs, and read strictly. Text
-behind a reference in a fragment is speech: `<ebml:reference .../>, and then`.
+behavior becomes `Unknown`; the realizer warns of both. Fragments are written by programs, and read strictly; but what
+is of another namespace is left out of either, and noted. Text behind a reference in a fragment is speech:
+`<ebml:reference .../>, and then`.
 """
 
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from itertools import chain, count
 from typing import Any
@@ -20,6 +21,7 @@ import msgspec
 from lxml import etree
 
 from engage_hri.schemas import behaviors as of
+from engage_hri.schemas import vocabulary
 from engage_hri.schemas.behavior_types import TYPES
 from engage_hri.schemas.blocks import Block, Unread
 from engage_hri.schemas.check import check
@@ -30,11 +32,14 @@ from engage_hri.schemas.documents.xml_source import (
     BML_1_0,
     CORE,
     EBML,
+    READ,
     Source,
     attributes,
     bml_children,
     children_named,
+    foreign_attributes,
     local_name,
+    prefixed_name,
     split,
 )  # fmt: skip
 from engage_hri.schemas.documents.xml_speech import MARKS, spoken
@@ -84,6 +89,7 @@ class _Document:
     def _block(self, root: etree._Element, namespace: str) -> Block:
         plain = attributes(root)
         self._note_attributes(root)
+        self._note_foreign(root, foreign_attributes(root))
         raw = {"composition": plain.get("composition"), "character_id": plain.get("characterId")}
         raw["dialect"] = "bml-1.0" if namespace == BML_1_0 else "draft"
         return disambiguated(self._converted(root, raw | self._content(root), Block))
@@ -91,6 +97,7 @@ class _Document:
     def _fragment(self, root: etree._Element) -> TurnFragment:
         self._is_strict = True
         raw = self._own_fields(root, TurnFragment)
+        self._note_foreign(root, foreign_attributes(root))
         fragment = disambiguated(self._converted(root, raw | self._content(root), TurnFragment))
         return in_draft_spelling(fragment, "bml-1.0") if self._speaks_1_0 else fragment
 
@@ -134,16 +141,29 @@ class _Document:
         for name in grammar.unknown_attributes(plain, local, kind):
             if kind and _is_reference(plain[name]):
                 timing.append(of.Timing(name, plain[name]))
+            elif dialect := vocabulary.definition(local, name):
+                reason = f"attribute {name!r} of <{local}>, which {dialect} has, is performed by no body"
+                self._note(reason, element, behavior, "DEGRADED")
             else:
                 self._note(f"<{local}> has no attribute {name!r}", element, behavior)
         return timing
+
+    def _note_foreign(self, element: etree._Element, parts: Iterable[str], behavior: str = "") -> None:
+        """Note what other namespaces add to an element: all in one note."""
+        if added := ", ".join(dict.fromkeys(parts)):
+            reason = f"what another namespace adds to <{local_name(element)}> is not supported: {added}"
+            self._note(reason, element, behavior, "CUSTOM_ATTRIBUTE_NOT_SUPPORTED")
 
     def _walk(self, parent: etree._Element, *, required: bool) -> None:
         """Read the content of a document, or of a <required> in it."""
         texts = [parent.text, *(child.tail for child in parent if not self._speaks_on(child))]
         if words := " ".join(text.strip() for text in texts if text and text.strip()):
             self._note(f"text {words[:40]!r} outside of speech", parent)
-        for element, namespace, local in bml_children(parent):
+        for element in parent:
+            namespace, local = split(str(element.tag))
+            if namespace not in READ:
+                self._custom(element, namespace, required)
+                continue
             self._speaks_1_0 |= namespace == BML_1_0
             if local in ("description", "participant"):
                 continue
@@ -152,6 +172,7 @@ class _Document:
                 raise self._source.refusal("a block can't hold an object reference", element, advice=advice)
             if local == "required":
                 self._note_attributes(element)
+                self._note_foreign(element, foreign_attributes(element))
                 self._walk(element, required=True)
             elif local == "constraint":
                 self._constraints.append(self._constraint(element, required))
@@ -162,7 +183,8 @@ class _Document:
             elif self._is_strict or not element.get("id"):
                 advice = f"known: {', '.join(grammar.STANDARD)}, constraint"
                 kind: WarningKind = "BEHAVIOR_TYPE_NOT_SUPPORTED"
-                self._leave_out(f"unknown element <{local}>", element, required=required, advice=advice, kind=kind)
+                reason = vocabulary.unperformed(local)
+                self._leave_out(reason, element, required=required, advice=advice, kind=kind)
             else:
                 self._behaviors.append(self._unknown(element, local, required))
 
@@ -179,13 +201,26 @@ class _Document:
         timing = (of.Timing("start", f"{reference}:end"),)
         return of.Speech(id=id, text=words, timing=timing, required=required, line=line)
 
-    def _unknown(self, element: etree._Element, local: str, required: bool) -> of.Unknown:
+    def _unknown(self, element: etree._Element, name: str, required: bool, namespace: str = "") -> of.Unknown:
         is_required = required or fields(attributes(element)).get("required")
-        raw = {"id": self._id(element), "element": local, "required": is_required}
+        raw = {"id": self._id(element), "element": name, "required": is_required, "namespace": namespace}
         return self._converted(element, raw, of.Unknown)
+
+    def _custom(self, element: etree._Element, namespace: str, required: bool) -> None:
+        """Take in a behavior of another namespace. Without an id, and in a fragment, there is but a note of it."""
+        name = prefixed_name(element)
+        if not self._is_strict and element.get("id"):
+            self._behaviors.append(self._unknown(element, name, required, namespace))
+            return
+        reason = f"<{name}> is of namespace {namespace!r}, of which nothing is performed"
+        kind: WarningKind = "CUSTOM_BEHAVIOR_NOT_SUPPORTED"
+        if required:
+            raise self._source.refusal(reason, element, advice="take it out of what is required")
+        self._note(reason, element, element.get("id", ""), kind)
 
     def _behavior(self, element: etree._Element, local: str, required: bool) -> of.Behavior:
         row, plain = TYPES[local], attributes(element)
+        self._note_foreign(element, grammar.foreign_parts(element), self._id(element))
         raw = fields(plain) if row.is_standard else self._own_fields(element, row.kind)
         raw |= {"id": self._id(element)} | ({"required": True} if required else {})
         timing = [of.Timing(name, value) for name, value in plain.items() if name in grammar.SYNC_ATTRIBUTES]
@@ -195,9 +230,12 @@ class _Document:
             self._only(element, raw["id"])
             timing += _ties(element)
         self._parts(element, local, raw)
-        for name, field in grammar.DRAFTS.get(local, {}).items():
-            if name in plain and not raw.get(field) and (local, plain[name].upper()) != ("head", "ROTATION"):
-                raw[field] = plain[name].upper()
+        for field, value in grammar.of_drafts(plain, local):
+            raw[field] = raw.get(field) or value
+        if local == "head" and str(raw.get("amount", "")).strip().startswith("-"):
+            reason = f"the sign of amount {raw['amount']!r}: a head begins on its own side"
+            self._note(reason, element, raw["id"], "DEGRADED")
+            raw["amount"] = str(raw["amount"]).strip().removeprefix("-")
         if local == "emit":
             said = ((child.text or child.get("id") or "").strip() for child in children_named(element, "event"))
             raw.setdefault("event", next(said, None))
@@ -212,6 +250,8 @@ class _Document:
         self._leave_out_strays(element, raw["id"])
         said = spoken(self._source, element, raw["id"])
         raw["text"], raw["marks"] = said.text, said.marks
+        if said.is_attribute:
+            del element.attrib["text"]  # It has been read.
         raw["markup"] = said.markup or raw.get("markup", "")
         children = list(bml_children(element))
         has_text = any(name == "text" for _, _, name in children)
@@ -230,26 +270,44 @@ class _Document:
             self._leave_out(f"unknown element <{local}> in <speech>", stray, id, advice=advice)
             stray.tag = _STRAY
         etree.strip_elements(speech, _STRAY, with_tail=False)
+        noted: set[tuple[str, str]] = set()
         for each in speech.iter():
-            if local_name(each) in MARKS:
+            if (local := local_name(each)) in MARKS:
                 self._only(each, id)
+                unknown = list(grammar.unknown_attributes(attributes(each), local, None))
+                for name in unknown:
+                    if (local, name) not in noted:  # one note for all the marks of a speech
+                        self._note(f"<{local}> has no attribute {name!r}", each, id)
+                noted.update((local, name) for name in unknown)
 
     def _parts(self, element: etree._Element, local: str, raw: dict[str, Any]) -> None:
-        """Read the elements inside a face (one expression) or a posture (one element of each kind)."""
-        family, seen = TYPES[local].family, set()
-        for child, _, name in bml_children(element):
-            if name not in grammar.PARTS.keys() & grammar.CHILDREN.get(local, ()):
-                continue
-            sort = "expression" if family == "face" else f"<{name}>"
-            if sort in seen:
-                reason, is_required = f"more than one {sort} in a {family}", _says_yes(raw.get("required"))
-                self._leave_out(reason, child, raw["id"], required=is_required, advice="one element for each")
-                continue
-            seen.add(sort)
+        """Read the elements inside a face (its expressions) or a posture (a stance and its poses)."""
+        found: list[dict[str, Any]] = []
+        elements = [
+            (child, name)
+            for child, _, name in bml_children(element)
+            if name in grammar.PARTS.keys() & grammar.CHILDREN.get(local, ())
+        ]
+        for child, name in elements:
             self._note_attributes(child, raw["id"])
-            for each, field in grammar.PARTS[name].items():
-                if each in child.attrib or family == "posture":
-                    raw[field] = child.get(each, "")
+            parts = {field: child.get(each) for each, field in grammar.PARTS[name].items()}
+            if name != "stance":
+                found.append({field: value for field, value in parts.items() if value is not None})
+            elif "stance" in raw:
+                reason, is_required = f"more than one <{name}> in a posture", _says_yes(raw.get("required"))
+                self._leave_out(reason, child, raw["id"], required=is_required, advice="one element for each")
+            else:
+                raw["stance"] = parts["stance"] or ""
+        if len(found) == 1:
+            raw.update(found[0])
+        elif found:
+            kind = of.Expression if TYPES[local].family == "face" else of.PartPose
+            children = [child for child, name in elements if name != "stance"]
+            parts_of = "expressions" if kind is of.Expression else "poses"
+            raw[parts_of] = [
+                msgspec.to_builtins(self._converted(child, each, kind))
+                for child, each in zip(children, found, strict=True)
+            ]
 
     def _options(self, element: etree._Element, raw: dict[str, Any]) -> list[of.SpeechOption] | None:
         """Phrases of a reference; None if the author leaves them to generation."""
@@ -265,6 +323,7 @@ class _Document:
 
     def _constraint(self, element: etree._Element, required: bool) -> of.Constraint:
         self._note_attributes(element)
+        self._note_foreign(element, grammar.foreign_parts(element))
         required = required or _says_yes(fields(attributes(element)).get("required"))
         operators = []
         for child, _, local in bml_children(element):

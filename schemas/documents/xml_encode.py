@@ -73,6 +73,12 @@ def _behavior(root: etree._Element, namespace: str, behavior: of.Behavior) -> No
             fill(element, behavior, namespace)
         case of.Posture() | of.PostureShift():
             _nest(element, namespace, grammar.CHILDREN[local])
+            for pose in behavior.poses:
+                etree.SubElement(element, f"{{{namespace}}}pose", {"part": pose.part, "lexeme": pose.lexeme})
+        case of.Face():
+            _express(element, namespace, behavior.expressions)
+        case of.FaceShift() if behavior.expressions:
+            _express(element, namespace, behavior.expressions)
         case of.FaceShift() if namespace == BML_1_0 and not (behavior.lexeme and behavior.au):
             _nest(element, namespace, ["lexeme"] if behavior.lexeme else ["facs"] if behavior.au else [])
         case of.Reference():
@@ -90,6 +96,12 @@ def _nest(element: etree._Element, namespace: str, parts: Sequence[str]) -> None
         if any(said.values()):
             said = {name: value for name, value in said.items() if value or part == "pose"}  # which has both
             etree.SubElement(element, f"{{{namespace}}}{part}", said)
+
+
+def _express(face: etree._Element, namespace: str, expressions: Sequence[of.Expression]) -> None:
+    for each in expressions:
+        inner = etree.SubElement(face, f"{{{namespace}}}{'lexeme' if each.lexeme else 'facs'}")
+        _set_fields(inner, each, namespace)
 
 
 def _set_timing(element: etree._Element, timings: Sequence[of.Timing]) -> None:

@@ -15,8 +15,19 @@ from lxml import etree
 
 from engage_hri.schemas import behaviors as of
 from engage_hri.schemas.behavior_types import TYPES, BehaviorType
-from engage_hri.schemas.documents.xml_source import CORE, EBML, bml_children, children_named, local_name, split
+from engage_hri.schemas.documents.xml_source import (
+    CORE,
+    EBML,
+    bml_children,
+    children_named,
+    foreign_attributes,
+    foreign_children,
+    local_name,
+    prefixed_name,
+    split,
+)
 from engage_hri.schemas.syncref import SYNC_POINTS
+from engage_hri.schemas.vocabulary import SHAPES
 
 AnyStruct = TypeVar("AnyStruct", bound=msgspec.Struct)
 SYNC_ATTRIBUTES = frozenset({*SYNC_POINTS, "strokeStart", "strokeEnd", "attackPeak"})
@@ -32,16 +43,22 @@ _NAMES = {"minimum_reliability": "minReliability"}
 """Fields with an attribute of another name."""
 _CONTENT = frozenset({
     "line", "timing", "marks", "options", "objects", "anchors", "distractors", "syncs", "operators", "behaviors",
-    "constraints", "dialect", "unread",
+    "constraints", "dialect", "unread", "expressions", "poses",
 })  # fmt: skip
 """Fields that are no attributes: they are elements, or not set by the author."""
 DRAFTS: Mapping[str, Mapping[str, str]] = {
     "gesture": {"hand": "mode", "type": "lexeme"},
     "pointing": {"hand": "mode"},
-    "head": {"rotation": "lexeme", "type": "lexeme", "action": "lexeme", "repeats": "repetition"},
-    "face": {"type": "lexeme"},
-}
+    "head": {
+        "rotation": "lexeme", "orientation": "lexeme", "type": "lexeme", "action": "lexeme", "repeats": "repetition",
+    },
+    "face": {**dict.fromkeys(SHAPES, "lexeme"), "type": "lexeme"},
+}  # fmt: skip
 """Further attributes of the drafts, by element, and the field of each. They count if the field is not given."""
+_ACTIONS = ("ROTATION", "ORIENTATION")
+"""Values of a draft's `action` that say which other attribute says what to do."""
+_AXES = {"X": "NOD", "Y": "SHAKE", "Z": "TILT"}
+"""The draft's other names of rotations."""
 PARTS: Mapping[str, Mapping[str, str]] = {
     "lexeme": {"lexeme": "lexeme", "amount": "amount"},
     "facs": {"au": "au", "side": "side", "amount": "amount"},
@@ -55,7 +72,8 @@ LISTS = {
 }  # fmt: skip
 """Fields that are a list of elements: the element of an item, and the attribute with its value."""
 _OTHER_ATTRIBUTES = {
-    "bml": ("composition", "characterId"), "face": ("overshoot",), "sync": ("ref",),
+    "bml": ("composition", "characterId"),
+    "sync": ("ref",), "mark": ("name", "ref"), "tm": ("name", "ref"),
     **dict.fromkeys(OPERATORS, ("ref",)),
 }  # fmt: skip
 
@@ -92,6 +110,17 @@ def unknown_attributes(plain: Mapping[str, str], local: str, kind: type[msgspec.
             yield name
 
 
+def of_drafts(plain: Mapping[str, str], local: str) -> Iterator[tuple[str, str]]:
+    """Read the further attributes of the drafts: field and value of each."""
+    for name, field in DRAFTS.get(local, {}).items():
+        value = plain.get(name, "").strip().upper()
+        if not value or (local == "head" and value in _ACTIONS):
+            continue
+        if local == "face" and name in SHAPES:
+            value = f"{SHAPES[name]}_{value}"
+        yield field, _AXES.get(value, value) if name == "rotation" else value
+
+
 # -- elements ------------------------------------------------------------------------------------------------------
 
 _FACE, _POSTURE = ("lexeme", "facs"), ("stance", "pose")
@@ -125,6 +154,15 @@ def misplaced(element: etree._Element) -> Iterator[tuple[etree._Element, str, st
             yield from misplaced(child)
 
 
+def foreign_parts(element: etree._Element) -> Iterator[str]:
+    """Find what other namespaces add to an element and to those inside it, but not inside a <description>."""
+    yield from foreign_attributes(element)
+    yield from (f"<{prefixed_name(child)}>" for child, _ in foreign_children(element))
+    for child, _, name in bml_children(element):
+        if name != "description":
+            yield from foreign_parts(child)
+
+
 def behaviors_inside(speech: etree._Element, *, is_strict: bool) -> Iterator[etree._Element]:
     """Find behaviors and constraints below a speech, which is no place for them. is_strict: in a fragment."""
     for child in speech:
@@ -146,7 +184,7 @@ _SPELLED: Mapping[str, Callable[[str], Any]] = {
     "side": str.upper,
 }
 """Readers of attributes that may be spelled more freely than the field."""
-_NEVER_SET = ("line", "timing", "marks", "unread")
+_NEVER_SET = ("line", "timing", "marks", "unread", "expressions", "poses")
 """Fields that no attribute can set."""
 
 

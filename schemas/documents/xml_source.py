@@ -20,7 +20,11 @@ BML_1_0_EXTENSIONS = "http://www.bml-initiative.org/bml/coreextensions-1.0"
 CORE = frozenset({"", DRAFT, BML_1_0, BML_1_0_EXTENSIONS})
 """Namespaces of BML proper."""
 READ = CORE | {EBML}
-"""Namespaces that are read; elements of all others are left alone."""
+"""Namespaces that are read; of all others it is only told that they are there."""
+SSML = "http://www.w3.org/2001/10/synthesis"
+XML = "http://www.w3.org/XML/1998/namespace"
+_OF_THE_DOCUMENT = frozenset({XML, "http://www.w3.org/2001/XMLSchema-instance"})
+"""Namespaces of attributes that say something of the document, and nothing of what is to be performed."""
 LARGEST = 4 * 1024 * 1024
 """Bytes. A block of a thousand behaviors has about 200 kB."""
 DEEPEST = 64
@@ -206,6 +210,28 @@ def bml_children(parent: etree._Element) -> Iterator[tuple[etree._Element, str, 
         namespace, local = split(str(child.tag))
         if namespace in READ:
             yield child, namespace, local
+
+
+def foreign_children(parent: etree._Element) -> Iterator[tuple[etree._Element, str]]:
+    """Children that are neither BML, EBML nor prosodic markup, with namespace."""
+    for child in parent:
+        namespace = split(str(child.tag))[0]
+        if namespace not in READ and namespace != SSML:
+            yield child, namespace
+
+
+def foreign_attributes(element: etree._Element) -> Iterator[str]:
+    """Names of the attributes of other namespaces, with their prefixes."""
+    for name in map(str, element.attrib):
+        namespace, local = split(name)
+        if namespace not in READ and namespace not in _OF_THE_DOCUMENT:
+            prefixes = (prefix for prefix, uri in element.nsmap.items() if prefix and uri == namespace)
+            yield f"{next(prefixes, '')}:{local}"
+
+
+def prefixed_name(element: etree._Element) -> str:
+    """Name of an element as it is written, with its prefix if it has one."""
+    return f"{element.prefix}:{local_name(element)}" if element.prefix else local_name(element)
 
 
 def children_named(parent: etree._Element, local: str) -> list[etree._Element]:

@@ -11,11 +11,20 @@ from xml.sax.saxutils import escape, quoteattr
 from lxml import etree
 
 from engage_hri.schemas.behaviors import Mark, Speech, Timing
-from engage_hri.schemas.documents.xml_source import BML_1_0, CORE, EBML, Source, local_name, split
+from engage_hri.schemas.documents.xml_source import (
+    BML_1_0,
+    CORE,
+    EBML,
+    READ,
+    SSML,
+    XML,
+    Source,
+    attributes,
+    local_name,
+    split,
+)
 from engage_hri.schemas.faults import InputRefused
 
-SSML = "http://www.w3.org/2001/10/synthesis"
-XML = "http://www.w3.org/XML/1998/namespace"
 MARKS = ("sync", "tm", "mark")
 _WHITE = re.compile("[ \t\r\n]+")
 
@@ -28,6 +37,8 @@ class Spoken(NamedTuple):
     markup: str
     timing: tuple[Timing, ...]
     """Timing of marks that name another sync point where they stand: `<sync ref="gaze-1:stroke"/>`."""
+    is_attribute: bool = False
+    """True if the words stand in an attribute of the <speech>: `<speech id="s" text="Hello"/>`."""
 
 
 def spoken(source: Source, speech: etree._Element, id: str) -> Spoken:
@@ -36,10 +47,15 @@ def spoken(source: Source, speech: etree._Element, id: str) -> Spoken:
     if len(texts) > 1:
         raise source.refusal("more than one <text>", texts[1], advice="one <speech> for each")
     content = texts[0] if texts else speech
-    reading = _Reading(source, id, preserve=content.get(f"{{{XML}}}space") == "preserve")
+    description, attribute = _ssml(speech), attributes(speech).get("text", "")
+    preserve = content.get(f"{{{XML}}}space") == "preserve"
+    reading = _Reading(source, id, preserve=preserve, hears_all=bool(texts) or description is None)
     reading.content(content)
-    description = _ssml(speech)
-    if not texts and not (said := reading.result("")).text and not said.marks:
+    said = reading.result("")
+    if not said.text and description is None and attribute.strip():
+        reading.say(attribute)
+        return reading.result("")._replace(is_attribute=True)
+    if not texts and not said.text and not said.marks:
         if description is None:
             raise source.refusal(f"speech {id!r} says nothing", speech, advice="write <text>…</text> into it")
         reading.content(description)
@@ -63,9 +79,13 @@ def _kind(element: etree._Element) -> str:
 
 
 class _Reading:
-    """Collector of text and marks, in one walk through a speech."""
+    """Collector of text and marks, in one walk through a speech.
 
-    def __init__(self, source: Source, id: str, *, preserve: bool) -> None:
+    hears_all: words inside elements of other namespaces count, too.
+    """
+
+    def __init__(self, source: Source, id: str, *, preserve: bool, hears_all: bool) -> None:
+        self._hears_all = hears_all
         self._said: list[str] = []
         self._length = 0
         self._source = source
@@ -76,7 +96,7 @@ class _Reading:
         self._prosodic: etree._Element | None = None
 
     def content(self, element: etree._Element, *, nested: bool = False) -> None:
-        self._say(element.text or "")
+        self.say(element.text or "")
         for child in element:
             namespace, local = split(str(child.tag))
             known = namespace in CORE or namespace == SSML
@@ -85,9 +105,11 @@ class _Reading:
             elif known and local != "description":
                 self._prosodic = element if self._prosodic is None and not nested else self._prosodic
                 self.content(child, nested=True)
-            self._say(child.tail or "")
+            elif namespace not in READ and self._hears_all:
+                self.content(child, nested=True)
+            self.say(child.tail or "")
 
-    def _say(self, words: str) -> None:
+    def say(self, words: str) -> None:
         if not self._preserve:
             words = _WHITE.sub(" ", words)
             if not self._length or self._said[-1].endswith(" "):

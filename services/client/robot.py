@@ -22,11 +22,9 @@ from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound, Act
 from engage_hri.schemas.attention import HeadOwner, Inhibit
 from engage_hri.schemas.behaviors import BlockBehavior, Constraint, EventKind
 from engage_hri.schemas.blocks import (
-    BehaviorInterrupted,
     Block,
     BlockOutcome,
     Composition,
-    InterruptBehavior,
     PerformBlock,
 )
 from engage_hri.schemas.faults import Fault, InputRefused, RunFailed
@@ -41,13 +39,14 @@ from engage_hri.services.client.event_stream import EventStream
 from engage_hri.services.client.feeds import EventFeed, Feed
 from engage_hri.services.client.inputs import FragmentSource, checked, fragment_in
 from engage_hri.services.client.results import in_time, successful
+from engage_hri.services.client.steering import Steering
 from engage_hri.services.requests.ends import Pending, Requester, RequestRefused
 
 ANSWER_PATIENCE = 20.0
 """Seconds after a fragment's end for which `await_answer` waits: longer than recognition waits for an answer."""
 
 
-class Robot:
+class Robot(Steering):
     """An engaged robot, as its collaboration manager sees it. Made by `connect` or, in a service, `Robot.on(bus)`.
 
     Errors carry a `fault` that says where and why. Once the client has ended (its `async with` has, or it broke), all
@@ -167,25 +166,6 @@ class Robot:
         outcome = await self._ask(keys.BLOCK, request, timeout)
         assert isinstance(outcome, BlockOutcome)
         return successful(outcome, block.id)
-
-    async def interrupt(self, block: str, behavior: str, *, timeout: Seconds | None = None) -> BehaviorInterrupted:
-        """End one behavior of a live block, which goes on without it; returns when it has ended, with what was said.
-
-        To end a whole block, cancel the task that awaits its `realize`.
-
-        block: its id.
-        behavior: its id within the block.
-        timeout: seconds to wait for the request to be accepted; None: for ever.
-
-        Raises:
-            InputRefused: it is not being performed.
-            RunFailed: the realizer is gone, or has not come within `timeout`.
-        """
-        id = self._request_id(f"{block}:{behavior}")
-        request = InterruptBehavior(id=id, block=block, behavior=behavior)
-        outcome = await self._ask(keys.BLOCK, request, timeout)
-        assert isinstance(outcome, BehaviorInterrupted)
-        return outcome
 
     @asynccontextmanager
     async def inhibit_gaze(

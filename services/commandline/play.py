@@ -155,7 +155,7 @@ async def _private_system(job: Job, config: Config, world: World) -> AsyncIterat
         names.append("generation")
     services = {name: roster.service(name, config) for name in names}
     perception = still(world, is_attentive=job.options.human != "none")
-    async with MemoryHub(config.robot) as hub, running(hub, {"simulation": perception, **services}):
+    async with MemoryHub(config.robot, decodes=False) as hub, running(hub, {"simulation": perception, **services}):
         yield hub
 
 

@@ -22,7 +22,7 @@ async def play_tangram(config: Config, sinks: Iterable[Sink]) -> None:
 
         return collaborate
 
-    async with MemoryHub(config.robot) as hub:
+    async with MemoryHub(config.robot, decodes=False) as hub:
         services = {name: roster.service(name, config) for name in roster.NAMES}
         services["collaboration"] = ending(services["collaboration"])
         async with following(hub.join("console"), sinks), running(hub, services):

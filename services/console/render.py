@@ -1,5 +1,6 @@
 """Drawing of a scene with Rich, as large as the terminal. No state: the same scene gives the same picture."""
 
+from collections.abc import Iterable
 from math import inf
 
 from rich import box
@@ -175,7 +176,7 @@ def _plan(scene: Scene, height: int) -> Panel:
     return _panel(_LastLines(table, height), title)
 
 
-def _rows(points: tuple[PointInView, ...]) -> list[list[PointInView]]:
+def _rows(points: Iterable[PointInView]) -> list[list[PointInView]]:
     """Group the points of one behavior that are the same instant into rows."""
     rows: list[list[PointInView]] = []
     for point in points:

@@ -16,6 +16,7 @@ from engage_hri.schemas.messages import Message
 from engage_hri.schemas.recognition import ConnectionEvent, Statistics, WindowStatistics
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.console import wording
+from engage_hri.services.console.shelf import Shelf
 
 
 class Counted(Struct, frozen=True, kw_only=True):
@@ -40,7 +41,7 @@ class Tally(Struct, frozen=True, kw_only=True):
 
     began: Seconds
     now: Seconds
-    events: tuple[ConnectionEvent, ...] = ()
+    events: Shelf[str, ConnectionEvent] = Shelf()
     session: WindowStatistics | None = None
     fragments: int = 0
     unfinished: int = 0
@@ -61,12 +62,10 @@ def feed(tally: Tally, message: Message, at: Seconds) -> Tally:
     tally = replace(tally, now=max(tally.now, at))
     match message:
         case ConnectionEvent():
-            known = {event.id: event for event in tally.events}
-            before = known.get(message.id, message).state
+            before = (tally.events.get(message.id) or message).state
             if message.state in ("completed", "lost") and before not in ("started", message.state):
                 return tally  # its decision is what counts
-            known[message.id] = message
-            return replace(tally, events=tuple(known.values()))
+            return replace(tally, events=tally.events.put(message.id, message))
         case Statistics(actor="", session=session):
             return replace(tally, session=session)
         case FragmentOutcome(status=status):

@@ -3,8 +3,6 @@
 `feed(scene, message, at)` gives the next scene; `services/console/render.py` draws one. Nothing here knows the bus.
 """
 
-from collections.abc import Mapping
-
 from msgspec import Struct
 from msgspec.structs import replace
 
@@ -18,6 +16,7 @@ from engage_hri.schemas.messages import Message
 from engage_hri.schemas.recognition import ConnectionEvent, Statistics, WindowStatistics
 from engage_hri.schemas.speakable import joined
 from engage_hri.schemas.units import Seconds
+from engage_hri.services.console.shelf import Shelf
 
 UTTERANCES_KEPT = 40
 EVENTS_KEPT = 100
@@ -72,12 +71,11 @@ class PointInView(Struct, frozen=True, kw_only=True):
 
 
 class BlockInView(Struct, frozen=True, kw_only=True):
-    """Block with its sync points. places: index of each point in `points`, by behavior and name."""
+    """Block with its sync points, by behavior and name."""
 
     id: str
     began: Seconds
-    points: tuple[PointInView, ...] = ()
-    places: Mapping[tuple[str, str], int] = {}
+    points: Shelf[tuple[str, str], PointInView] = Shelf()
     status: str = ""
     """Status at its end; empty while it runs."""
 
@@ -95,7 +93,7 @@ class Scene(Struct, frozen=True, kw_only=True):
     robot: str
     began: Seconds
     now: Seconds
-    actors: tuple[Actor, ...] = ()
+    actors: Shelf[str, Actor] = Shelf()
     said: tuple[UtteranceInView, ...] = ()
     blocks: tuple[BlockInView, ...] = ()
     events: tuple[EventInView, ...] = ()
@@ -105,7 +103,7 @@ class Scene(Struct, frozen=True, kw_only=True):
     notes: tuple[str, ...] = ()
 
     def actor(self, id: str) -> Actor:
-        return next((actor for actor in self.actors if actor.id == id), Actor(id=id))
+        return self.actors.get(id) or Actor(id=id)
 
     @property
     def block(self) -> BlockInView | None:
@@ -165,9 +163,7 @@ def _act(scene: Scene, message: ActionBegan | ActionEnded | ActorFound | ActorLo
             actor = Actor(id=actor.id)
         case ActorLost():
             actor = Actor(id=actor.id, present=False)
-    known = any(other.id == actor.id for other in scene.actors)
-    actors = tuple(actor if other.id == actor.id else other for other in scene.actors)
-    scene = replace(scene, actors=actors if known else (*scene.actors, actor))
+    scene = replace(scene, actors=scene.actors.put(actor.id, actor))
     if isinstance(message, ActionBegan | ActionEnded) and message.action == "speak":
         return _voice(scene, message, at)
     return scene
@@ -214,18 +210,15 @@ def _points(scene: Scene, id: str, news: tuple[PointInView, ...]) -> Scene:
 
 def _merged(block: BlockInView, news: tuple[PointInView, ...]) -> BlockInView:
     """Add points to a block. A realised point keeps its time, and the newest plan before it."""
-    points, places = list(block.points), block.places
-    if any((new.behavior, new.sync) not in places for new in news):
-        known = ((point.behavior, point.sync) for point in (*points, *news))
-        places = {key: place for place, key in enumerate(dict.fromkeys(known))}
+    changed = []
     for new in news:
-        place = places[new.behavior, new.sync]
-        if place == len(points):
-            points.append(new)
-        elif (old := points[place]).realised is None:
+        name = (new.behavior, new.sync)
+        if (old := block.points.get(name)) is None:
+            changed.append((name, new))
+        elif old.realised is None:
             planned = old.planned if new.planned is None else new.planned
-            points[place] = replace(new, planned=planned)
-    return replace(block, points=tuple(points), places=places)
+            changed.append((name, replace(new, planned=planned)))
+    return replace(block, points=block.points.put_all(changed))
 
 
 def _event(scene: Scene, event: ConnectionEvent, at: Seconds) -> Scene:

@@ -1,11 +1,15 @@
 """Actions that people see the robot do, from the sync points its body reports and what its eyes rest on. Pure."""
 
+from collections.abc import Mapping
+
 from engage_hri.schemas.actions import ActionBegan, ActionEnded
 from engage_hri.schemas.behaviors import Action, BlockBehavior, Head, Pointing, Speech
 from engage_hri.schemas.units import Seconds, Stamp
 from engage_hri.services.control.body import Reached
 
 ActionMessage = ActionBegan | ActionEnded
+_HEADS: Mapping[str, Action] = {"NOD": "nod", "SHAKE": "shake"}
+"""Heads that mean something as an action; others only turn or tilt."""
 
 
 class ActionReporter:
@@ -24,9 +28,8 @@ class ActionReporter:
         match behavior:
             case Pointing(target=target):
                 action, targets, first, last = "point", (target,), "stroke_start", "stroke_end"
-            case Head(lexeme=lexeme):
-                action = "nod" if lexeme.upper() == "NOD" else "shake"
-                targets, first, last = (), "start", "end"
+            case Head(lexeme=lexeme) if (known := _HEADS.get(lexeme.upper())) is not None:
+                action, targets, first, last = known, (), "start", "end"
             case Speech():
                 action, targets, first, last = "speak", (), "start", "end"
             case _:

@@ -19,6 +19,8 @@ from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.world import World
 
 AbortMode = Literal["relax", "freeze"]
+Revocation = Literal["relax", "freeze", "taken_over"]
+"""How a behavior ends early: by an abort, or since the body gives one of its parts to another behavior."""
 
 
 class Arrived(Struct, frozen=True):
@@ -66,18 +68,18 @@ class BodyFailed(EngageError):
 
 
 class Revoked(Exception):
-    """The behavior was aborted while it waited for its authority."""
+    """The authority of the behavior is gone: it was aborted or taken over."""
 
 
 class MovementAuthority:
-    """Permission for a behavior to move on up to a sync point. It is extended, never shrunk; revoking it aborts.
+    """Permission for a behavior to move on up to a sync point. It is extended, never shrunk; revoking it ends that.
 
     A simple body awaits `granted(sync)` before it leaves a hold point. One that plans ahead asks `covers` and
     is told of changes through `watch`.
 
     points: the sync points of the behavior, in order.
-    pace: loop times in seconds at which the behavior is asked to reach its points, where its natural pace would miss
-    them. A body with one pace only ignores them; the estimates of other bodies say how far they can follow.
+    held: true while the behavior is to wait at the next place where it can. Nothing is covered meanwhile, so a body
+    that asks before it leaves a hold point waits there.
     revoked: how the behavior is to end, once `revoke` was called; None before.
     """
 
@@ -92,8 +94,9 @@ class MovementAuthority:
             ValueError: the behavior has no sync point `through`.
         """
         self.points = sync_points(behavior)
-        self.pace: Mapping[str, Seconds] = dict(pace or {})
-        self.revoked: AbortMode | None = None
+        self.held = False
+        self._pace: Mapping[str, Seconds] = dict(pace or {})
+        self.revoked: Revocation | None = None
         self._through = self._index(through)
         self._watchers: list[Callable[[], None]] = []
 
@@ -102,8 +105,27 @@ class MovementAuthority:
         """The last sync point that may be passed without asking."""
         return self.points[self._through]
 
+    @property
+    def pace(self) -> Mapping[str, Seconds]:
+        """Loop times in seconds at which the behavior is asked to reach its points; none while it is held.
+
+        They are asked where its natural pace would miss them. A body with one pace only ignores them; the estimates
+        of other bodies say how far they can follow.
+        """
+        return {} if self.held else self._pace
+
     def covers(self, sync: str) -> bool:
         """True if `sync` may be passed now.
+
+        sync: a sync point of the behavior.
+
+        Raises:
+            ValueError: the behavior has no such point.
+        """
+        return not self.held and self.is_granted(sync)
+
+    def is_granted(self, sync: str) -> bool:
+        """True if `sync` may be passed as soon as the behavior is not held.
 
         sync: a sync point of the behavior.
 
@@ -129,14 +151,27 @@ class MovementAuthority:
 
         pace: loop times in seconds, by sync point.
         """
-        if dict(pace) != self.pace:
-            self.pace = dict(pace)
+        if dict(pace) != self._pace:
+            self._pace = dict(pace)
             self._tell()
 
-    def revoke(self, how: AbortMode = "relax") -> None:
+    def hold(self) -> None:
+        """Wait at the next place where the behavior can, until `go_on`. A second call changes nothing."""
+        if not self.held:
+            self.held = True
+            self._tell()
+
+    def go_on(self) -> None:
+        """Go on as far as is granted."""
+        if self.held:
+            self.held = False
+            self._tell()
+
+    def revoke(self, how: Revocation = "relax") -> None:
         """End the behavior now. A second call changes nothing.
 
-        how: go to the safe pose at once (`relax`), or stand still for a moment and then go (`freeze`).
+        how: go to the safe pose at once (`relax`), or stand still for a moment and then go (`freeze`); `taken_over`
+        by the body itself, as it gives a part of this behavior to another.
         """
         if self.revoked is None:
             self.revoked = how
@@ -156,7 +191,7 @@ class MovementAuthority:
         sync: a sync point of the behavior.
 
         Raises:
-            Revoked: the behavior is to end.
+            Revoked: the behavior is to end. Taken over just as it might pass, it passes.
             ValueError: the behavior has no such point.
         """
         changed = asyncio.Event()
@@ -167,7 +202,7 @@ class MovementAuthority:
                 await changed.wait()
         finally:
             unwatch()
-        if self.revoked is not None:
+        if self.revoked is not None and not (self.revoked == "taken_over" and self.covers(sync)):
             raise Revoked
 
     def _index(self, sync: str) -> int:
@@ -226,8 +261,9 @@ class Body(ABC):
     def perform(self, behavior: BlockBehavior, authority: MovementAuthority) -> AsyncGenerator[Progress, None]:
         """Perform a behavior: yield every sync point once, in order, when reached, and never past the authority.
 
-        Ending after `end` means done; ending earlier means that the authority was revoked. However it ends, the parts
-        that it used go on to their safe pose by themselves.
+        Ending after `end` means done; ending earlier means that the authority was revoked: by an abort, or by the
+        body itself (`taken_over`), as another behavior takes a part. A point that the joints have not passed is never
+        reported, however it ends. Parts that no other behavior has go on to their safe pose by themselves.
 
         behavior: what is to be done.
         authority: how far it may go now; more is granted while it runs.

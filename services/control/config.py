@@ -81,12 +81,19 @@ class ControlConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
         lease (`Request.lease`). After the last one the body goes home. Longer than two repetitions, one every 2 s.
     no_point_zones: spheres that are never pointed into.
     variability: deviations of the simulated body.
+    repertoire: files with lexemes of the simulated body, one name or a list; see docs/control.md.
     """
 
     state_rate: float = 20.0
     dead_man: Seconds = 5.0
     no_point_zones: tuple[NoPointZone, ...] = ()
     variability: Variability = Variability()
+    repertoire: str | tuple[str, ...] = ()
+
+    @property
+    def repertoire_files(self) -> tuple[str, ...]:
+        """Names of the files in `repertoire`, each stronger than those before it."""
+        return (self.repertoire,) if isinstance(self.repertoire, str) else self.repertoire
 
     def __post_init__(self) -> None:
         if not 1.0 <= self.state_rate <= 200.0:

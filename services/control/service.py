@@ -3,6 +3,7 @@
 import asyncio
 from contextlib import aclosing
 from math import inf
+from pathlib import Path
 from typing import Literal
 
 from engage_hri.schemas import keys
@@ -29,6 +30,7 @@ from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.messages import Message
 from engage_hri.schemas.requests import Cancel, Request
 from engage_hri.schemas.units import Seconds
+from engage_hri.schemas.utf8 import utf8
 from engage_hri.schemas.world import World
 from engage_hri.services.bus.interface import Bus, Received, is_asked_to_stop
 from engage_hri.services.control import variability
@@ -57,8 +59,9 @@ async def embody(
     bus: Bus, ready: Ready, config: ControlConfig, body: Body | None = None, *, covered_for: Seconds = COVERED_FOR
 ) -> None:
     """Serve until cancelled. body: the simulated one unless given. covered_for: see `CoveredObjects`."""
+    body = body or _simulated(config)
     async with asyncio.TaskGroup() as tasks:
-        control = _Control(bus, config, body or _simulated(config), tasks, CoveredObjects(covered_for))
+        control = _Control(bus, config, body, tasks, CoveredObjects(covered_for))
         with bus.subscribe(*RequestDesk.patterns("control"), keys.WORLD) as inbox:
             bus.answer(keys.ESTIMATE, control.estimate)
             bus.answer(keys.DESCRIBE, control.describe)
@@ -73,10 +76,20 @@ async def embody(
 
 
 def _simulated(config: ControlConfig) -> Body:
-    """Create the simulated torso. Imported here: a robot with a body of its own never loads it."""
+    """Create the simulated torso. Imported here: a robot with its own body never loads it. Raises InputRefused."""
     from engage_hri.services.control.torso.body import SimulatedBody
+    from engage_hri.services.control.torso.repertoire import BUILT_IN, extended
 
-    return SimulatedBody(config.no_point_zones, config.variability)
+    repertoire = extended(BUILT_IN, [(file, _read(file)) for file in config.repertoire_files])
+    return SimulatedBody(config.no_point_zones, config.variability, repertoire)
+
+
+def _read(file: str) -> str:
+    try:
+        return utf8(Path(file).read_bytes(), file)
+    except OSError as error:
+        advice = "it is in `control.repertoire`; a relative path counts from the folder of the process"
+        raise InputRefused(Fault(reason=error.strerror or str(error), where=file, advice=advice)) from error
 
 
 class _LiveBehavior:
@@ -88,7 +101,9 @@ class _LiveBehavior:
         self.id = id
         self.authority = authority
         self.position = 0
-        self.status: Literal["done", "aborted", "failed"] = "aborted"
+        self.status: Literal["done", "taken_over", "aborted", "failed"] = "aborted"
+        self.passed = ""
+        """The last sync point that it has passed."""
         self.aborts: list[str] = []
         """Ids of the abort requests that end with this behavior."""
 
@@ -187,6 +202,8 @@ class _Control:
             self.desk.refuse(request.id, Fault(reason=str(error), where=request.behavior.id, service="control"))
             return
         id = self.desk.asked(request.id).id
+        if request.held:
+            authority.hold()
         live = self._live[request.id] = _LiveBehavior(request, id, authority)
         self._tasks.create_task(self._perform(live), name=f"behavior {request.id}")
 
@@ -211,12 +228,16 @@ class _Control:
         return {planned.sync: self._bus.local(planned.at) for planned in request.pace}
 
     def _extend(self, live: _LiveBehavior, request: PerformBehavior) -> None:
+        if request.held:
+            live.authority.hold()
         live.authority.set_pace(self._pace(request))
         try:
             live.authority.extend(request.through)
         except ValueError as error:
             where = live.request.behavior.id
             self._bus.publish(keys.fault("control"), Fault(reason=str(error), where=where, service="control"))
+        if not request.held:
+            live.authority.go_on()
 
     async def _perform(self, live: _LiveBehavior) -> None:
         """Perform a behavior, from its request to the one terminal answer."""
@@ -242,6 +263,8 @@ class _Control:
             # An error of the driver ends this behavior. Nothing is known of where its parts are, so all go home.
             live.status, fault = "failed", self._bus.failed(error, f"behavior {live.label}")
             self._take_home(f"after {live.label} broke")
+        if live.status == "aborted" and live.authority.revoked == "taken_over":
+            live.status = "taken_over"
         del self._live[request.id]
         with self.desk.serving(request):
             self._end(live, fault)
@@ -254,7 +277,7 @@ class _Control:
         self._keep_publishing()
         outcome = BehaviorOutcome(
             id=request.id, block=request.block, behavior=request.behavior.id, status=live.status,
-            at=self._bus.stamp(at), spoken=live.spoken, fault=fault,
+            at=self._bus.stamp(at), passed=live.passed, spoken=live.spoken, fault=fault,
         )  # fmt: skip
         self.desk.end(outcome)
 
@@ -299,6 +322,7 @@ class _Control:
                     id=id, block=block, behavior=behavior, sync=sync, at=at, arrived=came, requester=requester
                 )
                 self._tell(reached)
+                live.passed = sync
                 live.status = "done" if sync == "end" else live.status
                 self._publish(self._actions.reached(request.id, live.label, request.behavior, progress))
                 self.note_look(live, progress.at)

@@ -301,7 +301,8 @@ class FragmentRunner:
         if performance.refusal is not None:
             aborted = self._turns.fragment_refused(fragment.id, now)
         else:
-            complete, reason = performance.status == "done", f"{fragment.id} {performance.status}"
+            complete = performance.status == "done" or performance.lost_motions_only
+            reason = f"{fragment.id} {performance.status}"
             aborted = self._turns.fragment_ended(fragment.id, complete=complete, now=now, reason=reason)
         self._abort(aborted, now)
         if target := self._turns.averted_to:

@@ -75,6 +75,8 @@ class FragmentPerformance:
         self._closed: set[str] = set()
         """Ids of the behaviors and events that the realizer has ended."""
         self._forbidden: set[str] = set()
+        self.lost_motions_only = False
+        """True if it failed because nothing of its block could be performed, and it had no words."""
         self._reached: set[tuple[str, str]] = set()
         self._ended: Ended | None = None
 
@@ -178,8 +180,11 @@ class FragmentPerformance:
         self._warnings += [f"{id} was dropped" + (f": {reason}" if reason else "") for id, reason in why.items()]
         self._started -= set(outcome.dropped)
         status, fault = outcome.status, outcome.fault
-        if status == "done" and (silence := self._silence(outcome, why)) is not None:
+        silence = self._silence(outcome, why)
+        none_left = self._behaviors.keys() <= why.keys() and not any(it.required for it in self._behaviors.values())
+        if silence is not None and (status == "done" or none_left):
             status, fault = "failed", silence
+        self.lost_motions_only = status == "failed" and none_left and silence is None
         self.end(Ended(at, status, outcome.spoken, outcome.replaced_by, fault))
 
     def _silence(self, outcome: BlockOutcome, why: Mapping[str, str]) -> Fault | None:

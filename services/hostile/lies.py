@@ -12,7 +12,7 @@ from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.hostile.chance import Chance, happens
 
-Status = Literal["done", "aborted", "failed"]
+Status = Literal["done", "taken_over", "aborted", "failed"]
 FAR = (1e9, -1e9, 1e308, -1e308, -1.0, 60.0)
 WAITS = {"stroke_start", "stroke_end", "stroke", "relax"}
 """Sync points before which an honest body waits for its authority."""
@@ -77,8 +77,9 @@ def lie(chance: Chance, behavior: BlockBehavior) -> Lie:
         case 7:
             broken = _steps(chance, points, 1.0)[: chance.randrange(0, len(points))]
             return Lie(steps=broken, end="failed", end_delay=_pause(chance))
-        case 8:  # aborted by itself
-            return Lie(steps=_steps(chance, points, 1.0)[:1], end="aborted", cancel_delay=_pause(chance))
+        case 8:  # ended by itself, or by a behavior that nobody has asked for
+            end: Status = chance.choice(("aborted", "taken_over"))
+            return Lie(steps=_steps(chance, points, 1.0)[:1], end=end, cancel_delay=_pause(chance))
         case 9:  # late after a cut, or a cancellation
             return Lie(steps=_steps(chance, points, 3.0), cancel_delay=chance.uniform(4.0, 40.0))
     twofold = _steps(chance, (*points, *points), 0.5)

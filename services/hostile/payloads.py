@@ -8,11 +8,12 @@ import msgspec
 from engage_hri.schemas import keys
 from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost
 from engage_hri.schemas.attention import HeadOwner, InhibitionEnded
-from engage_hri.schemas.blocks import BehaviorInterrupted, BlockOutcome
+from engage_hri.schemas.blocks import BehaviorInterrupted, BlockOutcome, PerformanceSteered
 from engage_hri.schemas.body import RobotState, SyncPointArrived, SyncPointReached, WordSpoken
 from engage_hri.schemas.feedback import BlockProgress, PredictionFeedback, SyncPointProgress, WarningFeedback
 from engage_hri.schemas.fragments import FragmentOutcome, TurnClosed
 from engage_hri.schemas.messages import COMMANDS, MAJOR, Message
+from engage_hri.schemas.nets import NetMarked, NetPlanned
 from engage_hri.schemas.perception import HeadPose, VoiceActivity
 from engage_hri.schemas.recognition import ConnectionEvent, EventOutcome, OpenEvents, Statistics, TurnOutcome
 from engage_hri.schemas.requests import Cancel, KeepAlive, Request
@@ -29,13 +30,15 @@ MARKUP = 0.05
 
 SERVER: Mapping[type, str] = {
     FragmentOutcome: "generation", InhibitionEnded: "generation", BlockOutcome: "realizer",
-    BehaviorInterrupted: "realizer", EventOutcome: "recognition", TurnOutcome: "recognition",
+    BehaviorInterrupted: "realizer", PerformanceSteered: "realizer",
+    EventOutcome: "recognition", TurnOutcome: "recognition",
 }  # fmt: skip
 FIXED_KEYS: Mapping[type, str] = {
     **dict.fromkeys((BlockProgress, SyncPointProgress, PredictionFeedback, WarningFeedback), keys.FEEDBACK),
     **dict.fromkeys((SyncPointArrived, SyncPointReached, WordSpoken), keys.SYNC_POINT),
     **dict.fromkeys((ActorFound, ActorLost), keys.PERCEIVED_ACTION),
     TurnClosed: keys.TURN_CLOSED, World: keys.WORLD, HeadOwner: keys.HEAD_OWNER, RobotState: keys.ROBOT_STATE,
+    NetPlanned: keys.NET, NetMarked: keys.NET,
 }  # fmt: skip
 """Key of each type of message that always has the same."""
 

@@ -9,7 +9,7 @@ from msgspec.structs import replace
 
 from engage_hri.schemas import keys
 from engage_hri.schemas.attention import Inhibit
-from engage_hri.schemas.blocks import BlockOutcome, InterruptBehavior, PerformBlock
+from engage_hri.schemas.blocks import BlockOutcome, InterruptBehavior, PerformBlock, SteerPerformance
 from engage_hri.schemas.body import AbortBehavior, BehaviorOutcome, GoHome, PerformBehavior
 from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.fragments import FragmentOutcome, PerformFragment
@@ -170,6 +170,11 @@ class Schemer:
             return PerformFragment(id="", fragment=plausible.fragment(chance, name, self._entities))
         if kind is InterruptBehavior:
             return InterruptBehavior(id="", block=self._word("block"), behavior=chance.choice(("b1", "b2", "b9")))
+        if kind is SteerPerformance:
+            block = chance.choice(("", self._word("block")))
+            named = chance.choice(("", "", "b1")) if block else ""
+            wishes: tuple[Literal["hold", "continue", "stop"], ...] = ("hold", "continue", "stop")
+            return SteerPerformance(id="", to=chance.choice(wishes), block=block, behavior=named)
         if kind is PerformBehavior:
             behavior = plausible.block(chance, name, self._entities).behaviors[0]
             through = chance.choice(("start", "end", "relax"))

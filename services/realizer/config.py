@@ -27,6 +27,7 @@ class RealizerConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
         point within 50 ms in 99 of 100 cases on two cores, if they begin at once, too (benchmarks/live_blocks.py).
     event_grace: how long after its limit an event ends as failed if recognition is not there to decide it.
     event_patience: how long after its limit an event ends as failed if recognition is there, but says nothing.
+    longest_hold: what is held for longer is stopped, so that no arm stays in the air when whoever held it has gone.
     most: behaviors, marks and sync references in a block; more is refused. Planning takes 0.1 ms each.
     *_limit: limit of an event that names none: recognition's own (its design page), the longer for a pair.
     """
@@ -46,6 +47,7 @@ class RealizerConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
     blocks: int = 300
     event_grace: Seconds = 0.5
     event_patience: Seconds = 10.0
+    longest_hold: Seconds = 60.0
     most: int = 2000
     directed_gaze_limit: Seconds = 2.5
     mutual_facial_gaze_limit: Seconds = 1.9

@@ -60,6 +60,7 @@ def as_json(plan: Plan) -> str:
         },
         "natural": sorted(plan.natural),
         "dropped": list(plan.dropped),
+        "given_up": list(plan.given_up),
         "problems": [
             {"kind": problem.kind, "behavior": problem.behavior, "message": problem.message}
             for problem in plan.problems

@@ -7,6 +7,8 @@ from functools import lru_cache
 from itertools import pairwise
 from typing import Literal, NamedTuple
 
+from msgspec import Struct
+
 from engage_hri.schemas.behavior_types import TYPES, Performer, sync_points, types_with
 from engage_hri.schemas.behaviors import Behavior, Event, Speech, Wait
 from engage_hri.schemas.body import Estimate
@@ -26,6 +28,8 @@ class Point(NamedTuple):
 
 ORIGIN = Point("", "start")
 """The start of the block itself."""
+FINISH = Point("", "end")
+"""The end of the block itself, the last transition of its net."""
 
 Gate = Literal["start", "hold", "prompt", "passive"]
 """How a behavior can be made to wait at an instant.
@@ -33,6 +37,20 @@ Gate = Literal["start", "hold", "prompt", "passive"]
 start: it is not begun yet. hold: it comes there and holds. passive: it cannot wait there.
 prompt: it could hold, but sets out so late that it need not. (A look that is on its target too early misleads.)
 """
+
+
+class Member(Struct, frozen=True, gc=False):
+    """A behavior's part in an instant: how it can be made to wait there, and the point that is reported then."""
+
+    behavior: str
+    kind: Gate
+    point: Point
+
+    @property
+    def can_wait(self) -> bool:
+        """True if it can hold there, once begun."""
+        return self.kind in ("hold", "prompt")
+
 
 WITH_STROKE = types_with(has_stroke=True)
 ON_TARGET = types_with(lasts=True, performer="body")

@@ -8,7 +8,14 @@ from msgspec.structs import replace
 
 from engage_hri.schemas import keys
 from engage_hri.schemas.behaviors import Gesture, Hand, Pointing, Speech
-from engage_hri.schemas.blocks import BehaviorInterrupted, Block, BlockOutcome, InterruptBehavior, PerformBlock
+from engage_hri.schemas.blocks import (
+    BehaviorInterrupted,
+    Block,
+    BlockOutcome,
+    InterruptBehavior,
+    PerformBlock,
+    SteerPerformance,
+)
 from engage_hri.schemas.body import (
     BodyPose,
     Estimate,
@@ -33,6 +40,7 @@ from engage_hri.services.realizer.perform.live import Ending, Live
 from engage_hri.services.realizer.perform.live_blocks import LiveBlocks
 from engage_hri.services.realizer.perform.performance import BlockPerformance
 from engage_hri.services.realizer.perform.shared_context import Moving, Presence, SharedContext
+from engage_hri.services.realizer.perform.steering import Steering
 from engage_hri.services.realizer.plan.planner import Plan, plan_steps
 from engage_hri.services.realizer.plan.poses import changed, planned_times, poses_before, poses_left
 from engage_hri.services.realizer.plan.relations import BlockRefused, extent, relation_steps
@@ -62,6 +70,7 @@ class _Realizer:
         self.live_blocks = LiveBlocks()
         self.homing: set[asyncio.Future[Outcome]] = set()
         """Outcomes of the parts that are on their way home, sent by blocks that replace others."""
+        self.steering = Steering(bus, self.desk, config, self.live, self.performances)
         self.shared = SharedContext(
             bus, self.requests, config, self.peers, self.routes, self.performing, self.live_blocks
         )
@@ -95,6 +104,8 @@ class _Realizer:
                 tasks.create_task(self._perform(live), name=f"block {request.block.id}")
             case InterruptBehavior():
                 tasks.create_task(self.interrupt(request), name=f"interruption {request.id}")
+            case SteerPerformance():
+                tasks.create_task(self.steering.steer(request), name=f"steering {request.id}")
             case Cancel():
                 self.cancel(request)
 
@@ -179,7 +190,9 @@ class _Realizer:
                 return
             named = {point.behavior.partition(":")[0] for point in plan.foreign}
             tied_to = {id: elsewhere[id] for id in named}
-            performance = self.performances[live.request.id] = BlockPerformance(live, plan, self.shared, tied_to)
+            performance = self.performances[live.request.id] = BlockPerformance(
+                live, plan, self.shared, tied_to, self.steering.held(block.id)
+            )
             await self._end(live, await performance.run())
 
     async def _plan(self, block: Block, elsewhere: Mapping[str, Block]) -> Plan:
@@ -220,7 +233,7 @@ class _Realizer:
         """Poses in which the blocks that `plan` is tied to leave the body for it, by part; the last tie says when."""
         others = {each.plan.block.id: each.decisions for each in self.performing()}
         named = {point: point.behavior.partition(":")[0::2] for point in plan.foreign}
-        times = {block: others[block].times() for block, _ in named.values() if block in others}
+        times = {block: others[block].foresight.times() for block, _ in named.values() if block in others}
         ties = [
             times[block].get(Point(id, point.sync), 0.0) for point, (block, id) in named.items() if block in times
         ]
@@ -322,6 +335,7 @@ class _Realizer:
 
     def _forget(self, live: Live) -> None:
         del self.live[live.request.id]
+        self.steering.forget(live.request.block.id)
         self.performances.pop(live.request.id, None)
         live.ended.set_result(None)
 

@@ -58,3 +58,43 @@ class Timer:
     def _rings(self) -> None:
         self._handle = None
         self._ring()
+
+
+class Afterwards:
+    """A call of `ring` a few turns of the loop after the last `set`: after all that is under way by then.
+
+    Nor later than `LONGEST` after the first.
+    """
+
+    TURNS = 5
+    """Turns until the answer to a message is here if it is made at once: a task is woken, the message is delivered,
+    its receiver is woken, the answer is delivered."""
+    LONGEST: Seconds = 0.005
+
+    def __init__(self, ring: Callable[[], None]) -> None:
+        self._ring = ring
+        self._loop = asyncio.get_running_loop()
+        self._left = 0
+        self._since: Seconds = 0.0
+        self._handle: asyncio.Handle | None = None
+
+    def set(self) -> None:
+        if self._handle is None:
+            self._since = self._loop.time()
+            self._handle = self._loop.call_soon(self._turn)
+        elif self._loop.time() > self._since + self.LONGEST:
+            return
+        self._left = self.TURNS
+
+    def stop(self) -> None:
+        if self._handle is not None:
+            self._handle.cancel()
+            self._handle = None
+
+    def _turn(self) -> None:
+        self._left -= 1
+        if self._left:
+            self._handle = self._loop.call_soon(self._turn)
+        else:
+            self._handle = None
+            self._ring()

@@ -2,6 +2,7 @@ import sys
 from collections.abc import Callable
 from io import StringIO
 from types import FrameType
+from typing import Any, TypeVar
 
 import msgspec
 import pytest
@@ -11,7 +12,7 @@ from rich.console import Console
 from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorLost
 from engage_hri.schemas.attention import Claim, HeadOwner
 from engage_hri.schemas.feedback import BlockProgress, PlannedPoint, PredictionFeedback, SyncPointProgress
-from engage_hri.services.console import view
+from engage_hri.services.console import tally, view
 from engage_hri.services.console.render import render
 from tests.console.scenes import SCENE, at, event, fed
 
@@ -260,30 +261,64 @@ def test_people_look_at_things_away_or_around(scene: view.Scene) -> None:
     assert [("looks at table" in looks[0]), ("looks away" in looks[1]), ("looks around" in looks[2])] == [True] * 3
 
 
+Fed = TypeVar("Fed", view.Scene, tally.Tally)
+
+
+def instructions(feed: Callable[[Fed, Any, float], Fed], before: Fed, message: object) -> tuple[int, Fed]:
+    """Number of Python's own instructions that a message takes, and what comes of it."""
+    count = 0
+
+    def counted(frame: FrameType, event: str, argument: object) -> Callable[..., object]:
+        nonlocal count
+        frame.f_trace_opcodes = True
+        count += event == "opcode"
+        return counted
+
+    tracing = sys.gettrace()
+    sys.settrace(counted)
+    try:
+        after = feed(before, message, 1.5)
+    finally:
+        sys.settrace(tracing)
+    return count, after
+
+
 def test_a_sync_point_costs_the_view_no_look_at_all_other_points_of_its_block() -> None:
     def work(size: int) -> int:
-        """Python's own instructions."""
         points = tuple(PlannedPoint(behavior=f"b{number}", sync="end", time=1.0) for number in range(size))
         scene = view.feed(view.empty("robot", 0.0), BlockProgress(block="long", progress="start", at=at(0.0)), 0.0)
         scene = view.feed(scene, PredictionFeedback(block="long", points=points), 0.0)
         reached = SyncPointProgress(block="long", behavior="b7", sync="end", at=at(0.0), time=1.5)
-        count = 0
-
-        def counted(frame: FrameType, event: str, argument: object) -> Callable[..., object]:
-            nonlocal count
-            frame.f_trace_opcodes = True
-            count += event == "opcode"
-            return counted
-
-        before = sys.gettrace()
-        sys.settrace(counted)
-        try:
-            scene = view.feed(scene, reached, 1.5)
-        finally:
-            sys.settrace(before)
+        count, scene = instructions(view.feed, scene, reached)
         assert scene.block is not None
-        assert scene.block.points[7].realised == 1.5
+        assert list(scene.block.points)[7].realised == 1.5
         assert [point.behavior for point in scene.block.points] == [each.behavior for each in points]
+        return count
+
+    assert work(1000) == work(10)
+
+
+def test_an_action_costs_the_view_no_look_at_all_who_were_ever_here() -> None:
+    def work(people: int) -> int:
+        scene = view.empty("robot", 0.0)
+        for number in range(people):
+            scene = view.feed(scene, ActorLost(actor=f"p{number}", at=at(0.0)), 0.0)
+        count, scene = instructions(view.feed, scene, ActionBegan(actor="p7", action="nod", at=at(1.0)))
+        assert [doing.action for doing in scene.actor("p7").doing] == ["nod"]
+        assert len(scene.actors) == people
+        return count
+
+    assert work(1000) == work(10)
+
+
+def test_a_decision_costs_the_tally_no_look_at_all_events_of_the_session() -> None:
+    def work(events: int) -> int:
+        told = tally.empty(0.0)
+        for number in range(events):
+            told = tally.feed(told, event(f"e{number}", "started", 0.0)[0], 0.0)
+        decided = event("e7", "succeeded", 1.0)[0]
+        count, told = instructions(tally.feed, told, decided)
+        assert [event.state for event in told.events][6:9] == ["started", "succeeded", "started"]
         return count
 
     assert work(1000) == work(10)

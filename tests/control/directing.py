@@ -16,7 +16,7 @@ from engage_hri.services.control.config import ControlConfig
 from engage_hri.services.control.service import embody
 from engage_hri.services.requests.ends import Pending, Requester
 from engage_hri.services.runtime.service import running
-from tests.control.contract import WORLD
+from tests.control.suite import WORLD
 
 
 class Client:
@@ -27,9 +27,13 @@ class Client:
         self.requests = requests
         self.heard: list[Message] = []
 
-    def perform(self, behavior: object, through: str = "end", block: str = "block-1") -> Pending:
+    def perform(
+        self, behavior: object, through: str = "end", block: str = "block-1", *, held: bool = False
+    ) -> Pending:
         id = f"{block}/{behavior.id}"  # type: ignore[attr-defined]
-        request = PerformBehavior(id=id, requester=self.bus.name, block=block, behavior=behavior, through=through)  # type: ignore[arg-type]
+        request = PerformBehavior(
+            id=id, requester=self.bus.name, block=block, behavior=behavior, through=through, held=held  # type: ignore[arg-type]
+        )  # fmt: skip
         return self.requests.send(keys.BEHAVIOR, request)
 
     async def outcome(self, pending: Pending) -> BehaviorOutcome:

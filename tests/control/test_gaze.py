@@ -12,8 +12,8 @@ from engage_hri.schemas.units import Vector
 from engage_hri.schemas.world import World
 from engage_hri.services.control.body import Arrived, Reached
 from engage_hri.services.control.torso.body import SimulatedBody
-from tests.control.contract import WORLD, Stage, performed, times
 from tests.control.motions import recorded, stops, violations
+from tests.control.suite import WORLD, Stage, performed, times
 
 
 def body_in(world: World) -> SimulatedBody:

@@ -33,9 +33,9 @@ from engage_hri.services.control.config import Displaced, Slow, Variability
 from engage_hri.services.requests.ends import RequestRefused
 from engage_hri.services.runtime.virtual_time import VirtualTimeLoop
 from tests.commanding import command
-from tests.control.contract import WORLD
 from tests.control.directing import robot, tip
 from tests.control.motions import STEP
+from tests.control.suite import WORLD
 
 POINT = Pointing(id="point-1", target="near-right")
 
@@ -163,16 +163,17 @@ async def test_a_bad_extension_is_a_fault_and_changes_nothing(hub: MemoryHub):
         assert [item.where for item in client.of(Fault)] == ["point-1"]
 
 
-async def test_a_later_gaze_hands_over_and_both_are_done(hub: MemoryHub):
+async def test_a_later_gaze_takes_the_head_and_the_earlier_ends_with_the_points_it_has_passed(hub: MemoryHub):
     async with robot(hub) as client:
         one = client.perform(Gaze(id="one", target="near-right"), "start")
         await asyncio.sleep(2.0)
         other = client.perform(Gaze(id="other", target="human"), "end")
         outcomes = [await client.outcome(one), await client.outcome(other)]
 
-    assert [outcome.status for outcome in outcomes] == ["done", "done"]
-    one_at = client.reached("one")
-    assert (one_at["stroke_end"], one_at["relax"], one_at["end"]) == (2.0, 2.0, 2.0)
+    assert [outcome.status for outcome in outcomes] == ["taken_over", "done"]
+    assert [outcome.passed for outcome in outcomes] == ["stroke_start", "end"]
+    assert outcomes[0].at.seconds == 2.0
+    assert list(client.reached("one")) == ["start", "ready", "stroke_start"]
 
 
 async def test_actions_follow_from_real_motion(hub: MemoryHub):

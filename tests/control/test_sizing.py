@@ -15,8 +15,8 @@ from engage_hri.services.control.config import Slow, Variability
 from engage_hri.services.control.torso.body import SimulatedBody
 from engage_hri.services.control.torso.sizing import SIZES
 from engage_hri.services.runtime.virtual_time import run_virtual
-from tests.control.contract import WORLD, times
 from tests.control.motions import Recording, recorded, violations
+from tests.control.suite import WORLD, times
 
 BEAT = Gesture(id="beat", lexeme="BEAT")
 NOD = Head(id="nod", lexeme="NOD")

@@ -9,7 +9,7 @@ from engage_hri.services.control.body import BehaviorRefused, BodyFailed, Reache
 from engage_hri.services.control.config import ControlConfig, Displaced, Slow, Stall, Variability
 from engage_hri.services.control.torso.body import SimulatedBody
 from engage_hri.services.control.variability import is_lost, normal
-from tests.control.contract import WORLD, Stage, performed, poses_agree, times
+from tests.control.suite import WORLD, Stage, performed, poses_agree, times
 
 POINT = Pointing(id="p", target="near-right")
 

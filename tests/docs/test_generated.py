@@ -26,9 +26,10 @@ def test_the_table_of_behavior_types_is_not_stale(monkeypatch: pytest.MonkeyPatc
 
 
 def test_make_generate_writes_all_of_it() -> None:
-    """The schemas are compared in tests/schemas/test_export.py."""
+    """Compared elsewhere: the schemas (tests/schemas/test_export.py), docs/vocabulary.md (tests/realizer)."""
     recipe = (ROOT / "Makefile").read_text(encoding="utf-8").partition("\ngenerate:")[2].partition("\n\n")[0]
 
     assert "engage_hri.schemas.export" in recipe
     assert "docs/site/configuration.py" in recipe
     assert "docs/site/types_table.py" in recipe
+    assert "docs/site/vocabulary_table.py" in recipe

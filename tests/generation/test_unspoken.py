@@ -5,7 +5,7 @@ from collections.abc import AsyncIterator
 
 import pytest
 
-from engage_hri.schemas.behaviors import BlockBehavior, Gaze, Speech
+from engage_hri.schemas.behaviors import BlockBehavior, Gaze, Head, Speech
 from engage_hri.schemas.blocks import SpokenText
 from engage_hri.schemas.body import BodyPose, Estimate
 from engage_hri.schemas.faults import Fault
@@ -121,6 +121,25 @@ async def test_one_spoken_word_is_enough_and_what_nobody_wanted_is_not_missed(
 
     assert outcome.status == status
     assert (outcome.fault is not None) == (status == "failed")
+
+
+async def test_a_fragment_without_words_of_which_nothing_was_performed_fails_and_its_turn_goes_on(
+    hub: MemoryHub,
+) -> None:
+    async with stage(hub) as partners:
+        nod = TurnFragment(id="a", turn_status="beginning", behaviors=(Head(id="n", lexeme="NOD"),))
+        pending = [partners.send(nod), partners.send(says("b", "end"))]
+        block = await partners.fragment_block("a")
+        await partners.fragment_block("b")
+        gone = tuple(each.id for each in block.behaviors)
+        fault = Fault(reason="no behavior of it came to its end")
+        partners.end(partners.request("a"), "failed", dropped=gone, reasons=("tired",) * len(gone), fault=fault)
+        partners.end(partners.request("b"))
+        outcomes = [await each.outcome for each in pending]
+
+    assert [(each.status, each.fault) for each in outcomes if isinstance(each, FragmentOutcome)] == [
+        ("failed", fault), ("done", None)
+    ]  # fmt: skip
 
 
 async def test_an_interrupted_fragment_stays_interrupted(hub: MemoryHub) -> None:

@@ -1,13 +1,14 @@
 """A body at message level: the durations it is told, the authority it is given, and the faults it is told to have.
 
-It behaves on the bus as control does: it waits at hold points until its authority covers them, says so, takes over
-when a later gaze or point comes, and ends every request exactly once.
+It behaves on the bus as control does: it waits at hold points until its authority covers them, says so, takes a part
+from whatever has it when another behavior comes, and ends every request exactly once.
 """
 
 import asyncio
 from collections.abc import Mapping
 from contextlib import suppress
 from itertools import pairwise
+from math import inf
 
 from msgspec import Struct, field
 
@@ -46,7 +47,11 @@ HOLDS = {
     "faceFacs": ("stroke", "relax"),
     "posture": ("stroke", "relax"),
 }
-PART = {"head": "nod", "gaze": "head", "gazeShift": "head", "headDirectionShift": "head", "speech": "voice"}
+SHIFTS = ("gazeShift", "headDirectionShift")
+PART = {
+    "head": "nod", "gaze": "head", "gazeShift": "head", "headDirectionShift": "head", "speech": "voice",
+    "posture": "torso", "postureShift": "torso", "pose": "torso",
+}  # fmt: skip
 ARMS = {None: ("right_arm",), "RIGHT_HAND": ("right_arm",), "LEFT_HAND": ("left_arm",)}
 DURATIONS: dict[str, tuple[Seconds, ...]] = {
     "pointing": (0.5, 0.25, 0.5, 0.25, 0.25, 0.5),
@@ -113,11 +118,15 @@ class Act(Struct, eq=False):
     changed: asyncio.Event
     task: asyncio.Task[None] | None = None
     passed: list[str] = field(default_factory=list)
+    coming: list[str] = field(default_factory=list)
+    """Points that it has come to and reports with the next one."""
+    due: Seconds = inf
+    """When it comes to its next point."""
     spoken: str = ""
 
     def covers(self, sync: str) -> bool:
         points = points_of(self.perform.behavior)
-        return points.index(sync) <= points.index(self.perform.through)
+        return not self.perform.held and points.index(sync) <= points.index(self.perform.through)
 
 
 class FakeBody:
@@ -234,55 +243,88 @@ class FakeBody:
         act.task = self.tasks.create_task(self._run(act), name=f"fake {perform.id}")
 
     def _take_over(self, perform: PerformBehavior) -> None:
+        """End whatever has a part of it. A shift and a look take nothing from each other: the look is on top."""
         type = type_of(perform.behavior)
-        if type not in HOLDS or type == "head":
-            return
         for other in list(self.acts.values()):
-            if set(parts_of(perform.behavior)) & set(parts_of(other.perform.behavior)):
-                assert other.task is not None
-                other.task.cancel()
-                for sync in points_of(other.perform.behavior)[len(other.passed) :]:
-                    self._reached(other, sync, self.bus.now())
-                self._end(other, "done")
+            theirs = type_of(other.perform.behavior)
+            shared = set(parts_of(perform.behavior)) & set(parts_of(other.perform.behavior))
+            if not shared or type == "speech" or (type in SHIFTS and theirs == "gaze"):
+                continue
+            assert other.task is not None
+            other.task.cancel()
+            self._pass_what_is_due(other)
+            if theirs in SHIFTS and type == "gaze":
+                self._pass(other, "end", self.bus.now())
+            self._end(other, "done" if "end" in other.passed else "taken_over")
 
     async def _run(self, act: Act) -> None:
         behavior = act.perform.behavior
         script = self._script(behavior)
-        durations = script.durations or natural_durations(behavior)
-        points, holds = points_of(behavior), self._holds(behavior)
-        self._reached(act, points[0], self.bus.now())
-        pending: list[str] = []
-        for seconds, sync in zip(durations, points[1:], strict=True):
+        self._reached(act, "start", self.bus.now())
+        for seconds, sync in self._phases(behavior):
             if sync == script.stall:
                 await asyncio.get_running_loop().create_future()
-            await self._phase(act, sync, seconds * script.slow)
+            await self._phase(act, sync, seconds)
             if sync == script.fail:
                 self._end(act, "failed", Fault(reason="overheated"))
                 return
-            if sync in held_with_next(behavior):
-                pending.append(sync)
-                continue
             arrived = self.bus.now()
-            if sync in holds and not act.covers(sync):
+            if sync in self._holds(behavior) and not act.covers(sync):
                 self._arrived(act, sync, arrived)
                 while not act.covers(sync):
                     act.changed.clear()
                     await act.changed.wait()
-            for each in (*pending, sync):
-                self._reached(act, each, arrived)
-            pending = []
-            if isinstance(behavior, Speech):
-                position = next((mark.position for mark in behavior.marks if mark.id == sync), len(behavior.text))
-                act.spoken = behavior.text[:position]
+            self._pass(act, sync, arrived)
         self._end(act, "done")
 
+    def _phases(self, behavior: BlockBehavior) -> list[tuple[Seconds, str]]:
+        """Seconds to each point, as it really does it; under a look a shift ends at once."""
+        script = self._script(behavior)
+        durations = script.durations or natural_durations(behavior)
+        if type_of(behavior) in SHIFTS and any(type_of(act.perform.behavior) == "gaze" for act in self.acts.values()):
+            durations = (0.0,)
+        return [(each * script.slow, sync) for each, sync in zip(durations, points_of(behavior)[1:], strict=True)]
+
+    def _pass(self, act: Act, sync: str, arrived: Seconds) -> None:
+        """Report a point and those before it that wait with it, unless it is one of these itself."""
+        act.coming.append(sync)
+        behavior = act.perform.behavior
+        if sync in held_with_next(behavior):
+            return
+        for each in act.coming:
+            self._reached(act, each, arrived)
+        act.coming = []
+        if isinstance(behavior, Speech):
+            position = next((mark.position for mark in behavior.marks if mark.id == sync), len(behavior.text))
+            act.spoken = behavior.text[:position]
+
+    def _pass_what_is_due(self, act: Act) -> None:
+        """Report the points of this very instant to which it comes, before another behavior takes its part."""
+        behavior, now = act.perform.behavior, self.bus.now()
+        phases = self._phases(behavior)[len(act.passed) + len(act.coming) - 1 :] if act.passed else []
+        for number, (seconds, sync) in enumerate(phases):
+            is_due = act.due <= now if not number else not seconds
+            is_faulty = sync in (self._script(behavior).stall, self._script(behavior).fail)
+            if not is_due or is_faulty or (sync in self._holds(behavior) and not act.covers(sync)):
+                return
+            self._pass(act, sync, now)
+
     async def _phase(self, act: Act, sync: str, natural: Seconds) -> None:
-        """As long as is natural, or as near to the planned instant as it can."""
+        """As long as is natural, or as near to the planned instant as it can; a voice is silent while it is held."""
         began = self.bus.now()
-        least, most = began + natural * self.elastic[0], began + natural * self.elastic[1]
         while True:
-            planned = {each.sync: self.bus.local(each.at) for each in act.perform.pace}
-            until = min(max(planned[sync], least), most) if sync in planned else began + natural
+            held = act.perform.held
+            if held and isinstance(act.perform.behavior, Speech):
+                since = self.bus.now()
+                act.changed.clear()
+                await act.changed.wait()
+                began += self.bus.now() - since
+                continue
+            # A shift under a look moves nothing: its end is whenever it is asked for.
+            is_beneath = type_of(act.perform.behavior) in SHIFTS and not natural
+            least, most = began + natural * self.elastic[0], inf if is_beneath else began + natural * self.elastic[1]
+            planned = {} if held else {each.sync: self.bus.local(each.at) for each in act.perform.pace}
+            until = act.due = min(max(planned[sync], least), most) if sync in planned else began + natural
             if until <= self.bus.now():
                 return
             act.changed.clear()
@@ -331,6 +373,7 @@ class FakeBody:
                 behavior=perform.behavior.id,
                 status=status,  # type: ignore[arg-type]
                 at=self.bus.stamp(),
+                passed=act.passed[-1] if act.passed else "",
                 spoken=act.spoken,
                 fault=fault,
             )

@@ -68,7 +68,7 @@ class Player:
     def _come(self, behavior: str) -> None:
         chain, number = self._plan.chains[behavior], self._next[behavior]
         point = chain.points[number]
-        member = self.decisions.member(point)
+        member = self.decisions.net.part_of[point]
         if member.kind == "hold" and self._through[behavior] < chain.points.index(member.point):
             self._waiting.add(behavior)
             self.decisions.arrive(member.point, self.now)

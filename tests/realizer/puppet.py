@@ -182,13 +182,14 @@ class Puppet:
             SyncPointArrived(id=f"r-{block}/{behavior}", block=block, behavior=behavior, sync=sync, at=self.stamp())
         )
 
-    def end(self, behavior: str, status: Any = "done", spoken: str = "", block: str = "b") -> None:
+    def end(self, behavior: str, status: Any = "done", spoken: str = "", block: str = "b", passed: str = "") -> None:
         outcome = BehaviorOutcome(
             id="",
             block=block,
             behavior=behavior,
             status=status,
             at=self.stamp(),
+            passed=passed,
             spoken=spoken,
             fault=Fault(reason="overheated") if status == "failed" else None,
         )

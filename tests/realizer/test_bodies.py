@@ -113,7 +113,7 @@ async def test_a_body_that_says_nothing_at_all_is_late_once_and_given_up_once_fo
     assert body.warnings() == [(who, kind) for who in behaviors for kind in ("LATE", "EXECUTION_FAILURE")]
     assert outcome.dropped == ("gaze-1", "point-1", "speech-1")
     assert body.aborted == ["gaze-1", "point-1", "speech-1"]
-    assert body.course()[-1] == ("b", "end", "done")
+    assert body.course()[-1] == ("b", "end", "failed")
 
 
 async def test_what_waits_for_a_late_one_is_predicted_anew_as_it_is_found_late() -> None:

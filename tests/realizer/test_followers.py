@@ -7,7 +7,7 @@ from contextlib import asynccontextmanager
 import pytest
 
 from engage_hri.schemas import keys
-from engage_hri.schemas.behaviors import Gesture, Mark, Speech
+from engage_hri.schemas.behaviors import Gesture, Head, Mark, Speech
 from engage_hri.schemas.blocks import Block, BlockOutcome, PerformBlock
 from engage_hri.schemas.body import AbortBehavior
 from engage_hri.services.requests.ends import Pending, RequestRefused
@@ -59,6 +59,28 @@ async def test_words_that_fail_and_must_not_are_followed_by_none() -> None:
         "two: one, which it follows, failed: overheated",
         "three: one, which it follows, failed: overheated",
     ]
+
+
+async def test_a_block_of_which_nothing_was_performed_has_failed_and_who_follows_it_goes_on() -> None:
+    motions = (Gesture(id="g", lexeme="BEAT"), Head(id="n", lexeme="NOD"))
+    body = FakeBody({"g": Script(fail="ready"), "n": Script(fail="ready")})
+    async with stage(body) as seen:
+        one = seen.ask(block(motions, id="one"))
+        words = seen.ask(block((Speech(id="t", text="five"),), after("one:g:end", "t:start"), id="two"), "one")
+        first, second = await outcomes([one, words])
+
+    assert (first.status, first.dropped) == ("failed", ("n", "g"))
+    assert str(first.fault) == "one: no behavior of it came to its end (n: overheated; g: overheated)"
+    assert (second.status, [each.text for each in second.spoken]) == ("done", ["five"])
+    assert [(end.block, end.status) for end in seen.ends()] == [("one", "failed"), ("two", "done")]
+
+
+async def test_a_block_with_one_behavior_that_came_to_its_end_is_done() -> None:
+    body = FakeBody({"g": Script(fail="ready")})
+    async with stage(body) as seen:
+        (outcome,) = await outcomes([seen.ask(block((Gesture(id="g", lexeme="BEAT"), Speech(id="t", text="five"))))])
+
+    assert (outcome.status, outcome.dropped, outcome.fault) == ("done", ("g",), None)
 
 
 async def test_a_body_that_breaks_off_required_words_lets_none_follow() -> None:

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from engage_hri.schemas.behaviors import After, Constraint, Mark, Pointing, Speech, Synchronize
 from engage_hri.schemas.blocks import Block
 from engage_hri.services.realizer.decide.decisions import Decisions
-from engage_hri.services.realizer.decide.experience import Experience
+from engage_hri.services.realizer.foresee.experience import Experience
 from engage_hri.services.realizer.plan.planner import Plan, plan_block
 from engage_hri.services.realizer.plan.relations import BlockRefused
 from tests.realizer.fake_body import FakeBody
@@ -40,11 +40,12 @@ def test_the_forecast_that_is_kept_is_the_one_from_scratch(
         return
 
     def compare(authority: Decisions) -> None:
-        kept = authority.forecast
-        if kept is None or authority.not_before:
+        kept = authority.foresight.forecast
+        if kept is None or authority.foresight.not_before:
             return
+        authority.foresight.catch_up()
         kept.update()
-        scratch = authority.from_scratch()
+        scratch = authority.foresight.from_scratch()
         known = [each for each in range(len(plan.members)) if kept.is_kept[each]]
         assert [round(kept.times[each], 5) for each in known] == [round(scratch.times[each], 5) for each in known]
 

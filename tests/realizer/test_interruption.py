@@ -19,7 +19,7 @@ from engage_hri.services.realizer.config import RealizerConfig
 from engage_hri.services.realizer.service import realize
 from engage_hri.services.requests.ends import Pending, Requester, RequestRefused
 from engage_hri.services.runtime.service import running
-from tests.control.contract import WORLD
+from tests.control.suite import WORLD
 from tests.realizer.fake_body import FakeBody, Script
 from tests.realizer.stage import FakeRecognition, Stage, after, block, stage
 

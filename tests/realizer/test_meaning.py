@@ -165,7 +165,7 @@ def test_a_duration_longer_than_natural_slows_down_what_cannot_hold() -> None:
 
 
 @pytest.mark.parametrize("end", ["1.25", "9"])
-def test_a_duration_that_cannot_be_drops_the_behavior_with_one_warning(end: str) -> None:
+def test_words_whose_end_cannot_be_lose_that_with_one_warning_and_are_said(end: str) -> None:
     speech = Speech(id="s", text="a")
     made = plan(
         block((timed(speech, start="1", end=end), GAZE), together("g:stroke", "s:end")),
@@ -173,7 +173,8 @@ def test_a_duration_that_cannot_be_drops_the_behavior_with_one_warning(end: str)
     )
 
     assert warnings(made) == [("IMPOSSIBLE_TO_SCHEDULE", "s")]
-    assert at(made, "g:stroke") == 0.5
+    assert (made.dropped, made.given_up) == ((), ("s",))
+    assert (at(made, "s:start"), at(made, "s:end"), at(made, "g:stroke")) == (1.0, 2.0, 2.0)
 
 
 @pytest.mark.parametrize(

@@ -103,12 +103,24 @@ def test_nothing_is_dropped_that_some_order_can_serve(block: Block) -> None:
 
     if orders:
         assert plan is not None
-        assert plan.dropped == ()
+        assert (plan.dropped, plan.given_up) == ((), ())
         assert tuple(spoken(plan)) in orders
         document = tuple(each.id for each in block.behaviors if isinstance(each, Speech))
         assert document not in orders or tuple(spoken(plan)) == document
-    if plan is not None and not plan.dropped and not are_tied(block):
+    if plan is not None and not (plan.dropped or plan.given_up) and not are_tied(block):
         assert orders
+
+
+@settings(max_examples=200, deadline=None)
+@given(sentences(timed=True))
+def test_words_are_never_dropped_for_a_time(block: Block) -> None:
+    plan = planned(block)
+
+    if plan is not None:
+        sentences_of_it = {each.id for each in block.behaviors if isinstance(each, Speech)}
+        assert not sentences_of_it & set(plan.dropped)
+        assert set(plan.given_up) <= sentences_of_it
+        assert {each.behavior for each in plan.problems} == {*plan.dropped, *plan.given_up}
 
 
 SAID = '<speech id="a"><text>First of all the words.</text></speech><speech id="c"><text>Second.</text></speech>'

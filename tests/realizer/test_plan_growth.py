@@ -12,6 +12,7 @@ from engage_hri.schemas.behaviors import (
     Constraint,
     FaceLexeme,
     Gaze,
+    Gesture,
     Pointing,
     Speech,
     Synchronize,
@@ -85,8 +86,16 @@ def fixed(size: int) -> Parts:
 def hopeless(size: int) -> Parts:
     """None has the time that it takes: each is dropped, for a reason of its own."""
     return [
-        Speech(id=f"s{number}", text="one two", timing=(Timing("start", "0"), Timing("end", "0.001")))
-        for number in range(2 * size)
+        Gesture(id=f"g{number}", lexeme="BEAT", timing=(Timing("start", "0"), Timing("end", "0.001")))
+        for number in range(size)
+    ], []
+
+
+def hasty(size: int) -> Parts:
+    """Words that are to end before they can: each gives up its end."""
+    return [
+        Speech(id=f"s{number}", text="one two", timing=(Timing("end", f"s{number}:start+0.001"),))
+        for number in range(size)
     ], []
 
 
@@ -130,7 +139,7 @@ def calls(size: int, shape: Callable[[int], Parts]) -> int:
 
 @pytest.mark.parametrize(
     "shape",
-    [references, looks, series, measured_words, joined, fixed, hopeless, rivals, preparing],
+    [references, looks, series, measured_words, joined, fixed, hopeless, hasty, rivals, preparing],
 )
 def test_twice_the_block_costs_twice_the_work(shape: Callable[[int], Parts]) -> None:
     calls(20, shape)  # what is remembered from now on

@@ -47,11 +47,11 @@ def test_no_sequence_of_reports_ends_the_authority_or_makes_it_tell_a_point_twic
             case "reach":
                 told += authority.reach(point, at)
             case "believe":
-                told += authority.reach(point, authority.plausible(point, at, now))
+                told += authority.reach(point, authority.facts.plausible(point, at, now))
             case "drop" if len(authority.plan.chains) > 1:
                 left_out = (*authority.plan.dropped, data.draw(st.sampled_from(sorted(authority.plan.chains))))
                 authority.replan(plan_block(block, plan.estimates.values(), dropped=left_out))
-        authority.expected(now)
+        authority.foresight.expected(now)
         assert all(authority.lateness(point) >= 0.0 for point in points)
 
     assert len(told) == len(set(told))
@@ -67,7 +67,7 @@ def test_what_has_not_begun_can_be_nowhere() -> None:
 
     assert authority.reach(Point("g", "stroke"), 0.5) == ()
     authority.arrive(Point("g", "stroke"), 0.5)
-    assert authority.arrived == {}
+    assert authority.facts.arrived == {}
 
 
 def test_an_arrival_where_the_behavior_has_passed_is_not_counted_again() -> None:
@@ -77,7 +77,7 @@ def test_an_arrival_where_the_behavior_has_passed_is_not_counted_again() -> None
     authority.reach(Point("g", "stroke"), 0.5)
     authority.arrive(Point("g", "stroke"), 0.6)
 
-    assert authority.arrived == {}
+    assert authority.facts.arrived == {}
 
 
 async def test_a_body_that_arrives_after_its_end_is_not_heard() -> None:

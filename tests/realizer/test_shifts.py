@@ -20,11 +20,18 @@ SLOWER = Estimate(
 WORDS = Speech(id="s", text="one two three", marks=(Mark("m", 7),))
 
 
-def test_a_shift_that_nobody_times_ends_where_the_next_takes_the_head() -> None:
+def test_a_shift_is_not_ended_by_another_before_it_has_come_to_its_target() -> None:
     made = plan(block((timed(SHIFT, start="0"), timed(OTHER, start="0.25"))))
 
+    assert warnings(made) == [("IMPOSSIBLE_TO_SCHEDULE", "h")]
+    assert at(made, "g:end") == 1.0
+
+
+def test_a_shift_that_need_not_begin_at_once_waits_for_the_one_before() -> None:
+    made = plan(block((timed(SHIFT, start="0"), OTHER)))
+
     assert made.problems == ()
-    assert at(made, "g:end") == at(made, "h:start") == 0.25
+    assert at(made, "g:end") == at(made, "h:start") == 1.0
 
 
 def test_the_end_of_a_shift_that_is_asked_for_is_waited_for() -> None:

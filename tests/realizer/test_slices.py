@@ -26,6 +26,7 @@ from tests.realizer.stage import Stage, block, stage, together
 from tests.realizer.test_plan_growth import (
     Parts,
     fixed,
+    hasty,
     hopeless,
     joined,
     looks,
@@ -38,7 +39,7 @@ from tests.realizer.test_plan_growth import (
 
 T = TypeVar("T")
 
-SHAPES = [references, looks, series, measured_words, joined, fixed, hopeless, rivals, preparing]
+SHAPES = [references, looks, series, measured_words, joined, fixed, hopeless, hasty, rivals, preparing]
 MOST_CALLS = 25_000
 """In one slice, for 800 behaviors: five milliseconds or so."""
 

@@ -23,6 +23,14 @@ actions = st.lists(st.sampled_from(get_args(of.Action)), max_size=3).map(tuple)
 offsets = st.floats(-1e3, 1e3).map(lambda number: number + 0.0)
 
 
+expressions = st.just(()) | st.lists(
+    st.builds(of.Expression, lexeme=words, amount=st.none() | amounts)
+    | st.builds(of.Expression, au=st.integers(1, 60), side=sides),
+    min_size=2, max_size=3,
+).map(tuple)  # fmt: skip
+poses = st.lists(st.builds(of.PartPose, lexeme=words, part=words), min_size=2, max_size=3).map(tuple)
+
+
 @st.composite
 def behaviors(draw: st.DrawFn, id: str, reference: st.SearchStrategy[str], *, in_fragment: bool) -> of.Behavior:
     kinds = [
@@ -32,12 +40,14 @@ def behaviors(draw: st.DrawFn, id: str, reference: st.SearchStrategy[str], *, in
         st.builds(of.Gesture, id=st.just(id), lexeme=words, mode=hands),
         st.builds(of.Head, id=st.just(id), lexeme=words, repetition=st.integers(1, 9), amount=amounts),
         st.builds(of.HeadDirectionShift, id=st.just(id), target=words),
-        st.builds(of.Face, id=st.just(id), amount=amounts, overshoot=numbers),
+        st.builds(of.Face, id=st.just(id), amount=amounts, overshoot=numbers, expressions=expressions),
         st.builds(of.FaceLexeme, id=st.just(id), lexeme=words, amount=amounts),
         st.builds(of.FaceFacs, id=st.just(id), au=st.integers(1, 60), side=sides, amount=amounts),
         st.builds(of.FaceShift, id=st.just(id), lexeme=words, au=st.integers(0, 60), side=sides),
+        st.builds(of.FaceShift, id=st.just(id), amount=amounts, expressions=expressions.filter(bool)),
         st.builds(of.Posture, id=st.just(id), stance=words, lexeme=words, part=words),
         st.builds(of.PostureShift, id=st.just(id), stance=words),
+        st.builds(of.Posture, id=st.just(id), stance=words, poses=poses),
         st.builds(of.Pose, id=st.just(id), lexeme=words, part=words),
         st.builds(of.Locomotion, id=st.just(id), target=words, manner=words),
         st.builds(of.Wait, id=st.just(id), duration=st.none() | st.floats(0, 1e6)),

@@ -5,7 +5,7 @@ from msgspec.structs import replace
 
 from engage_hri.schemas.behaviors import Gaze, Mark, Speech, Timing, Unknown
 from engage_hri.schemas.blocks import Block, Unread
-from engage_hri.schemas.documents.xml_decode import decode_xml
+from engage_hri.schemas.documents.xml_decode import decode_xml, encode_xml
 from engage_hri.schemas.faults import InputRefused
 from tests.schemas.test_xml_codec import BML_1_0, DRAFT, behavior, block
 
@@ -24,12 +24,35 @@ from tests.schemas.test_xml_codec import BML_1_0, DRAFT, behavior, block
         ('<speech id="s" text="?">Hi</speech>', Unread(message="<speech> has no attribute 'text'", behavior="s")),
         ('<constraint><during ref="1"/></constraint>', Unread(message="unknown element <during> in a constraint")),
         (
-            '<face id="f"><lexeme lexeme="SMILE"/><facs au="1"/></face>',
-            Unread(message="more than one expression in a face", behavior="f"),
+            '<posture id="p"><stance type="SITTING"/><stance type="STANDING"/></posture>',
+            Unread(message="more than one <stance> in a posture", behavior="p"),
         ),
         (
-            '<posture id="p"><pose part="ARMS" lexeme="X"/><pose part="LEGS" lexeme="Y"/></posture>',
-            Unread(message="more than one <pose> in a posture", behavior="p"),
+            '<gesture id="g" lexeme="BEAT" trajectory="CURVED"/>',
+            Unread(
+                message="attribute 'trajectory' of <gesture>, which the draft of 2007 has, is performed by no body",
+                behavior="g",
+                kind="DEGRADED",
+            ),
+        ),
+        (
+            '<face id="f" overshoot="0.3"><lexeme lexeme="SMILE"/></face>',
+            Unread(
+                message="attribute 'overshoot' of <face>, which BML 1.0 has, is performed by no body",
+                behavior="f",
+                kind="DEGRADED",
+            ),
+        ),
+        (
+            '<head id="h" lexeme="NOD" amount="-0.5"/>',
+            Unread(message="the sign of amount '-0.5': a head begins on its own side", behavior="h", kind="DEGRADED"),
+        ),
+        (
+            "<lips/>",
+            Unread(
+                message="<lips>, which the draft of 2007 has, is performed by no body",
+                kind="BEHAVIOR_TYPE_NOT_SUPPORTED",
+            ),
         ),
     ],
 )
@@ -56,13 +79,131 @@ def test_a_block_says_who_should_perform_it() -> None:
     assert decode_xml('<bml id="b" characterId="Melvin"/>') == Block(id="b", character_id="Melvin")
 
 
-def test_descriptions_and_what_others_added_are_nobodys_business() -> None:
-    decoded = block("""<description type="application/x">A <b>greeting</b></description>
-      <gaze id="g" target="t" other:speed="9" xmlns:other="o" more:thing="1">
-        <description><x/></description><other:x/>
-      </gaze><other:dance id="d" xmlns:other="o"/>""")
+def test_descriptions_are_nobodys_business_nor_is_what_is_said_of_the_document() -> None:
+    decoded = block("""<description type="a/x" other:x="1" xmlns:other="o">A <b>g</b><other:x/></description>
+      <gaze id="g" target="t" xml:lang="en" xmlns:xsi="http://www.w3.org/2001/XMLSchema-instance" xsi:nil="false">
+        <description><x/></description>
+      </gaze>""")
 
     assert decoded == Block(id="b", behaviors=(Gaze(id="g", target="t"),))
+
+
+@pytest.mark.parametrize("namespace", [DRAFT, "", BML_1_0])
+def test_a_behavior_of_another_namespace_is_kept_by_name_and_without_an_id_noted(namespace: str) -> None:
+    decoded = block('<o:dance id="d" start="x" xmlns:o="urn:o"/><play xmlns="urn:p"/>', namespace)
+
+    assert decoded.behaviors == (Unknown(id="d", element="o:dance", namespace="urn:o"),)
+    message = "line 1: <play> is of namespace 'urn:p', of which nothing is performed; it is ignored"
+    assert decoded.unread == (Unread(message=message, kind="CUSTOM_BEHAVIOR_NOT_SUPPORTED"),)
+    assert [replace(each, line=0) for each in decode_xml(encode_xml(decoded)).behaviors] == list(decoded.behaviors)
+
+
+@pytest.mark.parametrize(
+    ("content", "behavior", "noted"),
+    [
+        ('<gaze id="g" target="t" o:speed="9" p:x="1" start="0"><o:y/></gaze>', "g", "<gaze>: o:speed, p:x, <o:y>"),
+        ('<face id="f"><lexeme lexeme="SMILE" o:x="1"/></face>', "f", "<face>: o:x"),
+        ('<speech id="s">A <o:b o:c="1">b</o:b> <sync id="m" o:at="1"/>c</speech>', "s", "<speech>: <o:b>, o:at"),
+        ('<constraint o:x="1"><after ref="0" o:y="1"/></constraint>', "", "<constraint>: o:x, o:y"),
+        ('<required o:x="1"><gaze id="g" target="t"/></required>', "", "<required>: o:x"),
+        ('<ebml:event id="e" kind="directed_gaze" responder="a" o:x="1"/>', "e", "<event>: o:x"),
+    ],
+)  # fmt: skip
+@pytest.mark.parametrize("root", ["bml", "ebml:ebml"])
+def test_what_other_namespaces_add_is_noted_once_for_each_behavior(
+    content: str, behavior: str, noted: str, root: str
+) -> None:
+    namespaces = f'xmlns="{DRAFT}" xmlns:ebml="edu.wpi.ebml" xmlns:o="urn:o" xmlns:p="urn:p"'
+
+    thing = decode_xml(f'<{root} id="b" {namespaces}>\n{content}</{root}>')
+
+    element, parts = noted.split(": ")
+    message = f"line 2: what another namespace adds to {element} is not supported: {parts}; it is ignored"
+    assert thing.unread == (Unread(message=message, behavior=behavior, kind="CUSTOM_ATTRIBUTE_NOT_SUPPORTED"),)
+
+
+@pytest.mark.parametrize("root", ["bml", "ebml:ebml"])
+def test_an_attribute_of_another_namespace_at_the_root_is_noted_with_or_without_its_declaration(root: str) -> None:
+    thing = decode_xml(f'<{root} id="b" xmlns:ebml="edu.wpi.ebml" xmlns:o="urn:o" o:interrupt="a" q:after="c"/>')
+
+    (noted,) = thing.unread
+    assert noted.kind == "CUSTOM_ATTRIBUTE_NOT_SUPPORTED"
+    assert "o:interrupt" in noted.message
+    assert "q:after" in noted.message
+
+
+def test_a_required_behavior_of_another_namespace_without_an_id_refuses_the_block() -> None:
+    with pytest.raises(InputRefused, match="line 1: <o:dance> is of namespace 'o'"):
+        block('<required><o:dance xmlns:o="o"/></required>')
+
+
+def test_a_fragment_goes_on_without_a_behavior_of_another_namespace() -> None:
+    fragment = decode_xml(
+        f'<ebml:ebml id="f" xmlns="{DRAFT}" xmlns:ebml="edu.wpi.ebml"><o:x id="x" xmlns:o="o"/></ebml:ebml>'
+    )
+
+    assert fragment.behaviors == ()
+    assert [(each.behavior, each.kind) for each in fragment.unread] == [("x", "CUSTOM_BEHAVIOR_NOT_SUPPORTED")]
+
+
+@pytest.mark.parametrize(
+    ("content", "text"),
+    [
+        ("<speech id='s'><text>Oh <o:b>my</o:b> dear</text></speech>", "Oh my dear"),
+        ("<speech id='s'>Oh <o:b>my <o:c>dear</o:c></o:b></speech>", "Oh my dear"),
+        ("<speech id='s'><text>Oh my</text><o:b>7</o:b></speech>", "Oh my"),
+        (
+            "<speech id='s'><o:b>7</o:b><description type='application/ssml+xml'>Oh my</description></speech>",
+            "Oh my",
+        ),
+    ],
+)
+def test_words_inside_an_element_of_another_namespace_are_words(content: str, text: str) -> None:
+    decoded = block(f'<required xmlns:o="urn:o">{content}</required>')
+
+    assert [each.text for each in decoded.behaviors if isinstance(each, Speech)] == [text]
+    assert [each.kind for each in decoded.unread] == ["CUSTOM_ATTRIBUTE_NOT_SUPPORTED"]
+
+
+@pytest.mark.parametrize("namespace", [DRAFT, "", BML_1_0])
+@pytest.mark.parametrize(
+    ("content", "marks"),
+    [
+        ("", ()),
+        ("<text/>", ()),
+        (" \n", ()),
+        ('<sync id="m"/>', (Mark("m", 0),)),
+        ("<description>x</description>", ()),
+    ],
+)
+def test_words_may_stand_in_an_attribute_if_nowhere_else(
+    content: str, marks: tuple[Mark, ...], namespace: str
+) -> None:
+    decoded = block(f'<speech id="s" text=" Hi  there ">{content}</speech>', namespace)
+
+    assert decoded == replace(decoded, behaviors=(Speech(id="s", text="Hi there", marks=marks),), unread=())
+
+
+@pytest.mark.parametrize("speech", ['<speech id="s" text=" "/>', '<speech id="s" text=""><text> </text></speech>'])
+def test_an_attribute_without_words_says_nothing(speech: str) -> None:
+    if "<text>" in speech:
+        assert [each.text for each in block(speech).behaviors if isinstance(each, Speech)] == [""]
+    else:
+        with pytest.raises(InputRefused, match="says nothing"):
+            block(speech)
+
+
+def test_what_a_mark_cannot_say_is_noted_once_for_all_the_marks_of_a_speech() -> None:
+    decoded = block(
+        '<speech id="s">One <sync id="a" time="0.4"/>two <sync id="b" time="0.8"/>three '
+        '<mark name="c" time="1"/></speech>'
+    )
+
+    messages = [f"line 1: <{each}> has no attribute 'time'; it is ignored" for each in ("sync", "mark")]
+    assert decoded.unread == tuple([Unread(message=each, behavior="s") for each in messages])
+    assert [each.marks for each in decoded.behaviors if isinstance(each, Speech)] == [
+        (Mark("a", 4), Mark("b", 8), Mark("c", 13))
+    ]
 
 
 def test_words_may_stand_in_a_description_alone() -> None:

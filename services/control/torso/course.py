@@ -1,13 +1,15 @@
 """A behavior worked out for the simulated torso: where its joints go, and its sync points on the way."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 from msgspec import Struct
 
 from engage_hri.schemas.body import NoPointZone, Ray
 from engage_hri.schemas.feedback import WarningKind
+from engage_hri.schemas.syncref import SYNC_POINTS
 from engage_hri.schemas.world import World
 from engage_hri.services.control.torso.motion import Leg
+from engage_hri.services.control.torso.repertoire import BUILT_IN, Repertoire
 
 
 class Impossible(Exception):
@@ -42,6 +44,8 @@ class Course(Struct, frozen=True, kw_only=True):
     ray: Ray | None = None
     is_resizable: bool = False
     """True if it may be made smaller for want of time; false for a motion with a target."""
+    note: str = ""
+    """Warning, if this is only the nearest to what was asked: names both."""
 
 
 class Situation(Struct, frozen=True):
@@ -53,3 +57,37 @@ class Situation(Struct, frozen=True):
     zones: tuple[NoPointZone, ...] = ()
     busy: tuple[str, ...] = ()
     """Names of parts in use: a pointing without a mode takes the other arm."""
+    repertoire: Repertoire = BUILT_IN
+
+
+def course(
+    parts: tuple[str, ...], joints: tuple[str, ...], legs: tuple[Leg, ...], points: tuple[CoursePoint, ...],
+    goal: tuple[float, ...], ray: Ray | None = None, note: str = "",
+) -> Course:  # fmt: skip
+    """Make the course of a motion to `goal`."""
+    return Course(
+        parts=parts, joints=joints, legs=legs, points=points, on_target=dict(zip(joints, goal, strict=True)), ray=ray,
+        note=note,
+    )  # fmt: skip
+
+
+def held_on_target(*arrival: str) -> tuple[CoursePoint, ...]:
+    """Sync points of a course that can hold while it is on target. arrival: points at which it is first there."""
+    before = SYNC_POINTS[: SYNC_POINTS.index("stroke_end")]
+    points = [CoursePoint(sync, "stroke", "relax") if sync in arrival else CoursePoint(sync) for sync in before]
+    return (*points, CoursePoint("stroke_end", "relax"), CoursePoint("relax", "relax"), CoursePoint("end"))
+
+
+def held_around_stroke(strokes: Sequence[str] = ()) -> tuple[CoursePoint, ...]:
+    """Sync points of a course that can hold before and after its stroke. strokes: the stroke's repetitions."""
+    number = SYNC_POINTS.index("stroke_end")
+    syncs = (*SYNC_POINTS[:number], *strokes, *SYNC_POINTS[number:])
+    return tuple(CoursePoint(sync, sync if sync in ("stroke_start", "stroke_end") else "") for sync in syncs)
+
+
+def marks(fraction: float, *syncs: str) -> tuple[tuple[str, float], ...]:
+    return tuple((sync, fraction) for sync in syncs)
+
+
+def angles(joints: tuple[str, ...], pose: Mapping[str, float]) -> tuple[float, ...]:
+    return tuple(pose[joint] for joint in joints)

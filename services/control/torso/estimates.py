@@ -10,14 +10,15 @@ from engage_hri.schemas.behaviors import BlockBehavior, Speech, Wait
 from engage_hri.schemas.body import BodyPose, Estimate, Phase
 from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.units import Seconds
-from engage_hri.services.control.torso.course import Course, CoursePoint
+from engage_hri.services.control.torso.course import Course, CoursePoint, Impossible
 from engage_hri.services.control.torso.motion import SLOWEST, Path
 from engage_hri.services.control.torso.sizing import quickest
 from engage_hri.services.control.voice.timeline import Utterance
 
 
-def infeasible(behavior: BlockBehavior, warning: str, fault: Fault) -> Estimate:
-    return Estimate(behavior=behavior.id, feasible=False, fault=fault, warning=warning)
+def infeasible(behavior: BlockBehavior, impossible: Impossible) -> Estimate:
+    fault = Fault(reason=impossible.reason, where=behavior.id, service="control")
+    return Estimate(behavior=behavior.id, feasible=False, fault=fault, warning=impossible.kind)
 
 
 def speech_estimate(behavior: Speech, utterance: Utterance, pose: BodyPose) -> Estimate:
@@ -45,6 +46,7 @@ def motion_estimate(
     return Estimate(
         behavior=behavior.id,
         feasible=True,
+        degraded=course.note,
         parts=("head",) if course.parts == ("nod",) else course.parts,
         phases=_phases(course.points, path.marks, quickest(course, path), SLOWEST, path.gentlest_brake),
         head_degrees=degrees if is_gaze else 0.0,

@@ -11,6 +11,7 @@ from engage_hri.schemas.units import Seconds
 from engage_hri.services.control.torso import choreography, tracks
 from engage_hri.services.control.torso.course import Course, Impossible, Situation
 from engage_hri.services.control.torso.motion import Leg, Motion, Path
+from engage_hri.services.control.torso.pace import turning_time
 from engage_hri.services.control.torso.runs import Run
 from engage_hri.services.control.torso.tracks import Track
 
@@ -91,7 +92,7 @@ def turn(track: Track, goal: tuple[float, ...], now: Seconds) -> None:
 
 def way_back(here: tuple[float, ...], base: tuple[float, ...]) -> Leg:
     """Leg from a fixation back to the base gaze."""
-    seconds = choreography.turning_time(here, base)
+    seconds = turning_time(here, base)
     return Leg(goal=base if seconds else here, seconds=seconds, marks=(("end", 1.0),))
 
 

@@ -1,8 +1,8 @@
 """The simulated torso: where its joints put its eyes and hands, and which angles look or point at a position.
 
-A torso behind a table: hip, neck with yaw and pitch, two arms with shoulder yaw, shoulder pitch and elbow. Metres and
-radians; x ahead, y left, z up, origin on the floor below the robot. Shoulder pitch is measured from hanging down,
-forward positive; the elbow flexes the forearm forward, so that an arm stays in one vertical plane.
+A torso behind a table: hip, neck with yaw, pitch and roll, two arms with shoulder yaw, shoulder pitch and elbow.
+Metres and radians; x ahead, y left, z up, origin on the floor below the robot. Shoulder pitch is measured from
+hanging down, forward positive; the elbow flexes the forearm forward, so that an arm stays in one vertical plane.
 """
 
 import math
@@ -17,7 +17,7 @@ from engage_hri.schemas.units import Meters, Radians, Vector
 
 Side = Literal["left", "right"]
 Pose = Mapping[str, float]
-"""Angle of each joint; radians, of the face 0..1."""
+"""Angle of each joint; radians, of the face a share of the way, 0 at rest."""
 
 HIP: Vector = (0.0, 0.0, 0.60)
 NECK: Vector = (0.0, 0.0, 1.10)
@@ -35,6 +35,8 @@ REACH: Meters = 1.5
 """Greatest distance from the shoulder to a target of pointing: farther, people can't tell which object is meant."""
 HAND_TO_TARGET: Meters = 0.06
 """Least distance from the hand to the surface of a target: pointing is not touching."""
+NOD_RESERVE: Radians = radians(18.0)
+"""Part of the neck's range that gaze keeps free, so that a nod finds room anywhere."""
 SLIDE: Radians = radians(2.0)
 """Change of the shoulder pitch from stroke to stroke_end, the axis staying on target: it keeps the arm in motion."""
 
@@ -49,8 +51,13 @@ def _joint(
     return limit, radians(home)
 
 
-def _face_joint(name: str, low: float) -> tuple[JointLimit, float]:
-    return JointLimit(joint=name, part="face", low=low, high=1.0, speed=8.0, acceleration=120.0), 0.0
+def _face_joint(name: str, low: float, speed: float = 25.0, acceleration: float = 3000.0) -> tuple[JointLimit, float]:
+    return JointLimit(joint=name, part="face", low=low, high=1.0, speed=speed, acceleration=acceleration), 0.0
+
+
+def _lid(name: str) -> tuple[JointLimit, float]:
+    """Joint of an eyelid, as light as a person's: it closes in 0.03 s."""
+    return _face_joint(name, -0.5, speed=70.0, acceleration=14_000.0)
 
 
 def _arm_joints(side: Side, inward: int) -> list[tuple[JointLimit, float]]:
@@ -66,14 +73,20 @@ def _arm_joints(side: Side, inward: int) -> list[tuple[JointLimit, float]]:
 _TABLE = [
     _joint("torso_turn", "torso", -30, 30, 60, 300),
     _joint("torso_lean", "torso", -15, 25, 60, 300),
-    _joint("neck_yaw", "head", -85, 85, 400, 6000),
-    _joint("neck_pitch", "head", -80, 40, 400, 6000),
+    _joint("neck_yaw", "head", -85, 85, 500, 10_000),
+    _joint("neck_pitch", "head", -80, 40, 500, 10_000),
+    _joint("neck_roll", "head", -20, 20, 150, 3000),
     *_arm_joints("left", inward=-1),
     *_arm_joints("right", inward=1),
-    _face_joint("brows", -1.0),
-    _face_joint("lids", 0.0),
-    _face_joint("mouth_corners", -1.0),
-    _face_joint("mouth", 0.0),
+    _face_joint("left_brow", -1.0),
+    _face_joint("right_brow", -1.0),
+    _face_joint("brow_slant", -1.0),
+    _lid("left_lid"),
+    _lid("right_lid"),
+    _face_joint("left_mouth_corner", -1.0),
+    _face_joint("right_mouth_corner", -1.0),
+    _face_joint("lips", 0.0),
+    _face_joint("jaw", 0.0),
 ]
 JOINTS: tuple[JointLimit, ...] = tuple(limit for limit, _ in _TABLE)
 HOME: Mapping[str, float] = {limit.joint: home for limit, home in _TABLE}
@@ -103,9 +116,11 @@ def pose_message(pose: Pose) -> BodyPose:
 
 def gaze(pose: Pose) -> Ray:
     """Gaze as a ray: from between the eyes along their axis."""
-    yaw, pitch = pose["neck_yaw"], pose["neck_pitch"]
+    yaw, pitch, roll = pose["neck_yaw"], pose["neck_pitch"], pose["neck_roll"]
     ahead = (cos(pitch) * cos(yaw), cos(pitch) * sin(yaw), sin(pitch))
+    left = (-sin(yaw), cos(yaw), 0.0)
     up = (-sin(pitch) * cos(yaw), -sin(pitch) * sin(yaw), cos(pitch))
+    up = _add(_scale(up, cos(roll)), _scale(left, sin(roll)))
     eyes = _add(NECK, _add(_scale(ahead, EYES_AHEAD), _scale(up, EYES_ABOVE)))
     return Ray(origin=_to_world(eyes, pose), axis=_turned(ahead, pose))
 

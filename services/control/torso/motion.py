@@ -282,11 +282,18 @@ class Motion:
             cruise = sqrt(max(0.0, reach * reach - rate * rate + 2 * change * left)) - reach
         self.run_at(min(max(cruise, SLOWEST), fastest), now)
 
-    def brake(self, now: Seconds) -> None:
-        """Stop as soon as the limits permit."""
+    def brake(self, now: Seconds, at: Seconds | None = None) -> None:
+        """Stop as soon as the limits permit, or at position `at`, where it can (see `can_stop_at`)."""
         s, rate = self.s(now), self.rate(now)
-        self.limit = min(self.limit, s + rate * rate / (2 * self.path.gentlest_brake))
+        self.limit = min(self.limit, s + rate * rate / (2 * self.path.gentlest_brake) if at is None else at)
         self._replan(now, s, rate)
+
+    def can_stop_at(self, s: Seconds, now: Seconds) -> bool:
+        """True if it has not passed s, and can come to rest there."""
+        left, rate = s - self.s(now), self.rate(now)
+        if left < -1e-9 or self.path.at(s).at_rest:
+            return left >= -1e-9
+        return rate * rate <= 2 * self.path.steepest_brake(s, rate) * left + 1e-9
 
     def s(self, t: Seconds) -> Seconds:
         if t >= self.end:

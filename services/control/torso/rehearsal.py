@@ -9,22 +9,20 @@ from copy import copy
 from heapq import heapify, heappop, heappush
 from itertools import pairwise
 from math import inf
-from typing import Any, Protocol, TypeVar
 
 from msgspec.structs import replace
 
-from engage_hri.schemas.behaviors import BlockBehavior
+from engage_hri.schemas.behaviors import BlockBehavior, Gaze
 from engage_hri.schemas.body import BodyPose, Estimate, EstimateItem, Phase
 from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.world import World
 from engage_hri.services.control.body import MovementAuthority
 from engage_hri.services.control.config import Variability
 from engage_hri.services.control.torso import choreography, head, tracks
-from engage_hri.services.control.torso.course import Course, Impossible, Situation
-from engage_hri.services.control.torso.head import Fixation
+from engage_hri.services.control.torso.course import Impossible
 from engage_hri.services.control.torso.motion import Motion, Path, resting
+from engage_hri.services.control.torso.moving import Torso
 from engage_hri.services.control.torso.runs import Run
-from engage_hri.services.control.torso.tracks import Track
 from engage_hri.services.control.waiting import EARLY, Bell
 
 START, RELEASE, BEGIN = "start", 0, 1
@@ -54,47 +52,36 @@ class Clock(Bell):
         """Wake nobody: nobody waits."""
 
 
-class Moving(Protocol):
-    """The part of a simulated body that moves it: the same for a rehearsal as for a performance."""
-
-    _loop: Any
-    _tracks: dict[str, Track]
-    _runs: dict[str, Run]
-    _attention: Fixation
-    _world: World
-    _misbelieved: dict[str, float]
-
-    def estimate(self, behavior: BlockBehavior, pose: BodyPose | None, world: World) -> Estimate: ...
-    def _situation(self, world: World, pose: BodyPose | None = None, *, real: bool = False) -> Situation: ...
-    def _path(self, course: Course, situation: Situation | None = None) -> Path: ...
-    def _is_overlaid(self) -> bool: ...
-    def _take_over(self, run: Run, path: Path) -> None: ...
-    def _leave_hold(self, run: Run, hold: str) -> list[str]: ...
-    def _extend(self, run: Run) -> None: ...
-    def _release(self, run: Run) -> None: ...
-
-
-M = TypeVar("M", bound=Moving)
-
-
-def beside(body: M, clock: Clock, world: World) -> M:
-    """A copy of the body that moves on `clock`; what it does changes nothing of the body."""
+def beside(torso: Torso, clock: Clock, world: World) -> Torso:
+    """A copy of the torso that moves on `clock`; what it does changes nothing of the torso."""
     motions: dict[int, Motion] = {}
 
     def copied(motion: Motion) -> Motion:
         return motions.setdefault(id(motion), copy(motion))
 
-    other = copy(body)
-    other._loop, other._world, other._attention = clock, world, copy(body._attention)
-    other._misbelieved = dict(body._misbelieved)
-    other._tracks = {part: copy(track) for part, track in body._tracks.items()}
-    for track in other._tracks.values():
+    other = copy(torso)
+    other.clock, other.world, other.attention = clock, world, copy(torso.attention)
+    other.misbelieved = dict(torso.misbelieved)
+    other.tracks = {part: copy(track) for part, track in torso.tracks.items()}
+    for track in other.tracks.values():
         track.motion = copied(track.motion)
-    runs = {id(run): copy(run) for run in body._runs.values()}
+    runs = {id(run): copy(run) for run in torso.runs.values()}
     for run in runs.values():
         run.motion, run.bell, run.pending = copied(run.motion), clock, list(run.pending)
-    other._runs = {part: runs[id(run)] for part, run in body._runs.items()}
+        run.authority = _alike(run)
+    other.runs = {part: runs[id(run)] for part, run in torso.runs.items()}
+    other.base = None
     return other
+
+
+def _alike(run: Run) -> MovementAuthority:
+    """An authority like that of `run`, which the rehearsal may revoke."""
+    authority = MovementAuthority(run.behavior, run.authority.through, run.authority.pace)
+    if run.authority.held:
+        authority.hold()
+    if run.authority.revoked is not None:
+        authority.revoke(run.authority.revoked)
+    return authority
 
 
 class _Part:
@@ -108,10 +95,10 @@ class _Part:
         self._is_paced = paced
         self._phases: dict[str, Seconds] = {}
 
-    def settle(self, now: Seconds) -> None:
+    def settle(self, torso: Torso, clock: Clock, now: Seconds) -> None:
         """Note the points that it has passed by now. At a hold point where it waits it stays."""
         run = self.run
-        while run.pending and run.cut_at is None and not run.holding:
+        while run.pending and not run.is_over and not run.holding:
             point = run.pending[0]
             due = run.due(point)
             if due is None or due > now + EARLY:
@@ -121,6 +108,9 @@ class _Part:
                 return
             run.pending.pop(0)
             self.passed[point.sync] = due
+            if point.sync == "relax" and isinstance(run.behavior, Gaze):
+                clock.at = due
+                torso.turn_home(run)
 
     def leave(self, passed: Sequence[str], now: Seconds, *, waited: bool) -> None:
         """Note that it has passed these points. waited: at the first of them; else it stood there already."""
@@ -128,9 +118,9 @@ class _Part:
         if not waited:
             self._phases |= dict.fromkeys(passed, 0.0)
 
-    def foresee(self, now: Seconds) -> None:
+    def foresee(self, torso: Torso, now: Seconds) -> None:
         """Take the times of the phases to come from the motion as it is now, if nothing stopped it."""
-        if self.run.cut_at is not None:
+        if self.run.is_over:
             return
         if self._is_paced:
             self._foresee_unpaced(now)
@@ -144,9 +134,19 @@ class _Part:
             at[point.sync] = crossing
             if self.run.holding and point.held_with == self.run.pending[0].held_with:
                 come.add(point.sync)
+        if isinstance(self.run.behavior, Gaze) and self.run.awaits("relax"):
+            self._foresee_way_home(torso, trial, at)
         for since, to in pairwise([point.sync for point in self.run.course.points]):
             if to not in come:
                 self._phases[to] = at[to] - at[since]
+
+    def _foresee_way_home(self, torso: Torso, trial: Motion, at: dict[str, Seconds]) -> None:
+        """Take the way home of a look to where looks go home by now, if a shift has changed that."""
+        base = torso.attention.angles
+        if head.differ(self.run.course.legs[-1].goal, base):
+            start = trial.at(at["relax"])
+            back = head.way_back(tuple(start.q.tolist()), base)
+            at["end"] = at["relax"] + Path(start, (back,), tracks.LIMITS["head"]).length
 
     def _foresee_unpaced(self, now: Seconds) -> None:
         """Take the times from the path of a behavior that runs at another pace, if it has just left a hold point."""
@@ -173,32 +173,31 @@ class _Part:
         return replace(phase, natural=natural, shortest=share * natural, longest=longest)
 
 
-def rehearsed(body: Moving, clock: Clock, items: Sequence[EstimateItem]) -> tuple[Estimate, ...]:
-    """Estimate behaviors as one after the other moves the body, a copy that `beside` has made.
+def rehearsed(torso: Torso, clock: Clock, items: Sequence[EstimateItem]) -> tuple[Estimate, ...]:
+    """Estimate behaviors as one after the other moves the torso, a copy that `beside` has made.
 
-    Those without times are estimated by themselves. A pose counts for the parts that none of the others moves before.
+    A pose counts for the parts that none of the others moves before.
     """
     began = clock.at
     times: list[Mapping[str, Seconds]] = [
         {each.sync: round(began + each.at, ROUNDING) for each in item.times} for item in items
     ]
-    events = [(at[START], BEGIN, number, "") for number, at in enumerate(times) if START in at]
+    events = [(at[START], BEGIN, number, "") for number, at in enumerate(times)]
     heapify(events)
     parts: dict[int, _Part] = {}
     moved: set[str] = set()
-    alone = [number for number, at in enumerate(times) if START not in at]
-    told = {number: body.estimate(items[number].behavior, items[number].pose, body._world) for number in alone}
+    told: dict[int, Estimate] = {}
     while events:
         at, kind, number, hold = heappop(events)
         for part in parts.values():
-            part.settle(at)
+            part.settle(torso, clock, at)
             if not part.run.pending:
-                body._release(part.run)
+                torso.release(part.run)
         clock.at = max(at + EARLY, clock.at)  # What ends then has ended.
         if kind == RELEASE:
-            _let_go(body, parts[number], hold, clock.at)
+            _let_go(torso, parts[number], hold, clock.at)
         else:
-            begun = _begin(body, clock, items[number], times[number], moved)
+            begun = _begin(torso, clock, items[number], times[number], moved)
             if isinstance(begun, Estimate):
                 told[number] = begun
                 continue
@@ -208,28 +207,28 @@ def rehearsed(body: Moving, clock: Clock, items: Sequence[EstimateItem]) -> tupl
             for until in begun.run.authority.pace.values():
                 heappush(events, (until, RELEASE, number, ""))
         for part in parts.values():
-            part.foresee(clock.at)
+            part.foresee(torso, clock.at)
     told |= {number: part.told() for number, part in parts.items()}
     return tuple([told[number] for number in range(len(items))])
 
 
 def _begin(
-    body: Moving, clock: Clock, item: EstimateItem, times: Mapping[str, Seconds], moved: set[str]
+    torso: Torso, clock: Clock, item: EstimateItem, times: Mapping[str, Seconds], moved: set[str]
 ) -> _Part | Estimate:
     """Begin a behavior on the copy. Returns its estimate alone if it moves nothing."""
     behavior = item.behavior
-    if head.is_shift(behavior) and body._is_overlaid():
-        estimate = body.estimate(behavior, None, body._world)
+    if head.is_shift(behavior) and torso.is_overlaid():
+        estimate = torso.estimate(behavior, None, torso.world)
         if estimate.feasible:
-            body._attention.shift(behavior, choreography.plan(behavior, body._situation(body._world)))
+            torso.attention.shift(behavior, choreography.plan(behavior, torso.situation(torso.world)))
         return estimate
     try:
-        course = choreography.plan(behavior, body._situation(body._world))
-        _place(body, item.pose, [part for part in course.parts if part not in moved])
-        course = choreography.plan(behavior, body._situation(body._world))
+        course = choreography.plan(behavior, torso.situation(torso.world))
+        _place(torso, item.pose, [part for part in course.parts if part not in moved])
+        course = choreography.plan(behavior, torso.situation(torso.world))
     except Impossible:
-        return body.estimate(behavior, None, body._world)
-    estimate = body.estimate(behavior, None, body._world)
+        return torso.estimate(behavior, None, torso.world)
+    estimate = torso.estimate(behavior, None, torso.world)
     if not estimate.feasible:
         return estimate
     held = {point.sync: point.held_with for point in course.points}
@@ -238,40 +237,40 @@ def _begin(
     authority = MovementAuthority(behavior, _through(behavior, list(waits)), paced)
     run = Run(behavior, course, authority, Variability(), 0)
     run.bell = clock
-    body._take_over(run, body._path(course))
+    torso.take_over(run, torso.path(course))
     moved.update(course.parts)
     part = _Part(run, estimate, waits, paced=bool(paced))
     if paced:
-        body._extend(run)
+        torso.extend(run)
     return part
 
 
-def _place(body: Moving, pose: BodyPose | None, parts: Sequence[str]) -> None:
+def _place(torso: Torso, pose: BodyPose | None, parts: Sequence[str]) -> None:
     """Put parts to rest where `pose` has them, or leave them where they are if it does not say."""
     angles = {joint.joint: joint.angle for joint in pose.joints} if pose is not None else {}
     for part in parts:
-        track = body._tracks[part]
+        track = torso.tracks[part]
         if part != "nod" and all(joint in angles for joint in track.joints):
             start = resting([angles[joint] for joint in track.joints])
-            track.play(Motion(Path(start, (), tracks.LIMITS[part]), body._loop.time()))
+            track.play(Motion(Path(start, (), tracks.LIMITS[part]), torso.clock.time()))
 
 
-def _let_go(body: Moving, part: _Part, hold: str, now: Seconds) -> None:
+def _let_go(torso: Torso, part: _Part, hold: str, now: Seconds) -> None:
     """Let a behavior pass the hold point at which it waits, or to which it is still on its way.
 
     hold: empty to let it go on at another pace.
     """
     run = part.run
-    if run.cut_at is not None or not run.pending:
+    if run.is_over or not run.pending:
         return
     part.waits.pop(hold, None)
     run.authority.extend(_through(run.behavior, list(part.waits)))
     waited = True
     while hold and run.holding and run.authority.covers(hold):
-        part.leave(body._leave_hold(run, hold), now, waited=waited)
+        part.leave(torso.leave_hold(run, hold), now, waited=waited)
         hold, waited = run.pending[0].held_with, False
     if not run.holding:
-        body._extend(run)
+        torso.extend(run)
 
 
 def _through(behavior: BlockBehavior, waits: Sequence[str]) -> str:

@@ -21,8 +21,7 @@ STALL, OVERHEAT = "(stall)", "(overheat)"
 class Run:
     """A behavior that is being performed: `course` under `authority`.
 
-    bell: rings when the authority changes or another behavior takes over. cut_at: when a later behavior took its
-    parts. holding: it waits at a hold point, standing or still coming to a stop.
+    bell: rings when the authority changes. holding: it waits at a hold point, standing or still coming to a stop.
     """
 
     def __init__(
@@ -39,12 +38,16 @@ class Run:
         self.bell = Bell()
         self.pending: list[CoursePoint] = list(course.points)
         self.holding = False
-        self.cut_at: Seconds | None = None
+        self.is_beneath = False
+        """True for a shift of the head that a look lies over: it moves no more, and takes nothing from the look."""
         self.motion: Motion
         self.size = 1.0
         """Share of the full amplitude, 0 to 1."""
         self._aim: tuple[str, Seconds] | None = None
         """The sync point that the rate is set for, with the instant asked for; None: it runs at its own rate."""
+        self._is_held = False
+        self._missed: frozenset[str] = frozenset()
+        """Hold points at which it could not stop any more when it was told to wait."""
         self._tried_aims: list[tuple[str, Seconds]] = []
         """Instants asked for when a smaller path was last looked for."""
         real = ("head",) if course.parts == ("nod",) else course.parts
@@ -64,13 +67,8 @@ class Run:
         return self.awaits("stroke_end") or len(self.course.points) == 2
 
     @property
-    def unreported(self) -> list[str]:
-        """Sync points still to be reported."""
-        return [point.sync for point in self.pending if point.sync not in (STALL, OVERHEAT)]
-
-    @property
     def is_over(self) -> bool:
-        return self.cut_at is not None or self.authority.revoked is not None
+        return self.is_beneath or self.authority.revoked is not None
 
     def play(self, motion: Motion) -> None:
         self.motion = motion
@@ -123,9 +121,35 @@ class Run:
     def limit(self, path: Path) -> Seconds:
         """Position on `path`, in its natural seconds, up to which it may go now."""
         for point in self.pending:
-            if point.sync in (STALL, OVERHEAT) or (point.held_with and not self.authority.covers(point.held_with)):
+            if point.sync in (STALL, OVERHEAT) or (point.held_with and not self.may_pass(point.held_with)):
                 return path.marks.get(point.stands_at or point.sync, inf)
         return inf
+
+    @property
+    def is_taken_over(self) -> bool:
+        return self.authority.revoked == "taken_over"
+
+    def may_pass(self, hold: str) -> bool:
+        """True if it may go on from a hold point now, or has to, since it could stop there no more."""
+        return self.authority.covers(hold) or hold in self._missed
+
+    def brake_for_hold(self, now: Seconds) -> None:
+        """While the behavior is held, stop at the next hold point where the joints can."""
+        is_news, self._is_held = self.authority.held and not self._is_held, self.authority.held
+        if not self._is_held:
+            self._missed = frozenset()
+            return
+        if is_news:
+            marks = self.motion.path.marks
+            self._missed = frozenset(
+                point.held_with
+                for point in self.pending
+                if point.held_with
+                and self.authority.is_granted(point.held_with)
+                and not self.motion.can_stop_at(marks[point.stands_at or point.sync], now)
+            )
+        if (limit := self.limit(self.motion.path)) < self.motion.limit:
+            self.motion.brake(now, limit)
 
     @property
     def stands(self) -> bool:
@@ -151,10 +175,19 @@ class Run:
                 legs = tuple(_marked(leg, point.sync, following) for leg in legs)
         return legs
 
-    def cut(self, now: Seconds) -> None:
-        """Note that a later behavior has taken over its parts."""
-        self.cut_at = now
-        self.bell.ring()
+    def lie_beneath(self) -> None:
+        """Note that a look lies over this shift of the head."""
+        self.is_beneath = True
+
+    def passed_by(self, at: Seconds) -> list[tuple[str, Seconds]]:
+        """Sync points that it has passed by then and not reported yet, each with its instant."""
+        passed: list[tuple[str, Seconds]] = []
+        for point in () if self.holding else self.pending:
+            due = None if point.sync in (STALL, OVERHEAT) else self.due(point)
+            if due is None or due > at or (point.held_with and not self.may_pass(point.held_with)):
+                break
+            passed.append((point.sync, due))
+        return passed
 
     def _insert_fault(self, fault: str, before: str) -> None:
         """Put `fault` half-way to sync point `before`, on the leg that has it."""

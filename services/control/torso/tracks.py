@@ -1,6 +1,7 @@
 """Tracks: the motion of each part of the simulated torso, and the pose they add up to. Pure: time is an argument.
 
 The head has two tracks: gaze, and a nod on top of it. They share the neck's limits, so that their sum keeps them.
+Only the nod tilts the head.
 """
 
 from collections.abc import Mapping, Sequence
@@ -10,35 +11,36 @@ import numpy as np
 
 from engage_hri.schemas.body import BodyPose, JointLimit
 from engage_hri.schemas.units import Seconds
-from engage_hri.services.control.torso import choreography, kinematics
+from engage_hri.services.control.torso import kinematics
 from engage_hri.services.control.torso.motion import JointMotion, Leg, Motion, Path, resting
+from engage_hri.services.control.torso.pace import return_time, turning_time
 
 NECK = ("neck_yaw", "neck_pitch")
-GAZE_SHARE = 0.7
-"""Share of the neck's speed and acceleration for gaze; the rest is for nods."""
+GAZE_SHARES = (0.56, 0.42)
+"""Shares of the neck's speed and of its acceleration for gaze; the rest is for nods, which are short and quick."""
 
 
-def _neck_limits(share: float, reserve: float | None) -> tuple[JointLimit, ...]:
-    """Limits of the neck's joints for one track, with a share of speed and acceleration.
+def _neck_limits(speed: float, acceleration: float, reserve: float | None) -> tuple[JointLimit, ...]:
+    """Limits of the neck's joints for one track. speed, acceleration: its shares.
 
     reserve: kept free at both ends of the range; None: the range is `NOD_RESERVE` around 0.
     """
     limits = []
     for limit in (kinematics.LIMIT[joint] for joint in NECK):
-        low, high = -choreography.NOD_RESERVE, choreography.NOD_RESERVE
+        low, high = -kinematics.NOD_RESERVE, kinematics.NOD_RESERVE
         if reserve is not None:
             low, high = limit.low + reserve, limit.high - reserve
         limits.append(
             msgspec.structs.replace(
-                limit, low=low, high=high, speed=share * limit.speed, acceleration=share * limit.acceleration
+                limit, low=low, high=high, speed=speed * limit.speed, acceleration=acceleration * limit.acceleration
             )
         )
     return tuple(limits)
 
 
 LIMITS: Mapping[str, tuple[JointLimit, ...]] = {
-    "head": _neck_limits(GAZE_SHARE, choreography.NOD_RESERVE),
-    "nod": _neck_limits(1.0 - GAZE_SHARE, None),
+    "head": _neck_limits(*GAZE_SHARES, kinematics.NOD_RESERVE),
+    "nod": (*_neck_limits(1.0 - GAZE_SHARES[0], 1.0 - GAZE_SHARES[1], None), kinematics.LIMIT["neck_roll"]),
     **{
         part: tuple(kinematics.LIMIT[joint] for joint in kinematics.joints_of(part))
         for part in ("torso", "left_arm", "right_arm", "face")
@@ -57,10 +59,14 @@ def home_of(part: str, displaced: Mapping[str, float]) -> tuple[float, ...]:
 
 
 class Track:
-    """The motion of one part. Two arms that move as one share a motion, each with its columns of it."""
+    """The motion of one part. Two arms that move as one share a motion, each with its columns of it.
+
+    base: angles to which the part goes back; those of the safe pose until a shift changes them.
+    """
 
     def __init__(self, part: str, angles: Sequence[float]) -> None:
         self.part = part
+        self.base = HOME[part]
         self.joints = tuple(limit.joint for limit in LIMITS[part])
         self.motion = Motion(Path(resting(angles), (), LIMITS[part]), 0.0)
         self._column = 0
@@ -82,7 +88,7 @@ class Track:
     def return_to(self, goal: tuple[float, ...], now: Seconds) -> None:
         """Leave the current motion and go to rest at `goal`, by a path that is clear of the table."""
         start = self.at(now)
-        time = choreography.turning_time if self.part in ("head", "nod") else choreography.return_time
+        time = turning_time if self.part in ("head", "nod") else return_time
         seconds = time(self.angles(now), goal)
         direct = Path(start, (Leg(goal=goal, seconds=seconds),), LIMITS[self.part])
         if not meets_table(direct, self.joints):
@@ -94,6 +100,21 @@ class Track:
         above = (yaw, min(max(pitch, 0.2) + 0.2, limits[1].high), min(elbow + 0.4, limits[2].high))
         legs = (Leg(goal=above, seconds=0.4), Leg(goal=goal, seconds=max(seconds, 0.4)))
         self.play(Motion(Path(start, legs, limits), now))
+
+
+def bases(tracks: Mapping[str, Track]) -> dict[str, float]:
+    """Angles of all joints to which their parts go back."""
+    based = {part: track for part, track in tracks.items() if part != "nod"}
+    return {
+        **kinematics.HOME,
+        **{joint: angle for track in based.values() for joint, angle in zip(track.joints, track.base, strict=True)},
+    }
+
+
+def rebase(tracks: Mapping[str, Track], parts: Sequence[str], angles: Mapping[str, float] = kinematics.HOME) -> None:
+    """Change the angles to which parts go back; by default to those of the safe pose."""
+    for track in (tracks[part] for part in parts):
+        track.base = tuple(angles.get(joint, angle) for joint, angle in zip(track.joints, track.base, strict=True))
 
 
 def limits_of(parts: Sequence[str]) -> tuple[JointLimit, ...]:

@@ -3,6 +3,7 @@
 from collections.abc import AsyncGenerator
 from math import inf
 
+from msgspec import Struct
 from msgspec.structs import replace
 
 from engage_hri.schemas.behaviors import Speech, Wait
@@ -12,10 +13,17 @@ from engage_hri.services.control.voice.timeline import Utterance, utter
 from engage_hri.services.control.waiting import Bell
 
 
+class _Gap(Struct, frozen=True):
+    """Silence before a word, at `at` seconds from the start of the utterance."""
+
+    at: Seconds
+
+
 async def speak(behavior: Speech, authority: MovementAuthority, pace: float = 1.0) -> AsyncGenerator[Progress, None]:
     """Say a text word by word. At a mark between two words the voice pauses until it may pass the mark.
 
-    If the authority is revoked, the voice finishes the current word. pace: 2 takes twice as long.
+    While it is held it pauses before the next word, too. If the authority is revoked, the voice finishes the current
+    word. pace: 2 takes twice as long.
     """
     bell = Bell()
     begin = bell.now()
@@ -27,6 +35,11 @@ async def speak(behavior: Speech, authority: MovementAuthority, pace: float = 1.
             while not bell.is_past(begin + progress.at) and authority.revoked is None:
                 await bell.wait(begin + progress.at)
             arrived = at = begin + progress.at
+            if isinstance(progress, _Gap):
+                while authority.held and authority.revoked is None:
+                    await bell.wait(inf)
+                    begin = bell.now() - progress.at
+                continue
             if isinstance(progress, Reached) and progress.sync in gaps and not authority.covers(progress.sync):
                 yield Arrived(progress.sync, arrived)
                 while authority.revoked is None and not authority.covers(progress.sync):
@@ -68,16 +81,18 @@ async def wait(behavior: Wait, authority: MovementAuthority) -> AsyncGenerator[P
         unwatch()
 
 
-def _score(behavior: Speech, utterance: Utterance) -> list[Reached | Spoke]:
-    """List all that the voice is going to report in time order, seconds from its start.
+def _score(behavior: Speech, utterance: Utterance) -> list[Reached | Spoke | _Gap]:
+    """List all that the voice is going to report in time order, seconds from its start, and the gaps before words.
 
-    Reports of one instant are in the order of the text, a word before the mark after it.
+    Reports of one instant are in the order of the text: a word, the mark after it, the gap before the next.
     """
     last = len(behavior.text)
-    score: list[tuple[Seconds, int, Reached | Spoke]] = [(0.0, -1, Reached("start", 0.0, 0.0))]
+    score: list[tuple[Seconds, int, Reached | Spoke | _Gap]] = [(0.0, -1, Reached("start", 0.0, 0.0))]
     score += [(word.end, word.position, Spoke(word.text, word.position, word.end)) for word in utterance.words]
     for mark in sorted(behavior.marks, key=lambda mark: mark.position):
         at = utterance.said_by(mark.position)
         score.append((at, mark.position, Reached(mark.id, at, at)))
+    said = [word for word in utterance.words if word.end > word.start]
+    score += [(word.start, word.position - len(word.text), _Gap(word.start)) for word in said]
     score.append((utterance.seconds, last, Reached("end", utterance.seconds, utterance.seconds)))
     return [progress for _, _, progress in sorted(score, key=lambda each: each[:2])]

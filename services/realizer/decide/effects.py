@@ -2,11 +2,8 @@
 
 from msgspec import Struct
 
-from engage_hri.schemas.units import Seconds
 from engage_hri.services.realizer.decide.lateness import Late, Stalled
-
-Pace = tuple[tuple[str, Seconds], ...]
-"""Sync points and their instants, by loop time, where the behavior's natural pace would miss them; else empty."""
+from engage_hri.services.realizer.foresee.foresight import Pace
 
 
 class Begin(Struct, frozen=True):
@@ -18,11 +15,15 @@ class Begin(Struct, frozen=True):
 
 
 class Extend(Struct, frozen=True):
-    """Let `behavior` go through `through` now, and come to its points as `pace` says."""
+    """Let `behavior` go through `through` now, and come to its points as `pace` says.
+
+    held: wait where it next can, whatever `through` says.
+    """
 
     behavior: str
     through: str
     pace: Pace = ()
+    held: bool = False
 
 
 Effect = Begin | Extend | Late | Stalled

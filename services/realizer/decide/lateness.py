@@ -1,6 +1,6 @@
 """Time limits while a block runs: for the next report of a behavior under way, and for the decision of an event."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 
 from msgspec import Struct
 
@@ -11,6 +11,7 @@ from engage_hri.schemas.references import type_name
 from engage_hri.schemas.syncref import SyncRef
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.realizer.config import RealizerConfig
+from engage_hri.services.realizer.plan.planner import Plan
 from engage_hri.services.realizer.plan.schedule import EPSILON
 from engage_hri.services.realizer.points import Point
 from engage_hri.services.requests.deadlines import Deadlines
@@ -84,6 +85,37 @@ class LatenessWatch:
                 self._warned.add(behavior)
                 found.append(Late(behavior, awaited.sync, now - awaited.expected))
         return found
+
+
+class Bounds:
+    """Bounds that say how late an instant may be after others."""
+
+    def __init__(self, plan: Plan) -> None:
+        self._not_after: list[list[tuple[int, Seconds]]] = [[] for _ in plan.net.transitions]
+        """For each transition, those that it may be later than by no more than so many seconds."""
+        for place in plan.net.places:
+            if place.kind in ("order", "delay"):
+                # Points that are predicted, or of another block, may come before those that they wait for.
+                self._not_after[place.source].append((place.target, -place.lag))
+        for bound in plan.net.bounds:
+            if bound.kind != "phase":
+                self._not_after[bound.source].append((bound.target, -bound.lag))
+
+    def lateness(
+        self,
+        transition: int,
+        at: Seconds,
+        passed: Mapping[int, Seconds],
+        held_between: Callable[[Seconds, Seconds], Seconds],
+    ) -> Seconds:
+        """Seconds by which a transition at `at` is later than it may be.
+
+        passed: the times of the transitions that all their behaviors have passed. held_between: the seconds for which
+        behaviors were held between two times. They do not count.
+        """
+        known = [(passed[each], seconds) for each, seconds in self._not_after[transition] if each in passed]
+        late = (at - since - seconds - held_between(since, at) for since, seconds in known)
+        return max((0.0, *late))
 
 
 def event_deadline(

@@ -38,6 +38,7 @@ class ControlLink:
             behavior=behavior,
             through=asked.through.partition(":")[0],  # without the number of a repeated stroke
             pace=tuple(PlannedInstant(sync=sync, at=self._bus.stamp(at)) for sync, at in asked.pace),
+            held=isinstance(asked, Extend) and asked.held,
         )
         return self._requests.send(keys.BEHAVIOR, perform)
 

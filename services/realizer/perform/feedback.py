@@ -90,8 +90,9 @@ class Reporter:
 
         first_plan: the one the block began with, which said when the point was to be.
         """
-        plan, at = decisions.plan, decisions.reached[point]
-        together = (decisions.reached.get(member.point, at) for member in plan.members[plan.at[point]])
+        plan, facts = decisions.plan, decisions.facts
+        at = facts.reached[point]
+        together = (facts.reached.get(member.point, at) for member in plan.members[plan.at[point]])
         skew = at - min(at, *together)
         if (sync := self._spelled(point, plan)) is not None:
             told = self._no_earlier(at)
@@ -110,7 +111,7 @@ class Reporter:
                 )
             )
         if (late := max(skew, decisions.lateness(point))) > self._tolerance:
-            self.late(decisions.member(point).point, f"{point.sync} came {late:.2f} s later than it should")
+            self.late(decisions.net.part_of[point].point, f"{point.sync} came {late:.2f} s later than it should")
 
     def late(self, instant: Point, message: str) -> None:
         """Warn that a behavior is late for an instant: once for each."""

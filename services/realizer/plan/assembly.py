@@ -19,20 +19,7 @@ from engage_hri.services.realizer.plan.phases import Chain
 from engage_hri.services.realizer.plan.relations import Order, Relations
 from engage_hri.services.realizer.plan.schedule import EPSILON
 from engage_hri.services.realizer.plan.steps import PORTION, Steps, portions
-from engage_hri.services.realizer.points import ORIGIN, WITH_STROKE, Gate, Point, gate, gate_point, performer
-
-
-class Member(Struct, frozen=True, gc=False):
-    """A behavior's part in an instant: how it can be made to wait there, and the point that is reported then."""
-
-    behavior: str
-    kind: Gate
-    point: Point
-
-    @property
-    def can_wait(self) -> bool:
-        """True if it can hold there, once begun."""
-        return self.kind in ("hold", "prompt")
+from engage_hri.services.realizer.points import ORIGIN, WITH_STROKE, Member, Point, gate, gate_point, performer
 
 
 class Assembly(Struct, frozen=True):
@@ -54,6 +41,14 @@ class Assembly(Struct, frozen=True):
             if (tie.kind == "order" and tie.behavior and tie.source and tie.target != len(names) - 1)
             or (tie.kind == "series" and not tie.behavior)
         }
+
+    def rounds(self, times: Sequence[Seconds]) -> dict[Point, int]:
+        """Number of measured events in a row that each point waits for at its own time: an order of equal times."""
+        rounds = [0] * len(times)
+        for place in sorted(self.net.places, key=lambda place: place.source):  # numbered in firing order
+            if place.kind != "idle" and place.source and times[place.target] - times[place.source] < EPSILON:
+                rounds[place.target] = max(rounds[place.target], rounds[place.source] + 1)
+        return {point: rounds[transition] for point, transition in self.at.items()}
 
 
 class Assembler:
@@ -274,6 +269,8 @@ class Assembler:
     def _arranged(self) -> None:
         for later, earlier in self.arrangement.turns:
             self._follow(earlier, Point(later, "start"), behavior=later)
+        for successor, kept in self.arrangement.handovers.values():
+            self._follow(kept, Point(successor, "start"), behavior=successor)
         for id, (successor, point) in self.arrangement.successors.items():
             kind: PlaceKind = "series" if id in self.arrangement.natural else "handover"
             self._follow(Point(successor, "start"), point, behavior=id, kind=kind)

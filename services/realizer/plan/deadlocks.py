@@ -1,6 +1,6 @@
 """Blame for points that wait for each other in a circle: a behavior is dropped, or the whole block refused."""
 
-from collections.abc import Collection, Container, Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from itertools import accumulate
 from typing import NamedTuple
 
@@ -18,10 +18,16 @@ from engage_hri.services.realizer.points import Point
 
 
 class Loss(NamedTuple):
-    """A behavior that cannot be on time, and why. turn: the wait that is impossible, if it is one."""
+    """A behavior that cannot be on time, and why.
+
+    points: those that cannot all be on time, if it is a speech: of all speeches that may give way, the first to do so
+    last. among: points of all behaviors that have to do with it. turn: the wait that is impossible, if it is one.
+    """
 
     behavior: str
     reason: str
+    points: tuple[Point, ...] = ()
+    among: frozenset[Point] = frozenset()
     turn: Turn | None = None
 
 
@@ -48,7 +54,9 @@ def clashes(
         if free and later not in losses and _clash(chains[earlier], sync, chains[later], classes):
             lost = max(free, key=rank.__getitem__)
             turn = (later, Point(earlier, sync))
-            losses[lost] = Loss(lost, f"cannot be on time: {later} would have to wait for {turn[1]}", turn)
+            reason = f"cannot be on time: {later} would have to wait for {turn[1]}"
+            among = frozenset(chains[earlier].points + chains[later].points)
+            losses[lost] = Loss(lost, reason, chains[lost].points, among, turn)
             stays[lost] = later if lost == earlier else earlier
     return list(losses.values())
 
@@ -76,7 +84,8 @@ def judge(
 ) -> Steps[Losses | BlockRefused]:
     """The losses of impossible circles, or the refusal of the block.
 
-    A time that cannot be met costs a behavior, the later in the document; waiting for each other costs the block.
+    A time that cannot be met costs a behavior, a speech only if there is no other, and of several the later in the
+    document; waiting for each other costs the block.
     Each circle costs a behavior, unless one that is lost already was part of it.
     """
     net = assembly.net
@@ -85,7 +94,7 @@ def judge(
     found = []
     for circle in impossible.circles:
         found.append((_loss(circle, net, rank, chains, ends), circle))
-        yield 1 + len(circle)
+        yield 4 + 2 * len(circle)
     losses: dict[str, Loss] = {}
     for loss, circle in sorted(found, key=lambda each: rank[each[0].behavior] if each[0] else -1):
         yield len(circle)
@@ -98,7 +107,7 @@ def _loss(
     circle: Circle,
     net: PetriNet,
     rank: Mapping[str, int],
-    chains: Container[str],
+    chains: Mapping[str, Chain],
     turns: Mapping[tuple[int, int], Turn],
 ) -> Loss | None:
     """The behavior that is to blame for a circle; None: the block. rank: place in the document if it may be dropped.
@@ -116,8 +125,25 @@ def _loss(
     if turn or quick or is_timed or len([id for id in slow or touched if id in chains]) == 1:
         for group in ({turn[0], turn[1].behavior},) if turn else (slow, quick, touched):
             if free := group & rank.keys():
-                return Loss(max(free, key=rank.__getitem__), f"cannot be on time: {_route(net, circle)}", turn)
+                lost = max(free, key=lambda id: (chains[id].type != "speech", rank[id]))
+                among = frozenset(point for tie, _ in circle for point in net.transitions[tie.source].points)
+                speeches = sorted(
+                    (id for id in touched & rank.keys() if chains[id].type == "speech"), key=rank.__getitem__
+                )
+                points = [point for id in speeches for point in chains[id].points if point in among]
+                reason = f"cannot be on time: {_shortage(net, circle, lost)}{_route(net, circle)}"
+                return Loss(lost, reason, tuple(points) if lost in speeches else (), among, turn)
     return None
+
+
+def _shortage(net: PetriNet, circle: Circle, lost: str) -> str:
+    """Explain what takes more time than there is, if phases of the lost behavior do; else nothing."""
+    took = [(tie, seconds) for tie, seconds in circle if tie.kind == "phase" and tie.behavior == lost and seconds > 0]
+    if not took:
+        return ""
+    needed, excess = sum(seconds for _, seconds in took), sum(seconds for _, seconds in circle)
+    since, to = (net.transitions[end].name for end in (took[0][0].source, took[-1][0].target))
+    return f"from {since} to {to} it takes {needed:.2f} s at least, and there are {max(0.0, needed - excess):.2f} s: "
 
 
 def _touched(circle: Circle, net: PetriNet) -> set[str]:
@@ -138,7 +164,7 @@ def _deadlock(circle: Circle, net: PetriNet, classes: Classes, block: str) -> Bl
 
 
 def _route(net: PetriNet, circle: Circle) -> str:
-    steps = [f"{net.transitions[tie.source].name} ({seconds:+g} s)" for tie, seconds in circle]
+    steps = [f"{net.transitions[tie.source].name} ({round(seconds, 3) + 0.0:+g} s)" for tie, seconds in circle]
     return " -> ".join((*steps, net.transitions[circle[0][0].source].name))
 
 

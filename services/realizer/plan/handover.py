@@ -16,16 +16,26 @@ from engage_hri.services.realizer.plan.phases import Chain
 from engage_hri.services.realizer.plan.relations import Relations
 from engage_hri.services.realizer.plan.schedule import EPSILON
 from engage_hri.services.realizer.plan.steps import Steps
-from engage_hri.services.realizer.points import SHIFTS, WITH_STROKE, Point
+from engage_hri.services.realizer.points import ON_TARGET, SHIFTS, WITH_STROKE, Point
 
 _OTHER: dict[str, tuple[str, Hand]] = {
     "left_arm": ("right_arm", "RIGHT_HAND"),
     "right_arm": ("left_arm", "LEFT_HAND"),
 }
-_STROKE, _STROKE_END, _RELAX = (SYNC_POINTS.index(each) for each in ("stroke", "stroke_end", "relax"))
-"""Numbers of these points: every behavior that hands over has all seven."""
+_STROKE, _RELAX = SYNC_POINTS.index("stroke"), SYNC_POINTS.index("relax")
+"""Numbers of these points in a behavior that lasts."""
 Turn = tuple[str, Point]
 """A behavior, and the point of another that it waits for before it takes its part."""
+
+
+class Handover(NamedTuple):
+    """The part of a behavior goes to its successor, once the points up to `kept` are passed.
+
+    The points after that are its way home, which the handover saves.
+    """
+
+    successor: str
+    kept: Point
 
 
 class Arrangement(Struct, frozen=True):
@@ -33,6 +43,7 @@ class Arrangement(Struct, frozen=True):
 
     natural: behaviors that end when something takes their place, or with the block; lasting: those with the block.
     successors: for a behavior, the one that takes its part, and the first of its points that this brings about.
+    handovers: for each behavior whose part another takes some time, that one, and what it has to leave to it.
     cuts: number of the first segment that is not given its time, because a successor has the part by then.
     turns: behaviors that wait for a point of another before they take its part.
     spoken: the speeches in the order in which they are said.
@@ -41,6 +52,7 @@ class Arrangement(Struct, frozen=True):
     natural: frozenset[str] = frozenset()
     lasting: tuple[str, ...] = ()
     successors: Mapping[str, tuple[str, Point]] = {}
+    handovers: Mapping[str, Handover] = {}
     cuts: Mapping[str, int] = {}
     turns: frozenset[Turn] = frozenset()
     spoken: tuple[str, ...] = ()
@@ -76,6 +88,7 @@ def arrange(
         awaited.setdefault(order.later.point.behavior, set()).add(order.earlier.point)
     mentioned = {point.behavior for point in relations.constrained}
     successors, cuts = dict(before.successors), dict(before.cuts)
+    handovers: dict[str, Handover] = {}
     conflicts = []
     yield len(chains) // 4
     ranked = entering(chains, mentioned, times, rounds)
@@ -95,19 +108,25 @@ def arrange(
         taken = times[Point(successor, "start")]
         first = next((number for number, point in enumerate(chain.points) if times[point] > taken + EPSILON), 0)
         is_natural = id in before.natural
+        # Points that the successor itself is to come after are kept: cut short, they would come at once.
+        own = awaited.get(successor, set())
+        kept = [number for number, point in enumerate(chain.points) if point in held or point in own]
+        least = _least(chain, chains[successor])
         if first:
-            # Points that the successor itself is to come after are kept: cut short, they would come at once.
-            own = awaited.get(successor, set())
-            kept = {point for point in chain.points if point in held or point in own}
             is_asked = successor in mentioned or _is_overlaid(chain, chains[successor])
-            last = _not_given_up(chain, first, kept, is_natural, is_asked=is_asked)
+            last = _not_given_up(chain, first, [*kept, least], is_natural, is_asked=is_asked)
             turn = (successor, chain.points[last]) if last is not None else None
-            # A behavior that has made its stroke hands over; for one that has not, a free other arm is better.
-            is_worth_it = turn is not None or first <= _STROKE_END
-            hand = _free_hand((successor, id), chains, times, barred) if is_worth_it else None
-            yield 1 + len(chains) // 32  # `_free_hand` has looked at all others
-            if turn or hand:
-                conflicts.append(Conflict(turn, hand))
+            if turn is not None and chain.type != "speech" and id not in mentioned and successor in mentioned:
+                # Nobody has said when the earlier one comes: it is what waits.
+                number = _STROKE if successor in before.natural else len(chains[successor].points) - 1
+                turn = (id, chains[successor].points[number])
+            if turn is not None:
+                # A behavior that has made its stroke hands over; for one that has not, a free other arm is better.
+                conflicts.append(Conflict(turn, _free_hand((successor, id), chains, times, barred)))
+                yield 1 + len(chains) // 32  # `_free_hand` has looked at all others
+        kept = [number for number in kept if not first or number < first]
+        if chain.type != "speech":
+            handovers[id] = Handover(successor, chain.points[max([least, *kept])])
         if id in successors:
             continue
         if is_natural:
@@ -116,7 +135,21 @@ def arrange(
             successors[id] = (successor, chain.points[first])
             cuts[id] = first - 1
     lasting = tuple(sorted(before.natural - successors.keys()))
-    return replace(before, lasting=lasting, successors=successors, cuts=cuts), conflicts
+    arranged = replace(before, lasting=lasting, successors=successors, handovers=handovers, cuts=cuts)
+    return arranged, conflicts
+
+
+def kept_points(
+    chains: Mapping[str, Chain], relations: Relations, handovers: Mapping[str, Handover]
+) -> Mapping[str, Point]:
+    """For each behavior, the last point that it must pass itself, whoever takes its part."""
+    held = relations.held
+    kept = {id: each.kept for id, each in handovers.items()}
+    for id, chain in chains.items():
+        if id not in kept:
+            numbers = [number for number, point in enumerate(chain.points) if point in held]
+            kept[id] = chain.points[max([_least(chain, None), *numbers])]
+    return kept
 
 
 def entering(
@@ -133,20 +166,26 @@ def entering(
     return tuple(sorted(chains, key=rank.__getitem__))
 
 
-def _not_given_up(
-    chain: Chain, first: int, kept: Collection[Point], is_natural: bool, *, is_asked: bool
-) -> int | None:
+def _not_given_up(chain: Chain, first: int, kept: Iterable[int], is_natural: bool, *, is_asked: bool) -> int | None:
     """Number of the last point, from `first` on, that a successor must wait for; None if there is none.
 
-    Points count that share an instant with others or wait for them; all do if nothing asks for the successor now.
-    Words are never given up.
+    Points `kept` count; all do if nothing asks for the successor now.
     """
-    broken = [number for number in range(first, len(chain.points)) if chain.points[number] in kept]
-    if not is_asked or chain.type == "speech":
-        broken.append(_STROKE if is_natural else len(chain.points) - 1)
-    if not broken or broken[-1] < first:
-        return None
-    return max(broken[-1], _STROKE_END) if chain.type in WITH_STROKE else broken[-1]
+    broken = [*kept, *([] if is_asked else [_STROKE if is_natural else len(chain.points) - 1])]
+    last = max(broken)
+    return last if last >= first else None
+
+
+def _least(chain: Chain, successor: Chain | None) -> int:
+    """Number of the last point that a behavior must have passed before the successor takes its part.
+
+    A handover may cost it its way home, never its stroke. A shift that a look lies over has set what it is to set.
+    """
+    if chain.type in WITH_STROKE:
+        return next(number for number, point in enumerate(chain.points) if point.sync == "stroke_end")
+    if chain.type in ON_TARGET:
+        return _STROKE
+    return 0 if successor is not None and _is_overlaid(chain, successor) else len(chain.points) - 1
 
 
 def is_tied(later: Chain, speech: Chain, classes: Classes) -> bool:
@@ -179,9 +218,9 @@ def _successors(
 
 def _pairs(users: Sequence[str], chains: Mapping[str, Chain]) -> Iterator[tuple[str, str]]:
     """Each user of a part, in order, and the next that takes it over: a shift takes nothing from a gaze."""
-    above = [id for id in users if chains[id].type not in SHIFTS]
-    yield from pairwise(above)
+    yield from pairwise([id for id in users if chains[id].type not in SHIFTS])
     yield from ((one, other) for one, other in pairwise(users) if chains[one].type in SHIFTS)
+    yield from pairwise([id for id in users if chains[id].type in SHIFTS])
 
 
 def _is_overlaid(earlier: Chain, later: Chain) -> bool:

@@ -5,8 +5,7 @@ each with a warning: behaviors that the body cannot do, and those that cannot be
 between equals; any other permutation of a block gives the same net.
 """
 
-from collections.abc import Collection, Container, Iterable, Mapping, Sequence
-from typing import get_args
+from collections.abc import Collection, Container, Iterable, Mapping
 
 from msgspec import Struct
 from msgspec.structs import replace
@@ -19,9 +18,11 @@ from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.feedback import WarningKind
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.realizer.net.petri_net import PetriNet
-from engage_hri.services.realizer.plan.assembly import Assembler, Assembly, Member, assembling
+from engage_hri.services.realizer.plan import unsupported
+from engage_hri.services.realizer.plan.assembly import Assembler, Assembly, assembling
 from engage_hri.services.realizer.plan.deadlocks import Losses, clashes, judge
-from engage_hri.services.realizer.plan.handover import Arrangement, Conflict, Turn, arrange, entering
+from engage_hri.services.realizer.plan.given_up import times_of
+from engage_hri.services.realizer.plan.handover import Arrangement, Conflict, Turn, arrange, entering, kept_points
 from engage_hri.services.realizer.plan.instants import Classes
 from engage_hri.services.realizer.plan.phases import Chain, chain, natural_ends
 from engage_hri.services.realizer.plan.prediction import Impossible, predict
@@ -37,10 +38,10 @@ from engage_hri.services.realizer.plan.relations import (
     at_line,
     relation_steps,
 )
-from engage_hri.services.realizer.plan.schedule import EPSILON, Solution
+from engage_hri.services.realizer.plan.schedule import Solution, critical_path
 from engage_hri.services.realizer.plan.speaking_order import Misordered, SpeakingOrder
 from engage_hri.services.realizer.plan.steps import PORTION, Steps, finished, portions
-from engage_hri.services.realizer.points import ORIGIN, Point
+from engage_hri.services.realizer.points import ORIGIN, Member, Point
 
 
 class Plan(Struct, frozen=True, kw_only=True):
@@ -49,10 +50,12 @@ class Plan(Struct, frozen=True, kw_only=True):
     schedule: of each transition of the net, seconds from the block's start, if all goes as estimated.
     block: with a hand for each gesture that must use a certain one. critical: the transitions that make the block as
     long as it is, from first to last.
+    kept: for each behavior, the last point that it must pass itself. Who takes its part, in whatever block, may save
+    it the rest.
     entering: behaviors in the order in which they take their parts: of two that begin at one instant, too.
     behaviors: those that will be performed, in document order. dropped: those that will not, with `problems`.
     natural: behaviors that end when something takes their place, or with the block.
-    waited_for: behaviors that the end of the block waits for.
+    waited_for: behaviors that the end of the block waits for. given_up: speeches that lack a time they should have.
     """
 
     block: Block
@@ -66,9 +69,11 @@ class Plan(Struct, frozen=True, kw_only=True):
     natural: frozenset[str]
     required: frozenset[str]
     waited_for: frozenset[str]
+    kept: Mapping[str, Point]
     entering: tuple[str, ...]
     critical: tuple[int, ...] = ()
     dropped: tuple[str, ...] = ()
+    given_up: tuple[str, ...] = ()
     problems: tuple[Problem, ...] = ()
 
     def predicted(self, point: Point) -> Seconds:
@@ -125,6 +130,8 @@ class _Planner:
         self.barred = barred
         self.dropped = dict.fromkeys(dropped)
         """Behaviors, in the order in which they were dropped; the values mean nothing."""
+        self.given_up: dict[str, list[Problem]] = {}
+        """Speeches without some of their times, each with the warnings of that."""
         self.turns: frozenset[Turn] = frozenset()
         self.overlaps: set[Turn] = set()
         """Turns that there is no time to wait for."""
@@ -139,19 +146,23 @@ class _Planner:
                 if behavior.id not in self.dropped:
                     self._read(behavior)
             yield 4 * len(portion)
-        speeches = [id for id, chain in self.chains.items() if chain.type == "speech"]
-        self.order = SpeakingOrder(speeches, len(self.chains))
+        self.speeches = {id for id, chain in self.chains.items() if chain.type == "speech"}
+        self.order = SpeakingOrder([id for id in self.chains if id in self.speeches], len(self.chains))
 
     def _read(self, behavior: BlockBehavior) -> None:
         if isinstance(behavior, Unknown):
-            self._drop(behavior.id, "BEHAVIOR_TYPE_NOT_SUPPORTED", f"unknown element <{behavior.element}>")
+            self._drop(behavior.id, *unsupported.unknown(behavior))
         elif behavior.id in self.relations.unusable:
             self._refuse_if_required(behavior.id, "its timing names a sync point it does not have", "PARSING_FAILURE")
             self.dropped[behavior.id] = None
         elif (estimate := self.estimates.get(behavior.id)) and not estimate.feasible:
-            self._drop(behavior.id, _kind(estimate.warning), str(estimate.fault or "the body cannot do it"))
+            kind = unsupported.kind_of(estimate.warning)
+            self._drop(behavior.id, kind, str(estimate.fault or "the body cannot do it"))
         else:
             self.chains[behavior.id] = chain(behavior, estimate)
+            if estimate and estimate.degraded:
+                line = self.lines[behavior.id]
+                self.problems.append(Problem("DEGRADED", at_line(line, estimate.degraded), behavior.id))
 
     def _refuse_if_required(self, id: str, reason: str, kind: WarningKind) -> None:
         if id in self.relations.required:
@@ -163,6 +174,8 @@ class _Planner:
         self._refuse_if_required(id, reason, kind)
         self.chains.pop(id, None)
         self.dropped[id] = None
+        if futile := self.given_up.pop(id, None):
+            self.problems = [each for each in self.problems if each not in futile]
         self.problems.append(Problem(kind, at_line(self.lines[id], f"{reason}{DROPPED}"), id))
 
     def plan(self) -> Steps[Plan]:
@@ -175,15 +188,24 @@ class _Planner:
                 self.turns = frozenset()
             except Losses as found:
                 turns, self.turns = self.turns, frozenset()
+                times = yield from times_of(self.speeches, self.relations)
                 for number, loss in enumerate(found.losses):
                     if not number % PORTION:
-                        yield PORTION
+                        yield 8 * PORTION
                     turn = loss.turn
                     if turn and turn in turns and self._may_speak_at_once(turn[1].behavior, present):
                         self.overlaps.add(turn)
+                    elif given_up := times.give_up(loss.points, loss.among, self.dropped):
+                        self._keep_words(*given_up, loss.reason)
                     else:
                         self._drop(loss.behavior, "IMPOSSIBLE_TO_SCHEDULE", loss.reason)
+                self.relations = times.left
                 self.order.begin_anew(self.chains)
+
+    def _keep_words(self, id: str, said: str, reason: str) -> None:
+        reason = f"{reason}; {said} is given up, so that the words are said"
+        self.problems.append(Problem("IMPOSSIBLE_TO_SCHEDULE", at_line(self.lines[id], reason), id))
+        self.given_up.setdefault(id, []).append(self.problems[-1])
 
     def _plan(self, present: Relations, classes: Classes) -> Steps[Plan]:
         """The plan of the behaviors that are left. Raises Losses: those that cannot be on time."""
@@ -191,12 +213,11 @@ class _Planner:
         waited_for = frozenset(self.chains) - self._unawaited_events(present)
         arrangement = Arrangement(natural=natural, spoken=self.order.current)
         assembler = yield from assembling(self.chains, present, classes, waited_for)
-        mentioned = {point.behavior for point in present.constrained}
         while True:
             assembler, assembly, solution = yield from self._solved(assembler, arrangement, classes)
             times = {point: solution.times[transition] for point, transition in assembly.at.items()}
             yield len(times) // 4
-            rounds = _rounds(assembly, solution.times)
+            rounds = assembly.rounds(solution.times)
             yield len(times) // 4
             arranged, conflicts = yield from arrange(
                 self.chains, present, classes, arrangement, times, rounds, self.barred
@@ -215,6 +236,7 @@ class _Planner:
                 break
             else:
                 arrangement = arranged
+        mentioned = {point.behavior for point in present.constrained}
         return Plan(
             block=self._block(),
             behaviors=tuple([chain.behavior for chain in self.chains.values()]),
@@ -227,10 +249,14 @@ class _Planner:
             natural=natural,
             required=present.required,
             waited_for=waited_for,
+            kept=kept_points(self.chains, present, arrangement.handovers),
             entering=entering(self.chains, mentioned, times, rounds),
-            critical=_critical(solution),
+            critical=critical_path(solution),
             dropped=tuple(self.dropped),
-            problems=tuple(self.problems),
+            given_up=tuple(self.given_up),
+            problems=tuple(
+                one for one in self.problems if one.kind != "DEGRADED" or one.behavior not in self.dropped
+            ),
         )
 
     def _present(self) -> Steps[tuple[Relations, Classes]]:
@@ -344,7 +370,7 @@ class _Planner:
                 assembler.waive(waits)
                 return (yield from self._solved(assembler, arrangement, classes))
             required = self.relations.required
-            turns = self.turns | self.order.turns
+            turns = self.turns | self.order.turns | set(arrangement.handovers.values())
             raise (
                 yield from judge(impossible, assembly, self.chains, required, classes, self.block.id, turns)
             ) from None
@@ -371,24 +397,3 @@ class _Planner:
             replace(each, mode=hand) if (hand := self.hands.get(each.id)) else each for each in self.block.behaviors
         ]
         return replace(self.block, behaviors=tuple(chosen))
-
-
-def _kind(warning: str) -> WarningKind:
-    return warning if warning in get_args(WarningKind) else "CANNOT_CREATE_BEHAVIOR"  # type: ignore[return-value]
-
-
-def _rounds(assembly: Assembly, times: Sequence[Seconds]) -> dict[Point, int]:
-    """Number of measured events in a row that each point waits for at its own time. It orders simultaneous points."""
-    rounds = [0] * len(times)
-    for place in sorted(assembly.net.places, key=lambda place: place.source):  # numbered in firing order
-        if place.kind != "idle" and place.source and times[place.target] - times[place.source] < EPSILON:
-            rounds[place.target] = max(rounds[place.target], rounds[place.source] + 1)
-    return {point: rounds[transition] for point, transition in assembly.at.items()}
-
-
-def _critical(solution: Solution) -> tuple[int, ...]:
-    """Transitions from the start of the block to its end, each the reason why the next is not earlier."""
-    path = [len(solution.times) - 1]
-    while (cause := solution.causes.get(path[-1])) is not None:
-        path.append(cause.source)
-    return tuple(path[::-1])

@@ -50,7 +50,10 @@ def predict(
                 circle = tuple([(ties[lag.reason], lag.seconds) for lag in cycle])
                 room = [seconds - _least(tie) for tie, seconds in circle]
                 excess = sum(lag.seconds for lag in cycle)
-                if sum(room) < excess - EPSILON or is_dispensable([tie for tie, _ in circle]):
+                if sum(room) < excess - EPSILON:
+                    hopeless.append(tuple([(tie, _least(tie)) for tie, _ in circle]))
+                    continue
+                if is_dispensable([tie for tie, _ in circle]):
                     hopeless.append(circle)
                     continue
                 for lag in _shortened(cycle, room, excess):

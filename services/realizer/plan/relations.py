@@ -186,6 +186,7 @@ class _Reader:
             is_there = ref.block in self.elsewhere
         else:
             is_there = behavior is not None and sync in sync_points(behavior) and ref.repetition < 2
+            is_there |= isinstance(behavior, Unknown)  # It is dropped there, and the tie with it.
         if not is_there:
             advice = "the block it names must be running when this one comes"
             raise self.refusal(f"{text!r} is not a point of a live block", where, line, advice)
@@ -251,6 +252,10 @@ class _Reader:
                 other = self.term(timing.ref, behavior.id, behavior.line)
             else:
                 other = Problem("PARSING_FAILURE", f"{type_name(behavior)} has no sync point {timing.sync!r}")
+            if isinstance(other, Problem) and isinstance(behavior, Speech) and behavior.id not in self.required:
+                message = at_line(behavior.line, f"{other.message}; it is ignored")
+                self.problems.append(Problem("PARSING_FAILURE", message, behavior.id))
+                continue  # Its words are not lost for the sake of a time.
             if isinstance(other, Problem):
                 self.unusable.add(behavior.id)
                 message = at_line(behavior.line, f"{other.message}{DROPPED}")

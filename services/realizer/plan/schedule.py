@@ -110,3 +110,11 @@ def _cycles(causes: dict[int, Lag]) -> list[list[Lag]]:
                 cycle.append(causes[before])
             found.append(cycle[::-1])
     return found
+
+
+def critical_path(solution: Solution) -> tuple[int, ...]:
+    """Transitions from the start of the block to its end, each the reason why the next is not earlier."""
+    path = [len(solution.times) - 1]
+    while (cause := solution.causes.get(path[-1])) is not None:
+        path.append(cause.source)
+    return tuple(path[::-1])

@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from math import inf
 
 from engage_hri.schemas.units import Seconds
-from engage_hri.services.realizer.decide.longest_paths import FINEST, Arc, Circle, LongestPaths
+from engage_hri.services.realizer.foresee.longest_paths import FINEST, Arc, Circle, LongestPaths
 from engage_hri.services.realizer.net.petri_net import order
 from engage_hri.services.realizer.plan.planner import Plan
 from engage_hri.services.realizer.plan.schedule import EPSILON
@@ -213,6 +213,12 @@ class Forecast(LongestPaths):
         hurried = (number for number in self._given_way if not self._arcs[number].is_bound)
         return any(self._arcs[number].behavior == behavior for number in hurried)
 
+    @property
+    def bounded(self) -> set[int]:
+        """Instants that an upper bound can hold back, or that make one do so."""
+        bounds = [arc for arc in self._arcs if arc.is_on and arc.is_bound]
+        return {arc.source for arc in bounds} | {arc.target for arc in bounds}
+
     def update(self) -> set[int]:
         """Draw the conclusions of all facts since the last time; returns the transitions that have moved."""
         if not self._todo and not self._old:
@@ -307,3 +313,15 @@ def full_forecast(
         forecast.require(transition)
     forecast.update()
     return forecast
+
+
+def is_predictive(plan: Plan) -> bool:
+    """True if a time is bounded from above, or a point that cannot or should not wait is tied to another."""
+    if any(bound.kind != "phase" for bound in plan.net.bounds):
+        return True
+    constrained = {place.target for place in plan.net.places if place.kind in ("order", "delay", "series")}
+    return any(
+        any(member.kind in ("passive", "prompt") for member in members)
+        and (len(members) > 1 or transition in constrained)
+        for transition, members in enumerate(plan.members)
+    )

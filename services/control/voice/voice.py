@@ -1,0 +1,65 @@
+"""The voice of the simulated body: it says one text at a time."""
+
+from collections.abc import AsyncGenerator
+from contextlib import aclosing
+from math import inf
+
+from engage_hri.schemas.behaviors import Speech
+from engage_hri.schemas.faults import Fault
+from engage_hri.services.control.body import BehaviorRefused, MovementAuthority, Progress, Reached
+from engage_hri.services.control.voice import speaking
+from engage_hri.services.control.waiting import Bell
+
+
+class Voice:
+    """A voice that refuses a text while it says another. saying: the text that is being said; empty: silence.
+
+    is_mute: it says nothing, and reports its words all the same.
+    """
+
+    def __init__(self, *, is_mute: bool = False) -> None:
+        self.saying = ""
+        self._is_mute = is_mute
+        self._utterance: MovementAuthority | None = None
+        self._waiting: list[Bell] = []
+
+    @property
+    def is_busy(self) -> bool:
+        return self._utterance is not None
+
+    def hush(self) -> None:
+        """End what is being said, at a word."""
+        if self._utterance is not None:
+            self._utterance.revoke()
+
+    async def wait_for_silence(self, authority: MovementAuthority) -> None:
+        """Wait until an aborted speech has finished its current word; return at once if `authority` is revoked."""
+        bell = Bell()
+        unwatch = authority.watch(bell.ring)
+        self._waiting.append(bell)
+        try:
+            while self._utterance is not None and self._utterance.revoked is not None and authority.revoked is None:
+                await bell.wait(inf)
+        finally:
+            self._waiting.remove(bell)
+            unwatch()
+
+    async def speak(
+        self, behavior: Speech, authority: MovementAuthority, pace: float
+    ) -> AsyncGenerator[Progress, None]:
+        """Say a text. pace: 2 takes twice as long. Raises BehaviorRefused: it says another."""
+        if self._utterance is not None:
+            reason = f"the voice is busy with {self.saying!r}"
+            raise BehaviorRefused(Fault(reason=reason, where=behavior.id, service="control"))
+        self._utterance, self.saying = authority, "" if self._is_mute else behavior.text
+        try:
+            async with aclosing(speaking.speak(behavior, authority, pace)) as utterance:
+                async for progress in utterance:
+                    if isinstance(progress, Reached) and progress.sync == "end":
+                        self._utterance, self.saying = None, ""
+                    yield progress
+        finally:
+            if self._utterance is authority:
+                self._utterance, self.saying = None, ""
+            for bell in self._waiting:
+                bell.ring()

@@ -1,0 +1,197 @@
+"""Grants: which behavior may begin, and how far each may go, given the marking of the net.
+
+An instant is decided when nothing but behaviors on their way is missing there. Behaviors that are early hold; the
+last to come is told to pass, and never stops. A behavior that cannot hold is kept back where it last can, so that by
+prediction it comes on time. Only instants that something has changed for are looked at again.
+"""
+
+import heapq
+
+from engage_hri.schemas.behaviors import Speech
+from engage_hri.schemas.units import Seconds
+from engage_hri.services.realizer.config import RealizerConfig
+from engage_hri.services.realizer.foresee.foresight import Foresight
+from engage_hri.services.realizer.net.facts import Facts
+from engage_hri.services.realizer.net.running import RunningNet
+from engage_hri.services.realizer.plan.planner import Plan
+from engage_hri.services.realizer.plan.schedule import EPSILON
+from engage_hri.services.realizer.points import Member, Point
+
+
+class Grants:
+    """Who may pass which instant. An observer of the net (see net/running.py).
+
+    touched: behaviors that may go further, or at another pace, than they were told. granted_at: when each behavior
+    was last allowed to go further.
+    """
+
+    def __init__(self, facts: Facts, foresight: Foresight, config: RealizerConfig) -> None:
+        self.touched: set[str] = set()
+        self.granted_at: dict[str, Seconds] = {}
+        self._facts = facts
+        self._foresight = foresight
+        self._config = config
+        self._through: dict[str, int] = {}
+        """For each behavior, the number of the last point that it may go through."""
+
+    def adopt(self, plan: Plan, net: RunningNet) -> None:
+        """Decide about another plan from now on. What a behavior was told stays."""
+        self._plan = plan
+        self._net = net
+        self.touched.clear()
+        self._granted: set[tuple[int, str]] = set()
+        self._wakes: list[tuple[Seconds, int]] = []
+        self._dirty: set[int] = set()
+        """Instants that something has changed for."""
+        self._pauses = _pauses(plan)
+
+    # -- what happens (see `Observer`) ---------------------------------------------------------------------------
+
+    def on_began(self, behavior: str, at: Seconds) -> None:
+        """Nothing: its instants open."""
+
+    def on_arrived(self, point: Point, at: Seconds) -> None:
+        self._dirty.add(self._plan.at[point])
+
+    def on_reached(self, point: Point, at: Seconds) -> None:
+        self._dirty.add(self._plan.at[point])
+
+    def on_opened(self, transition: int) -> None:
+        self._dirty.add(transition)
+
+    def on_fired(self, transition: int, at: Seconds) -> None:
+        """Nothing: what it opens is told."""
+
+    # -- what is to be decided -----------------------------------------------------------------------------------
+
+    def look_again(self, behavior: str) -> None:
+        """Look at the next point that the behavior was not told to pass.
+
+        Only when it is under way can be told whether it comes on time there.
+        """
+        if (chain := self._plan.chains.get(behavior)) is not None:
+            number = max(self._facts.next_number(behavior), self.through(behavior) + 1)
+            if number < len(chain.points):
+                self._dirty.add(self._plan.at[chain.points[number]])
+
+    def moved(self, transition: int) -> None:
+        """Decide again about an instant that is expected at another time than before."""
+        if transition < len(self._plan.members):
+            self._dirty.add(transition)
+            self.touched.update(member.behavior for member in self._plan.members[transition])
+
+    @property
+    def deadline(self) -> Seconds | None:
+        """Time at which to `wake` even if nothing happens until then; None: there is no need."""
+        return self._wakes[0][0] if self._wakes else None
+
+    def wake(self, now: Seconds) -> None:
+        """Take up the instants that are to be decided by `now`."""
+        while self._wakes and self._wakes[0][0] <= now + EPSILON:
+            self._dirty.add(heapq.heappop(self._wakes)[1])
+
+    def take(self, *, only_measured: bool) -> list[int]:
+        """The instants to be decided. only_measured: without those that it takes a forecast to decide."""
+        taken = {each for each in self._dirty if not (only_measured and self._foresight.minds(each))}
+        self._dirty -= taken
+        return sorted(taken)
+
+    # -- decisions -----------------------------------------------------------------------------------------------
+
+    def decide(self, transition: int, now: Seconds) -> list[str]:
+        """Decide about an instant; returns the behaviors that are to begin."""
+        if not self._net.is_open(transition):
+            return []
+        members = self._plan.members[transition]
+        if self._facts.is_holding and any(self._is_held(member) for member in members):
+            return []
+        missing = [member for member in members if member.kind != "start" and not self._is_there(member)]
+        may_pass = missing[0] if len(missing) == 1 and missing[0].can_wait else None
+        ripe = max(self._facts.began, self._net.ripe_at(transition))
+        # Where all are there, and no bound holds them back, what was measured says enough.
+        due = self._foresight.due(transition, ripe) if missing or self._foresight.minds(transition) else ripe
+        for member in missing:
+            if member.point in self._pauses:
+                self._decide_pause(transition, member, due, now)
+        if due > now + EPSILON:
+            self._wake(transition, due)
+            arrival = None if may_pass is None else self._foresight.arrival(may_pass)
+            if may_pass is not None and arrival is not None and arrival >= due - EPSILON:
+                # Not told earlier than necessary: if the behavior is faster than expected, it must wait after all.
+                if ripe - self._config.lead > now + EPSILON:
+                    self._wake(transition, ripe - self._config.lead)
+                else:
+                    self._grant(transition, may_pass)
+            return []
+        if may_pass is not None:
+            self._grant(transition, may_pass)
+        if missing:
+            return []
+        for member in members:
+            self._grant(transition, member)
+        begun = self._facts.begun
+        return [each.behavior for each in members if each.kind == "start" and each.behavior not in begun]
+
+    def _is_held(self, member: Member) -> bool:
+        return self._facts.is_held(member.behavior) and member.point not in self._facts.reached
+
+    def _is_there(self, member: Member) -> bool:
+        can_wait = member.can_wait or member.point in self._pauses
+        return member.point in self._facts.reached or (can_wait and member.point in self._facts.arrived)
+
+    def _decide_pause(self, transition: int, member: Member, due: Seconds, now: Seconds) -> None:
+        """Let an utterance through a word gap unless it would be noticeably early; it is told just before."""
+        arrival = self._foresight.arrival(member)
+        if arrival is None or (transition, member.behavior) in self._granted:
+            return
+        if arrival - self._config.gap > now + EPSILON:
+            self._wake(transition, arrival - self._config.gap)
+        elif due <= arrival + self._config.skew:
+            self._grant(transition, member)
+
+    def _grant(self, transition: int, member: Member) -> None:
+        if (transition, member.behavior) not in self._granted:
+            self._granted.add((transition, member.behavior))
+            self.touched.add(member.behavior)
+
+    def _wake(self, transition: int, at: Seconds) -> None:
+        heapq.heappush(self._wakes, (at, transition))
+
+    # -- how far -------------------------------------------------------------------------------------------------
+
+    def through(self, behavior: str) -> int:
+        """Number of the last point that the behavior was last told to go through; -1: it was told nothing yet."""
+        return self._through.get(behavior, -1)
+
+    def extend(self, behavior: str, now: Seconds) -> int:
+        """Number of the last point that the behavior may go through from now on; at least its start."""
+        points = self._plan.chains[behavior].points
+        known = furthest = self.through(behavior)
+        for number in range(known + 1, len(points)):
+            if not self.may_pass(points[number]):
+                break
+            furthest = number
+        if furthest > known:
+            self._through[behavior] = furthest
+            self.granted_at[behavior] = now
+        return max(0, furthest)
+
+    def may_pass(self, point: Point) -> bool:
+        """True if the behavior need not ask before it passes `point`."""
+        if point in self._facts.reached or not (self._net.part_of[point].can_wait or point in self._pauses):
+            return True
+        return (self._plan.at[point], point.behavior) in self._granted
+
+
+def _pauses(plan: Plan) -> frozenset[Point]:
+    """Word gaps at which an utterance waits, so as not to be too early."""
+    constrained = {place.target for place in plan.net.places if place.kind in ("order", "delay", "series")}
+    found: set[Point] = set()
+    for id, chain in plan.chains.items():
+        if isinstance(chain.behavior, Speech) and (estimate := plan.estimates.get(id)) is not None:
+            for phase in estimate.phases:
+                gap, at = Point(id, phase.to), plan.at.get(Point(id, phase.to), 0)
+                waits = at and plan.predicted(gap) - plan.predicted(Point(id, phase.since)) > phase.natural + EPSILON
+                if phase.hold and (waits or at in constrained or len(plan.members[at]) > 1):
+                    found.add(gap)
+    return frozenset(found)

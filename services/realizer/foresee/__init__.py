@@ -1,0 +1,1 @@
+"""Expected times of a running block: from what was measured, and from what others expect."""

@@ -1,0 +1,280 @@
+"""Foresight: expected times of a running block, from what was measured and what other blocks expect.
+
+It observes the net and says "not before"; who is released by a measured event need not ask it. So it may fall behind:
+what it is told waits until `update`.
+"""
+
+import heapq
+from collections.abc import Callable, Iterable, Mapping
+from typing import Any
+
+from engage_hri.schemas.units import Seconds
+from engage_hri.services.realizer.foresee.experience import Experience
+from engage_hri.services.realizer.foresee.forecast import Forecast, full_forecast, is_predictive
+from engage_hri.services.realizer.net.facts import Facts
+from engage_hri.services.realizer.net.running import RunningNet
+from engage_hri.services.realizer.plan.planner import Plan
+from engage_hri.services.realizer.plan.schedule import EPSILON
+from engage_hri.services.realizer.points import SHIFTS, Member, Point, performer
+
+SURPRISE: Seconds = 0.1
+"""Difference from the expected time, in seconds, from which predictions are computed again."""
+NOTICEABLE: Seconds = 0.02
+"""Seconds; planned instants that differ by less are not worth a message."""
+Pace = tuple[tuple[str, Seconds], ...]
+"""Sync points and their instants, by loop time, where the behavior's natural pace would miss them; else empty."""
+
+
+class Foresight:
+    """Expectations of a block. An observer of its net (see net/running.py).
+
+    paces: the pace that each behavior was last told. is_surprised: something has moved by `SURPRISE` since the last
+    call of `expected`. not_before: when a behavior that is overdue is expected at its next point. foreseen: expected
+    times of points of other blocks that this one is tied to. forecast: None if nothing in the block needs one.
+    """
+
+    forecast: Forecast | None
+
+    def __init__(self, plan: Plan, facts: Facts) -> None:
+        self.experience = Experience(plan.estimates)
+        self.paces: dict[str, Pace] = {}
+        self.not_before: dict[str, Seconds] = {}
+        self.foreseen: dict[Point, Seconds] = {}
+        self.is_surprised = False
+        self._facts = facts
+        self._followed: set[Point] = set()
+        """Points of this block that other blocks are tied to."""
+        self._expected = {point: facts.began + plan.predicted(point) for point in plan.at}
+
+    def look_ahead(self, plan: Plan, net: RunningNet) -> None:
+        """Begin a forecast of the plan, if it needs one. The net has yet to run."""
+        self.plan = plan
+        self._net = net
+        self.is_surprised = True
+        self._news: list[tuple[Any, ...]] = []
+        """What the forecast has yet to be told: a function, and its arguments."""
+        self._arrivals: list[tuple[Seconds, Seconds, str, int]] = []
+        """Behaviors and numbers of their next points: until when, and since when, each is expected there."""
+        self._minded: frozenset[str] = frozenset()
+        self.forecast = None
+        if is_predictive(plan) or self._followed:
+            self.forecast = forecast = Forecast(plan, self._facts.began, self.experience.factor, self.foreseen)
+            for point in self._followed & plan.at.keys():
+                forecast.require(plan.at[point])
+            bounded = forecast.bounded
+            self._minded = frozenset(member.behavior for transition in bounded for member in plan.members[transition])
+
+    def minds(self, transition: int) -> bool:
+        """True if it takes a forecast to say when `transition` is due: some behavior there may be held back."""
+        return bool(self._minded) and any(member.behavior in self._minded for member in self.plan.members[transition])
+
+    # -- what happens (see `Observer`) ---------------------------------------------------------------------------
+
+    def on_began(self, behavior: str, at: Seconds) -> None:
+        """Expect the points of a behavior that begins from now on."""
+        if (forecast := self.forecast) is not None and (chain := self.plan.chains.get(behavior)) is not None:
+            self._news.append((forecast.overdue, self.plan.at[chain.points[0]], at))
+            self._news += [(forecast.require, self.plan.at[point]) for point in chain.points]
+
+    def on_arrived(self, point: Point, at: Seconds) -> None:
+        if (forecast := self.forecast) is not None:
+            self._news.append((forecast.come, point.behavior, self.plan.at[point], at))
+
+    def on_reached(self, point: Point, at: Seconds) -> None:
+        if (forecast := self.forecast) is not None:
+            self._news.append((forecast.passed, point.behavior, self.plan.at[point], at))
+        if not self.is_surprised and point.behavior in self.plan.chains:
+            self.is_surprised = abs(at - self._expected.get(point, at)) > SURPRISE
+
+    def on_opened(self, transition: int) -> None:
+        if (forecast := self.forecast) is not None:
+            self._news.append((forecast.require, transition))
+
+    def on_fired(self, transition: int, at: Seconds) -> None:
+        if (forecast := self.forecast) is not None:
+            self._news.append((forecast.fix, transition, at))
+
+    # -- other blocks --------------------------------------------------------------------------------------------
+
+    def foresee(self, point: Point, at: Seconds) -> None:
+        """Note that the other block that has `point` expects it at `at` now."""
+        if point in self.plan.at and point not in self._facts.reached:
+            self.is_surprised = self.is_surprised or abs(at - self.foreseen.get(point, self._facts.began)) > SURPRISE
+            self.foreseen[point] = at
+            if (forecast := self.forecast) is not None:
+                self._news.append((forecast.foresee, self.plan.at[point], at))
+
+    def follow(self, points: Iterable[Point]) -> bool:
+        """Expect these points from now on, for other blocks (see `ahead`). False: look ahead again for that."""
+        self._followed.update(points)
+        if (forecast := self.forecast) is None:
+            return not self._followed
+        self._news += [(forecast.require, self.plan.at[each]) for each in self._followed & self.plan.at.keys()]
+        return True
+
+    @property
+    def ahead(self) -> Mapping[Point, Seconds]:
+        """Expected times of the points that other blocks are tied to and that are still to come."""
+        if not self._followed or self.forecast is None:
+            return {}
+        at, times = self.plan.at, self.forecast.times
+        reached = self._facts.reached
+        return {point: times[at[point]] for point in self._followed if point in at and point not in reached}
+
+    # -- behaviors under way -------------------------------------------------------------------------------------
+
+    def learn(self, point: Point, at: Seconds) -> None:
+        """Correct the estimates of the same parts by a phase that ends at `point`, unless it was hurried or held up.
+
+        The point is the next of its behavior, and not among the facts yet.
+        """
+        chain = self.plan.chains.get(point.behavior)
+        number = self._facts.next_number(point.behavior)
+        if chain is None or number == 0 or chain.points[number] != point or self.paces.get(point.behavior):
+            return
+        if performer(chain.behavior) == "body":
+            before, natural = chain.points[number - 1], chain.segments[number - 1].natural
+            if self.plan.predicted(point) - self.plan.predicted(before) < natural - EPSILON:
+                return  # it was to be cut short
+            changed = self.experience.learn(point.behavior, natural, at - self._facts.reached[before])
+            if self.forecast is not None and changed:
+                self._news.append((self.forecast.relearn, changed))
+
+    def expect_next(self, behavior: str) -> None:
+        """Note from when on the behavior is overdue at its next point."""
+        number, chain = self._facts.next_number(behavior), self.plan.chains.get(behavior)
+        if self.forecast is not None and chain is not None and 0 < number < len(chain.points):
+            self.not_before.pop(behavior, None)
+            self._news.append((self._await, behavior, number))
+
+    def _await(self, behavior: str, number: int) -> None:
+        if (before := self._facts.reached.get(self.plan.chains[behavior].points[number - 1])) is not None:
+            expected = before + self._phase(behavior, number)
+            heapq.heappush(self._arrivals, (expected, expected, behavior, number))
+
+    def catch_up(self) -> None:
+        """Tell the forecast what has happened."""
+        for function, *arguments in self._news:
+            function(*arguments)
+        self._news.clear()
+
+    def update(self, now: Seconds) -> Iterable[int]:
+        """Draw the conclusions of all that happened; returns the instants that are expected at another time now.
+
+        A behavior that is overdue by a second is expected a second from now.
+        """
+        if self.forecast is None:
+            return ()
+        self.catch_up()
+        facts = self._facts
+        while self._arrivals and self._arrivals[0][0] < now - EPSILON:
+            _, expected, behavior, number = heapq.heappop(self._arrivals)
+            chain = self.plan.chains.get(behavior)
+            if chain is None or facts.next_number(behavior) != number or facts.holds(chain.points[number]):
+                continue
+            expected = max(expected, self.asked(chain.points[number], expected))
+            until = expected
+            if expected < now - EPSILON:  # and not slower on purpose
+                until = self.not_before[behavior] = now + (now - expected)
+                self.forecast.overdue(self.plan.at[chain.points[number]], until)
+            heapq.heappush(self._arrivals, (until, expected, behavior, number))
+        return self.forecast.update()
+
+    @property
+    def next_check(self) -> Seconds | None:
+        """Next time to look for delays that only other blocks depend on; None: there is no need."""
+        while self._arrivals and self._facts.next_number(self._arrivals[0][2]) != self._arrivals[0][3]:
+            heapq.heappop(self._arrivals)  # The behavior has arrived there.
+        return self._arrivals[0][0] + SURPRISE if self._followed and self._arrivals else None
+
+    def asked(self, point: Point, natural: Seconds) -> Seconds:
+        """Time at which the behavior was told to be at `point`; `natural` if it was told none."""
+        return dict(self.paces.get(point.behavior, ())).get(point.sync, natural)
+
+    def due(self, transition: int, ripe: Seconds) -> Seconds:
+        """Time at which an instant is due, no earlier than all that it waits for is `ripe`."""
+        return ripe if self.forecast is None else max(ripe, self.forecast.times[transition])
+
+    def arrival(self, member: Member) -> Seconds | None:
+        """Expected time at which a behavior comes to its hold point; None if it has not begun."""
+        points, number = self.plan.chains[member.behavior].points, self._facts.next_number(member.behavior)
+        if not number:
+            return None
+        at = self._facts.reached[points[number - 1]]
+        for each in range(number, points.index(member.point) + 1):
+            at += self._phase(member.behavior, each)
+            if each == number:
+                at = max(at, self.not_before.get(member.behavior, at))
+        return at
+
+    def _phase(self, behavior: str, number: int) -> Seconds:
+        """Expected seconds from the point before to the point of that number."""
+        chain = self.plan.chains[behavior]
+        if self.forecast is None:
+            return chain.segments[number - 1].natural * self.experience.factor(behavior)
+        before, here = (self.plan.at[point] for point in chain.points[number - 1 : number + 1])
+        return 0.0 if before == here else self.forecast.phase(behavior, here)
+
+    def pace(self, behavior: str, now: Seconds, may_pass: Callable[[Point], bool]) -> Pace:
+        """Instants for the behavior's points up to the next where it must ask; empty if it comes to them anyway."""
+        forecast, plan, facts = self.forecast, self.plan, self._facts
+        if forecast is None or behavior not in plan.chains:
+            return ()
+        points, segments = plan.chains[behavior].points, plan.chains[behavior].segments
+        is_moving = (
+            plan.chains[behavior].type not in SHIFTS
+        )  # a shift beneath a look takes no time
+        number = facts.next_number(behavior)
+        at = facts.reached[points[number - 1]] if number else now
+        is_paced = forecast.is_hurried(behavior)
+        planned: list[tuple[str, Seconds]] = []
+        before = plan.at[points[number - 1]] if number else -1
+        for index, point in enumerate(points[number:], start=number):
+            here = plan.at[point]
+            if here != before:
+                if is_moving and index and forecast.phase(behavior, here) == 0.0 < segments[index - 1].natural:
+                    break  # another takes its part before this point: it need not hurry there
+                natural, latest = at + forecast.phase(behavior, here), at + forecast.longest(behavior, here)
+                if point is points[number] and not self.paces.get(behavior):
+                    natural = max(natural, self.not_before.get(behavior, natural))  # overdue, not slower on purpose
+                at = max(natural, now) if facts.holds(point) else natural
+                if forecast.times[here] > natural + NOTICEABLE and self._net.part_of[point].kind == "passive":
+                    at = max(natural, min(forecast.times[here], latest))
+                    is_paced = is_paced or at > natural + NOTICEABLE
+            before = here
+            planned.append((point.sync, at))
+            if not may_pass(point):
+                break
+        return tuple(planned) if is_paced else ()
+
+    # -- expected times ------------------------------------------------------------------------------------------
+
+    def expected(self, now: Seconds) -> dict[Point, Seconds]:
+        """Expected times of all points of the block that are still to come, in seconds from the block's start."""
+        forecast = self.from_scratch()
+        for transition in range(len(self.plan.members)):
+            forecast.overdue(transition, now)
+        forecast.update()
+        points = {point for chain in self.plan.chains.values() for point in chain.points}
+        coming = points - self._facts.reached.keys()
+        self._expected |= {point: max(now, forecast.times[self.plan.at[point]]) for point in coming}
+        self.is_surprised = False
+        return {point: self._expected[point] - self._facts.began for point in coming}
+
+    def times(self) -> dict[Point, Seconds]:
+        """Time of each point of the plan, measured or expected, by the clock of the loop."""
+        forecast, reached = self.from_scratch(), self._facts.reached
+        return {point: reached.get(point, forecast.times[at]) for point, at in self.plan.at.items()}
+
+    def from_scratch(self) -> Forecast:
+        """A forecast of all instants; for those that the kept forecast has, it says the same."""
+        facts = (self.foreseen, self._facts.reached, self._facts.arrived, self._net.instants)
+        return full_forecast(self.plan, self._facts.began, self.experience.factor, *facts)
+
+
+def differ_noticeably(one: Pace, other: Pace) -> bool:
+    """True if `other` has a new point, or moves one by more than NOTICEABLE, or if only one of the two is empty."""
+    if not one or not other:
+        return one != other
+    before = dict(one)
+    return any(sync not in before or abs(before[sync] - at) > NOTICEABLE for sync, at in other)

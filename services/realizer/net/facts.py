@@ -1,0 +1,132 @@
+"""Facts of a running block: what has been measured so far, and what follows from that alone.
+
+Bodies report late, twice, out of order, and about what was never asked of them. Such a report is no fact, and
+changes nothing.
+"""
+
+from collections.abc import Collection, Mapping
+from math import isfinite
+
+from engage_hri.schemas.units import Seconds
+from engage_hri.services.realizer.net.running import RunningNet
+from engage_hri.services.realizer.points import Point
+
+
+class Facts:
+    """Measured times, by the clock of the loop. They outlive the net: another plan of the block starts from them.
+
+    began: when the block started. begun: when each behavior was told to begin. reached, arrived: when each point was
+    passed, and held at. held: behaviors that are to wait where they next can (`hold`); None: all of them.
+    """
+
+    def __init__(self, began: Seconds) -> None:
+        self.began = began
+        self.reached: dict[Point, Seconds] = {}
+        self.arrived: dict[Point, Seconds] = {}
+        self.begun: dict[str, Seconds] = {}
+        self._next: dict[str, int] = {}
+        """For each behavior, the number of its points that are reached."""
+        self._heard: dict[str, Seconds] = {}
+        """Time of the latest report of each behavior."""
+        self.held: Collection[str] | None = ()
+        self._holds: list[tuple[Seconds, Collection[str] | None]] = []
+        """The times at which other behaviors were held than before, and which."""
+
+    def adopt(self, net: RunningNet, points: Mapping[str, tuple[Point, ...]]) -> None:
+        """Let `net` run from its start to where these facts bring it. points: of each behavior, in order."""
+        self._net = net
+        self._points = points
+        net.start(self.began)
+        for behavior, at in self.begun.items():
+            net.begin(behavior, at)
+        for point, at in self.reached.items():
+            net.reach(point, at)
+        for point in self.arrived.keys() - self.reached.keys():
+            net.arrive(point, self.arrived[point])
+
+    # -- what is measured ----------------------------------------------------------------------------------------
+
+    def begin(self, behavior: str, at: Seconds) -> None:
+        """Note that a behavior was told to begin."""
+        self.begun[behavior] = at
+        self._net.begin(behavior, at)
+
+    def arrive(self, point: Point, at: Seconds) -> None:
+        """Note that the behavior holds at `point`, which is ahead of it."""
+        self.arrived[point] = self._heard[point.behavior] = at = self.bounded(point, at)
+        self._net.arrive(point, at)
+
+    def reach(self, point: Point, at: Seconds) -> tuple[Point, ...]:
+        """Note that the behavior has passed `point`, which is ahead of it, and earlier ones that were not reported.
+
+        Returns these points.
+        """
+        points, known = self._points[point.behavior], self.next_number(point.behavior)
+        news = points[known : points.index(point, known) + 1]
+        self._heard[point.behavior] = at = self.bounded(point, at)
+        self._next[point.behavior] = known + len(news)
+        self.reached.update(dict.fromkeys(news, at))
+        for each in news:
+            self._net.reach(each, at)
+        return news
+
+    def hear(self, point: Point, at: Seconds) -> None:
+        """Note that a point of another block is reached."""
+        if isfinite(at) and point not in self.reached:
+            self.reached[point] = at
+            self._net.reach(point, at)
+
+    def hold(self, behaviors: Collection[str] | None, now: Seconds) -> None:
+        """Note that these behaviors, and no others, are held from now on. None: all of them."""
+        self.held = behaviors
+        self._holds.append((now, behaviors))
+
+    def plausible(self, point: Point, at: Seconds, now: Seconds) -> Seconds:
+        """`at`, but no later than now, and no earlier than the behavior's last report: clocks differ, bodies err."""
+        return self.bounded(point, min(at, now) if isfinite(at) else now)
+
+    def bounded(self, point: Point, at: Seconds) -> Seconds:
+        """`at`, but no earlier than the last report of the behavior, and its beginning."""
+        return max(at, self._heard.get(point.behavior, at), self.begun.get(point.behavior, at))
+
+    def is_ahead(self, point: Point) -> bool:
+        """True if the behavior has begun, and has not passed `point` yet."""
+        if point.behavior not in self.begun or point in self.reached:
+            return False
+        return point in self._points.get(point.behavior, ())
+
+    # -- what follows --------------------------------------------------------------------------------------------
+
+    def has_ended(self, behavior: str) -> bool:
+        """True if the behavior has passed all its points, or is not in the block any more."""
+        points = self._points.get(behavior)
+        return points is None or points[-1] in self.reached
+
+    def next_number(self, behavior: str) -> int:
+        """Number of points of the behavior that are reached."""
+        return self._next.get(behavior, 0)
+
+    def holds(self, point: Point) -> bool:
+        """True if the behavior has arrived at the instant of `point`.
+
+        A gaze holds at `relax`, and its `stroke_end` is the same instant.
+        """
+        return self._net.part_of[point].point in self.arrived
+
+    @property
+    def is_holding(self) -> bool:
+        """True if any behavior is held."""
+        return self.held is None or bool(self.held)
+
+    def is_held(self, behavior: str) -> bool:
+        """True if the behavior is to wait where it next can."""
+        return self.held is None or behavior in self.held
+
+    def held_between(self, since: Seconds, until: Seconds, behavior: str = "") -> Seconds:
+        """Seconds between these times in which the behavior was held; empty: in which any was."""
+        ends = [at for at, _ in self._holds[1:]] + [until]
+        return sum(
+            max(0.0, min(end, until) - max(at, since))
+            for (at, held), end in zip(self._holds, ends, strict=False)
+            if held is None or (behavior in held if behavior else held)
+        )

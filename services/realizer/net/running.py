@@ -1,0 +1,303 @@
+"""Net of a block while it runs: where its tokens are, and which transitions have fired, and when.
+
+Reports of a body move the tokens. A behavior's own token goes from phase to phase as the behavior passes its sync
+points, by itself: a word or a stroke cannot wait for the others of its instant. A transition fires once all its
+behaviors have passed it and every other place before it holds a ripe token. So its time is that of the last of them,
+and the time between the first and the last is its skew. The last transition, the end of the block, fires once all
+others have that lead to it.
+
+A token in a place with a delay is ripe so many seconds after its transition fired, as measured. A token in a phase is
+ripe when the behavior holds at the end of the phase. A `handover` place is not waited for: a behavior that was early
+has gone home by itself, and a token that comes too late is taken at once.
+"""
+
+from collections.abc import Collection, Mapping, Sequence
+from math import inf
+from typing import Protocol
+
+from engage_hri.schemas.units import Seconds
+from engage_hri.services.realizer.net.clocks import Clocks
+from engage_hri.services.realizer.net.petri_net import Marking, PetriNet
+from engage_hri.services.realizer.points import Member, Point
+
+EMPTY, TOKEN, RIPE = 0, 1, 2
+"""Contents of a place."""
+EPSILON: Seconds = 1e-6
+"""Seconds; instants that differ by less are one."""
+
+
+class Observer(Protocol):
+    """A part of the realizer that is told what happens in a running net, as it happens."""
+
+    def on_began(self, behavior: str, at: Seconds) -> None:
+        """Take the news that a behavior was told to begin: it is on its way to all its points."""
+
+    def on_arrived(self, point: Point, at: Seconds) -> None:
+        """Take the news that a behavior holds at `point`."""
+
+    def on_reached(self, point: Point, at: Seconds) -> None:
+        """Take the news that a behavior has passed `point`, or that a point of another block has been reached."""
+
+    def on_opened(self, transition: int) -> None:
+        """Take the news that nothing but behaviors on their way, and clocks, is missing at `transition`."""
+
+    def on_fired(self, transition: int, at: Seconds) -> None:
+        """Take the news that `transition` has fired."""
+
+
+class RunningNet:
+    """A marking that runs, from the initial one to the initial one.
+
+    members: for each transition, the behaviors' parts in it. at: the transition of each point. observers: told of
+    everything, in this order. instants: the time at which each transition fired. passed: the time at which the last
+    of its behaviors passed it, which may be before it fires. end: the transition that ends the block.
+    """
+
+    def __init__(
+        self,
+        net: PetriNet,
+        members: Sequence[Sequence[Member]],
+        at: Mapping[Point, int],
+        observers: Sequence[Observer] = (),
+    ) -> None:
+        size = len(net.transitions)
+        self.net = net
+        self.instants: dict[int, Seconds] = {}
+        self.passed: dict[int, Seconds] = {}
+        self.at = at
+        self._members = members
+        self.observers = tuple(observers)
+        self._tokens = bytearray(RIPE * count for count in net.initial)
+        self._before: dict[int, int] = {}
+        """Places whose token was put or taken since `changes` was asked last, with what was there then."""
+        self._clocks = Clocks()
+        self._held: Collection[str] | None = ()
+        """Behaviors whose clocks are stopped; None: all clocks are."""
+        self._latest = [-inf] * size
+        """For each transition, the time at which the latest behavior passed it."""
+        self._since = [-inf] * size
+        """For each transition, the time at which the last came of what has come there."""
+        self._ripe = [-inf] * size
+        """For each transition, the time at which the tokens that lie before it are ripe, or were."""
+        self._firing: list[tuple[int, Seconds]] = []
+        """Transitions that fire now, the first is at it."""
+        self._into: dict[tuple[str, int], int] = {}
+        self._out_of: dict[tuple[str, int], int] = {}
+        """The phases of each behavior, by the transitions at their ends."""
+        self._inputs: list[list[int]] = [[] for _ in range(size)]
+        self._outputs: list[list[int]] = [[] for _ in range(size)]
+        """Places before and behind each transition, apart from phases."""
+        self._absent = [len(each) for each in members]
+        """For each transition, the number of behaviors that have not passed it."""
+        self._lacking = [0] * size
+        """For each transition, the places before it without a token, and the behaviors that have yet to begin."""
+        self._missing = [len(each) for each in members]
+        """For each transition, the behaviors that have not passed it, and places before it without a ripe token."""
+        for number, place in enumerate(net.places):
+            if place.kind == "phase":
+                self._into[place.behavior, place.target] = self._out_of[place.behavior, place.source] = number
+                continue
+            self._inputs[place.target].append(number)
+            self._outputs[place.source].append(number)
+            if place.kind not in ("handover", "idle"):
+                self._lacking[place.target] += 1
+                self._missing[place.target] += 1
+        self._stations: dict[str, list[int]] = {}
+        """For each behavior, the transitions that it comes to later than with its start."""
+        for transition, group in enumerate(members):
+            for member in group:
+                if member.kind != "start" and ":" not in member.behavior:
+                    self._stations.setdefault(member.behavior, []).append(transition)
+                    self._lacking[transition] += 1
+        parts = {(each.behavior, number): each for number, group in enumerate(members) for each in group}
+        self.part_of: Mapping[Point, Member] = {
+            point: parts[point.behavior, number] for point, number in at.items() if (point.behavior, number) in parts
+        }
+        """For each point, the part that its behavior has in the point's instant."""
+        self.end = size - 1
+        self._before_end = self._leading_to_end()
+        self._lacking[self.end] = self._missing[self.end] = len(self._before_end)
+
+    def _leading_to_end(self) -> set[int]:
+        """The transitions that the end of the block waits for: all but ends of events that may outlast it."""
+        sources: list[list[int]] = [[] for _ in self.net.transitions]
+        for place in self.net.places:
+            if place.kind != "idle":
+                sources[place.target].append(place.source)
+        found: set[int] = set()
+        todo = [self.end]
+        while todo:
+            for source in sources[todo.pop()]:
+                if source not in found:
+                    found.add(source)
+                    todo.append(source)
+        return found
+
+    # -- questions -----------------------------------------------------------------------------------------------
+
+    @property
+    def marking(self) -> Marking:
+        """Tokens in each place of the net, ripe or not."""
+        return bytes(each != EMPTY for each in self._tokens)
+
+    def changes(self) -> tuple[tuple[int, ...], tuple[int, ...]]:
+        """Places that have a token now and had none, and that had one and have none, since this was asked last."""
+        before, self._before = self._before, {}
+        put = [place for place, content in before.items() if not content and self._tokens[place]]
+        taken = [place for place, content in before.items() if content and not self._tokens[place]]
+        return tuple(sorted(put)), tuple(sorted(taken))
+
+    @property
+    def is_over(self) -> bool:
+        """True if the end of the block has fired."""
+        return self.end in self.instants
+
+    def is_open(self, transition: int) -> bool:
+        """True if nothing but behaviors on their way, and clocks, is missing at a transition that has not fired.
+
+        The start of the block is open for the behaviors that begin with it, though it has fired.
+        """
+        return not self._lacking[transition] and (not transition or transition not in self.instants)
+
+    def ripe_at(self, transition: int) -> Seconds:
+        """Time at which the tokens that other transitions have put before `transition` are ripe.
+
+        -inf: there are none. inf: a clock is stopped.
+        """
+        stopped = self._clocks.stopped
+        if stopped and any(place in stopped for place in self._inputs[transition]):
+            return inf
+        return self._ripe[transition]
+
+    @property
+    def next_ripe(self) -> Seconds | None:
+        """Time at which to call `tick` even if nothing is reported until then; None: there is no need."""
+        return self._clocks.next
+
+    # -- what moves tokens ---------------------------------------------------------------------------------------
+
+    def start(self, at: Seconds) -> None:
+        """Fire the start of the block."""
+        self.passed[0] = at
+        self._fire(0, at)
+
+    def begin(self, behavior: str, at: Seconds) -> None:
+        """Note that a behavior was told to begin."""
+        for observer in self.observers:
+            observer.on_began(behavior, at)
+        for transition in self._stations.get(behavior, ()):
+            self._lack_less(transition)
+
+    def arrive(self, point: Point, at: Seconds) -> None:
+        """Note that a behavior holds at `point`, which ends a phase."""
+        if (transition := self.at.get(point)) is None:
+            return
+        if (place := self._into.get((point.behavior, transition))) is not None and self._tokens[place]:
+            self._set(place, RIPE)
+        for observer in self.observers:
+            observer.on_arrived(point, at)
+
+    def reach(self, point: Point, at: Seconds) -> None:
+        """Move the token of a behavior that has passed `point`, and fire what has everything then."""
+        if (transition := self.at.get(point)) is None:
+            return
+        for observer in self.observers:
+            observer.on_reached(point, at)
+        if self.part_of[point].point == point:
+            here = (point.behavior, transition)
+            if (place := self._into.get(here)) is not None:
+                self._set(place, EMPTY)
+            if (place := self._out_of.get(here)) is not None:
+                self._set(place, TOKEN)
+            self._latest[transition] = max(self._latest[transition], at)
+            self._absent[transition] -= 1
+            if not self._absent[transition]:
+                self.passed[transition] = self._latest[transition]
+            self._miss_less(transition, at)
+
+    def tick(self, now: Seconds) -> None:
+        """Let the tokens ripen that are due by `now`."""
+        while (ripe := self._clocks.ripe(now + EPSILON)) is not None:
+            self._ripen(*ripe)
+
+    def hold(self, behaviors: Collection[str] | None, now: Seconds) -> None:
+        """Stop the clocks before the transitions of these behaviors (None: all), and let all others go on."""
+        self._held = behaviors
+        for place, at in self._clocks.stop(self._is_held, now).items():
+            target = self.net.places[place].target
+            self._ripe[target] = max(self._ripe[target], at)
+
+    def _is_held(self, place: int) -> bool:
+        held = self._held
+        return held is None or any(each.behavior in held for each in self._members[self.net.places[place].target])
+
+    def _set(self, place: int, content: int) -> None:
+        self._before.setdefault(place, self._tokens[place])
+        self._tokens[place] = content
+
+    def _lack_less(self, transition: int) -> None:
+        self._lacking[transition] -= 1
+        if not self._lacking[transition]:
+            for observer in self.observers:
+                observer.on_opened(transition)
+
+    def _miss_less(self, transition: int, at: Seconds) -> None:
+        """Note that something has come to `transition`; fire it, and all that follows, if that was the last."""
+        self._since[transition] = max(self._since[transition], at)
+        self._missing[transition] -= 1
+        if not self._missing[transition] and transition not in self.instants:
+            self._fire(transition, self._since[transition])
+
+    def _fire(self, transition: int, at: Seconds) -> None:
+        self._firing.append((transition, at))
+        if len(self._firing) == 1:  # Otherwise the call that is going on fires it: chains are longer than stacks.
+            for here, then in self._firing:
+                self._fire_one(here, then)
+            self._firing.clear()
+
+    def _fire_one(self, transition: int, at: Seconds) -> None:
+        self.instants[transition] = at
+        for place in self._inputs[transition]:
+            self._set(place, EMPTY)
+        for observer in self.observers:
+            observer.on_fired(transition, at)
+        for place in self._outputs[transition]:
+            self._put(place, at)
+        if transition in self._before_end:
+            self._miss_less(self.end, at)
+
+    def _put(self, number: int, at: Seconds) -> None:
+        """Put a token into a place, at the time of the transition before it."""
+        place = self.net.places[number]
+        target = place.target
+        if target in self.instants and place.kind != "idle":
+            return  # Only where the target does not wait for it.
+        self._set(number, TOKEN if place.lag > 0.0 else RIPE)
+        if place.kind in ("handover", "idle") or target == self.end:
+            return
+        self._ripe[target] = max(self._ripe[target], at + place.lag)
+        if place.lag > 0.0:
+            self._clocks.set(number, at + place.lag, at, is_stopped=self._is_held(number))
+        self._lack_less(target)
+        if place.lag <= 0.0:
+            self._miss_less(target, at)
+
+    def _ripen(self, number: int, at: Seconds) -> None:
+        self._set(number, RIPE)
+        self._miss_less(self.net.places[number].target, at)
+
+    def let_go(self) -> None:
+        """Let events go that outlast the block: recognition follows them. For a block that is over."""
+        left = [each for each, place in enumerate(self.net.places) if place.kind == "idle" and not self._tokens[each]]
+        outlasting = {self.net.places[each].behavior for each in left}
+        for number in left:
+            self._set(number, RIPE)
+        for (behavior, _), number in self._into.items():
+            if behavior in outlasting:
+                self._set(number, EMPTY)
+
+    def clear(self) -> None:
+        """Take all tokens away: the block has failed or was interrupted."""
+        for place, content in enumerate(self._tokens):
+            if content:
+                self._set(place, EMPTY)

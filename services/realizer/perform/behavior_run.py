@@ -1,0 +1,188 @@
+"""One behavior of a live block: an asyncio task that awaits its sync points, and talks to what performs it."""
+
+import asyncio
+from typing import Protocol
+
+from engage_hri.schemas.behavior_types import sync_points
+from engage_hri.schemas.behaviors import BlockBehavior, Event, TurnSignal, Wait
+from engage_hri.schemas.body import BehaviorOutcome, SyncPointArrived, SyncPointReached
+from engage_hri.schemas.faults import EngageError, Fault
+from engage_hri.schemas.feedback import WarningKind
+from engage_hri.schemas.units import Seconds
+from engage_hri.services.bus.interface import Bus
+from engage_hri.services.realizer.decide.decisions import Decisions
+from engage_hri.services.realizer.decide.effects import Begin, Extend
+from engage_hri.services.realizer.perform.control_link import ControlLink
+from engage_hri.services.realizer.perform.futures import SyncPointFutures
+from engage_hri.services.realizer.perform.handed_over import has_lost_nothing, loss
+from engage_hri.services.realizer.perform.recognition_link import RecognitionLink
+from engage_hri.services.realizer.perform.spoken import Spoken
+from engage_hri.services.realizer.plan.planner import Plan
+from engage_hri.services.realizer.plan.schedule import EPSILON
+from engage_hri.services.realizer.points import Point, performer
+from engage_hri.services.requests.ends import NeverEnded, Pending, RequestRefused
+
+
+class Performing(Protocol):
+    """The block, as the runs of its behaviors see it."""
+
+    plan: Plan
+    decisions: Decisions
+    bus: Bus
+    body: ControlLink
+    recognition: RecognitionLink
+    futures: SyncPointFutures
+    spoken: Spoken
+
+    def route(self, id: str) -> None:
+        """Send reports about this request here."""
+
+    def arrive(self, point: Point, at: Seconds) -> None:
+        """Take the news that a behavior holds at `point`."""
+
+    def reach(self, point: Point, at: Seconds, *, arrived: Seconds | None = None, by_body: bool = False) -> None:
+        """Take the news that a behavior has passed `point`."""
+
+    def lose(self, id: str, fault: Fault, kind: WarningKind = "EXECUTION_FAILURE", *, at_rest: bool = False) -> None:
+        """Drop a behavior that cannot be finished. at_rest: its parts rest."""
+
+    def lose_body(self, fault: Fault) -> None:
+        """End the block: what performs it is gone."""
+
+
+class BehaviorRun:
+    """Performance of one behavior.
+
+    behavior: as it was begun (a later plan may have chosen another hand); None before. asked: the last command to it.
+    pending: the request to what performs it.
+    """
+
+    def __init__(self, block: Performing, id: str) -> None:
+        self.id = id
+        self.behavior: BlockBehavior | None = None
+        self.pending: Pending | None = None
+        self._block = block
+        self._asked: Begin | Extend | None = None
+        self._hold_changed: asyncio.Future[None] | None = None
+
+    @property
+    def is_by_body(self) -> bool:
+        """True if the body performs it: it has begun."""
+        return self.behavior is not None and performer(self.behavior) == "body"
+
+    def command(self, asked: Begin | Extend) -> None:
+        """Let it begin, or go on as far as is asked."""
+        self._asked = asked
+        if asked.through == "end" and isinstance(self._block.plan.chains[self.id].behavior, Wait):
+            self._block.futures.grant(Point(self.id, "end"))
+        if isinstance(asked, Begin):
+            self._block.futures.grant(Point(self.id, "start"))
+        elif self._hold_changed is not None and not self._hold_changed.done():
+            self._hold_changed.set_result(None)
+        elif self.is_by_body and self.pending is not None:
+            self._send()
+
+    def feed(self, message: SyncPointArrived | SyncPointReached) -> None:
+        """Take a report of the body."""
+        block, point = self._block, Point(self.id, message.sync)
+        if self.pending is None or self.pending.request.id != message.id or self.pending.outcome.done():
+            return
+        facts, bus = block.decisions.facts, block.bus
+        at = facts.plausible(point, bus.local(message.at), bus.now())
+        if isinstance(message, SyncPointArrived):
+            block.arrive(point, at)
+        else:
+            arrived = facts.plausible(point, bus.local(message.arrived), at)
+            block.reach(point, at, arrived=arrived, by_body=True)
+
+    async def perform(self) -> None:
+        """Wait until it may begin, and perform it to its end."""
+        block = self._block
+        await block.futures.granted(Point(self.id, "start"))
+        behavior = self.behavior = block.decisions.plan.chains[self.id].behavior
+        match behavior:
+            case Wait(duration=duration):
+                await self._wait(duration or 0.0)
+            case Event():
+                await self._event(behavior)
+            case TurnSignal():
+                block.recognition.signal(block.body.id(self.id), block.plan.block.id, behavior)
+                self._at_once()
+            case _ if performer(behavior) == "clock":
+                self._at_once()
+            case _:
+                await self._by_body(behavior)
+
+    def _send(self) -> Pending:
+        assert self.behavior is not None
+        assert self._asked is not None
+        self.pending = self._block.body.perform(self.behavior, self._asked)
+        return self.pending
+
+    async def _by_body(self, behavior: BlockBehavior) -> None:
+        block = self._block
+        block.route(block.body.id(self.id))
+        try:
+            outcome = await self._send().outcome
+        except (RequestRefused, NeverEnded) as error:
+            refused = isinstance(error, RequestRefused)
+            block.lose(self.id, error.fault, "CANNOT_CREATE_BEHAVIOR" if refused else "EXECUTION_FAILURE")
+            return
+        except EngageError as error:
+            self.pending = None
+            block.lose_body(Fault(reason=error.fault.reason, where=block.plan.block.id))
+            return
+        if not isinstance(outcome, BehaviorOutcome):
+            block.lose(self.id, Fault(reason=f"control ended it with a {type(outcome).__name__}"))
+            return
+        block.spoken.end(outcome)
+        facts, end = block.decisions.facts, Point(self.id, sync_points(behavior)[-1])
+        at = facts.plausible(end, block.bus.local(outcome.at), block.bus.now())
+        if outcome.status == "taken_over":  # its last report may be lost
+            block.reach(Point(self.id, outcome.passed), at, by_body=True)
+        if has_lost_nothing(block.decisions.plan, outcome, facts.reached):
+            block.reach(end, at, by_body=outcome.status == "done")
+        else:
+            block.lose(self.id, loss(outcome), at_rest=outcome.status != "failed")
+
+    def _at_once(self) -> None:
+        now = self._block.bus.now()
+        self._block.reach(Point(self.id, "start"), now)
+        self._block.reach(Point(self.id, "end"), now)
+
+    async def _wait(self, duration: Seconds) -> None:
+        block, end = self._block, Point(self.id, "end")
+        began = block.bus.now()
+        block.reach(Point(self.id, "start"), began)
+        if duration:
+            await self._time(began, duration)
+        arrived = block.bus.now()
+        block.arrive(end, arrived)
+        await block.futures.granted(end)
+        block.reach(end, block.bus.now(), arrived=arrived)
+
+    async def _time(self, began: Seconds, duration: Seconds) -> None:
+        """Wait for so long, not counting the time in which the behavior is held."""
+        facts, bus = self._block.decisions.facts, self._block.bus
+        while True:
+            left = began + duration + facts.held_between(began, bus.now(), self.id) - bus.now()
+            if left <= EPSILON:
+                return
+            self._hold_changed = asyncio.get_running_loop().create_future()
+            await asyncio.wait([self._hold_changed], timeout=None if facts.is_held(self.id) else left)
+
+    async def _event(self, event: Event) -> None:
+        block = self._block
+        began = block.bus.now()
+        block.reach(Point(event.id, "start"), began)
+        pending = block.recognition.ask(block.body.id(event.id), block.plan.block.id, event, began)
+        if pending is not None:
+            self.pending = pending
+        try:
+            reached = block.decisions.facts.reached
+            decision = await block.recognition.decision(event, block.plan.block, pending, reached)
+        except RequestRefused as error:
+            block.lose(event.id, error.fault, kind="CANNOT_CREATE_BEHAVIOR")
+        else:
+            end = Point(event.id, "end")
+            block.reach(end, max(began, decision.at), by_body=decision.by_recognition)

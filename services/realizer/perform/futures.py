@@ -1,0 +1,85 @@
+"""Futures of one block, which its running net resolves: one for each sync point and each instant that is awaited."""
+
+import asyncio
+from typing import Any, TypeVar
+
+from engage_hri.schemas.units import Seconds
+from engage_hri.services.realizer.net.running import RunningNet
+from engage_hri.services.realizer.points import FINISH, Point
+
+T = TypeVar("T")
+
+
+class SyncPointFutures:
+    """Futures by sync point, each made when first awaited. They outlive the net. An observer (see net/running.py)."""
+
+    def __init__(self) -> None:
+        self._granted: dict[Point, asyncio.Future[None]] = {}
+        self._reached: dict[Point, asyncio.Future[Seconds]] = {}
+        self._fired: dict[Point, asyncio.Future[Seconds]] = {}
+
+    def adopt(self, net: RunningNet) -> "SyncPointFutures":
+        """Observe another net of the same block from now on."""
+        self._net = net
+        for transition in net.instants if self._fired else ():
+            self.on_fired(transition, net.instants[transition])
+        return self
+
+    def granted(self, point: Point) -> "asyncio.Future[None]":
+        """Resolved when the behavior may pass `point`; of its start: when it is to begin."""
+        return _future(self._granted, point)
+
+    def reached(self, point: Point) -> "asyncio.Future[Seconds]":
+        """Resolved when `point` is reached, with the time. For points that are still to come."""
+        return _future(self._reached, point)
+
+    def fired(self, point: Point) -> "asyncio.Future[Seconds]":
+        """Resolved when the transition of `point` fires, with the time. `FINISH`: when the block is over."""
+        future = _future(self._fired, point)
+        transition = self._net.end if point == FINISH else self._net.at[point]
+        if transition in self._net.instants:
+            _resolve(self._fired, point, self._net.instants[transition])
+        return future
+
+    def grant(self, point: Point) -> None:
+        """Let the behavior pass `point`."""
+        if not (future := self.granted(point)).done():  # done: its task was cancelled
+            future.set_result(None)
+
+    def cancel(self) -> None:
+        """Cancel all that is still awaited: the block has ended."""
+        futures: list[asyncio.Future[Any]] = [
+            *self._granted.values(), *self._reached.values(), *self._fired.values()
+        ]  # fmt: skip
+        for future in futures:
+            future.cancel()
+
+    # -- what happens (see `Observer`) ---------------------------------------------------------------------------
+
+    def on_began(self, behavior: str, at: Seconds) -> None:
+        """Nothing: its points are still to come."""
+
+    def on_arrived(self, point: Point, at: Seconds) -> None:
+        """Nothing: it has not passed."""
+
+    def on_opened(self, transition: int) -> None:
+        """Nothing: it has not fired."""
+
+    def on_reached(self, point: Point, at: Seconds) -> None:
+        _resolve(self._reached, point, at)
+
+    def on_fired(self, transition: int, at: Seconds) -> None:
+        if self._fired:
+            for point in self._net.net.transitions[transition].points or (FINISH,):
+                _resolve(self._fired, point, at)
+
+
+def _future(futures: dict[Point, "asyncio.Future[T]"], point: Point) -> "asyncio.Future[T]":
+    if (future := futures.get(point)) is None:
+        future = futures[point] = asyncio.get_running_loop().create_future()
+    return future
+
+
+def _resolve(futures: dict[Point, "asyncio.Future[Seconds]"], point: Point, at: Seconds) -> None:
+    if (future := futures.get(point)) is not None and not future.done():
+        future.set_result(at)

@@ -1,0 +1,27 @@
+"""Behaviors that the body has ended before their end: handed over, with all that matters done, or lost. Pure."""
+
+from collections.abc import Container
+
+from engage_hri.schemas.body import BehaviorOutcome
+from engage_hri.schemas.faults import Fault
+from engage_hri.services.realizer.plan.planner import Plan
+from engage_hri.services.realizer.points import Point
+
+
+def has_lost_nothing(plan: Plan, outcome: BehaviorOutcome, reached: Container[Point]) -> bool:
+    """True if a behavior is done, or was taken over when it had nothing left to do but its way home.
+
+    reached: points that were measured.
+    """
+    id = outcome.behavior
+    if outcome.status != "taken_over" or id not in plan.kept:
+        return outcome.status == "done"
+    points = plan.chains[id].points
+    return all(point in reached for point in points[: points.index(plan.kept[id]) + 1])
+
+
+def loss(outcome: BehaviorOutcome) -> Fault:
+    """Reason why a behavior has not come to its end."""
+    if outcome.status == "taken_over":
+        return Fault(reason=f"another behavior took its part after {outcome.passed or 'nothing of it'}")
+    return outcome.fault or Fault(reason=f"the body {outcome.status} it")

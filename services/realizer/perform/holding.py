@@ -1,0 +1,41 @@
+"""Holds that are in force: on the whole robot, on blocks, on behaviors."""
+
+from engage_hri.schemas.units import Seconds
+
+Held = tuple[str, str]
+"""A block and a behavior of it. An empty behavior: the whole block; an empty block: the robot."""
+
+
+class Holds:
+    """What is held, and since when."""
+
+    def __init__(self) -> None:
+        self._since: dict[Held, Seconds] = {}
+
+    def hold(self, block: str, behavior: str, now: Seconds) -> None:
+        """Hold it from now on, if it is not held already."""
+        self._since.setdefault((block, behavior), now)
+
+    def let_go(self, block: str, behavior: str) -> None:
+        """Let go what this names, and all that is part of it."""
+        for held in [each for each in self._since if _is_part(each, (block, behavior))]:
+            del self._since[held]
+
+    def of_block(self, block: str) -> frozenset[str] | None:
+        """Behaviors of the block that are held; None: all of them."""
+        if ("", "") in self._since or (block, "") in self._since:
+            return None
+        return frozenset(behavior for held, behavior in self._since if held == block)
+
+    def earliest(self) -> Seconds | None:
+        """Time since when something is held, the longest; None: nothing is."""
+        return min(self._since.values(), default=None)
+
+    def since(self, at: Seconds) -> list[Held]:
+        """What has been held since `at`, or longer."""
+        return [held for held, since in self._since.items() if since <= at]
+
+
+def _is_part(one: Held, whole: Held) -> bool:
+    block, behavior = whole
+    return not block or (one[0] == block and (not behavior or one[1] == behavior))

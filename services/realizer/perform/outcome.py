@@ -1,0 +1,45 @@
+"""The outcome of a block that was performed: what was said, what was dropped, whether anything was done at all."""
+
+from collections.abc import Collection, Mapping
+
+from msgspec.structs import replace
+
+from engage_hri.schemas.blocks import Block, BlockOutcome, SpokenText
+from engage_hri.schemas.faults import Fault
+
+_BEHAVIORS = ("BEHAVIOR_TYPE_NOT_SUPPORTED", "CUSTOM_BEHAVIOR_NOT_SUPPORTED")
+"""Kinds of the notes about behaviors without an id, which no list of a block's behaviors has."""
+
+
+def completed(
+    ended: BlockOutcome,
+    block: Block,
+    spoken: tuple[SpokenText, ...],
+    lost: Mapping[str, str],
+    interrupted: Collection[str],
+) -> BlockOutcome:
+    """Complete the outcome of a block. One that had behaviors, each of which was dropped, has failed.
+
+    ended: how it ended. lost: behaviors that did not come to their end, each with the reason. interrupted: those of
+    them that were ended on request, which is no failure.
+    """
+    dropped = {id: why for id, why in lost.items() if id not in interrupted}
+    nothing = _nothing_performed(block, dropped) if ended.status == "done" else None
+    return replace(
+        ended,
+        status="failed" if nothing else ended.status,
+        fault=nothing or ended.fault,
+        spoken=spoken,
+        dropped=tuple(dropped),
+        reasons=tuple(dropped.values()),
+        interrupted=tuple([id for id in lost if id in interrupted]),
+    )
+
+
+def _nothing_performed(block: Block, dropped: Mapping[str, str]) -> Fault | None:
+    """Fault of a block of whose behaviors each was dropped; None if it had none, or another is left."""
+    left_out = [each.message for each in block.unread if each.kind in _BEHAVIORS]
+    if not (block.behaviors or left_out) or any(behavior.id not in dropped for behavior in block.behaviors):
+        return None
+    whys = [*(f"{id}: {why.removeprefix(f'{id}: ')}" if why else id for id, why in dropped.items()), *left_out]
+    return Fault(reason=f"no behavior of it came to its end ({'; '.join(whys)})", where=block.id)

@@ -1,0 +1,101 @@
+"""Holding, continuing and stopping what is performed, on request: the robot, a block, or a behavior."""
+
+import asyncio
+from collections.abc import Mapping
+
+from engage_hri.schemas.blocks import PerformanceSteered, SteerPerformance
+from engage_hri.schemas.faults import Fault
+from engage_hri.services.bus.interface import Bus
+from engage_hri.services.realizer.config import RealizerConfig
+from engage_hri.services.realizer.perform.holding import Holds
+from engage_hri.services.realizer.perform.live import Ending, Live
+from engage_hri.services.realizer.perform.performance import BlockPerformance
+from engage_hri.services.requests.ends import RequestDesk
+from engage_hri.services.runtime.alarm import Timer
+
+
+class Steering:
+    """Takes requests to hold, continue and stop.
+
+    live, performances: live blocks, and those that are being performed, by the id of their request.
+    """
+
+    def __init__(
+        self,
+        bus: Bus,
+        desk: RequestDesk,
+        config: RealizerConfig,
+        live: Mapping[str, Live],
+        performances: Mapping[str, BlockPerformance],
+    ) -> None:
+        self._bus = bus
+        self._desk = desk
+        self._longest = config.longest_hold
+        self._live = live
+        self._performances = performances
+        self._holds = Holds()
+        self._timer = Timer(self._expire)
+
+    async def steer(self, request: SteerPerformance) -> None:
+        """Do what is asked for, and answer it."""
+        block, behavior = request.block, request.behavior
+        with self._desk.serving(request):
+            concerned = [live for live in self._live.values() if block in ("", live.request.block.id)]
+            performances = [each for each in self._performances.values() if each.plan.block.id == block]
+            is_there = (
+                any(each.is_going_on(behavior) for each in performances) if behavior else concerned or not block
+            )
+            if not is_there:
+                where = f"{block}: {behavior}" if behavior else block
+                self._desk.refuse(request.id, Fault(reason="it is not being performed", where=where))
+                return
+            self._desk.accept(request.id)
+            match request.to:
+                case "hold":
+                    self._holds.hold(block, behavior, self._bus.now())
+                case "continue":
+                    self._holds.let_go(block, behavior)
+                case "stop":
+                    self._holds.let_go(block, behavior)
+                    await self._stop(concerned, behavior, "stopped on request")
+            self._apply()
+            blocks = tuple(live.request.block.id for live in concerned)
+            self._desk.end(PerformanceSteered(id=request.id, blocks=blocks))
+
+    def held(self, block: str) -> frozenset[str] | None:
+        """Behaviors of the block that are held now; None: all of them."""
+        return self._holds.of_block(block)
+
+    def forget(self, block: str) -> None:
+        """Let go what was held of a block that has ended: its id is free."""
+        self._holds.let_go(block, "")
+
+    def close(self) -> None:
+        """Ring no more."""
+        self._timer.set(None)
+
+    def _apply(self) -> None:
+        for performance in self._performances.values():
+            performance.hold(self._holds.of_block(performance.plan.block.id))
+        since = self._holds.earliest()
+        self._timer.set(None if since is None else since + self._longest)
+
+    async def _stop(self, concerned: list[Live], behavior: str, reason: str) -> None:
+        if behavior:
+            performed = [self._performances.get(live.request.id) for live in concerned]
+            await asyncio.gather(*[each.interrupt(behavior) for each in performed if each is not None])
+            return
+        for live in concerned:
+            live.stop(Ending("interrupted", Fault(reason=reason, where=live.request.block.id)))
+        if concerned:
+            await asyncio.wait([live.ended for live in concerned])
+
+    def _expire(self) -> None:
+        """Stop what has been held for too long."""
+        for block, behavior in self._holds.since(self._bus.now() - self._longest):
+            self._holds.let_go(block, behavior)
+            reason = f"held for {self._longest:g} s, the longest time (`realizer.longest_hold`)"
+            for live in self._live.values():
+                if block in ("", live.request.block.id):
+                    live.stop(Ending("interrupted", Fault(reason=reason, where=live.request.block.id)))
+        self._apply()

@@ -1,0 +1,19 @@
+"""Warnings about what is not performed: behaviors that nobody here knows, or that the body refuses."""
+
+from typing import get_args
+
+from engage_hri.schemas.behaviors import Unknown
+from engage_hri.schemas.feedback import WarningKind
+from engage_hri.schemas.vocabulary import unperformed
+
+
+def unknown(behavior: Unknown) -> tuple[WarningKind, str]:
+    """Kind and reason of the warning about a behavior of a type that nobody here knows."""
+    if behavior.namespace:
+        return "CUSTOM_BEHAVIOR_NOT_SUPPORTED", f"<{behavior.element}> is of namespace {behavior.namespace!r}"
+    return "BEHAVIOR_TYPE_NOT_SUPPORTED", unperformed(behavior.element)
+
+
+def kind_of(warning: str) -> WarningKind:
+    """Kind of the warning that a body gives as the reason why it cannot do a behavior."""
+    return warning if warning in get_args(WarningKind) else "CANNOT_CREATE_BEHAVIOR"  # type: ignore[return-value]

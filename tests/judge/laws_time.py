@@ -1,0 +1,237 @@
+"""Laws about times: what was asked for holds, what was predicted comes true, the voice keeps the document's order."""
+
+from collections.abc import Iterator, Mapping
+from itertools import combinations, pairwise, permutations
+
+from tests.judge.case import Case, Finding
+from tests.judge.reading import Place, Reading, Relation, Term
+
+EXACT = 0.0101
+"""Seconds: how much an exact body may miss an instant, or a prediction."""
+NOTICEABLE = 0.12
+"""Seconds by which a body with faults may miss an instant untold: what people notice is 0.1."""
+
+
+def constraints(case: Case) -> Iterator[Finding]:
+    """Every constraint between points that were reached holds, or a warning names somebody of its instant."""
+    if not case.is_told_true:
+        return
+    tolerance = EXACT if case.is_exact else NOTICEABLE
+    for id, block in case.blocks.items():
+        if case.record.began(id) is None:
+            continue
+        instants = _instants(block)
+        warned = {(id, each.behavior) for each in case.record.warnings(id) if each.kind == "LATE"}
+        for relation in block.relations:
+            terms = [term for term in relation.terms if _counts(term.place, id, case)]
+            for one, other in combinations(terms, 2):
+                if relation.kind != "same" and one is not relation.terms[0]:
+                    continue
+                gap = _gap(relation, case.times[one.place] + one.offset, case.times[other.place] + other.offset)
+                if gap <= tolerance:
+                    continue
+                group = {(each.block, each.behavior) for each in _touched(instants, one.place, other.place)}
+                if group & warned or _was_late_abroad(group, id, case):
+                    continue
+                where = f"{relation.text}: {_shown(one, case)} against {_shown(other, case)}, off by {gap:.3f} s"
+                yield Finding(_law(relation, one, other, id, case), id, where)
+
+
+def _counts(place: Place, block: str, case: Case) -> bool:
+    """True if the point was reached, nothing of its behavior was lost, and it was there to be named."""
+    if place not in case.times or (place.block, place.behavior) in case.lost:
+        return False
+    if place.block == block:
+        return True
+    asked = case.record.asked
+    if place.block not in asked or asked[place.block] > asked[block]:
+        return False
+    ends = case.record.ends.get(place.block, [])
+    # A point of a block that was broken off: whoever waits for the end of that block is set free.
+    is_whole = case.record.status(place.block) == "done" or place.behavior != ""
+    return is_whole and not (ends and ends[0].at <= asked[block])
+
+
+def _gap(relation: Relation, one: float, other: float) -> float:
+    if relation.kind == "same":
+        return abs(one - other)
+    return one - other if relation.kind == "after" else other - one
+
+
+def _law(relation: Relation, one: Term, other: Term, block: str, case: Case) -> str:
+    abroad = [term for term in (one, other) if term.place.block != block]
+    if not abroad:
+        return "broken"
+    # Where the other block's point puts ours; before our block began, nothing could be done about it.
+    own = other if abroad[0] is one else one
+    meant = case.times[abroad[0].place] + abroad[0].offset - own.offset
+    is_past = meant < case.times[Place(block, "", "start")] - EXACT
+    return "broken, point was past" if is_past else "broken across blocks"
+
+
+def _instants(block: Reading) -> dict[Place, set[Place]]:
+    """Points that are tied to each other by equalities, give or take an offset."""
+    groups: dict[Place, set[Place]] = {}
+    for relation in block.relations:
+        if relation.kind == "same":
+            for one, other in pairwise(relation.terms):
+                merged = groups.get(one.place, {one.place}) | groups.get(other.place, {other.place})
+                groups.update(dict.fromkeys(merged, merged))
+    return groups
+
+
+def _touched(instants: Mapping[Place, set[Place]], *places: Place) -> set[Place]:
+    found: set[Place] = set()
+    for place in places:
+        found |= {each for each in instants.get(place, {place}) if each.behavior}
+    return found
+
+
+def _was_late_abroad(group: set[tuple[str, str]], block: str, case: Case) -> bool:
+    return any(
+        (other, each.behavior) in group
+        for other in {other for other, _ in group} - {block}
+        for each in case.record.warnings(other)
+        if each.kind == "LATE"
+    )
+
+
+def _shown(term: Term, case: Case) -> str:
+    place = term.place
+    offset = f"{term.offset:+g}" if term.offset else ""
+    return f"{place.behavior or place.block}:{place.sync}{offset} at {case.times[place] + term.offset:.3f}"
+
+
+# -- predictions -----------------------------------------------------------------------------------------------------
+
+
+def surprises(case: Case, block: str) -> list[tuple[float, str]]:
+    """How far each point was off the last prediction told before it, with its name; the farthest first."""
+    predictions = case.record.predictions(block)
+    if not predictions:
+        return []
+    found = []
+    for each in case.record.points(block):
+        at = each.at.seconds
+        told = [message for when, message in predictions if when < at - EXACT] or [predictions[0][1]]
+        planned = {
+            (point.behavior, point.sync): (message.at.seconds if message.at else 0.0) + point.time
+            for message in told
+            for point in message.points
+        }
+        if (expected := planned.get((each.behavior, each.sync))) is not None:
+            found.append((abs(at - expected), f"{each.behavior}:{each.sync} at {at:.3f}, expected at {expected:.3f}"))
+    return sorted(found, reverse=True)
+
+
+def foreseeable(case: Case) -> list[str]:
+    """Blocks whose points an exact body could have foreseen: nothing was disturbed, or lost on the way."""
+    if not case.is_exact or case.story.is_disturbed:
+        return []
+    return [
+        block for block in case.blocks if case.record.status(block) == "done" and not _lost_on_the_way(case, block)
+    ]
+
+
+def _lost_on_the_way(case: Case, block: str) -> bool:
+    began = case.times[Place(block, "", "start")]
+    return any(
+        each.kind != "LATE" and (block, each.behavior) in case.lost and (each.at is None or each.at.seconds > began)
+        for each in case.record.warnings(block)
+    )
+
+
+def misses(case: Case) -> list[float]:
+    """Of each block that could be foreseen, how far its worst point was off the last prediction before it."""
+    return [off[0][0] for block in foreseeable(case) if (off := surprises(case, block))]
+
+
+def predictions(case: Case) -> Iterator[Finding]:
+    """With an exact body, points come when the last prediction before them said, unless something was disturbed."""
+    for block in foreseeable(case):
+        off = surprises(case, block)
+        if off and off[0][0] > EXACT:
+            yield Finding("off its prediction", block, off[0][1])
+
+
+# -- the order of words ----------------------------------------------------------------------------------------------
+
+
+def spoken_order(case: Case) -> Iterator[Finding]:
+    """Sentences come in the document's order, if that is possible, else in another; what can be served is not lost.
+
+    Asked of blocks whose behaviors use parts of their own, with the natural seconds that the body has named before.
+    """
+    if not case.record.natural or not case.is_exact:
+        return
+    for id, block in case.blocks.items():
+        orders = [order for order in permutations(block.speeches) if _is_possible(case, block, order)]
+        if not orders:
+            continue
+        outcome = case.record.outcome(id)
+        if outcome is None or outcome.dropped:
+            lost = "the block is refused" if outcome is None else f"{outcome.dropped} dropped"
+            yield Finding("needless loss", id, f"{lost}, and {' '.join(orders[0])} can be said")
+            continue
+        starts = {speech: case.times.get(Place(id, speech, "start")) for speech in block.speeches}
+        said = tuple(sorted(block.speeches, key=lambda speech: starts[speech] or 0.0))
+        if block.speeches in orders and said != block.speeches:
+            yield Finding("spoken order", id, f"said {' '.join(said)} instead of {' '.join(block.speeches)}")
+        elif said not in orders:
+            yield Finding("spoken order", id, f"said {' '.join(said)}, which cannot be")
+
+
+def _is_possible(case: Case, block: Reading, order: tuple[str, ...]) -> bool:
+    """Whether the speeches can be said in this order, every phase taking its natural time: single points, relaxed."""
+    zero = Place(block.id, "", "start")
+    lags: list[tuple[Place, Place, float]] = []
+    places: set[Place] = {zero}
+    for behavior in block.behaviors.values():
+        phases = case.record.natural.get((block.id, behavior.id), ())
+        draft = {since: Place(block.id, behavior.id, since) for since, *_ in phases}
+        draft |= {to: Place(block.id, behavior.id, to) for _, to, *_ in phases}
+        places.update(draft.values())
+        for since, to, seconds, may_wait in phases:
+            lags.append((draft[since], draft[to], seconds))
+            is_on_target = behavior.type in ("gaze", "faceLexeme") and to == "stroke_end"
+            if not may_wait and not is_on_target:
+                lags.append((draft[to], draft[since], -seconds))
+        lags += [(zero, place, 0.0) for place in draft.values()]
+    for earlier, later in pairwise(order):
+        lags.append((Place(block.id, earlier, "end"), Place(block.id, later, "start"), 0.0))
+    for relation in block.relations:
+        first = relation.terms[0]
+        for term in relation.terms[1:]:
+            gap = first.offset - term.offset
+            one, other = _drafted(first.place, block), _drafted(term.place, block)
+            places |= {one, other}
+            if relation.kind != "before":
+                lags.append((one, other, gap))
+            if relation.kind != "after":
+                lags.append((other, one, -gap))
+    return _settles(places, lags, zero)
+
+
+def _settles(places: set[Place], lags: list[tuple[Place, Place, float]], zero: Place) -> bool:
+    times = dict.fromkeys(places, 0.0)
+    for _ in range(len(places) + 1):
+        moved = False
+        for since, to, seconds in lags:
+            if times[since] + seconds > times[to] + 1e-9:
+                times[to], moved = times[since] + seconds, True
+        if not moved:
+            return times[zero] <= 1e-6
+    return False
+
+
+_DRAFT = {"strokeStart": "stroke_start", "strokeEnd": "stroke_end", "attackPeak": "stroke"}
+
+
+def _drafted(place: Place, block: Reading) -> Place:
+    """The point as estimates name it: in the draft's spelling."""
+    asked = block.behaviors.get(place.behavior)
+    if asked is None or asked.type == "speech":
+        return place
+    if place.sync == "ready" and asked.type in ("gaze", "posture"):
+        return place._replace(sync="stroke")
+    return place._replace(sync=_DRAFT.get(place.sync, place.sync))

@@ -1,0 +1,127 @@
+"""Random stories, performed with the simulated body: what must hold for ever, and what the judge may know.
+
+Only `ENFORCED` laws fail here, in all stories; `WHOLE` stories keep every law. The others are counted by
+`python -m tests.judge`, which prints the smallest story for each. A law that is kept by now is moved to `ENFORCED`.
+"""
+
+import ast
+from pathlib import Path
+
+import pytest
+
+from tests.judge import generate, playing
+from tests.judge.generate import Kind
+from tests.judge.laws import LAWS, judge
+from tests.judge.reading import Place, Term, read, term
+from tests.judge.shrinking import shrink
+from tests.judge.story import Deed, Story
+
+ENFORCED = (
+    "hang", "crash", "end", "points", "losses", "required", "words", "wrong length", "out of turn", "parts",
+    "in the air", "spoken order", "needless loss",
+)  # fmt: skip
+"""Laws that no story may break."""
+SEED = 12
+MANY: dict[tuple[Kind, bool], int] = {
+    ("alone", False): 30, ("streams", False): 25, ("sentences", False): 20,
+    ("alone", True): 15, ("streams", True): 10,
+}  # fmt: skip
+"""Number of stories of each kind, without and with a body that has faults."""
+WHOLE: dict[Kind, tuple[int, ...]] = {
+    "alone": (0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 15), "streams": (0, 1, 2, 3, 4, 6, 8, 10, 11, 16),
+    "sentences": (0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11),
+}  # fmt: skip
+"""Stories that break no law at all."""
+
+
+@pytest.mark.contained
+@pytest.mark.parametrize(("kind", "faults"), MANY)
+def test_no_story_breaks_a_law_that_is_enforced(kind: Kind, faults: bool) -> None:
+    found = []
+    for number in range(MANY[kind, faults]):
+        story = generate.story(SEED, number, kind, faults=faults)
+        record = playing.play(story, asks=kind == "sentences")
+        assert record.told, story.seed
+        found += [f"{story.seed}: {each}" for each in judge(story, record) if each.law in ENFORCED]
+
+    assert found == []
+
+
+@pytest.mark.parametrize("kind", WHOLE)
+def test_these_stories_break_no_law(kind: Kind) -> None:
+    found = []
+    for number in WHOLE[kind]:
+        story = generate.story(SEED, number, kind)
+        found += [f"{story.seed}: {each}" for each in judge(story, playing.play(story, asks=kind == "sentences"))]
+
+    assert found == []
+
+
+def test_the_list_of_laws_that_are_enforced_names_laws() -> None:
+    assert set(ENFORCED) <= LAWS.keys()
+
+
+def test_the_judge_takes_nothing_from_what_it_judges() -> None:
+    allowed = {
+        "lying.py": ("control.body",),
+        "playing.py": ("realizer.service", "realizer.config", "control.service", "control.config", "control.body",
+                       "control.torso.body", "bus", "requests.ends", "runtime"),
+    }  # fmt: skip
+    taken = []
+    for path in Path(__file__).parent.glob("*.py"):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            names = [node.module or ""] if isinstance(node, ast.ImportFrom) else []
+            names += [each.name for each in node.names] if isinstance(node, ast.Import) else []
+            services = [name.partition("services.")[2] for name in names if "services" in name]
+            taken += [(path.name, name) for name in services if not name.startswith(allowed.get(path.name, ("-",)))]
+
+    assert taken == []
+
+
+BLOCK = read(
+    '<bml id="b" xmlns="http://www.bml-initiative.org/bml/bml-1.0"><head id="n-1" lexeme="NOD"/>'
+    '<speech id="s"><text>One <sync id="w-2"/>two</text></speech><gaze id="g" target="cup"/></bml>'
+)
+
+
+@pytest.mark.parametrize(
+    ("text", "place", "offset"),
+    [
+        ("n-1:stroke", Place("b", "n-1", "stroke"), 0.0),
+        ("n-1:stroke-2", Place("b", "n-1", "stroke"), -2.0),
+        ("n-1:stroke : 3 + 0.5", Place("b", "n-1", "stroke", 3), 0.5),
+        ("s:w-2", Place("b", "s", "w-2"), 0.0),
+        ("s:w-2+1", Place("b", "s", "w-2"), 1.0),
+        ("1.5", Place("b", "", "start"), 1.5),
+        ("bml:start+1", Place("b", "", "start"), 1.0),
+        ("a:bml:end - 0.2", Place("a", "", "end"), -0.2),
+        ("b:g:ready", Place("b", "g", "ready"), 0.0),
+    ],
+)
+def test_references_are_read_by_the_rules_of_bml(text: str, place: Place, offset: float) -> None:
+    assert term(text, BLOCK, {"b": BLOCK}) == Term(place, offset)
+
+
+@pytest.mark.parametrize("text", ["g:strokeStart", "nobody:start", "n-1:nothing"])
+def test_what_feedback_does_not_tell_is_no_point(text: str) -> None:
+    assert term(text, BLOCK, {"b": BLOCK}) is None
+
+
+def test_a_story_shrinks_to_what_matters() -> None:
+    story = generate.story(SEED, 0, "streams")
+    last = story.blocks[-1]
+    behavior = next(iter(read(last.xml).behaviors))
+
+    smallest = shrink(
+        story, lambda one: any(f'id="{behavior}"' in deed.xml for deed in one.blocks if deed.block == last.block)
+    )
+
+    assert [deed.block for deed in smallest.deeds] == [last.block]
+    assert list(read(smallest.deeds[0].xml).behaviors) == [behavior]
+    assert read(smallest.deeds[0].xml).relations == ()
+
+
+def test_a_block_that_does_not_end_is_noticed() -> None:
+    story = Story((Deed(0.0, "perform", "b0", '<bml id="b0"><wait id="w" duration="4000"/></bml>'),))
+
+    assert {each.law for each in judge(story, playing.play(story))} == {"hang"}

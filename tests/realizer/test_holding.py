@@ -1,0 +1,189 @@
+"""Hold, continue, stop: a behavior, a block, the robot; nothing is late for it, and it goes on from there."""
+
+import asyncio
+import random
+from itertools import count
+from typing import Literal
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from engage_hri.schemas import keys
+from engage_hri.schemas.behaviors import Gaze, Gesture, Mark, Speech, Wait
+from engage_hri.schemas.blocks import Block, BlockOutcome, PerformanceSteered, SteerPerformance
+from engage_hri.services.realizer.config import RealizerConfig
+from engage_hri.services.requests.ends import RequestRefused
+from engage_hri.services.runtime.virtual_time import run_virtual
+from tests.realizer.fake_body import FakeBody
+from tests.realizer.stage import Stage, after, block, stage, together
+from tests.realizer.test_properties import blocks
+
+BEAT = Gesture(id="beat", lexeme="BEAT", mode="RIGHT_HAND")
+"""Takes 2.25 s: 0.5, 0.25, 0.5, 0.25, 0.25, 0.5."""
+STORY = Speech(id="s", text="one two three", marks=(Mark("m1", 3), Mark("m2", 7)))
+"""A second to each mark."""
+NUMBERS = count()
+
+
+async def steered(
+    seen: Stage, to: Literal["hold", "continue", "stop"], block: str = "", behavior: str = ""
+) -> tuple[str, ...]:
+    request = SteerPerformance(id=f"steer-{next(NUMBERS)}", requester="test", to=to, block=block, behavior=behavior)
+    outcome = await seen.requests.send(keys.BLOCK, request).outcome
+    assert isinstance(outcome, PerformanceSteered)
+    return outcome.blocks
+
+
+@pytest.mark.parametrize("name", ["", "b"])
+async def test_a_block_that_is_held_goes_on_from_there_and_nothing_is_late(name: str) -> None:
+    made = block((BEAT, STORY, Wait(id="w", duration=1.5), Gaze(id="g", target="a")), together("w:end+1", "g:start"))
+    async with stage() as free:
+        await free.perform(made)
+    async with stage() as seen:
+        performing = seen.ask(made)
+        await asyncio.sleep(0.6)
+        assert await steered(seen, "hold", name) == ("b",)
+        await asyncio.sleep(20.0)
+        standing = dict(seen.times())
+        await asyncio.sleep(20.0)
+        assert seen.times() == standing
+        assert await steered(seen, "continue", name) == ("b",)
+        outcome = await performing.outcome
+
+    assert isinstance(outcome, BlockOutcome)
+    assert outcome.status == "done"
+    assert seen.warnings() == []
+    held, unheld = seen.times(), free.times()
+    assert held.keys() == unheld.keys()
+    assert (held["beat:ready"], held["s:start"]) == (unheld["beat:ready"], unheld["s:start"])
+    assert held["beat:stroke"] == pytest.approx(40.6 + 0.5)  # it had come to the hold point before the stroke
+    assert held["w:end"] == pytest.approx(unheld["w:end"] + 40.0)
+    assert held["g:start"] == pytest.approx(unheld["g:start"] + 40.0)
+    assert [each.text for each in outcome.spoken] == ["one two three"]
+
+
+async def test_one_behavior_is_held_and_those_that_are_tied_to_it_wait() -> None:
+    async with stage() as seen:
+        performing = seen.ask(block((BEAT, STORY, Wait(id="w", duration=3.0)), after("beat:end", "s:start")))
+        await asyncio.sleep(0.2)
+        await steered(seen, "hold", "b", "beat")
+        await asyncio.sleep(10.0)
+        assert (seen.times()["w:end"], "s:start" in seen.times()) == (3.0, False)
+        await steered(seen, "continue", "b", "beat")
+        await performing.outcome
+
+    assert seen.times()["s:start"] == pytest.approx(10.2 + 1.5)
+    assert seen.warnings() == []
+
+
+async def test_what_comes_while_the_robot_is_held_waits_until_it_continues() -> None:
+    async with stage() as seen:
+        assert await steered(seen, "hold") == ()
+        performing = seen.ask(block((BEAT,)))
+        await asyncio.sleep(5.0)
+        assert seen.body.commands == []
+        assert await steered(seen, "continue") == ("b",)
+        await performing.outcome
+
+    assert seen.times()["beat:start"] == pytest.approx(5.0)
+    assert seen.warnings() == []
+
+
+async def test_to_continue_the_robot_lets_everything_go_and_to_continue_a_block_only_that() -> None:
+    async with stage() as seen:
+        one, two = seen.ask(block((BEAT,), id="one")), seen.ask(block((STORY,), id="two"))
+        await asyncio.sleep(0.1)
+        for held in (("one", ""), ("two", "s"), ("", "")):
+            await steered(seen, "hold", *held)
+        await steered(seen, "continue", "one")
+        await asyncio.sleep(5.0)
+        assert not one.outcome.done()
+        await steered(seen, "continue")
+        await asyncio.gather(one.outcome, two.outcome)
+
+    assert seen.warnings() == []
+
+
+async def test_stopped_is_interrupted_and_tells_what_was_said() -> None:
+    async with stage() as seen:
+        one, two = seen.ask(block((BEAT,), id="one")), seen.ask(block((STORY,), id="two"))
+        await asyncio.sleep(1.2)
+        await steered(seen, "hold")
+        await asyncio.sleep(1.0)
+        assert await steered(seen, "stop") == ("one", "two")
+        outcomes = [await one.outcome, await two.outcome]
+        after_that = await seen.perform(block((BEAT,), id="three"))
+
+    assert [getattr(each, "status", "") for each in outcomes] == ["interrupted", "interrupted"]
+    assert isinstance(outcomes[1], BlockOutcome)
+    assert [(each.text, each.complete) for each in outcomes[1].spoken] == [("one", False)]
+    assert after_that.status == "done"
+
+
+async def test_a_behavior_that_is_stopped_is_interrupted_and_its_block_is_done() -> None:
+    async with stage() as seen:
+        performing = seen.ask(block((BEAT, STORY)))
+        await asyncio.sleep(0.2)
+        assert await steered(seen, "stop", "b", "beat") == ("b",)
+        outcome = await performing.outcome
+
+    assert isinstance(outcome, BlockOutcome)
+    assert (outcome.status, outcome.interrupted) == ("done", ("beat",))
+
+
+async def test_what_is_held_for_too_long_is_stopped() -> None:
+    async with stage(config=RealizerConfig(longest_hold=7.0)) as seen:
+        performing = seen.ask(block((BEAT,)))
+        await asyncio.sleep(1.0)
+        await steered(seen, "hold")
+        before = asyncio.get_running_loop().time()
+        outcome = await performing.outcome
+        assert asyncio.get_running_loop().time() - before == pytest.approx(7.0, abs=0.6)
+        after_that = await seen.perform(block((BEAT,), id="next"))
+
+    assert isinstance(outcome, BlockOutcome)
+    assert outcome.status == "interrupted"
+    assert "realizer.longest_hold" in str(outcome.fault)
+    assert after_that.status == "done"
+
+
+@pytest.mark.parametrize("named", [("nobody", ""), ("b", "nothing"), ("nobody", "beat")])
+async def test_what_is_not_performed_cannot_be_held(named: tuple[str, str]) -> None:
+    async with stage() as seen:
+        performing = seen.ask(block((BEAT,)))
+        await asyncio.sleep(0.1)
+        with pytest.raises(RequestRefused, match="not being performed"):
+            await steered(seen, "hold", *named)
+        await performing.outcome
+
+
+@settings(max_examples=60, deadline=None)
+@given(blocks(), st.integers(0, 10_000))
+def test_whatever_is_held_and_let_go_at_random_each_block_has_the_end_that_it_has_without(
+    made: Block, seed: int
+) -> None:
+    async def main(holds: bool) -> tuple[str, tuple[str, ...], list[str]]:
+        chance = random.Random(seed)
+        async with stage(FakeBody(elastic=(0.5, 4.0)), config=RealizerConfig(longest_hold=1000.0)) as seen:
+            performing = seen.ask(made)
+            while holds and not performing.outcome.done():
+                await asyncio.sleep(chance.choice((0.0, 0.1, 0.4, 1.3)))
+                behavior = chance.choice(("", *(each.id for each in made.behaviors)))
+                for to in ("hold", "continue"):
+                    try:
+                        await steered(seen, to, "b", behavior)
+                    except RequestRefused:
+                        break
+                    await asyncio.sleep(chance.choice((0.0, 0.3, 30.0)) if to == "hold" else 0.0)
+            try:
+                outcome = await performing.outcome
+            except RequestRefused:
+                return "refused", (), []
+        assert isinstance(outcome, BlockOutcome)
+        return outcome.status, outcome.dropped, [str(each.kind) for each in seen.warnings()]
+
+    without, held = run_virtual(main(False)), run_virtual(main(True))
+
+    assert held[:2] == without[:2]
+    assert set(held[2]) <= set(without[2])
