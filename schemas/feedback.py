@@ -38,7 +38,7 @@ class SyncPointProgress(Struct, frozen=True, kw_only=True, tag="sync_point_progr
     sync: in the spelling of the block's dialect.
     at: instant as measured, but never before that of an earlier message about the block.
     time: the same in seconds since the block's start.
-    predicted: time at which it was planned. arrived: time at which the body came to it.
+    predicted: time at which the last prediction had it. arrived: time at which the body came to it.
     skew: seconds after the first of the sync points that should be the same instant.
     source: `body`: the body reported it; `clock`: the realizer itself realised it.
     """

@@ -1,13 +1,12 @@
 """The realizer on the bus: takes blocks, answers each exactly once, and performs any number of them at a time."""
 
 import asyncio
-from collections.abc import Coroutine, Iterable, Mapping
+from collections.abc import Coroutine, Mapping
 from typing import Any, TypeVar
 
 from msgspec.structs import replace
 
 from engage_hri.schemas import keys
-from engage_hri.schemas.behaviors import Gesture, Hand, Pointing, Speech
 from engage_hri.schemas.blocks import (
     BehaviorInterrupted,
     Block,
@@ -17,19 +16,12 @@ from engage_hri.schemas.blocks import (
     SteerPerformance,
 )
 from engage_hri.schemas.body import (
-    BodyPose,
-    Estimate,
-    EstimateBehaviors,
-    EstimateItem,
-    Estimates,
     GoHome,
-    PlannedTime,
     SyncPointArrived,
     SyncPointReached,
     WordSpoken,
 )
-from engage_hri.schemas.check import validated
-from engage_hri.schemas.faults import EngageError, Fault, NoReply
+from engage_hri.schemas.faults import EngageError, Fault
 from engage_hri.schemas.feedback import WarningFeedback
 from engage_hri.schemas.presence import PeerAlive, PeerGone
 from engage_hri.schemas.requests import Cancel, Outcome, Request, Unreadable
@@ -39,21 +31,15 @@ from engage_hri.services.realizer.perform.control_link import LONGEST_WAY
 from engage_hri.services.realizer.perform.live import Ending, Live
 from engage_hri.services.realizer.perform.live_blocks import LiveBlocks
 from engage_hri.services.realizer.perform.performance import BlockPerformance
+from engage_hri.services.realizer.perform.planning import Planning
 from engage_hri.services.realizer.perform.shared_context import Moving, Presence, SharedContext
 from engage_hri.services.realizer.perform.steering import Steering
-from engage_hri.services.realizer.plan.planner import Plan, plan_steps
-from engage_hri.services.realizer.plan.poses import changed, planned_times, poses_before, poses_left
-from engage_hri.services.realizer.plan.relations import BlockRefused, extent, relation_steps
-from engage_hri.services.realizer.plan.steps import Steps, T
-from engage_hri.services.realizer.points import Point, performer
+from engage_hri.services.realizer.plan.planner import Plan
+from engage_hri.services.realizer.plan.relations import BlockRefused
 from engage_hri.services.requests.ends import Patience, RequestDesk, Requester
 from engage_hri.services.runtime.service import Ready
 
 Result = TypeVar("Result")
-SLICE = 512
-"""Elements that are worked on in one go (see `steps`): one to five milliseconds. Counted: equal runs stay equal."""
-ROUNDS = 3
-"""How often the body is asked about a plan anew, at most: each answer may make another plan."""
 
 
 class _Realizer:
@@ -70,6 +56,7 @@ class _Realizer:
         self.live_blocks = LiveBlocks()
         self.homing: set[asyncio.Future[Outcome]] = set()
         """Outcomes of the parts that are on their way home, sent by blocks that replace others."""
+        self.planning = Planning(bus, config, self.live_blocks, self.performing)
         self.steering = Steering(bus, self.desk, config, self.live, self.performances)
         self.shared = SharedContext(
             bus, self.requests, config, self.peers, self.routes, self.performing, self.live_blocks
@@ -176,9 +163,14 @@ class _Realizer:
             fault = Fault(reason=f"it follows {', '.join(sorted(absent))}: no such live block", where=block.id)
             self._refuse(live, BlockRefused(fault))
             return
+        if live.request.follows and block.composition == "REPLACE":
+            advice = "leave out one of the two: REPLACE ends all that runs, and a block ends with those it follows"
+            fault = Fault(reason="it follows blocks that it replaces", where=block.id, advice=advice)
+            self._refuse(live, BlockRefused(fault))
+            return
         with self.live_blocks.opened(block):
             try:
-                plan = await _result_or_stopped(live.ending, self._plan(block, elsewhere))
+                plan = await _result_or_stopped(live.ending, self.planning.plan(live, elsewhere))
             except EngageError as error:
                 self._refuse(live, error)
                 return
@@ -188,91 +180,12 @@ class _Realizer:
             if plan is None:
                 await self._end(live, live.outcome)
                 return
-            named = {point.behavior.partition(":")[0] for point in plan.foreign}
-            tied_to = {id: elsewhere[id] for id in named}
+            there = {**self.live_blocks.blocks, **elsewhere}
             performance = self.performances[live.request.id] = BlockPerformance(
-                live, plan, self.shared, tied_to, self.steering.held(block.id)
+                live, plan, self.shared, there, self.steering.held(block.id)
             )
+            live.settle()
             await self._end(live, await performance.run())
-
-    async def _plan(self, block: Block, elsewhere: Mapping[str, Block]) -> Plan:
-        """The plan of a block.
-
-        The body is asked again from where it will be by then, and about the hands that the plan has chosen.
-        """
-        for each in block.behaviors:
-            if isinstance(each, Speech) and len(each.text) > self.config.utterance:
-                reason = f"{len(each.text)} characters of speech, at most {self.config.utterance} are said in one go"
-                advice = "say it in several; `realizer.utterance` is the limit"
-                raise BlockRefused(
-                    Fault(reason=reason, where=f"{block.id}: {each.id}", line=each.line, advice=advice)
-                )
-        if (held := extent(block)) > self.config.most:
-            reason = f"{held} behaviors, marks and sync references; at most {self.config.most} can be planned in time"
-            advice = "send several (blocks with APPEND, fragments of one turn); `realizer.most` is the limit"
-            raise BlockRefused(Fault(reason=reason, where=block.id, advice=advice))
-        await unhurried(relation_steps(block, elsewhere))  # Finds a bad reference before the body is asked.
-        block = validated(block)
-        barred: set[tuple[str, Hand]] = set()
-        chosen, estimates = block, await self._estimates(block, {})
-        first, rounds = estimates, 0
-        while True:
-            plan = await unhurried(plan_steps(chosen, estimates, elsewhere=elsewhere, barred=barred))
-            before, times = poses_before(plan, self._left_for(plan)), planned_times(plan)
-            if plan.block is chosen and (rounds >= ROUNDS or not (before or times)):
-                return plan
-            known, estimates = estimates, await self._estimates(plan.block, before, times)
-            if plan.block is chosen and not changed(known, estimates):
-                return plan
-            chosen, rounds = plan.block, rounds + 1
-            if refused := _hands_refused(block, chosen, estimates):
-                barred |= refused
-                chosen, estimates, rounds = block, first, 0
-
-    def _left_for(self, plan: Plan) -> dict[str, BodyPose]:
-        """Poses in which the blocks that `plan` is tied to leave the body for it, by part; the last tie says when."""
-        others = {each.plan.block.id: each.decisions for each in self.performing()}
-        named = {point: point.behavior.partition(":")[0::2] for point in plan.foreign}
-        times = {block: others[block].foresight.times() for block, _ in named.values() if block in others}
-        ties = [
-            times[block].get(Point(id, point.sync), 0.0) for point, (block, id) in named.items() if block in times
-        ]
-        poses: dict[str, BodyPose] = {}
-        for block in others:
-            if block in times:
-                poses |= poses_left(others[block].plan, times[block], max(ties))
-        return poses
-
-    async def _estimates(
-        self, block: Block, before: Mapping[str, BodyPose], times: Mapping[str, tuple[PlannedTime, ...]] = {}
-    ) -> tuple[Estimate, ...]:
-        """Estimates of the body. before: poses in which behaviors start; without one, from where the body is now.
-
-        times: when they are planned to begin and to wait, in the order in which they begin.
-        """
-        behaviors = [behavior for behavior in block.behaviors if performer(behavior) == "body"]
-        if not behaviors:
-            return ()
-        rank = {id: number for number, id in enumerate(times)}
-        behaviors.sort(key=lambda behavior: rank.get(behavior.id, len(rank)))
-        items = (
-            EstimateItem(behavior=behavior, pose=before.get(behavior.id), times=times.get(behavior.id, ()))
-            for behavior in behaviors
-        )
-        question = EstimateBehaviors(items=tuple(items))
-        try:
-            answer = await self.bus.query(keys.ESTIMATE, question, timeout=self.config.estimate)
-        except NoReply as error:
-            fault = Fault(reason="there is no body to perform it", where=block.id, advice="start control")
-            raise BlockRefused(fault, "CANNOT_CREATE_BEHAVIOR") from error
-        except EngageError as error:
-            raise BlockRefused(error.fault, "CANNOT_CREATE_BEHAVIOR") from error
-        if not isinstance(answer, Estimates):
-            fault = Fault(
-                reason=f"control answered with a {type(answer).__name__}, not with estimates", where=block.id
-            )
-            raise BlockRefused(fault, "CANNOT_CREATE_BEHAVIOR")
-        return answer.items
 
     async def _await_turn(self, live: Live, plan: Plan, elsewhere: Mapping[str, Block]) -> Plan:
         """Wait for earlier blocks if composition asks for that. Returns the plan, made anew if that took time."""
@@ -286,6 +199,7 @@ class _Realizer:
         if replaces:
             for other in earlier:
                 other.stop(Ending("interrupted", replaced_by=block))
+        live.settle()
         if earlier:
             await asyncio.wait([other.ended for other in earlier])
         if replaces:
@@ -295,9 +209,9 @@ class _Realizer:
                 _, lost = await asyncio.wait(self.homing, timeout=self.config.abort)
                 self.homing -= lost
         try:
+            live.unsettle()
             # Asked again: the body is elsewhere by now.
-            estimates = await self._estimates(plan.block, poses_before(plan), planned_times(plan))
-            return await unhurried(plan_steps(plan.block, estimates, elsewhere=elsewhere))
+            return await self.planning.again(plan, elsewhere)
         except EngageError as error:
             self._warn(live, error)
             live.stop(Ending("failed", error.fault))
@@ -337,6 +251,7 @@ class _Realizer:
         del self.live[live.request.id]
         self.steering.forget(live.request.block.id)
         self.performances.pop(live.request.id, None)
+        live.settle()
         live.ended.set_result(None)
 
 
@@ -357,19 +272,6 @@ def unread(block: str, fault: Fault) -> WarningFeedback:
     return WarningFeedback(block=block or None, kind="PARSING_FAILURE", message=str(fault))
 
 
-def _hands_refused(block: Block, chosen: Block, estimates: Iterable[Estimate]) -> set[tuple[str, Hand]]:
-    """Hands that `block` leaves open and `chosen` does not, with which the body cannot perform a behavior."""
-    impossible = {each.behavior for each in estimates if not each.feasible}
-    return {
-        (after.id, after.mode)
-        for before, after in zip(block.behaviors, chosen.behaviors, strict=True)
-        if after is not before
-        and isinstance(after, Pointing | Gesture)
-        and after.mode is not None
-        and after.id in impossible
-    }
-
-
 async def realize(bus: Bus, ready: Ready, config: RealizerConfig) -> None:
     """Serve until cancelled. A bad block is answered with a fault; it never ends the service."""
     realizer = _Realizer(bus, config)
@@ -384,22 +286,3 @@ async def realize(bus: Bus, ready: Ready, config: RealizerConfig) -> None:
     finally:
         realizer.desk.close()
         realizer.requests.close()
-
-
-async def unhurried(steps: Steps[T]) -> T:
-    """The result of long work, done a slice at a time: whatever else is due comes in between.
-
-    A cancellation takes effect at the end of the slice.
-    """
-    done = 0
-    try:
-        while True:
-            done += next(steps)
-            if done >= SLICE:
-                done = 0
-                await asyncio.sleep(0)
-    except StopIteration as end:
-        result: T = end.value
-        return result
-    finally:
-        steps.close()

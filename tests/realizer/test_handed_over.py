@@ -52,12 +52,12 @@ async def two_blocks(seen: Stage, one: Block, other: Block, when: str) -> None:
 async def test_a_pointing_that_another_block_cuts_is_lost(*, required: bool) -> None:
     held = replace(timed(POINT, start="0", end="6"), required=required)
     async with stage() as seen:
-        await two_blocks(seen, block((held,), id="one"), block((BEAT,), id="two"), "p:start")
+        await two_blocks(seen, block((held, WORDS), id="one"), block((BEAT,), id="two"), "p:start")
 
     ends = {each.block: each.status for each in seen.ends()}
     assert ends == {"one": "failed" if required else "done", "two": "done"}
     assert [(each.block, each.kind, each.behavior) for each in seen.warnings()] == [("one", "EXECUTION_FAILURE", "p")]
-    assert list(seen.times("one")) == ["p:start"]
+    assert [name for name in seen.times("one") if name.startswith("p:")] == ["p:start"]
 
 
 async def test_a_cut_motion_of_the_simulated_body_leaves_no_point_behind() -> None:

@@ -17,6 +17,7 @@ from engage_hri.schemas.behaviors import (
 )
 from engage_hri.schemas.blocks import Block
 from engage_hri.services.realizer.net.petri_net import is_live, is_safe
+from engage_hri.services.realizer.plan.known import Known
 from engage_hri.services.realizer.plan.planner import plan_block
 from engage_hri.services.realizer.plan.relations import BlockRefused
 from tests.realizer.fake_body import FakeBody, Script
@@ -77,7 +78,9 @@ def test_own_block_and_no_block_name_the_same_point() -> None:
 def test_a_point_of_another_block_is_a_transition_of_its_own() -> None:
     example = block((GAZE, SPEECH), after("other:x:end+1", "s:start"))
     other = block((Speech(id="x", text="so"),), id="other")
-    made = plan_block(example, [FakeBody().estimate(each) for each in example.behaviors], elsewhere={"other": other})
+    made = plan_block(
+        example, [FakeBody().estimate(each) for each in example.behaviors], known=Known(blocks={"other": other})
+    )
 
     assert at(made, "s:start") == 1.0
     assert is_live(made.net)

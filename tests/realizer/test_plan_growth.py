@@ -20,6 +20,7 @@ from engage_hri.schemas.behaviors import (
 )
 from engage_hri.schemas.blocks import Block
 from engage_hri.services.realizer.net.petri_net import fire_once_each, is_live, is_safe
+from engage_hri.services.realizer.plan.known import Known
 from engage_hri.services.realizer.plan.planner import plan_block
 
 Parts = tuple[list[BlockBehavior], list[Synchronize | After]]
@@ -128,7 +129,7 @@ def calls(size: int, shape: Callable[[int], Parts]) -> int:
     before = sys.getprofile()
     sys.setprofile(counted)
     try:
-        plan = plan_block(block, elsewhere=elsewhere)
+        plan = plan_block(block, known=Known(blocks=elsewhere))
         assert is_live(plan.net)
         assert is_safe(plan.net)
         fire_once_each(plan.net, plan.net.initial)

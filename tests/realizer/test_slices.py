@@ -16,10 +16,11 @@ from engage_hri.schemas.blocks import Block, BlockOutcome
 from engage_hri.schemas.body import SyncPointReached
 from engage_hri.schemas.feedback import BlockProgress
 from engage_hri.services.realizer.config import RealizerConfig
+from engage_hri.services.realizer.perform.planning import SLICE, unhurried
+from engage_hri.services.realizer.plan.known import Known
 from engage_hri.services.realizer.plan.planner import Plan, plan_block, plan_steps
 from engage_hri.services.realizer.plan.relations import BlockRefused
 from engage_hri.services.realizer.plan.steps import Steps, finished, portions
-from engage_hri.services.realizer.service import SLICE, unhurried
 from tests.realizer.fake_body import FakeBody, Script
 from tests.realizer.oracle import estimate, possible_blocks, random_blocks
 from tests.realizer.stage import Stage, block, stage, together
@@ -82,9 +83,9 @@ def test_no_slice_of_planning_is_long(shape: Callable[[int], Parts]) -> None:
     said = tuple(Speech(id=f"s{number}", text="one") for number in range(400))
     elsewhere = {"other": Block(id="other", behaviors=said)}
 
-    calls, plan = slices(plan_steps(large(shape), elsewhere=elsewhere))
+    calls, plan = slices(plan_steps(large(shape), known=Known(blocks=elsewhere)))
     assert max(calls) < MOST_CALLS
-    assert plan == plan_block(large(shape), elsewhere=elsewhere)
+    assert plan == plan_block(large(shape), known=Known(blocks=elsewhere))
 
 
 @settings(max_examples=60, deadline=None)

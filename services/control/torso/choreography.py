@@ -47,8 +47,8 @@ from engage_hri.services.control.torso.course import (
 )
 from engage_hri.services.control.torso.expressions import SETTLE, sides
 from engage_hri.services.control.torso.kinematics import Side, Unreachable
-from engage_hri.services.control.torso.motion import Leg
 from engage_hri.services.control.torso.pace import arm_time, return_time, turning_time
+from engage_hri.services.control.torso.path import Leg
 
 SLIDE: Seconds = 0.2
 OFFSETS: Mapping[str, tuple[int, int]] = {

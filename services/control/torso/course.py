@@ -8,7 +8,7 @@ from engage_hri.schemas.body import NoPointZone, Ray
 from engage_hri.schemas.feedback import WarningKind
 from engage_hri.schemas.syncref import SYNC_POINTS
 from engage_hri.schemas.world import World
-from engage_hri.services.control.torso.motion import Leg
+from engage_hri.services.control.torso.path import Leg
 from engage_hri.services.control.torso.repertoire import BUILT_IN, Repertoire
 
 

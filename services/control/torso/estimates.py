@@ -11,7 +11,8 @@ from engage_hri.schemas.body import BodyPose, Estimate, Phase
 from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.control.torso.course import Course, CoursePoint, Impossible
-from engage_hri.services.control.torso.motion import SLOWEST, Path
+from engage_hri.services.control.torso.motion import SLOWEST
+from engage_hri.services.control.torso.path import Path
 from engage_hri.services.control.torso.sizing import quickest
 from engage_hri.services.control.voice.timeline import Utterance
 

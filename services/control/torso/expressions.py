@@ -32,8 +32,8 @@ from engage_hri.services.control.torso.course import (
     marks,
 )
 from engage_hri.services.control.torso.kinematics import Side
-from engage_hri.services.control.torso.motion import Leg
 from engage_hri.services.control.torso.pace import arm_time, moving_time, return_time
+from engage_hri.services.control.torso.path import Leg
 from engage_hri.services.control.torso.repertoire import Absent, Found, GesturePath, HeadPath, Table
 
 SETTLE: Seconds = 0.08

@@ -16,14 +16,15 @@ from engage_hri.services.control.torso import choreography, head, kinematics, tr
 from engage_hri.services.control.torso.course import Course, Impossible, Situation
 from engage_hri.services.control.torso.estimates import infeasible, motion_estimate
 from engage_hri.services.control.torso.head import Fixation
-from engage_hri.services.control.torso.motion import Motion, Path, resting
+from engage_hri.services.control.torso.motion import Motion
+from engage_hri.services.control.torso.path import Path, resting
 from engage_hri.services.control.torso.repertoire import Repertoire
 from engage_hri.services.control.torso.runs import Run
 from engage_hri.services.control.torso.tracks import Track
 
 
 class Clock(Protocol):
-    """What tells the time."""
+    """Source of the time."""
 
     def time(self) -> Seconds: ...
 

@@ -20,8 +20,9 @@ from engage_hri.services.control.body import MovementAuthority
 from engage_hri.services.control.config import Variability
 from engage_hri.services.control.torso import choreography, head, tracks
 from engage_hri.services.control.torso.course import Impossible
-from engage_hri.services.control.torso.motion import Motion, Path, resting
+from engage_hri.services.control.torso.motion import Motion
 from engage_hri.services.control.torso.moving import Torso
+from engage_hri.services.control.torso.path import Path, resting
 from engage_hri.services.control.torso.runs import Run
 from engage_hri.services.control.waiting import EARLY, Bell
 

@@ -10,7 +10,8 @@ from engage_hri.services.control import variability
 from engage_hri.services.control.body import MovementAuthority
 from engage_hri.services.control.config import Stall, Variability
 from engage_hri.services.control.torso.course import Course, CoursePoint
-from engage_hri.services.control.torso.motion import Leg, Motion, Path
+from engage_hri.services.control.torso.motion import Motion
+from engage_hri.services.control.torso.path import Leg, Path
 from engage_hri.services.control.torso.sizing import hurried
 from engage_hri.services.control.waiting import Bell
 

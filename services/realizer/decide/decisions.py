@@ -114,6 +114,13 @@ class Decisions:
             return 0.0
         return self.bounds.lateness(self.plan.at[point], at, self.net.passed, self.facts.held_between)
 
+    def earliness(self, point: Point) -> Seconds:
+        """Seconds by which a point was reached before the time that the block fixes for it; 0 if it fixes none."""
+        at = self.facts.reached.get(point)
+        if at is None or point not in self.plan.at:
+            return 0.0
+        return max(0.0, self.began + self.bounds.fixed(self.plan.at[point]) - at)
+
     # -- decisions -----------------------------------------------------------------------------------------------
 
     def urgent(self, now: Seconds) -> list[Effect]:

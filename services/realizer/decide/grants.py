@@ -19,7 +19,7 @@ from engage_hri.services.realizer.points import Member, Point
 
 
 class Grants:
-    """Who may pass which instant. An observer of the net (see net/running.py).
+    """Permissions to pass instants. An observer of the net (see net/running.py).
 
     touched: behaviors that may go further, or at another pace, than they were told. granted_at: when each behavior
     was last allowed to go further.

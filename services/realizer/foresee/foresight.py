@@ -13,6 +13,7 @@ from engage_hri.services.realizer.foresee.experience import Experience
 from engage_hri.services.realizer.foresee.forecast import Forecast, full_forecast, is_predictive
 from engage_hri.services.realizer.net.facts import Facts
 from engage_hri.services.realizer.net.running import RunningNet
+from engage_hri.services.realizer.plan.known import BLOCK_END, BLOCK_START
 from engage_hri.services.realizer.plan.planner import Plan
 from engage_hri.services.realizer.plan.schedule import EPSILON
 from engage_hri.services.realizer.points import SHIFTS, Member, Point, performer
@@ -39,7 +40,7 @@ class Foresight:
         self.experience = Experience(plan.estimates)
         self.paces: dict[str, Pace] = {}
         self.not_before: dict[str, Seconds] = {}
-        self.foreseen: dict[Point, Seconds] = {}
+        self.foreseen = {point: facts.began + plan.predicted(point) for point in plan.foreign}
         self.is_surprised = False
         self._facts = facts
         self._followed: set[Point] = set()
@@ -59,8 +60,8 @@ class Foresight:
         self.forecast = None
         if is_predictive(plan) or self._followed:
             self.forecast = forecast = Forecast(plan, self._facts.began, self.experience.factor, self.foreseen)
-            for point in self._followed & plan.at.keys():
-                forecast.require(plan.at[point])
+            for transition in self._transitions_followed():
+                forecast.require(transition)
             bounded = forecast.bounded
             self._minded = frozenset(member.behavior for transition in bounded for member in plan.members[transition])
 
@@ -109,7 +110,7 @@ class Foresight:
         self._followed.update(points)
         if (forecast := self.forecast) is None:
             return not self._followed
-        self._news += [(forecast.require, self.plan.at[each]) for each in self._followed & self.plan.at.keys()]
+        self._news += [(forecast.require, transition) for transition in self._transitions_followed()]
         return True
 
     @property
@@ -117,9 +118,13 @@ class Foresight:
         """Expected times of the points that other blocks are tied to and that are still to come."""
         if not self._followed or self.forecast is None:
             return {}
-        at, times = self.plan.at, self.forecast.times
-        reached = self._facts.reached
-        return {point: times[at[point]] for point in self._followed if point in at and point not in reached}
+        times, reached = self.forecast.times, self._facts.reached
+        coming = {point: self.plan.transition(point) for point in self._followed if point not in reached}
+        return {point: times[transition] for point, transition in coming.items() if transition is not None}
+
+    def _transitions_followed(self) -> list[int]:
+        found = [self.plan.transition(point) for point in self._followed]
+        return [transition for transition in found if transition is not None]
 
     # -- behaviors under way -------------------------------------------------------------------------------------
 
@@ -218,12 +223,10 @@ class Foresight:
     def pace(self, behavior: str, now: Seconds, may_pass: Callable[[Point], bool]) -> Pace:
         """Instants for the behavior's points up to the next where it must ask; empty if it comes to them anyway."""
         forecast, plan, facts = self.forecast, self.plan, self._facts
-        if forecast is None or behavior not in plan.chains:
-            return ()
+        if forecast is None or behavior not in self._minded:
+            return ()  # No bound can make it hurry, or wait on its way.
         points, segments = plan.chains[behavior].points, plan.chains[behavior].segments
-        is_moving = (
-            plan.chains[behavior].type not in SHIFTS
-        )  # a shift beneath a look takes no time
+        is_moving = plan.chains[behavior].type not in SHIFTS  # a shift beneath a look takes no time
         number = facts.next_number(behavior)
         at = facts.reached[points[number - 1]] if number else now
         is_paced = forecast.is_hurried(behavior)
@@ -251,25 +254,31 @@ class Foresight:
 
     def expected(self, now: Seconds) -> dict[Point, Seconds]:
         """Expected times of all points of the block that are still to come, in seconds from the block's start."""
-        forecast = self.from_scratch()
-        for transition in range(len(self.plan.members)):
-            forecast.overdue(transition, now)
-        forecast.update()
+        forecast = self.from_scratch(now)
         points = {point for chain in self.plan.chains.values() for point in chain.points}
         coming = points - self._facts.reached.keys()
         self._expected |= {point: max(now, forecast.times[self.plan.at[point]]) for point in coming}
         self.is_surprised = False
         return {point: self._expected[point] - self._facts.began for point in coming}
 
-    def times(self) -> dict[Point, Seconds]:
-        """Time of each point of the plan, measured or expected, by the clock of the loop."""
-        forecast, reached = self.from_scratch(), self._facts.reached
-        return {point: reached.get(point, forecast.times[at]) for point, at in self.plan.at.items()}
+    def times(self, now: Seconds) -> dict[Point, Seconds]:
+        """Time of each point of the plan and of the end of the block, measured or expected, by the loop's clock."""
+        forecast, reached = self.from_scratch(now), self._facts.reached
+        times = {point: reached.get(point, forecast.times[at]) for point, at in self.plan.at.items()}
+        return {**times, BLOCK_START: self._facts.began, BLOCK_END: forecast.times[len(self.plan.members) - 1]}
 
-    def from_scratch(self) -> Forecast:
-        """A forecast of all instants; for those that the kept forecast has, it says the same."""
+    def from_scratch(self, now: Seconds | None = None) -> Forecast:
+        """A forecast of all instants; for those that the kept forecast has, it says the same.
+
+        now: what has not come is expected no earlier.
+        """
         facts = (self.foreseen, self._facts.reached, self._facts.arrived, self._net.instants)
-        return full_forecast(self.plan, self._facts.began, self.experience.factor, *facts)
+        forecast = full_forecast(self.plan, self._facts.began, self.experience.factor, *facts)
+        if now is not None:
+            for transition in range(len(self.plan.members)):
+                forecast.overdue(transition, now)
+            forecast.update()
+        return forecast
 
 
 def differ_noticeably(one: Pace, other: Pace) -> bool:

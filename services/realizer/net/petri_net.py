@@ -78,6 +78,22 @@ class PetriNet(Struct, frozen=True, dict=True):
     places: tuple[Place, ...]
     bounds: tuple[Bound, ...] = ()
 
+    def later(self, sources: Iterable[int]) -> set[int]:
+        """Transitions that come after one of these, and these."""
+        found = set(sources)
+        if not found:
+            return found
+        out: dict[int, list[int]] = {}
+        for place in self.places:
+            if place.kind != "idle":
+                out.setdefault(place.source, []).append(place.target)
+        todo = list(found)
+        while todo:
+            fresh = set(out.get(todo.pop(), ())) - found
+            found |= fresh
+            todo += fresh
+        return found
+
     @cached_property
     def initial(self) -> Marking:
         """The marking before the block starts: a token in each `idle` place."""

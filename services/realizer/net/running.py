@@ -275,12 +275,14 @@ class RunningNet:
         self._set(number, TOKEN if place.lag > 0.0 else RIPE)
         if place.kind in ("handover", "idle") or target == self.end:
             return
-        self._ripe[target] = max(self._ripe[target], at + place.lag)
+        if place.source or place.lag > 0.0:
+            self._ripe[target] = max(self._ripe[target], at + place.lag)
         if place.lag > 0.0:
             self._clocks.set(number, at + place.lag, at, is_stopped=self._is_held(number))
         self._lack_less(target)
         if place.lag <= 0.0:
-            self._miss_less(target, at)
+            # A point of another block may be older than this block: its instant is in the past.
+            self._miss_less(target, at if place.source else -inf)
 
     def _ripen(self, number: int, at: Seconds) -> None:
         self._set(number, RIPE)

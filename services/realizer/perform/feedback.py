@@ -18,6 +18,7 @@ from engage_hri.schemas.feedback import (
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.interface import Bus
 from engage_hri.services.realizer.decide.decisions import Decisions
+from engage_hri.services.realizer.decide.lateness import too_early
 from engage_hri.services.realizer.plan.planner import Plan
 from engage_hri.services.realizer.points import Point
 
@@ -51,6 +52,8 @@ class Reporter:
         self._latest: Seconds = -inf
         """Time of the latest message; none after it has an earlier one."""
         self._predicted: Mapping[Point, Seconds] = {}
+        self._told: dict[Point, Seconds] = {}
+        """The last prediction of each point, in seconds from the block's start."""
         self._not_before = 0.0
         """Earliest time for the next prediction."""
 
@@ -59,6 +62,10 @@ class Reporter:
         at = self._bus.stamp(self._no_earlier(began))
         self._say(BlockProgress(block=self._block, progress="start", at=at, character_id=self._character))
         self._predict(plan, began, {point: plan.predicted(point) for point in _points(plan)})
+
+    def now(self) -> Seconds:
+        """Present loop time."""
+        return self._bus.now()
 
     def may_expect(self) -> bool:
         """True if it is time to predict again."""
@@ -73,6 +80,7 @@ class Reporter:
 
     def _predict(self, plan: Plan, began: Seconds, times: Mapping[Point, Seconds]) -> None:
         self._predicted = times
+        self._told.update(times)
         points = []
         for point, time in times.items():
             if (sync := self._spelled(point, plan)) is not None:
@@ -83,13 +91,8 @@ class Reporter:
         )
         self._say(prediction)
 
-    def reached(
-        self, first_plan: Plan, decisions: Decisions, point: Point, *, arrived: Seconds | None, by_body: bool
-    ) -> None:
-        """Report a point, and how much later it was than the first of its instant, as measured.
-
-        first_plan: the one the block began with, which said when the point was to be.
-        """
+    def reached(self, decisions: Decisions, point: Point, *, arrived: Seconds | None, by_body: bool) -> None:
+        """Report a point, and how much later it was than the first of its instant, as measured."""
         plan, facts = decisions.plan, decisions.facts
         at = facts.reached[point]
         together = (facts.reached.get(member.point, at) for member in plan.members[plan.at[point]])
@@ -103,7 +106,7 @@ class Reporter:
                     sync=sync,
                     at=self._bus.stamp(told),
                     time=told - decisions.began,
-                    predicted=first_plan.predicted(point),
+                    predicted=self._told.get(point, told - decisions.began),
                     arrived=None if arrived is None or arrived == at else arrived - decisions.began,
                     skew=skew,
                     source="body" if by_body else "clock",
@@ -112,6 +115,16 @@ class Reporter:
             )
         if (late := max(skew, decisions.lateness(point))) > self._tolerance:
             self.late(decisions.net.part_of[point].point, f"{point.sync} came {late:.2f} s later than it should")
+        elif (early := decisions.earliness(point)) > self._tolerance:
+            instant = decisions.net.part_of[point].point
+            self.late(instant, f"{point.sync} came {early:.2f} s earlier than its fixed time")
+
+    def heard(self, decisions: Decisions, foreign: Point) -> None:
+        """Warn if a point of another block, reached now, is one that points of this block should have waited for."""
+        for point, early in too_early(decisions.plan, decisions.facts.reached, foreign):
+            if early > self._tolerance:
+                instant = decisions.net.part_of[point].point
+                self.late(instant, f"{point.sync} came {early:.2f} s earlier than {foreign} allows")
 
     def late(self, instant: Point, message: str) -> None:
         """Warn that a behavior is late for an instant: once for each."""

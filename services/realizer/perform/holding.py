@@ -7,7 +7,7 @@ Held = tuple[str, str]
 
 
 class Holds:
-    """What is held, and since when."""
+    """Holds by what they hold, each with the time since when."""
 
     def __init__(self) -> None:
         self._since: dict[Held, Seconds] = {}
@@ -32,7 +32,7 @@ class Holds:
         return min(self._since.values(), default=None)
 
     def since(self, at: Seconds) -> list[Held]:
-        """What has been held since `at`, or longer."""
+        """Holds that are in force since `at`, or longer."""
         return [held for held, since in self._since.items() if since <= at]
 
 

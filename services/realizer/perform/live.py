@@ -33,6 +33,8 @@ class Live:
         self.earlier = list(earlier)
         self.ended: asyncio.Future[None] = loop.create_future()
         self.ending: asyncio.Future[Ending] = loop.create_future()
+        self.settled: asyncio.Future[None] = loop.create_future()
+        """Resolved while it is being performed, has ended, or waits for its turn: others can be planned now."""
         there = {each.request.block.id: each for each in reversed(earlier)}  # a second one with an id is refused
         self.leaders = tuple([there[id] for id in request.follows if id in there])
         """Blocks that it continues (`follows`): it ends with any of them that ends otherwise than done."""
@@ -43,6 +45,16 @@ class Live:
             leader._followers.append(self)
             if leader.ending.done():
                 self._end_with(leader)
+
+    def settle(self) -> None:
+        """Let blocks that came later be planned."""
+        if not self.settled.done():
+            self.settled.set_result(None)
+
+    def unsettle(self) -> None:
+        """Let blocks that come be planned after this one: its turn has come."""
+        if self.settled.done():
+            self.settled = asyncio.get_running_loop().create_future()
 
     def stop(self, ending: Ending) -> None:
         """End it now, as the first call says. Its followers end at once, before they hear what is lost."""

@@ -1,7 +1,7 @@
 """Sync points of live blocks that other live blocks refer to: expected, reached or lost."""
 
 from collections import deque
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Set
 from contextlib import contextmanager
 from math import inf
 from typing import Protocol
@@ -9,6 +9,7 @@ from typing import Protocol
 from engage_hri.schemas.blocks import Block
 from engage_hri.schemas.syncref import BLOCK_ITSELF
 from engage_hri.schemas.units import Seconds
+from engage_hri.services.realizer.plan.known import block_of, qualified
 from engage_hri.services.realizer.plan.schedule import EPSILON
 from engage_hri.services.realizer.points import Point
 
@@ -36,12 +37,13 @@ class FollowedBlock(Protocol):
 class _Tracked:
     """Points of one live block that others may be tied to.
 
-    lost: behaviors that were dropped. named: points that others are tied to. expected: the last expected time of each
-    of these points that was told.
+    others: blocks that were live when it came. lost: behaviors that were dropped. named: points that others are tied
+    to. expected: the last expected time of each of these points that was told.
     """
 
-    def __init__(self, block: Block) -> None:
+    def __init__(self, block: Block, others: Mapping[str, "_Tracked"]) -> None:
         self.block = block
+        self.others = others
         self.performance: FollowedBlock | None = None
         self.named: set[Point] = set()
         self.expected: dict[Point, Seconds] = {}
@@ -62,11 +64,12 @@ class LiveBlocks:
     @contextmanager
     def opened(self, block: Block) -> Iterator[None]:
         """Keep the block as live inside the `with`."""
-        tracked = self._tracked[block.id] = _Tracked(block)
+        tracked = self._tracked[block.id] = _Tracked(block, dict(self._tracked))
         try:
             yield
         finally:
             del self._tracked[block.id]
+            tracked.others = {}  # Nobody asks any more what it referred to.
             ends = (BLOCK_ITSELF, *(behavior.id for behavior in block.behaviors))
             for follower in list(tracked.followers):
                 follower.miss(f"{block.id}:{id}" for id in ends)
@@ -76,12 +79,26 @@ class LiveBlocks:
         """The live blocks, by id."""
         return {id: tracked.block for id, tracked in self._tracked.items()}
 
+    def named(self, block: str) -> Set[Point]:
+        """Points of a live block that others wait for."""
+        return self._tracked[block].named
+
+    def reached(self, block: str, content: Block | None) -> Mapping[Point, Seconds]:
+        """Points that a block has reached, by loop time, as long as blocks live that came before its end."""
+        tracked = self._find(block, content)
+        return tracked.reached if tracked is not None else {}
+
+    def _find(self, id: str, block: Block | None) -> _Tracked | None:
+        """A live block, or one that has ended while others lived; another one that has taken its id is not meant."""
+        known = (tracked.get(id) for tracked in (self._tracked, *(each.others for each in self._tracked.values())))
+        return next((each for each in known if each is not None and each.block is block), None)
+
     def reach(self, block: str, point: Point, at: Seconds) -> None:
         """Tell followers that a point of a live block is reached. The block itself is the behavior `bml`."""
         tracked = self._tracked[block]
         tracked.reached[point] = at
         for follower in list(tracked.followers):
-            follower.hear(_qualified(block, point), at)
+            follower.hear(qualified(block, point), at)
 
     def perform(self, block: str, performance: FollowedBlock) -> None:
         """Note that the block is performed now, by `performance`, which is asked for its expected times."""
@@ -103,7 +120,7 @@ class LiveBlocks:
             while self._untold:
                 tracked, point, at = self._untold.popleft()
                 for follower in list(tracked.followers):
-                    follower.foresee(_qualified(tracked.block.id, point), at)
+                    follower.foresee(qualified(tracked.block.id, point), at)
         finally:
             self._is_telling = False
 
@@ -117,43 +134,41 @@ class LiveBlocks:
             follower.miss((f"{block}:{behavior}",))
 
     @contextmanager
-    def followed(self, follower: TiedBlock, points: Iterable[Point], blocks: Mapping[str, Block]) -> Iterator[None]:
-        """Tell `follower` what becomes of these points of other `blocks`, and what already has.
+    def followed(
+        self, follower: TiedBlock, points: Iterable[Point], blocks: Mapping[str, Block | None]
+    ) -> Iterator[None]:
+        """Tell `follower` what becomes of these points of other `blocks`, and what already has."""
+        self.follow(follower, points, blocks)
+        try:
+            yield
+        finally:
+            for tracked in self._tracked.values():
+                if follower in tracked.followers:
+                    tracked.followers.remove(follower)
+
+    def follow(self, follower: TiedBlock, points: Iterable[Point], blocks: Mapping[str, Block | None]) -> None:
+        """Tell `follower` from now on what becomes of these points of other `blocks`, and what already has.
 
         A block that has taken the id of one of them since is another block.
         """
         wanted = sorted(points)
-        known = {id: self._tracked[id] for id in map(_block_of, wanted) if id in self._tracked}
-        homes = {id: tracked for id, tracked in known.items() if tracked.block is blocks.get(id)}
+        found = {id: self._find(id, blocks.get(id)) for id in map(block_of, wanted)}
+        homes = {id: tracked for id, tracked in found.items() if tracked is not None}
         for tracked in homes.values():
-            tracked.followers.append(follower)
+            if follower not in tracked.followers:
+                tracked.followers.append(follower)
         for point in wanted:
-            block = _block_of(point)
+            block = block_of(point)
             named = Point(point.behavior.removeprefix(f"{block}:"), point.sync)
             home = homes.get(block)
-            if home is None or named.behavior in home.lost:
-                follower.miss((point.behavior,))
-            elif (at := home.reached.get(named)) is not None:
+            if home is not None and (at := home.reached.get(named)) is not None:
                 follower.hear(point, at)
+            elif home is None or named.behavior in home.lost or self._tracked.get(block) is not home:
+                follower.miss((point.behavior,))
             else:
                 home.named.add(named)
                 if (expected := home.expected.get(named)) is not None:
                     follower.foresee(point, expected)
-        for tracked in homes.values():
-            if tracked.performance is not None:
+        for id, tracked in homes.items():
+            if tracked.performance is not None and self._tracked.get(id) is tracked:
                 tracked.performance.follow(tracked.named)
-        try:
-            yield
-        finally:
-            for tracked in homes.values():
-                tracked.followers.remove(follower)
-
-
-def _qualified(block: str, point: Point) -> Point:
-    """The point as other blocks name it."""
-    return Point(f"{block}:{point.behavior}", point.sync)
-
-
-def _block_of(point: Point) -> str:
-    """Id of the block of a qualified point."""
-    return point.behavior.partition(":")[0]

@@ -30,6 +30,7 @@ from engage_hri.services.realizer.perform.outcome import completed
 from engage_hri.services.realizer.perform.recognition_link import RecognitionLink
 from engage_hri.services.realizer.perform.shared_context import SharedContext
 from engage_hri.services.realizer.perform.spoken import Spoken
+from engage_hri.services.realizer.perform.ties import Ties
 from engage_hri.services.realizer.plan.planner import Plan, plan_block
 from engage_hri.services.realizer.plan.relations import DROPPED
 from engage_hri.services.realizer.points import FINISH, Point
@@ -72,7 +73,7 @@ class BlockPerformance:
         self._held = held
         self._net = NetStream(shared.bus, plan.block.id)
         self._net_timer = Timer(self._net.changed)
-        self._report = Reporter(shared.bus, plan.block.id, shared.config.skew)
+        self.report = Reporter(shared.bus, plan.block.id, shared.config.skew)
         self._runs = {id: BehaviorRun(self, id) for id in plan.chains}
         self._tasks: dict[str, asyncio.Task[None]] = {}
         why = {each.behavior: each.message.removesuffix(DROPPED) for each in reversed(plan.problems)}
@@ -80,14 +81,11 @@ class BlockPerformance:
         """Behaviors that were dropped, each with the reason."""
         self._interrupted: set[str] = set()
         """Behaviors that are ended on request."""
-        self._elsewhere = elsewhere
-        self._foreign = frozenset(plan.foreign)
-        self._vanished: set[str] = set()
-        """Behaviors of other blocks of which some point will never be reached."""
+        self.ties = Ties(self, shared.others, shared.live_blocks, elsewhere)
         self.spoken = Spoken(plan.block.behaviors)
         self._ending = live.ending
-        self._timer = Timer(self._take_in)
-        self._afterwards = Afterwards(self._take_in)
+        self._timer = Timer(self.take_in)
+        self._afterwards = Afterwards(self.take_in)
         self._untold: list[News] = []
         self._needs_replan = False
 
@@ -108,9 +106,9 @@ class BlockPerformance:
         self.decisions = Decisions(self.plan, began, self._config, self._observers)
         if self._held != ():
             self.decisions.hold(self._held, began)
-        self._report.started(self.plan, began)
+        self.report.started(self.plan, began)
         for problem in self.plan.problems:
-            self._report.warn(problem.kind, problem.message, problem.behavior)
+            self.report.warn(problem.kind, problem.message, problem.behavior)
         for behavior in self.plan.dropped:
             self._shared.live_blocks.lose(block, behavior)
         self._shared.live_blocks.reach(block, Point(BLOCK_ITSELF, "start"), began)
@@ -121,8 +119,9 @@ class BlockPerformance:
                     id: tasks.create_task(run.perform(), name=f"{block}/{id}") for id, run in self._runs.items()
                 }
                 self._shared.live_blocks.perform(block, self)
-                with self._shared.live_blocks.followed(self, self._foreign, self._elsewhere):
-                    self._take_in()
+                with self._shared.live_blocks.followed(self.ties, set(self.ties.foreign), self.ties.blocks):
+                    self.ties.begin()
+                    self.take_in()
                     ending = await asyncio.shield(self._ending)  # others wait for it, too
                     await self._end_behaviors(ending)
                 for task in self._tasks.values():
@@ -130,7 +129,7 @@ class BlockPerformance:
         finally:
             self._close()
         outcome = completed(self._live.outcome, self.plan.block, self.spoken.texts, self._dropped, self._interrupted)
-        self._report.ended(outcome.status, began)
+        self.report.ended(outcome.status, began)
         self._shared.live_blocks.reach(block, Point(BLOCK_ITSELF, "end"), self.bus.now())
         return outcome
 
@@ -157,7 +156,7 @@ class BlockPerformance:
             task.cancel()
             self._requests.cancel(self.body.id(behavior), "interrupted")
             self.lose(behavior, Fault(reason="interrupted"))
-            self._take_in()
+            self.take_in()
         return behavior not in self._dropped and self.decisions.facts.has_ended(behavior)
 
     def hold(self, behaviors: Collection[str] | None) -> None:
@@ -165,7 +164,7 @@ class BlockPerformance:
         if behaviors != self._held:
             self._held = behaviors
             if self._tasks:  # Otherwise it is held as it begins.
-                self._take_in(self._hold)
+                self.take_in(self._hold)
 
     def _hold(self) -> None:
         for effect in self.decisions.hold(self._held, self.bus.now()):
@@ -178,28 +177,21 @@ class BlockPerformance:
 
     # -- other blocks ------------------------------------------------------------------------------------------------
 
-    def hear(self, point: Point, at: Seconds) -> None:
-        """Note that a point of another block is reached."""
-        if point in self._foreign:
-            self._take_in(partial(self.decisions.facts.hear, point, at))
+    @property
+    def is_ending(self) -> bool:
+        """True if its behaviors are being ended, whatever was planned."""
+        return self._ending.done()
 
-    def foresee(self, point: Point, at: Seconds) -> None:
-        """Note that a point of another block is expected at `at` now."""
-        if point in self._foreign:
-            self._take_in(partial(self.decisions.foresight.foresee, point, at))
+    def fail(self, behavior: str, fault: Fault) -> None:
+        """End the block as failed, and say that it is because of this behavior."""
+        self._tell()
+        self.report.warn("EXECUTION_FAILURE", str(fault), behavior)
+        self._live.fail(Fault(reason=fault.reason, where=f"{self.plan.block.id}: {behavior}"))
 
     def follow(self, points: Iterable[Point]) -> None:
         """Tell from now on when these points are expected: other blocks are tied to them."""
         if points:
-            self._take_in(partial(self.decisions.follow, points))
-
-    def miss(self, behaviors: Iterable[str]) -> None:
-        """Plan without these behaviors of other blocks if a point of them is needed that is not reached."""
-        lost = {point.behavior for point in self._foreign - self.decisions.facts.reached.keys()}
-        lost = lost.intersection(behaviors) - self._vanished
-        if lost:
-            self._vanished |= lost
-            self._take_in(self._replan)
+            self.take_in(partial(self.decisions.follow, points))
 
     # -- the end -----------------------------------------------------------------------------------------------------
 
@@ -240,7 +232,7 @@ class BlockPerformance:
 
     # -- what is decided, carried out --------------------------------------------------------------------------------
 
-    def _take_in(self, news: Callable[[], object] = lambda: None) -> None:
+    def take_in(self, news: Callable[[], object] = lambda: None) -> None:
         """Take in `news`, and do what follows from it, unless the block is ending."""
         if not self._ending.done():
             with self.containing():
@@ -251,14 +243,14 @@ class BlockPerformance:
     def _advance(self) -> None:
         self._afterwards.stop()
         if self._needs_replan:
-            self._replan()
+            self.replan()
         again = True
         while again and not self._ending.done():
             made_news = [self._apply(effect) for effect in self.decisions.advance(self.bus.now())]
             again = any(made_news)
         foresight = self.decisions.foresight
-        if foresight.is_surprised and self._report.may_expect() and not self._ending.done():
-            self._report.expect(self.decisions.plan, self.decisions.began, foresight.expected(self.bus.now()))
+        if foresight.is_surprised and self.report.may_expect() and not self._ending.done():
+            self.report.expect(self.decisions.plan, self.decisions.began, foresight.expected(self.bus.now()))
         self._shared.live_blocks.foresee(self.plan.block.id, foresight.ahead)
         self._timer.set(None if self._ending.done() else self.decisions.deadline)
         if self._net_timer.at is None:
@@ -272,7 +264,7 @@ class BlockPerformance:
             case Late(behavior=id, sync=sync, overdue=overdue):
                 if not self._shared.peers.has_left("control"):
                     instant = self.decisions.net.part_of[Point(id, sync)].point
-                    self._report.late(instant, f"{sync} is {overdue:.1f} s overdue")
+                    self.report.late(instant, f"{sync} is {overdue:.1f} s overdue")
                 self.decisions.foresight.is_surprised = True
             case Stalled(behavior=id, sync=sync, overdue=overdue):
                 self.body.abort(id)
@@ -286,7 +278,7 @@ class BlockPerformance:
             untold, self._untold = self._untold, []
             for point, at, arrived, by_body in untold:
                 came = self.decisions.facts.arrived.get(point, arrived)
-                self._report.reached(self.plan, self.decisions, point, arrived=came, by_body=by_body)
+                self.report.reached(self.decisions, point, arrived=came, by_body=by_body)
                 self._shared.live_blocks.reach(self.plan.block.id, point, at)
 
     # -- what behaviors report (see `Performing`) --------------------------------------------------------------------
@@ -324,33 +316,34 @@ class BlockPerformance:
         self._dropped[id] = str(fault)
         if id in self._interrupted:
             # Its parts go home by themselves: the body does not need to be told, nor to forget what it looked at.
-            self._report.interrupted(id, self.spoken.of(id))
+            self.report.interrupted(id, self.spoken.of(id))
         else:
-            self._report.warn(kind, str(fault), id)
+            self.report.warn(kind, str(fault), id)
             if id in self.decisions.facts.begun and not at_rest:
                 self._go_home(self._parts(id), id)
             if id in self.plan.required:
                 self._live.stop(Ending("failed", Fault(reason=fault.reason, where=f"{self.plan.block.id}: {id}")))
         self._needs_replan = True  # later and once, for all that is lost in one go
-        asyncio.get_running_loop().call_soon(self._take_in)
+        asyncio.get_running_loop().call_soon(self.take_in)
 
     def lose_body(self, fault: Fault) -> None:
         """End the block: what performs it is gone."""
         if not self._ending.done():
             self._tell()
-            self._report.warn("EXECUTION_FAILURE", str(fault))
+            self.report.warn("EXECUTION_FAILURE", str(fault))
         self._live.stop(Ending("failed", fault))
 
-    def _replan(self) -> None:
+    def replan(self) -> None:
         """Go on as if what was dropped, or vanished elsewhere, had never been written."""
         self._needs_replan = False
-        gone = (*self._dropped, *self._vanished)
+        gone = (*self._dropped, *self.ties.vanished)
         try:
-            plan = plan_block(self.plan.block, self.plan.estimates.values(), dropped=gone, elsewhere=self._elsewhere)
+            plan = plan_block(self.plan.block, self.plan.estimates.values(), dropped=gone, known=self.ties.known())
         except InputRefused as error:
             self._live.stop(Ending("failed", error.fault))
             return
         self.decisions.replan(plan)
+        self.ties.renew()
         for id in self._dropped:  # Told only now that the block goes on: its followers would end with it.
             self._shared.live_blocks.lose(self.plan.block.id, id)
         for problem in plan.problems:

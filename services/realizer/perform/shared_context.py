@@ -11,6 +11,7 @@ from engage_hri.schemas.presence import PeerAlive, PeerGone
 from engage_hri.services.bus.interface import Bus, Containing
 from engage_hri.services.realizer.config import RealizerConfig
 from engage_hri.services.realizer.perform.live_blocks import LiveBlocks
+from engage_hri.services.realizer.perform.ties import Tied
 from engage_hri.services.requests.ends import Requester
 
 
@@ -38,7 +39,7 @@ class Presence:
         return participant in self._there
 
 
-class Moving(Protocol):
+class Moving(Tied, Protocol):
     """A performance, as the others and the reports of the body see it."""
 
     @property
@@ -50,8 +51,8 @@ class Moving(Protocol):
 class SharedContext(Struct, frozen=True):
     """Context of every performance.
 
-    routes: for the id of each request to the body, the performance that sent it. others: all performances.
-    live_blocks: for ties between blocks.
+    routes: for the id of each request to the body, the performance that sent it. others: all performances, in the
+    order in which they began. live_blocks: for ties between blocks.
     """
 
     bus: Bus

@@ -37,7 +37,7 @@ class Steering:
         self._timer = Timer(self._expire)
 
     async def steer(self, request: SteerPerformance) -> None:
-        """Do what is asked for, and answer it."""
+        """Carry out a request, and answer it."""
         block, behavior = request.block, request.behavior
         with self._desk.serving(request):
             concerned = [live for live in self._live.values() if block in ("", live.request.block.id)]

@@ -9,6 +9,8 @@ from msgspec import Struct
 from msgspec.structs import replace
 
 from engage_hri.schemas.behaviors import Gesture, Hand, Pointing
+from engage_hri.schemas.blocks import Block
+from engage_hri.schemas.body import Estimate
 from engage_hri.schemas.syncref import SYNC_POINTS
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.realizer.plan.instants import Classes
@@ -47,6 +49,7 @@ class Arrangement(Struct, frozen=True):
     cuts: number of the first segment that is not given its time, because a successor has the part by then.
     turns: behaviors that wait for a point of another before they take its part.
     spoken: the speeches in the order in which they are said.
+    takes: behaviors of other blocks, by `block:behavior`, of which one of this block takes a part over.
     """
 
     natural: frozenset[str] = frozenset()
@@ -56,6 +59,7 @@ class Arrangement(Struct, frozen=True):
     cuts: Mapping[str, int] = {}
     turns: frozenset[Turn] = frozenset()
     spoken: tuple[str, ...] = ()
+    takes: Mapping[str, str] = {}
 
 
 class Conflict(NamedTuple):
@@ -76,10 +80,12 @@ def arrange(
     times: Mapping[Point, Seconds],
     rounds: Mapping[Point, int],
     barred: Container[tuple[str, Hand]] = (),
+    given: Mapping[str, Chain] = {},
 ) -> Steps[tuple[Arrangement, list[Conflict]]]:
     """The arrangement for a schedule that was made with `before`, and conflicts where it breaks what was asked for.
 
-    rounds: order of points that come at one time. barred: hands with which a behavior cannot be done.
+    rounds: order of points that come at one time. barred: hands with which a behavior cannot be done. given:
+    behaviors of other blocks that have parts, with their `times`.
     """
     held = relations.held
     awaited: dict[str, set[Point]] = {}
@@ -122,8 +128,8 @@ def arrange(
                 turn = (id, chains[successor].points[number])
             if turn is not None:
                 # A behavior that has made its stroke hands over; for one that has not, a free other arm is better.
-                conflicts.append(Conflict(turn, _free_hand((successor, id), chains, times, barred)))
-                yield 1 + len(chains) // 32  # `_free_hand` has looked at all others
+                conflicts.append(Conflict(turn, free_hand((successor, id), {**chains, **given}, times, barred)))
+                yield 1 + len(chains) // 32  # `free_hand` has looked at all others
         kept = [number for number in kept if not first or number < first]
         if chain.type != "speech":
             handovers[id] = Handover(successor, chain.points[max([least, *kept])])
@@ -241,13 +247,13 @@ def _overlaid(
                 yield id
 
 
-def _free_hand(
-    rivals: tuple[str, str],
+def free_hand(
+    rivals: tuple[str, ...],
     chains: Mapping[str, Chain],
     times: Mapping[Point, Seconds],
     barred: Container[tuple[str, Hand]],
 ) -> tuple[str, Hand] | None:
-    """The one of the two that can use the other arm, since it names none and the arm is free all the while."""
+    """The one of these that can use the other arm, since it names none and the arm is free all the while."""
     for id in rivals:
         chain = chains[id]
         other = _OTHER.get(chain.parts[0]) if len(chain.parts) == 1 else None
@@ -271,3 +277,16 @@ def _is_free(
     since, to = window
     windows: Sequence[tuple[Seconds, Seconds]] = [_window(each, times) for each in others if arm in each.parts]
     return all(end <= since + EPSILON or start >= to - EPSILON for start, end in windows)
+
+
+def hands_refused(block: Block, chosen: Block, estimates: Iterable[Estimate]) -> set[tuple[str, Hand]]:
+    """Hands that `block` leaves open and `chosen` does not, with which the body cannot perform a behavior."""
+    impossible = {each.behavior for each in estimates if not each.feasible}
+    return {
+        (after.id, after.mode)
+        for before, after in zip(block.behaviors, chosen.behaviors, strict=True)
+        if after is not before
+        and isinstance(after, Pointing | Gesture)
+        and after.mode is not None
+        and after.id in impossible
+    }

@@ -5,13 +5,12 @@ each with a warning: behaviors that the body cannot do, and those that cannot be
 between equals; any other permutation of a block gives the same net.
 """
 
-from collections.abc import Collection, Container, Iterable, Mapping
+from collections.abc import Container, Iterable, Mapping
 
 from msgspec import Struct
 from msgspec.structs import replace
 
-from engage_hri.schemas.behavior_types import TYPES
-from engage_hri.schemas.behaviors import BlockBehavior, Event, Hand, Head, Unknown
+from engage_hri.schemas.behaviors import BlockBehavior, Event, Hand, Unknown
 from engage_hri.schemas.blocks import Block
 from engage_hri.schemas.body import Estimate
 from engage_hri.schemas.faults import Fault
@@ -21,27 +20,29 @@ from engage_hri.services.realizer.net.petri_net import PetriNet
 from engage_hri.services.realizer.plan import unsupported
 from engage_hri.services.realizer.plan.assembly import Assembler, Assembly, assembling
 from engage_hri.services.realizer.plan.deadlocks import Losses, clashes, judge
+from engage_hri.services.realizer.plan.foresight import foreseen, losses_to_others, too_late, unkept, without_date
 from engage_hri.services.realizer.plan.given_up import times_of
 from engage_hri.services.realizer.plan.handover import Arrangement, Conflict, Turn, arrange, entering, kept_points
 from engage_hri.services.realizer.plan.instants import Classes
+from engage_hri.services.realizer.plan.known import BLOCK_END, NOTHING, Known, is_foreign
 from engage_hri.services.realizer.plan.phases import Chain, chain, natural_ends
 from engage_hri.services.realizer.plan.prediction import Impossible, predict
 from engage_hri.services.realizer.plan.relations import (
     DROPPED,
     BlockRefused,
-    Elsewhere,
     Equal,
-    Order,
     Problem,
     Relations,
     Term,
     at_line,
     relation_steps,
 )
+from engage_hri.services.realizer.plan.remaining import remaining
 from engage_hri.services.realizer.plan.schedule import Solution, critical_path
+from engage_hri.services.realizer.plan.sharing import naming_others, share, waits_elsewhere
 from engage_hri.services.realizer.plan.speaking_order import Misordered, SpeakingOrder
 from engage_hri.services.realizer.plan.steps import PORTION, Steps, finished, portions
-from engage_hri.services.realizer.points import ORIGIN, Member, Point
+from engage_hri.services.realizer.points import Member, Point
 
 
 class Plan(Struct, frozen=True, kw_only=True):
@@ -56,6 +57,9 @@ class Plan(Struct, frozen=True, kw_only=True):
     behaviors: those that will be performed, in document order. dropped: those that will not, with `problems`.
     natural: behaviors that end when something takes their place, or with the block.
     waited_for: behaviors that the end of the block waits for. given_up: speeches that lack a time they should have.
+    constrained: points that something waits for, or that are timed.
+    successors: behaviors that hand their parts over, each with the one that takes them (`block:behavior` of another
+    block), and the first of its points that comes by that. takes: behaviors of other blocks whose parts are taken.
     """
 
     block: Block
@@ -71,6 +75,9 @@ class Plan(Struct, frozen=True, kw_only=True):
     waited_for: frozenset[str]
     kept: Mapping[str, Point]
     entering: tuple[str, ...]
+    constrained: frozenset[Point] = frozenset()
+    successors: Mapping[str, tuple[str, Point]] = {}
+    takes: Mapping[str, str] = {}
     critical: tuple[int, ...] = ()
     dropped: tuple[str, ...] = ()
     given_up: tuple[str, ...] = ()
@@ -80,10 +87,14 @@ class Plan(Struct, frozen=True, kw_only=True):
         """Seconds from the block's start to the point, if all goes as estimated."""
         return self.schedule[self.at[point]]
 
+    def transition(self, point: Point) -> int | None:
+        """The transition of a point as other blocks may name it: the end of the block has one, too."""
+        return len(self.net.transitions) - 1 if point == BLOCK_END else self.at.get(point)
+
     @property
     def foreign(self) -> tuple[Point, ...]:
-        """Points of other blocks that this one is tied to."""
-        return tuple([point for point in self.at if ":" in point.behavior])
+        """Points of other blocks that this one is tied to, or waits for."""
+        return tuple([point for point in self.at if is_foreign(point.behavior)])
 
 
 def plan_block(
@@ -91,15 +102,15 @@ def plan_block(
     estimates: Iterable[Estimate] = (),
     *,
     dropped: Iterable[str] = (),
-    elsewhere: Elsewhere | None = None,
+    known: Known = NOTHING,
     barred: Container[tuple[str, Hand]] = (),
 ) -> Plan:
     """Plan `block`; durations that no estimate gives are nominal. Raises BlockRefused, with place and line.
 
-    dropped: behaviors to leave out as if never written. elsewhere: other live blocks, by id. barred: hands
-    with which a behavior cannot be done.
+    dropped: behaviors to leave out as if never written. known: other live blocks. barred: hands with which a behavior
+    cannot be done.
     """
-    return finished(plan_steps(block, estimates, dropped=dropped, elsewhere=elsewhere, barred=barred))
+    return finished(plan_steps(block, estimates, dropped=dropped, known=known, barred=barred))
 
 
 def plan_steps(
@@ -107,12 +118,12 @@ def plan_steps(
     estimates: Iterable[Estimate] = (),
     *,
     dropped: Iterable[str] = (),
-    elsewhere: Elsewhere | None = None,
+    known: Known = NOTHING,
     barred: Container[tuple[str, Hand]] = (),
 ) -> Steps[Plan]:
     """Plan as `plan_block` does, in steps."""
-    planner = _Planner(block, {each.behavior: each for each in estimates}, dropped, barred)
-    yield from planner.read(elsewhere)
+    planner = _Planner(block, {each.behavior: each for each in estimates}, dropped, barred, known)
+    yield from planner.read()
     return (yield from planner.plan())
 
 
@@ -123,8 +134,12 @@ class _Planner:
         estimates: Mapping[str, Estimate],
         dropped: Iterable[str],
         barred: Container[tuple[str, Hand]],
+        known: Known,
     ) -> None:
         self.block = block
+        self.known = known
+        self.doubted: set[Point] = set()
+        """Points of other blocks that are not planned for when they are expected: something else leaves no time."""
         self.lines = {behavior.id: behavior.line for behavior in block.behaviors}
         self.estimates = estimates
         self.barred = barred
@@ -138,8 +153,8 @@ class _Planner:
         self.hands: dict[str, Hand] = {}
         self.chains: dict[str, Chain] = {}
 
-    def read(self, elsewhere: Elsewhere | None) -> Steps[None]:
-        self.relations = yield from relation_steps(self.block, elsewhere)
+    def read(self) -> Steps[None]:
+        self.relations = yield from relation_steps(self.block, self.known.blocks)
         self.problems = list(self.relations.problems)
         for portion in portions(self.block.behaviors):
             for behavior in portion:
@@ -181,7 +196,7 @@ class _Planner:
     def plan(self) -> Steps[Plan]:
         """The plan; behaviors that cannot be on time are dropped until the rest can be."""
         while True:
-            present, classes = yield from self._present()
+            present, classes = yield from remaining(self.relations, self.chains, self.dropped, self.block.id)
             try:
                 return (yield from self._plan(present, classes))
             except Misordered:
@@ -213,17 +228,24 @@ class _Planner:
         waited_for = frozenset(self.chains) - self._unawaited_events(present)
         arrangement = Arrangement(natural=natural, spoken=self.order.current)
         assembler = yield from assembling(self.chains, present, classes, waited_for)
+        given = {name: holder.chain for name, holder in self.known.holders.items()}
         while True:
+            if (named := naming_others(present, arrangement)) != assembler.relations:
+                assembler = yield from assembling(self.chains, named, classes, waited_for)
             assembler, assembly, solution = yield from self._solved(assembler, arrangement, classes)
             times = {point: solution.times[transition] for point, transition in assembly.at.items()}
             yield len(times) // 4
             rounds = assembly.rounds(solution.times)
             yield len(times) // 4
             arranged, conflicts = yield from arrange(
-                self.chains, present, classes, arrangement, times, rounds, self.barred
+                self.chains, present, classes, arrangement, {**times, **self.known.points}, rounds, self.barred, given
             )
-            conflicts = [each for each in conflicts if each.hand or each.turn not in self.overlaps]
-            turns = [each.turn for each in conflicts if each.turn and not each.hand]
+            undated = without_date(assembly, self.known) if given else ()
+            arranged, others = yield from share(
+                self.chains, present, self.known, arranged, times, self.barred, undated
+            )
+            conflicts = [each for each in (*conflicts, *others) if each.hand or each.turn not in self.overlaps]
+            turns = [each.turn for each in conflicts if each.turn and not (each.hand or waits_elsewhere(each.turn))]
             if losses := (yield from clashes(turns, self.chains, self.relations.required, classes)):
                 raise Losses(losses)
             for part in portions(conflicts):
@@ -251,6 +273,9 @@ class _Planner:
             waited_for=waited_for,
             kept=kept_points(self.chains, present, arrangement.handovers),
             entering=entering(self.chains, mentioned, times, rounds),
+            constrained=present.constrained,
+            successors=arrangement.successors,
+            takes=arrangement.takes,
             critical=critical_path(solution),
             dropped=tuple(self.dropped),
             given_up=tuple(self.given_up),
@@ -258,84 +283,6 @@ class _Planner:
                 one for one in self.problems if one.kind != "DEGRADED" or one.behavior not in self.dropped
             ),
         )
-
-    def _present(self) -> Steps[tuple[Relations, Classes]]:
-        """Relations of the behaviors that are not dropped, and the classes of their points."""
-
-        def is_left(term: Term) -> bool:
-            return term.point.behavior not in self.dropped
-
-        timed = self._timed
-        equals = [
-            Equal(tuple(map(timed, kept)), equal.behavior)
-            for equal in self.relations.equals
-            if (kept := tuple(filter(is_left, equal.terms))) and (len(kept) > 1 or len(equal.terms) == 1)
-        ]
-        yield len(equals)
-        classes = yield from self._classes(equals)
-        equals += [equal for equal in self._left_over() if classes.tie_if_possible(equal)]
-        yield len(equals)
-        orders = [each for each in self.relations.orders if is_left(each.earlier) and is_left(each.later)]
-        present = Relations(
-            tuple(equals),
-            tuple([Order(timed(each.earlier), timed(each.later), each.placed) for each in orders]),
-            self.relations.required - self.dropped.keys(),
-        )
-        return present, classes
-
-    def _left_over(self) -> list[Equal]:
-        """Ties through points of dropped behaviors: they stay, unless they could not have been kept."""
-        torn = [
-            Equal(tuple(map(self._timed, equal.terms)))
-            for equal in self.relations.equals
-            if equal.behavior not in self.dropped  # a dropped behavior's own timing is dropped, too
-            and any(term.point.behavior in self.dropped for term in equal.terms)
-        ]
-        through = Classes()
-        for equal in sorted(torn, key=lambda equal: [term.text for term in equal.terms]):
-            through.tie_if_possible(equal)
-        survivors = {
-            term.point: term
-            for equal in torn
-            for term in equal.terms
-            if term.point != ORIGIN and term.point.behavior not in self.dropped
-        }
-        first: dict[Point, Term] = {}
-        found = []
-        for point, term in sorted(survivors.items()):
-            root, offset = through.find(point)
-            here = replace(term, offset=-offset, stroke=0)
-            if root in first:
-                found.append(Equal((first[root], here)))
-                continue
-            first[root] = here
-            if (at := through.at(point)) is not None:
-                found.append(Equal((here, Term(ORIGIN, at - offset, term.text, term.line))))
-        return found
-
-    def _timed(self, term: Term) -> Term:
-        """The term of a later stroke: a point of its own if the body tells of it, otherwise an offset to stroke 1."""
-        if term.stroke < 2 or (movement := self.chains.get(term.point.behavior)) is None:
-            return term
-        later = Point(term.point.behavior, f"{term.point.sync}:{term.stroke}")
-        if later in movement.points:
-            return replace(term, point=later, stroke=0)
-        assert isinstance(movement.behavior, Head)
-        strokes = next(each.natural for each in movement.segments if each.since == "stroke")
-        share = (term.stroke - 1) / movement.behavior.repetition
-        return replace(term, offset=term.offset + share * strokes, stroke=0)
-
-    def _classes(self, equals: Collection[Equal]) -> Steps[Classes]:
-        classes = Classes()
-        for portion in portions(self.chains.values()):
-            for each in portion:
-                for syncs in TYPES[each.type].one_instant:
-                    classes.tie(Equal(tuple([Term(Point(each.behavior.id, sync), 0.0, sync) for sync in syncs])), "")
-            yield 2 * len(portion)
-        for equal in equals:
-            classes.tie(equal, self.block.id)
-            yield 2 * len(equal.terms)
-        return classes
 
     def _unawaited_events(self, present: Relations) -> frozenset[str]:
         """Events with a decision that nothing in the block waits for."""
@@ -359,13 +306,20 @@ class _Planner:
                 classes.tie(Equal(terms), self.block.id)
             assembler = yield from assembling(self.chains, assembler.relations, classes, assembler.waited_for)
         try:
-            solution = yield from predict(assembly.net, lambda ties: bool(assembly.waits(ties)))
+            times = foreseen(assembly, self.known, self.doubted)
+            solution = yield from predict(assembly.net, lambda ties: bool(assembly.waits(ties)), times)
             if self.order.pass_alone():
                 raise Misordered
             return assembler, assembly, solution
         except Impossible as impossible:
             if self.order.refute(impossible.circles, assembly.net):
                 raise Misordered from None
+            if taken := losses_to_others(impossible, assembly, arrangement.turns, self.chains, self.known):
+                raise Losses(taken) from None
+            if late := too_late(impossible, assembly) - self.doubted:
+                self.doubted |= late
+                self.problems += unkept(late, self.known)
+                return (yield from self._solved(assembler, arrangement, classes))
             if waits := assembly.waits(tie for circle in impossible.circles for tie, _ in circle):
                 assembler.waive(waits)
                 return (yield from self._solved(assembler, arrangement, classes))
@@ -377,7 +331,11 @@ class _Planner:
 
     def _may_speak_at_once(self, id: str, present: Relations) -> bool:
         """True for an utterance that no constraint mentions: the voice decides whether it has to wait."""
-        return self.chains[id].type == "speech" and all(point.behavior != id for point in present.constrained)
+        return (
+            id in self.chains
+            and self.chains[id].type == "speech"
+            and all(point.behavior != id for point in present.constrained)
+        )
 
     def _resolve(self, conflict: Conflict) -> None:
         """Settle a conflict: one of the two uses the other arm, or waits for its turn."""

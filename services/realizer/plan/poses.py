@@ -6,6 +6,8 @@ from math import inf
 
 from engage_hri.schemas.body import BodyPose, Estimate, PlannedTime
 from engage_hri.schemas.units import Seconds
+from engage_hri.services.realizer.plan.known import NOTHING, Known, is_foreign
+from engage_hri.services.realizer.plan.phases import Chain
 from engage_hri.services.realizer.plan.planner import Plan
 from engage_hri.services.realizer.plan.schedule import EPSILON
 from engage_hri.services.realizer.points import SHIFTS, Point, family
@@ -19,31 +21,36 @@ CUT: Seconds = 1.0
 """Seconds after it has been cut: a behavior that is to be cut at a hold point is never let go there."""
 
 
-def poses_before(plan: Plan, left: Mapping[str, BodyPose] = {}) -> dict[str, BodyPose]:
+def poses_before(plan: Plan, known: Known = NOTHING) -> dict[str, BodyPose]:
     """Poses in which behaviors start that take another's place, by their ids: on the target of the earlier one.
 
     How long a look takes depends on what was looked at before it, not on where the head is as the block comes in.
-    left: poses in which other blocks leave parts, see `poses_left`.
+    known: other live blocks; the earlier one may be of any of them.
     """
-    latest: dict[str, Estimate] = {}
+    latest: dict[str, tuple[Chain, Estimate]] = {}
     base: BodyPose | None = None
     """Pose to which a look goes home, once a shift has been made."""
     poses = {}
-    order = {id: (plan.predicted(each.points[0]), number) for number, (id, each) in enumerate(plan.chains.items())}
-    for id in sorted(plan.chains, key=order.__getitem__):
-        estimate, is_shift = plan.estimates.get(id), plan.chains[id].type in SHIFTS
-        for part in plan.chains[id].parts:
-            before = latest.get(part)
-            if before is None and part in left:
-                poses[id] = left[part]
-            if before is not None and before.pose_after is not None:
-                if not _is_home(plan, before.behavior, id):
+    times = {
+        **known.points,
+        **{point: plan.predicted(point) for each in plan.chains.values() for point in each.points},
+    }
+    users = {name: (each.chain, each.estimate) for name, each in known.holders.items()}
+    users |= {id: (each, plan.estimates.get(id)) for id, each in plan.chains.items()}
+    order = {id: (times[each.points[0]], number) for number, (id, (each, _)) in enumerate(users.items())}
+    for id in sorted(users, key=order.__getitem__):
+        chain, estimate = users[id]
+        is_shift, is_ours = chain.type in SHIFTS, id in plan.chains
+        for part in chain.parts:
+            earlier, before = latest.get(part, (None, None))
+            if is_ours and earlier is not None and before is not None and before.pose_after is not None:
+                if not _is_home(times, earlier, chain):
                     poses[id] = before.pose_after
-                elif base is not None and family(plan.chains[id].type) == "gaze":
+                elif base is not None and family(chain.type) == "gaze":
                     poses[id] = base
-            if estimate is not None and not (is_shift and _is_overlaid(plan, id)):
-                latest[part] = estimate
-        if is_shift and estimate is not None:
+            if estimate is not None and not (is_shift and is_ours and _is_overlaid(plan, id)):
+                latest[part] = chain, estimate
+        if is_shift and is_ours and estimate is not None:
             base = estimate.pose_after
     return poses
 
@@ -93,7 +100,9 @@ def _taken(plan: Plan, id: str) -> Seconds:
     begun, parts = plan.predicted(plan.chains[id].points[0]), set(plan.chains[id].parts)
     later = plan.entering[plan.entering.index(id) + 1 :]
     rivals = [plan.chains[each] for each in later if is_shift or plan.chains[each].type not in SHIFTS]
-    starts = (plan.predicted(each.points[0]) for each in rivals if parts & set(each.parts))
+    starts = [plan.predicted(each.points[0]) for each in rivals if parts & set(each.parts)]
+    if id in plan.successors and is_foreign(successor := plan.successors[id][0]):
+        starts.append(plan.predicted(Point(successor, "start")))
     return min((start for start in starts if start >= begun), default=inf)
 
 
@@ -109,27 +118,15 @@ def changed(before: Sequence[Estimate], after: Sequence[Estimate]) -> bool:
     )
 
 
-def poses_left(plan: Plan, times: Mapping[Point, Seconds], until: Seconds) -> dict[str, BodyPose]:
-    """Poses of the body at `until`, by part: on the target of what goes on then. times: of each point."""
-    going = [
-        (times[chain.points[0]], number, chain.parts, estimate.pose_after)
-        for number, (id, chain) in enumerate(plan.chains.items())
-        if times[chain.points[0]] <= until < times[chain.points[-1]]
-        and (estimate := plan.estimates.get(id)) is not None
-        and estimate.pose_after is not None
-    ]
-    return {part: pose for *_, parts, pose in sorted(going, key=lambda each: each[:2]) for part in parts}
-
-
 def _is_overlaid(plan: Plan, shift: str) -> bool:
     """True if the shift has no time to move the head, since a gaze has it or takes it."""
     since, to = (plan.predicted(point) for point in plan.chains[shift].points)
     return to < since + EPSILON
 
 
-def _is_home(plan: Plan, earlier: str, later: str) -> bool:
+def _is_home(times: Mapping[Point, Seconds], earlier: Chain, later: Chain) -> bool:
     """True if the earlier had the time to take its part home. A shift leaves it where it is."""
-    if plan.chains[earlier].type in SHIFTS:
+    if earlier.type in SHIFTS:
         return False
-    relax, end = (plan.predicted(point) for point in plan.chains[earlier].points[-2:])
-    return relax + EPSILON < end <= plan.predicted(plan.chains[later].points[0]) + EPSILON
+    relax, end = (times[point] for point in earlier.points[-2:])
+    return relax + EPSILON < end <= times[later.points[0]] + EPSILON

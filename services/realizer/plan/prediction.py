@@ -1,12 +1,17 @@
 """The predicted schedule of a net: phases last as long as is natural, faster or slower only where they must be."""
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from math import inf
 
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.realizer.net.petri_net import Bound, PetriNet, Place
 from engage_hri.services.realizer.plan.schedule import EPSILON, Lag, PositiveCycle, Solution, solve
 from engage_hri.services.realizer.plan.steps import PORTION, Steps
+
+
+class Foresight(Place, frozen=True):
+    """Place that stands for what is known beforehand of its target: it comes no earlier than `lag` seconds."""
+
 
 Circle = tuple[tuple[Place | Bound, Seconds], ...]
 """Ties that lead back to their start, in order, each with its seconds: the sum is more than 0."""
@@ -24,24 +29,31 @@ class Impossible(Exception):
 
 
 def predict(
-    net: PetriNet, is_dispensable: Callable[[Iterable[Place | Bound]], bool] = lambda ties: False
+    net: PetriNet,
+    is_dispensable: Callable[[Iterable[Place | Bound]], bool] = lambda ties: False,
+    known: Mapping[int, Seconds] = {},
 ) -> Steps[Solution]:
     """The earliest schedule; `reason` of a cause is the number of the place or, after them, of the bound.
 
+    known: when transitions come that depend on more than this net, at the earliest; negative: before the block.
     A cycle that takes too long is shortened: each phase by a share of its room. Raises Impossible; also for a cycle
     with ties that are dispensable: no phase is hurried for their sake.
     """
-    ties: tuple[Place | Bound, ...] = (*net.places, *net.bounds)
+    foreseen = [Foresight("order", 0, each, at, at) for each, at in sorted(known.items()) if each and at > 0.0]
+    past = {each: at for each, at in known.items() if each and at <= 0.0}
+    ties: tuple[Place | Bound, ...] = (*net.places, *net.bounds, *foreseen)
     lags = []
     for number, tie in enumerate(ties):
         if tie.kind != "idle":
-            lags.append(Lag(tie.source, tie.target, tie.lag, number))
+            # What came before the block does not wait for its start.
+            is_before = tie.target in past and _is_beginning(tie)
+            lags.append(Lag(tie.source, tie.target, past[tie.target] if is_before else tie.lag, number))
         if not number % PORTION:
             yield PORTION // 4
     index: dict[int, int] = {}
     while True:
         try:
-            return (yield from solve(len(net.transitions), lags))
+            return (yield from solve(len(net.transitions), lags, past))
         except PositiveCycle as found:
             index = index or {lag.reason: number for number, lag in enumerate(lags)}
             hopeless = []
@@ -71,6 +83,11 @@ def _shortened(cycle: tuple[Lag, ...], room: list[Seconds], excess: Seconds) -> 
     return [
         lag._replace(seconds=lag.seconds - excess * share) for lag, share in zip(cycle, shares, strict=True) if share
     ]
+
+
+def _is_beginning(tie: Place | Bound) -> bool:
+    """True for the place that only says that nothing comes before the block."""
+    return isinstance(tie, Place) and tie.kind == "order" and not (tie.source or tie.lag or tie.behavior)
 
 
 def _least(tie: Place | Bound) -> Seconds:

@@ -3,7 +3,7 @@
 Constraints and inline timing mean the same thing and become the same relations; so do `before` and `after`.
 """
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from functools import cached_property
 
 from msgspec import Struct
@@ -27,7 +27,7 @@ from engage_hri.schemas.feedback import WarningKind
 from engage_hri.schemas.references import type_name
 from engage_hri.schemas.syncref import BLOCK_ITSELF, SyncRef
 from engage_hri.schemas.units import Seconds
-from engage_hri.services.realizer.plan.steps import PORTION, Steps, portions
+from engage_hri.services.realizer.plan.steps import PORTION, Steps, finished, portions
 from engage_hri.services.realizer.points import ORIGIN, Point
 
 
@@ -301,3 +301,17 @@ def extent(block: Block) -> int:
     inline = sum(len(each.timing) for each in block.behaviors)
     operators = (operator for constraint in block.constraints for operator in constraint.operators)
     return len(block.behaviors) + marks + inline + sum(1 + len(operator.syncs) for operator in operators)
+
+
+def needing(block: Block, elsewhere: Elsewhere, points: Collection[Point]) -> list[tuple[str, Point]]:
+    """Behaviors that are required, or in a required constraint, and tied to one of these points of other blocks."""
+    relations = finished(relation_steps(block, elsewhere))
+    ties = [equal.terms for equal in relations.equals] + [(each.earlier, each.later) for each in relations.orders]
+    return [
+        (one.point.behavior, other.point)
+        for terms in ties
+        for other in terms
+        if other.point in points
+        for one in terms
+        if one.point.behavior in relations.required
+    ]

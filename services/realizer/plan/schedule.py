@@ -41,14 +41,16 @@ class Solution(NamedTuple):
     causes: dict[int, Lag]
 
 
-def solve(size: int, lags: Sequence[Lag]) -> Steps[Solution]:
-    """The least instants, none before 0, that satisfy `lags`. Raises PositiveCycle.
+def solve(size: int, lags: Sequence[Lag], past: Mapping[int, Seconds] = {}) -> Steps[Solution]:
+    """The least instants, none before 0 or what `past` says, that satisfy `lags`. Raises PositiveCycle.
 
     Sweeps go to and fro over the lags. Where these are in an order in which they can be met, forward lags need one
     sweep, what backward ones push back another; only what is pushed to and fro costs more (Yen's Bellman-Ford).
     Instant 0 stays where it is, so that every bound on a time of the clock that cannot be kept is found in one go.
     """
     times = [0.0] * size
+    for instant, at in past.items():
+        times[instant] = at
     causes: dict[int, Lag] = {}
     inner = [lag for lag in lags if lag.target]
     clock = [lag for lag in lags if not lag.target]

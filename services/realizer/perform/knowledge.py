@@ -1,0 +1,132 @@
+"""Knowledge about other live blocks, gathered for the planning of one: points, parts, and who depends on whom."""
+
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from typing import Protocol
+
+from msgspec import Struct
+
+from engage_hri.schemas.behavior_types import TYPES
+from engage_hri.schemas.behaviors import BlockBehavior
+from engage_hri.schemas.blocks import Block
+from engage_hri.schemas.body import Estimate
+from engage_hri.schemas.references import type_name
+from engage_hri.schemas.units import Seconds
+from engage_hri.services.realizer.decide.decisions import Decisions
+from engage_hri.services.realizer.perform.live_blocks import LiveBlocks
+from engage_hri.services.realizer.plan.known import (
+    Holder,
+    Known,
+    block_of,
+    holders_of,
+    is_foreign,
+    is_named_in,
+    qualified,
+)
+from engage_hri.services.realizer.plan.phases import chain
+from engage_hri.services.realizer.plan.planner import Plan
+from engage_hri.services.realizer.plan.relations import Elsewhere
+from engage_hri.services.realizer.plan.sharing import needed_points
+from engage_hri.services.realizer.points import Point, performer
+
+_ARMS = ("left_arm", "right_arm")
+
+
+class Performed(Protocol):
+    """A block that is being performed, as far as others plan with it."""
+
+    decisions: Decisions
+
+    @property
+    def is_ending(self) -> bool:
+        """True if its behaviors are being ended, whatever was planned."""
+
+
+class Asker(Struct, frozen=True):
+    """The block that is planned. since: loop time from which its plan counts.
+
+    named: points of other blocks that it names. parts: those that it may use. blocks: see `Known`.
+    """
+
+    block: str
+    since: Seconds
+    now: Seconds
+    named: Collection[Point]
+    parts: Collection[str]
+    blocks: Elsewhere
+
+
+def knowledge(asker: Asker, others: Iterable[Performed], live_blocks: LiveBlocks) -> Known:
+    """Other live blocks, as known now. others: those that are given, in the order in which they began."""
+    concerned = [each for each in others if concerns(asker.block, asker.named, asker.parts, each)]
+    there = {each.decisions.plan.block.id for each in concerned}
+    points: dict[Point, Seconds] = {}
+    holders: dict[str, Holder] = {}
+    for block in sorted({block_of(point) for point in asker.named} - there):
+        for point, at in live_blocks.reached(block, asker.blocks.get(block)).items():
+            points[qualified(block, point)] = at - asker.since
+    dependent = _dependents(asker.block, [each.decisions.plan for each in concerned])
+    for each in concerned:
+        plan, decisions = each.decisions.plan, each.decisions
+        block = plan.block.id
+        for point, at in decisions.foresight.times(asker.now).items():
+            if not is_foreign(point.behavior):
+                points[qualified(block, point)] = at - asker.since
+        if not each.is_ending:
+            over = {id for id in plan.chains if decisions.facts.has_ended(id) or f"{block}:{id}" in dependent}
+            kept = plan.constrained | live_blocks.named(block)
+            holders |= holders_of(
+                block, plan.chains, plan.estimates, plan.natural, kept, over, decisions.facts.next_number
+            )
+    return Known(blocks=asker.blocks, points=points, holders=holders)
+
+
+def concerns(block: str, named: Iterable[Point], parts: Collection[str], other: Performed) -> bool:
+    """True if a block has to be planned with the other in mind: it names it, or is named, or uses a part of it."""
+    plan = other.decisions.plan
+    if is_named_in(plan.block.id, named) or is_named_in(block, plan.foreign):
+        return True
+    has_ended = other.decisions.facts.has_ended
+    return any(part in parts and not has_ended(id) for id, each in plan.chains.items() for part in each.parts)
+
+
+def _dependents(block: str, plans: Sequence[Plan]) -> set[str]:
+    """Behaviors, by `block:behavior`, that wait for points of a block, or for others that do: they are not given.
+
+    The end of a look that waits to be taken over by that block does not count.
+    """
+    found: set[str] = set()
+    while True:
+        before = len(found)
+        for plan in plans:
+            sources = [
+                transition
+                for point, transition in plan.at.items()
+                if is_foreign(point.behavior) and (block_of(point) == block or point.behavior in found)
+            ]
+            if sources:
+                later = plan.net.later(sources)
+                for id, each in plan.chains.items():
+                    needed = (*each.points[: needed_points(each, is_natural=id in plan.natural)], *plan.constrained)
+                    if any(point.behavior == id and plan.at[point] in later for point in needed):
+                        found.add(f"{plan.block.id}:{id}")
+        if len(found) == before:
+            return found
+
+
+def parts_of(behaviors: Iterable[BlockBehavior], estimates: Iterable[Estimate]) -> set[str]:
+    """Parts of the body that behaviors may use; with one arm, the other, too."""
+    known = {each.behavior: each for each in estimates}
+    moving = [each for each in behaviors if performer(each) == "body"]
+    parts = {part for each in moving for part in chain(each, known.get(each.id)).parts}
+    return parts | set(_ARMS) if parts.intersection(_ARMS) else parts
+
+
+def may_share(one: Block, other: Block) -> bool:
+    """True if two blocks may use a part of the body both, as far as can be told before the body is asked."""
+    return bool(_kinds(one) & _kinds(other))
+
+
+def _kinds(block: Block) -> set[str]:
+    kinds: Mapping[str, str] = {"gesture": "arm", "pointing": "arm"}
+    rows = [(type_name(each), TYPES[type_name(each)]) for each in block.behaviors]
+    return {kinds.get(name, row.family or name) for name, row in rows if row.takes_over and row.performer == "body"}

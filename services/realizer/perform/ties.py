@@ -1,0 +1,168 @@
+"""Ties between a block that is performed and other live blocks: points of theirs, and parts that change hands."""
+
+from collections.abc import Callable, Collection, Iterable, Mapping
+from functools import partial
+from typing import Protocol
+
+from engage_hri.schemas.blocks import Block
+from engage_hri.schemas.faults import Fault
+from engage_hri.schemas.units import Seconds
+from engage_hri.services.realizer.decide.decisions import Decisions
+from engage_hri.services.realizer.perform.feedback import Reporter
+from engage_hri.services.realizer.perform.knowledge import Asker, Performed, knowledge, parts_of
+from engage_hri.services.realizer.perform.live_blocks import LiveBlocks
+from engage_hri.services.realizer.plan.known import Known, block_of, is_named_in
+from engage_hri.services.realizer.plan.planner import Plan
+from engage_hri.services.realizer.plan.relations import needing
+from engage_hri.services.realizer.points import Point
+
+
+class Tied(Performed, Protocol):
+    """A performance, as its ties need it. plan: the one that it began with."""
+
+    plan: Plan
+    decisions: Decisions
+    report: Reporter
+    ties: "Ties"
+
+    def take_in(self, news: Callable[[], object]) -> None:
+        """Take in news and do what follows from it, unless the block is ending."""
+
+    def replan(self) -> None:
+        """Plan again what is left, with what is known now."""
+
+    def fail(self, behavior: str, fault: Fault) -> None:
+        """End the block as failed, and say that it is because of this behavior."""
+
+
+class Ties:
+    """Ties of one performance.
+
+    foreign: points of other blocks that are followed. foreign_ties: those that the block itself names. vanished:
+    behaviors of other blocks of which some point will never be reached. given: behaviors whose parts another block
+    takes by its plan, and the start of the one there.
+    """
+
+    def __init__(
+        self,
+        owner: Tied,
+        others: Callable[[], Iterable[Tied]],
+        live_blocks: LiveBlocks,
+        blocks: Mapping[str, Block],
+    ) -> None:
+        """others: all performances, in the order in which they began. blocks: those that the plan may name."""
+        self._owner = owner
+        self._others = others
+        self._live_blocks = live_blocks
+        self.blocks = dict(blocks)
+        self.foreign = set(owner.plan.foreign)
+        self.foreign_ties = frozenset(point for point in owner.plan.foreign if point in owner.plan.constrained)
+        self.vanished: set[str] = set()
+        self.given: dict[str, Point] = {}
+
+    # -- news of other blocks --------------------------------------------------------------------------------------
+
+    def hear(self, point: Point, at: Seconds) -> None:
+        """Note that a point of another block is reached."""
+        if point in self.foreign:
+            self._owner.take_in(partial(self._hear, point, at))
+
+    def _hear(self, point: Point, at: Seconds) -> None:
+        decisions = self._owner.decisions
+        if point not in decisions.facts.reached:
+            decisions.facts.hear(point, at)
+            if point in decisions.facts.reached:  # else it was named by an earlier plan only
+                self._owner.report.heard(decisions, point)
+
+    def foresee(self, point: Point, at: Seconds) -> None:
+        """Note that a point of another block is expected at `at` now."""
+        if point in self.foreign:
+            self._owner.take_in(partial(self._owner.decisions.foresight.foresee, point, at))
+
+    def miss(self, behaviors: Iterable[str]) -> None:
+        """Plan without these behaviors of other blocks if a point of them is needed that is not reached."""
+        decisions = self._owner.decisions
+        points = {point for point in self.foreign if point not in decisions.facts.reached}
+        lost = {point.behavior for point in points}.intersection(behaviors) - self.vanished
+        if not lost:
+            return
+        self.vanished |= lost
+        for id in [id for id, taker in self.given.items() if taker.behavior in lost]:
+            del self.given[id]
+        missed = {point for point in points if point.behavior in lost}
+        self._owner.take_in(partial(self._go_on_without, missed))
+
+    def _go_on_without(self, missed: Collection[Point]) -> None:
+        """Plan without points of other blocks; fail if a required behavior or constraint was tied to one of them."""
+        owner = self._owner
+        needed = needing(owner.plan.block, self.blocks, missed)
+        for id, point in needed:
+            if id in owner.decisions.plan.chains and not owner.decisions.facts.has_ended(id):
+                owner.fail(id, Fault(reason=f"{point}, which it is tied to, does not come, and the tie is required"))
+                return
+        owner.replan()
+
+    # -- parts that change hands -----------------------------------------------------------------------------------
+
+    def known(self) -> Known:
+        """Blocks that began earlier, and what of this one has begun, as known now. Times from this block's start."""
+        owner, decisions = self._owner, self._owner.decisions
+        plan = decisions.plan
+        earlier, is_later = [], False
+        for each in self._others():
+            is_later = is_later or each is owner
+            if each is not owner and (not is_later or is_named_in(each.decisions.plan.block.id, self.foreign_ties)):
+                earlier.append(each)
+        parts = parts_of(plan.block.behaviors, plan.estimates.values())
+        now = owner.report.now()
+        asker = Asker(plan.block.id, decisions.began, now, self.foreign, parts, self.blocks)
+        found = knowledge(asker, earlier, self._live_blocks)
+        points = dict(found.points)
+        performances = {each.decisions.plan.block.id: each for each in self._others()}
+        for taker in self.given.values():
+            if (other := performances.get(block_of(taker))) is not None:
+                start = Point(taker.behavior.partition(":")[2], taker.sync)
+                points[taker] = other.decisions.foresight.times(now).get(start, now) - decisions.began
+        for point in self.foreign:
+            if (at := decisions.facts.reached.get(point, decisions.foresight.foreseen.get(point))) is not None:
+                points.setdefault(point, at - decisions.began)
+        points |= {Point(id, "start"): at - decisions.began for id, at in decisions.facts.begun.items()}
+        return Known(
+            blocks=self.blocks,
+            points=points,
+            holders={id: each for id, each in found.holders.items() if id not in self.vanished},
+            given={id: point for id, point in self.given.items() if point not in decisions.facts.reached},
+            begun=frozenset(decisions.facts.begun),
+        )
+
+    def begin(self) -> None:
+        """Tell other blocks that this one has begun: those that are tied to it can be planned now."""
+        for each in self._others():
+            if each is not self._owner and is_named_in(self._owner.plan.block.id, each.ties.foreign_ties):
+                each.take_in(each.replan)
+        self.take_over()
+
+    def take_over(self) -> None:
+        """Tell other blocks which of their behaviors this one takes a part from by plan."""
+        plan = self._owner.decisions.plan
+        performances = {each.decisions.plan.block.id: each for each in self._others()}
+        for name, taker in plan.takes.items():
+            block, _, behavior = name.partition(":")
+            if (other := performances.get(block)) is not None:
+                other.ties.give(behavior, Point(f"{plan.block.id}:{taker}", "start"))
+
+    def give(self, behavior: str, taker: Point) -> None:
+        """Plan to hand over the part of a behavior at `taker`, a point of another block."""
+        owner = self._owner
+        if self.given.get(behavior) != taker and behavior in owner.decisions.plan.chains:
+            self.given[behavior] = taker
+            self.blocks[block_of(taker)] = self._live_blocks.blocks[block_of(taker)]
+            owner.take_in(owner.replan)
+
+    def renew(self) -> None:
+        """Follow the points of other blocks that a new plan names, and tell whose parts it takes."""
+        decisions = self._owner.decisions
+        fresh = set(decisions.plan.foreign) - decisions.facts.reached.keys()
+        self.foreign |= fresh
+        self._live_blocks.follow(self, fresh, self.blocks)
+        self.take_over()

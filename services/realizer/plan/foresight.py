@@ -1,0 +1,80 @@
+"""Points of other blocks in the schedule of a block: when they come, and what they leave no time for."""
+
+from collections.abc import Collection, Container, Iterable, Mapping
+from math import inf
+
+from engage_hri.schemas.units import Seconds
+from engage_hri.services.realizer.plan.assembly import Assembly
+from engage_hri.services.realizer.plan.deadlocks import Loss
+from engage_hri.services.realizer.plan.handover import Turn
+from engage_hri.services.realizer.plan.known import Known, is_foreign
+from engage_hri.services.realizer.plan.phases import Chain
+from engage_hri.services.realizer.plan.prediction import Circle, Foresight, Impossible
+from engage_hri.services.realizer.plan.relations import Problem
+from engage_hri.services.realizer.points import Point
+
+
+def foreseen(assembly: Assembly, known: Known, doubted: Collection[Point]) -> dict[int, Seconds]:
+    """Earliest times of transitions, as far as they are known beforehand. doubted: points not to count on."""
+    found: dict[int, Seconds] = {}
+    if known.points:
+        for point, transition in assembly.at.items():
+            if point not in doubted and (at := known.points.get(point)) is not None:
+                found[transition] = max(at, found.get(transition, -inf))
+    return found
+
+
+def losses_to_others(
+    impossible: Impossible,
+    assembly: Assembly,
+    turns: Iterable[Turn],
+    chains: Mapping[str, Chain],
+    known: Known,
+) -> list[Loss]:
+    """Behaviors that have no time to wait until another block is done with their part, in document order."""
+    ends = {(assembly.at[point], assembly.at[Point(id, "start")]): (id, point) for id, point in turns}
+    found = {}
+    for circle in impossible.circles:
+        if (turn := _turn(circle, ends)) is not None and is_foreign(turn[1].behavior):
+            found[turn[0]] = Loss(turn[0], _taken(turn, chains, known), turn=turn)
+    return [found[id] for id in chains if id in found]
+
+
+def _turn(circle: Circle, ends: Mapping[tuple[int, int], Turn]) -> Turn | None:
+    series = ((tie.source, tie.target) for tie, _ in circle if tie.kind == "series")
+    return next((ends[each] for each in series if each in ends), None)
+
+
+def _taken(turn: Turn, chains: Mapping[str, Chain], known: Known) -> str:
+    id, point = turn
+    holder = known.holders[point.behavior].chain if point.behavior in known.holders else None
+    parts = [part for part in chains[id].parts if holder is None or part in holder.parts]
+    name = " and ".join(part.replace("_", " ") for part in parts)
+    return f"cannot be on time: {point.behavior} has the {name} until {point}{_when(point, known)}"
+
+
+def _when(point: Point, known: Known) -> str:
+    at = known.points.get(point)
+    return "" if at is None else f", {at:.2f} s after the start of the block"
+
+
+def too_late(impossible: Impossible, assembly: Assembly) -> set[Point]:
+    """Points that are expected too late for times that are fixed."""
+    late = {tie.target for circle in impossible.circles for tie, _ in circle if isinstance(tie, Foresight)}
+    return {point for number in late for point in assembly.net.transitions[number].points}
+
+
+def unkept(late: Container[Point], known: Known) -> list[Problem]:
+    """Warnings about ties to points of other blocks that leave no time for what is fixed in this block."""
+    return [
+        Problem("LATE", f"{point} is not waited for: expected{_when(point, known)[1:]}, after times that are fixed")
+        for point in sorted(known.points)
+        if point in late and is_foreign(point.behavior)
+    ]
+
+
+def without_date(assembly: Assembly, known: Known) -> set[str]:
+    """Behaviors that come after points of other blocks of which it is not known when they come."""
+    unknown = [at for point, at in assembly.at.items() if is_foreign(point.behavior) and point not in known.points]
+    later = assembly.net.later(unknown)
+    return {point.behavior for point, at in assembly.at.items() if at in later}

@@ -1,0 +1,94 @@
+"""Other live blocks, as known when a block is planned: when their points come, and who has which part when."""
+
+from collections.abc import Callable, Container, Iterable, Iterator, Mapping
+
+from msgspec import Struct
+from msgspec.structs import replace
+
+from engage_hri.schemas.body import Estimate
+from engage_hri.schemas.syncref import BLOCK_ITSELF
+from engage_hri.schemas.units import Seconds
+from engage_hri.services.realizer.plan.phases import Chain
+from engage_hri.services.realizer.plan.relations import Elsewhere
+from engage_hri.services.realizer.points import Point
+
+
+class Holder(Struct, frozen=True):
+    """A behavior of another live block that has parts of the body, or will have them.
+
+    chain: its points are named as other blocks name them. is_natural: it ends when something takes its place, or with
+    its block. kept: points that it cannot be deprived of, since something waits for them. estimate: of the body.
+    reached: number of its points that have been.
+    """
+
+    chain: Chain
+    is_natural: bool
+    kept: frozenset[Point]
+    estimate: Estimate | None = None
+    reached: int = 0
+
+
+class Known(Struct, frozen=True, kw_only=True):
+    """Other live blocks, as far as the planning of one block has to know them. Times are seconds from its own start.
+
+    blocks: their contents, by id. points: when points of others were reached (negative: before this block) or are
+    expected; and when behaviors of this block began. holders: behaviors of others that have parts of the body or will
+    have them, by `block:behavior`; they are given, and come in the order in which they have their parts.
+    given: behaviors of this block that hand their parts over to another block by plan, and the start of the one there
+    that takes them. begun: behaviors of this block that have begun; they wait for nobody any more.
+    """
+
+    blocks: Elsewhere = {}
+    points: Mapping[Point, Seconds] = {}
+    holders: Mapping[str, Holder] = {}
+    given: Mapping[str, Point] = {}
+    begun: frozenset[str] = frozenset()
+
+
+NOTHING = Known()
+
+
+def qualified(block: str, point: Point) -> Point:
+    """The point as other blocks name it."""
+    return Point(f"{block}:{point.behavior}", point.sync)
+
+
+def block_of(point: Point) -> str:
+    """Id of the block of a point that is named as other blocks name it."""
+    return point.behavior.partition(":")[0]
+
+
+def is_foreign(name: str) -> bool:
+    """True for the name of a behavior of another block."""
+    return ":" in name
+
+
+def is_named_in(block: str, foreign: Iterable[Point]) -> bool:
+    """True if one of these points of other blocks is of the block of that id."""
+    return any(block_of(point) == block for point in foreign)
+
+
+def holders_of(
+    block: str,
+    chains: Mapping[str, Chain],
+    estimates: Mapping[str, Estimate],
+    natural: Container[str],
+    kept: frozenset[Point],
+    over: Container[str],
+    reached: Callable[[str], int],
+) -> Iterator[tuple[str, Holder]]:
+    """Behaviors of a live block that have parts of the body or will have them, by `block:behavior`.
+
+    kept: points that something waits for. over: behaviors that have ended or do not count. reached: number of points
+    of a behavior that have been.
+    """
+    for id, chain in chains.items():
+        if chain.parts and id not in over:
+            renamed = replace(chain, points=tuple([qualified(block, point) for point in chain.points]))
+            held = frozenset(qualified(block, point) for point in kept.intersection(chain.points))
+            yield f"{block}:{id}", Holder(renamed, id in natural, held, estimates.get(id), reached(id))
+
+
+BLOCK_END = Point(BLOCK_ITSELF, "end")
+"""The end of a block, as its own live block names it."""
+BLOCK_START = Point(BLOCK_ITSELF, "start")

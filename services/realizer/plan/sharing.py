@@ -1,0 +1,204 @@
+"""Parts of the body that other live blocks have: who of this block takes them over, waits for them, or does without.
+
+The others are given: what they were promised is not taken from them. A behavior that has made its stroke hands its
+part over and loses its way home, as within one block; before that, who comes waits, or uses the other arm.
+"""
+
+from collections.abc import Container, Iterator, Mapping
+
+from msgspec.structs import replace
+
+from engage_hri.schemas.behaviors import Hand
+from engage_hri.schemas.syncref import SYNC_POINTS
+from engage_hri.schemas.units import Seconds
+from engage_hri.services.realizer.plan.handover import Arrangement, Conflict, Turn, free_hand
+from engage_hri.services.realizer.plan.known import Holder, Known, is_foreign
+from engage_hri.services.realizer.plan.phases import Chain
+from engage_hri.services.realizer.plan.relations import Equal, Relations, Term
+from engage_hri.services.realizer.plan.schedule import EPSILON
+from engage_hri.services.realizer.plan.steps import Steps
+from engage_hri.services.realizer.points import SHIFTS, WITH_STROKE, Point
+
+_STROKE, _STROKE_END, _RELAX = (SYNC_POINTS.index(each) for each in ("stroke", "stroke_end", "relax"))
+
+
+def share(
+    chains: Mapping[str, Chain],
+    relations: Relations,
+    known: Known,
+    arranged: Arrangement,
+    times: Mapping[Point, Seconds],
+    barred: Container[tuple[str, Hand]] = (),
+    undated: Container[str] = (),
+) -> Steps[tuple[Arrangement, list[Conflict]]]:
+    """The arrangement with the handovers from and to behaviors of other live blocks, and the conflicts with them.
+
+    times: of the points of this block, in the schedule that `arranged` is for. undated: behaviors that wait for
+    points of blocks that have not begun: nobody knows when they come; they are planned again once it is known.
+    """
+    if not known.holders and not known.given:
+        return arranged, []
+    # Others come when they come, also where this block would need them later.
+    everywhere = {**known.points, **{point: at for point, at in times.items() if not is_foreign(point.behavior)}}
+    shared = _Sharing(chains, relations, known, arranged, everywhere, barred)
+    for id in chains:
+        yield 2 + len(known.holders) // 8
+        shared.give(id)
+        for name in shared.rivals(id) if id not in undated else ():
+            shared.settle(id, name)
+    lasting = tuple(sorted(arranged.natural - shared.successors.keys()))
+    return (
+        replace(arranged, lasting=lasting, successors=shared.successors, cuts=shared.cuts, takes=shared.takes),
+        shared.conflicts,
+    )
+
+
+class _Sharing:
+    def __init__(
+        self,
+        chains: Mapping[str, Chain],
+        relations: Relations,
+        known: Known,
+        arranged: Arrangement,
+        times: Mapping[Point, Seconds],
+        barred: Container[tuple[str, Hand]],
+    ) -> None:
+        self.chains = chains
+        self.known = known
+        self.times = times
+        self.barred = barred
+        self.natural = arranged.natural
+        self.successors = dict(arranged.successors)
+        self.cuts = dict(arranged.cuts)
+        self.takes = dict(arranged.takes)
+        self.turns = arranged.turns
+        self.conflicts: list[Conflict] = []
+        self.held = relations.constrained
+        self.mentioned = {point.behavior for point in relations.constrained}
+        """Behaviors of which something is said. One that nobody asks for now waits until the earlier has ended."""
+        self.awaited: dict[str, set[Point]] = {}
+        """For each behavior, the points that it is to come after."""
+        for order in relations.orders:
+            self.awaited.setdefault(order.later.point.behavior, set()).add(order.earlier.point)
+        self.users: dict[str, list[str]] = {}
+        for name, holder in known.holders.items():
+            for part in holder.chain.parts:
+                self.users.setdefault(part, []).append(name)
+
+    def rivals(self, id: str) -> Iterator[str]:
+        """Behaviors of other blocks that have a part of this one while it does, in the order of their starts."""
+        names = {name for part in self.chains[id].parts for name in self.users.get(part, ())}
+        since, to = self._window(self.chains[id])
+        for name in sorted(names, key=lambda name: (self._window(self.known.holders[name].chain), name)):
+            begins, ends = self._window(self.known.holders[name].chain)
+            if since < ends - EPSILON and (begins < to - EPSILON or begins <= since + EPSILON):
+                yield name
+
+    def _window(self, chain: Chain) -> tuple[Seconds, Seconds]:
+        return self.times[chain.points[0]], self.times[chain.points[-1]]
+
+    def settle(self, id: str, name: str) -> None:
+        """Settle between a behavior of this block and one of another that has the same part."""
+        chain, holder = self.chains[id], self.known.holders[name]
+        start, begins = self.times[chain.points[0]], self.times[holder.chain.points[0]]
+        if begins > start + EPSILON:
+            first = self._first_after(chain, begins)
+            if first is None or _is_overlaid(holder.chain, chain):
+                return
+            is_overlaid = _is_overlaid(chain, holder.chain)
+            last = _not_given_up(chain, first, self.held, is_natural=id in self.natural, is_free=is_overlaid)
+            if last is None:
+                self._hand_over(id, name, first)
+            elif id not in self.known.begun:
+                self._wait(id, self._release(id, holder, 1))
+        elif _is_overlaid(chain, holder.chain):
+            self.cuts[id] = 0  # A shift takes nothing from a gaze.
+        elif (first := self._first_after(holder.chain, start)) is not None and id not in self.known.begun:
+            if (point := self._needed(id, holder, first)) is not None:
+                self._wait(id, point)
+            elif (point := self._needed(id, holder, holder.reached)) is not None and (id, point) not in self.turns:
+                self.conflicts.append(Conflict((id, point), None))  # by plan it comes first; it may turn out slow
+            elif name not in self.takes or start < self.times[self.chains[self.takes[name]].points[0]] - EPSILON:
+                self.takes[name] = id
+
+    def give(self, id: str) -> None:
+        """Hand the part over to the behavior of another block that takes it by that block's plan."""
+        if (taker := self.known.given.get(id)) is not None and taker in self.times:
+            first = self._first_after(self.chains[id], self.times[taker])
+            if first is not None:
+                self._hand_over(id, taker.behavior, first)
+
+    def _first_after(self, chain: Chain, at: Seconds) -> int | None:
+        """Number of the first point of a behavior that comes after `at`; None: it has ended by then."""
+        numbers = (number for number, point in enumerate(chain.points) if self.times[point] > at + EPSILON)
+        return next(numbers, None)
+
+    def _hand_over(self, id: str, successor: str, first: int) -> None:
+        if id in self.successors:
+            before = Point(self.successors[id][0], "start")
+            if self.times[before] <= self.times[Point(successor, "start")] + EPSILON:
+                return
+        if id in self.natural:
+            first = min(first, _RELAX)
+        if first:
+            self.successors[id] = (successor, self.chains[id].points[first])
+            self.cuts[id] = first - 1
+
+    def _needed(self, id: str, holder: Holder, first: int) -> Point | None:
+        """The last point of the holder, from `first` on, that a behavior of this block must wait for."""
+        kept = holder.kept | self.awaited.get(id, set())
+        is_overlaid = _is_overlaid(holder.chain, self.chains[id])
+        last = _not_given_up(holder.chain, first, kept, is_natural=holder.is_natural, is_free=is_overlaid)
+        if id not in self.mentioned and not holder.is_natural and not is_overlaid:
+            last = len(holder.chain.points) - 1
+        return None if last is None else holder.chain.points[last]
+
+    def _release(self, id: str, holder: Holder, first: int) -> Point:
+        """The point from which on the holder may lose its part to a behavior of this block."""
+        return self._needed(id, holder, first) or holder.chain.points[first]
+
+    def _wait(self, id: str, point: Point) -> None:
+        turn: Turn = (id, point)
+        if turn in self.turns:
+            return
+        others = {**self.chains, **{name: holder.chain for name, holder in self.known.holders.items()}}
+        self.conflicts.append(Conflict(turn, free_hand((id,), others, self.times, self.barred)))
+
+
+def _not_given_up(chain: Chain, first: int, kept: Container[Point], *, is_natural: bool, is_free: bool) -> int | None:
+    """Number of the last point, from `first` on, that is not taken from a behavior; None if there is none.
+
+    These are its stroke, the arrival of a look, words, and what others wait for. is_free: it loses nothing by it.
+    """
+    needed = [number for number in range(first, len(chain.points)) if chain.points[number] in kept]
+    if not is_free:
+        needed.append(needed_points(chain, is_natural=is_natural) - 1)
+    furthest = max(needed, default=-1)
+    return furthest if furthest >= first else None
+
+
+def needed_points(chain: Chain, *, is_natural: bool) -> int:
+    """Number of points that a behavior must have passed before its part can be taken over, whatever waits for it."""
+    if chain.type in WITH_STROKE:
+        return _STROKE_END + 1
+    return _STROKE + 1 if is_natural or len(chain.points) > _RELAX else len(chain.points)
+
+
+def _is_overlaid(shift: Chain, other: Chain) -> bool:
+    """True for a shift beneath a look: that takes nothing from it, nor it from that."""
+    return shift.type in SHIFTS and other.type not in SHIFTS
+
+
+def naming_others(present: Relations, arrangement: Arrangement) -> Relations:
+    """The relations, with the points of other blocks that the arrangement names, too."""
+    points = {turn[1] for turn in arrangement.turns}
+    points |= {Point(successor, "start") for successor, _ in arrangement.successors.values()}
+    foreign = sorted(point for point in points - present.named if is_foreign(point.behavior))
+    if not foreign:
+        return present
+    return replace(present, equals=(*present.equals, *(Equal((Term(each, 0.0, str(each)),)) for each in foreign)))
+
+
+def waits_elsewhere(turn: Turn) -> bool:
+    """True if the turn is to wait for a behavior of another block."""
+    return is_foreign(turn[1].behavior)
