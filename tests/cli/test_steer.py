@@ -34,13 +34,13 @@ async def test_a_robot_is_held_goes_on_and_is_stopped_from_the_command_line() ->
             assert await said(await start("steer", "hold", *where)) == (
                 0, "held: nothing is being performed; so is what comes, until `engage steer continue`", ""
             )  # fmt: skip
-            performing = asyncio.create_task(robot.realize("b", [BEAT]))
-            await asyncio.sleep(0.2)
+            with robot.feedback() as feedback:
+                performing = asyncio.create_task(robot.realize("b", [BEAT]))
+                assert await feedback.next(PATIENCE) is not None
             assert await said(await start("steer", "continue", "b", *where)) == (0, "continued: b", "")
-            await asyncio.sleep(0.2)
-            assert not performing.done()  # the robot is held still
             code, _, error = await said(await start("steer", "hold", "b", "wave", *where))
             assert (code, error) == (2, "b: wave: it is not being performed")
+            assert not performing.done()  # the robot is held still
             assert await said(await start("steer", "continue", *where)) == (0, "continued: b", "")
             assert (await asyncio.wait_for(performing, PATIENCE)).status == "done"
         finally:
