@@ -88,12 +88,15 @@ def _alike(run: Run) -> MovementAuthority:
 class _Part:
     """One behavior of the rehearsal: its run, when its points were passed, and how long its phases take."""
 
-    def __init__(self, run: Run, estimate: Estimate, waits: Mapping[str, Seconds], *, paced: bool) -> None:
+    def __init__(
+        self, run: Run, estimate: Estimate, waits: Mapping[str, Seconds], paced: Mapping[str, Seconds]
+    ) -> None:
         self.run = run
         self.estimate = estimate
         self.waits = dict(waits)
         self.passed: dict[str, Seconds] = {}
-        self._is_paced = paced
+        self._paced = paced
+        """Instants that it is asked to keep, by its points: their phases are not at its natural pace."""
         self._phases: dict[str, Seconds] = {}
 
     def settle(self, torso: Torso, clock: Clock, now: Seconds) -> None:
@@ -123,8 +126,11 @@ class _Part:
         """Take the times of the phases to come from the motion as it is now, if nothing stopped it."""
         if self.run.is_over:
             return
-        if self._is_paced:
+        syncs = [point.sync for point in self.run.course.points]
+        last = max((syncs.index(sync) for sync in self._paced), default=-1)
+        if last >= 0:
             self._foresee_unpaced(now)
+        if any(at > now for at in self._paced.values()):
             return
         trial = copy(self.run.motion)
         trial.extend(inf, now)
@@ -137,8 +143,8 @@ class _Part:
                 come.add(point.sync)
         if isinstance(self.run.behavior, Gaze) and self.run.awaits("relax"):
             self._foresee_way_home(torso, trial, at)
-        for since, to in pairwise([point.sync for point in self.run.course.points]):
-            if to not in come:
+        for number, (since, to) in enumerate(pairwise(syncs), start=1):
+            if to not in come and number > last:
                 self._phases[to] = at[to] - at[since]
 
     def _foresee_way_home(self, torso: Torso, trial: Motion, at: dict[str, Seconds]) -> None:
@@ -240,7 +246,7 @@ def _begin(
     run.bell = clock
     torso.take_over(run, torso.path(course))
     moved.update(course.parts)
-    part = _Part(run, estimate, waits, paced=bool(paced))
+    part = _Part(run, estimate, waits, paced)
     if paced:
         torso.extend(run)
     return part

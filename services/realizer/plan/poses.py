@@ -60,7 +60,8 @@ def planned_times(plan: Plan) -> dict[str, tuple[PlannedTime, ...]]:
 
     Empty if no behavior makes a difference to another or to itself: then its first estimates hold.
     """
-    order = sorted(plan.entering, key=lambda id: round(plan.predicted(plan.chains[id].points[0]), 6))
+    order = plan.begun_in_order(plan.chains)
+    order.sort(key=lambda id: round(plan.predicted(plan.chains[id].points[0]), 6))
     moving = [id for id in order if (estimate := plan.estimates.get(id)) is not None and estimate.parts]
     times = {id: _times(plan, id) for id in moving if plan.estimates[id].parts != ("voice",)}
     used = [part for id in times for part in plan.estimates[id].parts]
