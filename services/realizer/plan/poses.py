@@ -77,14 +77,14 @@ def _times(plan: Plan, id: str) -> tuple[PlannedTime, ...]:
     for (since, to), segment in zip(pairwise(chain.points), chain.segments, strict=True):
         begins, comes = plan.predicted(since), plan.predicted(to)
         surplus = comes - begins - segment.natural
-        if comes >= taken - EPSILON:
+        if comes >= taken - EPSILON and (segment.hold or chain.type in SHIFTS or surplus < -NOTICEABLE):
             if segment.hold:  # It may not pass: it waits there until it is cut.
                 times.append(PlannedTime(sync=to.sync, at=taken + CUT))
             elif chain.type in SHIFTS:  # It hurries to be there.
                 times.append(PlannedTime(sync=to.sync, at=taken))
             if segment.hold or chain.type in SHIFTS:
                 break
-        elif surplus > NOTICEABLE or (_is_met_there(plan, to) if segment.hold else surplus < -NOTICEABLE):
+        elif abs(surplus) > NOTICEABLE or (segment.hold and _is_met_there(plan, to)):
             times.append(PlannedTime(sync=to.sync, at=comes + (APART if id in plan.natural else 0.0)))
     return tuple(times)
 
