@@ -43,7 +43,10 @@ def performed_block(*behaviors: BlockBehavior, ties: tuple[tuple[str, str], ...]
 
 
 CUT_NOD = (timed(Head(id="n", lexeme="NOD"), start="0"), timed(Head(id="m", lexeme="NOD"), start="0.4"))
-CUT_ON_ITS_WAY = (timed(Gaze(id="g", target="ball"), start="0"), timed(Gaze(id="h", target="box"), start="0.2"))
+CUT_ON_ITS_WAY = (
+    timed(Gaze(id="g", target="ball"), start="0", relax="1"),
+    timed(Gaze(id="h", target="box"), start="1.2"),
+)
 HELD = (Pointing(id="p", target="cup"), Speech(id="s", text="this is the one that I mean"))
 HOME_AFTER_A_SHIFT = (
     timed(GazeShift(id="s", target="ball"), start="0"),

@@ -96,6 +96,12 @@ class Plan(Struct, frozen=True, kw_only=True):
         """Seconds from the block's start to the point, if all goes as estimated."""
         return self.schedule[self.at[point]]
 
+    def begun_in_order(self, behaviors: Iterable[str]) -> list[str]:
+        """Behaviors that begin at one instant in the order in which they are told: as they take parts, and a torso
+        first, since head and arms aim for where that is going to be."""
+        rank = {id: ("torso" not in self.chains[id].parts, number) for number, id in enumerate(self.entering)}
+        return sorted(behaviors, key=rank.__getitem__)
+
     def transition(self, point: Point) -> int | None:
         """The transition of a point as other blocks may name it: the end of the block has one, too."""
         return len(self.net.transitions) - 1 if point == BLOCK_END else self.at.get(point)

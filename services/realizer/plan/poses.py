@@ -60,7 +60,8 @@ def planned_times(plan: Plan) -> dict[str, tuple[PlannedTime, ...]]:
 
     Empty if no behavior makes a difference to another or to itself: then its first estimates hold.
     """
-    order = sorted(plan.entering, key=lambda id: round(plan.predicted(plan.chains[id].points[0]), 6))
+    order = plan.begun_in_order(plan.chains)
+    order.sort(key=lambda id: round(plan.predicted(plan.chains[id].points[0]), 6))
     moving = [id for id in order if (estimate := plan.estimates.get(id)) is not None and estimate.parts]
     times = {id: _times(plan, id) for id in moving if plan.estimates[id].parts != ("voice",)}
     used = [part for id in times for part in plan.estimates[id].parts]
@@ -76,14 +77,14 @@ def _times(plan: Plan, id: str) -> tuple[PlannedTime, ...]:
     for (since, to), segment in zip(pairwise(chain.points), chain.segments, strict=True):
         begins, comes = plan.predicted(since), plan.predicted(to)
         surplus = comes - begins - segment.natural
-        if comes >= taken - EPSILON:
+        if comes >= taken - EPSILON and (segment.hold or chain.type in SHIFTS or surplus < -NOTICEABLE):
             if segment.hold:  # It may not pass: it waits there until it is cut.
                 times.append(PlannedTime(sync=to.sync, at=taken + CUT))
             elif chain.type in SHIFTS:  # It hurries to be there.
                 times.append(PlannedTime(sync=to.sync, at=taken))
             if segment.hold or chain.type in SHIFTS:
                 break
-        elif surplus > NOTICEABLE or (_is_met_there(plan, to) if segment.hold else surplus < -NOTICEABLE):
+        elif abs(surplus) > NOTICEABLE or (segment.hold and _is_met_there(plan, to)):
             times.append(PlannedTime(sync=to.sync, at=comes + (APART if id in plan.natural else 0.0)))
     return tuple(times)
 
