@@ -87,3 +87,63 @@ def test_who_has_begun_waits_for_nobody_any_more(tie: dict[str, str]) -> None:
     made = plan_block(example, [FakeBody().estimate(each) for each in example.behaviors], known=known)
 
     assert (made.dropped, made.problems) == ((), ())
+
+
+@pytest.mark.parametrize("tie", [{}, {"start": "p:stroke_start"}])
+def test_who_has_begun_waits_for_nobody_any_more(tie: dict[str, str]) -> None:
+    one, other = Gesture(id="p", lexeme="BEAT", mode="LEFT_HAND"), Gesture(id="q", lexeme="BEAT", mode="LEFT_HAND")
+    example = block((one, timed(other, **tie)))
+    points = {Point("p", "start"): 0.0, Point("q", "start"): 0.1}
+    known = Known(points=points, begun=frozenset({"p", "q"}))
+
+    made = plan_block(example, [FakeBody().estimate(each) for each in example.behaviors], known=known)
+
+    assert (made.dropped, made.problems) == ((), ())
+
+
+@pytest.mark.parametrize("tie", [{}, {"start": "p:stroke_start"}])
+def test_who_has_begun_waits_for_nobody_any_more(tie: dict[str, str]) -> None:
+    one, other = Gesture(id="p", lexeme="BEAT", mode="LEFT_HAND"), Gesture(id="q", lexeme="BEAT", mode="LEFT_HAND")
+    example = block((one, timed(other, **tie)))
+    points = {Point("p", "start"): 0.0, Point("q", "start"): 0.1}
+    known = Known(points=points, begun=frozenset({"p", "q"}))
+
+    made = plan_block(example, [FakeBody().estimate(each) for each in example.behaviors], known=known)
+
+    assert (made.dropped, made.problems) == ((), ())
+
+
+@pytest.mark.parametrize("tie", [{}, {"start": "p:stroke_start"}])
+def test_who_has_begun_waits_for_nobody_any_more(tie: dict[str, str]) -> None:
+    one, other = Gesture(id="p", lexeme="BEAT", mode="LEFT_HAND"), Gesture(id="q", lexeme="BEAT", mode="LEFT_HAND")
+    example = block((one, timed(other, **tie)))
+    points = {Point("p", "start"): 0.0, Point("q", "start"): 0.1}
+    known = Known(points=points, begun=frozenset({"p", "q"}))
+
+    made = plan_block(example, [FakeBody().estimate(each) for each in example.behaviors], known=known)
+
+    assert (made.dropped, made.problems) == ((), ())
+
+
+@pytest.mark.parametrize("tie", [{}, {"start": "p:stroke_start"}])
+def test_who_has_begun_waits_for_nobody_any_more(tie: dict[str, str]) -> None:
+    one, other = Gesture(id="p", lexeme="BEAT", mode="LEFT_HAND"), Gesture(id="q", lexeme="BEAT", mode="LEFT_HAND")
+    example = block((one, timed(other, **tie)))
+    points = {Point("p", "start"): 0.0, Point("q", "start"): 0.1}
+    known = Known(points=points, begun=frozenset({"p", "q"}))
+
+    made = plan_block(example, [FakeBody().estimate(each) for each in example.behaviors], known=known)
+
+    assert (made.dropped, made.problems) == ((), ())
+
+
+@pytest.mark.parametrize("tie", [{}, {"start": "p:stroke_start"}])
+def test_who_has_begun_waits_for_nobody_any_more(tie: dict[str, str]) -> None:
+    one, other = Gesture(id="p", lexeme="BEAT", mode="LEFT_HAND"), Gesture(id="q", lexeme="BEAT", mode="LEFT_HAND")
+    example = block((one, timed(other, **tie)))
+    points = {Point("p", "start"): 0.0, Point("q", "start"): 0.1}
+    known = Known(points=points, begun=frozenset({"p", "q"}))
+
+    made = plan_block(example, [FakeBody().estimate(each) for each in example.behaviors], known=known)
+
+    assert (made.dropped, made.problems) == ((), ())

@@ -281,7 +281,7 @@ class _Planner:
         )
 
     def _is_open(self, conflict: Conflict) -> bool:
-        """Whether anything can be done about a conflict: who has begun waits no more, and uses the arm that it has."""
+        """Whether anything can be done about a conflict: who has begun waits no more, and keeps its arm."""
         if conflict.hand:
             return conflict.hand[0] not in self.known.begun
         assert conflict.turn is not None
