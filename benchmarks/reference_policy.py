@@ -38,7 +38,8 @@ from engage_hri.services.commandline.process import run
 from engage_hri.services.control.torso.body import SimulatedBody
 from engage_hri.services.generation.config import GenerationConfig
 from engage_hri.services.generation.references.motions import Motions, collect, distinct, from_each_other, from_here
-from engage_hri.services.generation.references.policy import HeadAndArms, ReferenceScene, choose, considered, cost
+from engage_hri.services.generation.references.policy import ReferenceScene, choose, considered, cost
+from engage_hri.services.generation.references.posture import HeadAndArms
 from engage_hri.services.generation.service import generate
 from engage_hri.services.requests.ends import RequestDesk, Requester
 from engage_hri.services.runtime.service import running

@@ -16,7 +16,7 @@ from msgspec.structs import replace
 from engage_hri.schemas.behaviors import BlockBehavior
 from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.requests import Outcome, Request
-from engage_hri.schemas.units import Degrees, Duration, Meters, Radians, Stamp, Vector
+from engage_hri.schemas.units import Degrees, Duration, Meters, Radians, Seconds, Stamp, Vector
 
 
 class PlannedInstant(Struct, frozen=True, kw_only=True, omit_defaults=True):
@@ -206,13 +206,22 @@ class Estimate(Struct, frozen=True, kw_only=True, omit_defaults=True):
     on, if the body reports them; strokes that it does not report are expected at equal distances up to
     `stroke_end`."""
     head_degrees: Degrees = 0.0
-    """Rotations of the head's joints from the starting pose to the target, added up. Cg of thesis 3.3.2."""
+    """Rotations of the head's joints on their way from the pose to the target, added up. Cg of thesis 3.3.2."""
     arm_degrees: Degrees = 0.0
     """The same for the arm used. Cp of thesis 3.3.2."""
     ray: Ray | None = None
     """Gaze axis or forearm once on target."""
     pose_after: BodyPose | None = None
     """Pose on target (for a sequence of references), joints as in `BodyPose`."""
+    pose_end: BodyPose | None = None
+    """Pose at the end, once its parts have gone back to rest; of a shift the same as on target. None: not known."""
+
+
+class PlannedTime(Struct, frozen=True, kw_only=True, omit_defaults=True):
+    """Time planned for a sync point. at: seconds from now."""
+
+    sync: str
+    at: Seconds
 
 
 class EstimateItem(Struct, frozen=True, kw_only=True, omit_defaults=True):
@@ -221,6 +230,10 @@ class EstimateItem(Struct, frozen=True, kw_only=True, omit_defaults=True):
     behavior: BlockBehavior
     pose: BodyPose | None = None
     """Pose to start from; None: the present one."""
+    times: tuple[PlannedTime, ...] = ()
+    """Times of its start, of the hold points at which it has to wait, and of points that it has to reach faster or
+    slower than by itself; empty: it is estimated by itself. The items of one question that have times are one plan: a
+    body that can rehearse it estimates each from where the others will have brought its parts by then."""
 
 
 class EstimateBehaviors(Struct, frozen=True, kw_only=True, tag="estimate_behaviors", omit_defaults=True):

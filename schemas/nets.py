@@ -5,11 +5,26 @@ from msgspec import Struct
 from engage_hri.schemas.units import Seconds, Stamp
 
 
-class NetTransition(Struct, frozen=True, kw_only=True, omit_defaults=True):
-    """An instant. name: the sync points that share it. time: seconds from the block's start, as planned."""
+class NetPoint(Struct, frozen=True, kw_only=True, omit_defaults=True):
+    """A sync point. behavior: empty for the start and the end of the block itself."""
 
-    name: str
+    behavior: str = ""
+    sync: str = ""
+
+    def __str__(self) -> str:
+        return f"{self.behavior or 'bml'}:{self.sync}"
+
+
+class NetTransition(Struct, frozen=True, kw_only=True, omit_defaults=True):
+    """An instant. points: those that share it. time: seconds from the block's start, as planned."""
+
+    points: tuple[NetPoint, ...]
     time: Seconds = 0.0
+
+    @property
+    def name(self) -> str:
+        """All points, as `gaze-1:stroke = point-1:start`."""
+        return " = ".join(map(str, self.points))
 
 
 class NetPlace(Struct, frozen=True, kw_only=True, omit_defaults=True):
@@ -26,10 +41,18 @@ class NetPlace(Struct, frozen=True, kw_only=True, omit_defaults=True):
     behavior: str = ""
 
 
-class NetPlanned(Struct, frozen=True, kw_only=True, tag="net_planned", omit_defaults=True):
-    """stream: realizer: the net that a block runs on from now on; again when something was dropped.
+class Fired(Struct, frozen=True, kw_only=True, omit_defaults=True):
+    """A transition that has fired, `time` seconds after the block's start."""
 
-    at: when the block started. marked: numbers of the places that hold a token.
+    transition: int
+    time: Seconds
+
+
+class NetPlanned(Struct, frozen=True, kw_only=True, tag="net_planned", omit_defaults=True):
+    """stream: realizer: the net that a block runs on, and where its tokens are; all that a late watcher needs.
+
+    Told at the block's start, when it is planned anew since something was dropped, and every two seconds.
+    at: when the block started. marked: numbers of the places that hold a token. fired: the transitions so far.
     """
 
     block: str
@@ -37,13 +60,7 @@ class NetPlanned(Struct, frozen=True, kw_only=True, tag="net_planned", omit_defa
     transitions: tuple[NetTransition, ...]
     places: tuple[NetPlace, ...]
     marked: tuple[int, ...] = ()
-
-
-class Fired(Struct, frozen=True, kw_only=True, omit_defaults=True):
-    """A transition that has fired, `time` seconds after the block's start."""
-
-    transition: int
-    time: Seconds
+    fired: tuple[Fired, ...] = ()
 
 
 class NetMarked(Struct, frozen=True, kw_only=True, tag="net_marked", omit_defaults=True):

@@ -37,6 +37,7 @@ SHELLS = {
     "services/realizer/perform/shared_context.py",  # what performances share: the bus, too
     "services/realizer/perform/behavior_run.py",  # awaits sync points
     "services/realizer/perform/futures.py",  # resolves them
+    "services/realizer/perform/planning.py",  # asks the body
     "services/realizer/perform/net_stream.py",  # publishes the marking
     "services/realizer/perform/steering.py",  # holds, continues and stops
     "services/realizer/perform/live.py",  # resolved when a block has ended

@@ -73,7 +73,7 @@ class Steering(ABC):
     async def _steer(
         self, to: Literal["hold", "continue", "stop"], block: str, behavior: str, timeout: Seconds | None
     ) -> tuple[str, ...]:
-        id = self._request_id(f"{to} {block}:{behavior}")
+        id = self._request_id(":".join((to, *filter(None, (block, behavior)))))
         request = SteerPerformance(id=id, to=to, block=block, behavior=behavior)
         outcome = await self._ask(keys.BLOCK, request, timeout)
         assert isinstance(outcome, PerformanceSteered)

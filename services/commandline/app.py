@@ -28,6 +28,8 @@ COMMANDS = {
     "Exit 3 if one did not finish.",
     "watch": "Follow a running system: connection events, the open ones first, feedback, claims on the head, "
     "as they come.",
+    "steer": "Hold what a running robot performs, let it continue, or stop it: a behavior, a block, or everything. "
+    "Exit 2 if it is not being performed.",
     "hostile": "Attack the whole robot, in memory and virtual time only. "
     "Exit 1 if anything came of it that should not have.",
     "session": "",

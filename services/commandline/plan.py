@@ -13,10 +13,15 @@ from engage_hri.schemas.world import World
 from engage_hri.services.commandline.config import Config
 from engage_hri.services.commandline.generating import generated
 from engage_hri.services.commandline.options import Configured, Strict, WorldFile
+from engage_hri.services.commandline.outputs import Terminal
 from engage_hri.services.commandline.process import DONE
 from engage_hri.services.commandline.prose import strict_refusal
 from engage_hri.services.commandline.sources import read_source, read_world
+from engage_hri.services.realizer.plan.planner import Plan
 from engage_hri.services.runtime.virtual_time import run_virtual
+
+HIGHEST = 40
+"""Most lines of the drawing."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -33,7 +38,7 @@ def main(options: Options) -> int:
     config = options.load()
     source = read_source(options.file)
     around = read_world(options.world)
-    writers = {"text": export.as_text, "json": export.as_json, "dot": export.as_dot, "pnml": export.as_pnml}
+    writers = {"text": _as_text, "json": export.as_json, "dot": export.as_dot, "pnml": export.as_pnml}
     texts, warnings = [], 0
     with source.naming_file():
         for plan in generated(source.things, around, config, str(options.file)):
@@ -47,6 +52,17 @@ def main(options: Options) -> int:
     if options.strict and warnings:
         raise strict_refusal(warnings)
     return DONE
+
+
+def _as_text(plan: Plan) -> str:
+    from engage_hri.services.console.net_drawing import drawing, legend
+    from engage_hri.services.console.nets import in_view
+    from engage_hri.services.realizer import export
+
+    net = in_view(export.as_message(plan))
+    assert net is not None
+    width = Terminal().width
+    return "\n".join((export.as_text(plan), *drawing(net, width, HIGHEST), legend((net,))))
 
 
 async def estimated(block: Block, world: World, config: Config) -> tuple[Estimate, ...]:

@@ -2,6 +2,7 @@
 
 import asyncio
 from collections.abc import Collection
+from contextlib import ExitStack
 from dataclasses import dataclass
 from typing import Annotated, NamedTuple, get_args
 
@@ -20,7 +21,7 @@ from engage_hri.services.commandline.options import Connected
 from engage_hri.services.commandline.outputs import Terminal
 from engage_hri.services.commandline.process import DONE, forever, run_until_signal, unique_name
 from engage_hri.services.console.follow import FOLLOWED, Sink, following
-from engage_hri.services.console.live import Log
+from engage_hri.services.console.live import LiveNets, Log, NetLog
 from engage_hri.services.console.log import Telling
 
 OTHERS = (keys.ANY_FEEDBACK, keys.HEAD_OWNER, keys.ANY_FAULT)
@@ -40,6 +41,7 @@ class Options(Connected):
         list[str] | None,
         typer.Option(metavar="WHAT", help="events, statistics, feedback, head or faults; may be repeated."),
     ] = None
+    net: Annotated[bool, typer.Option("--net", help="Petri nets of live blocks, and where their tokens are.")] = False
     actor: Annotated[str, typer.Option(metavar="ID", help="Only what goes on with this person.")] = ""
     kind: Annotated[
         list[str] | None, typer.Option(metavar="KIND", help="Only these connection events; may be repeated.")
@@ -92,7 +94,10 @@ def main(options: Options) -> int:
     config = options.load()
     wanted = Wanted(tuple(options.only or ()), options.actor, tuple(options.kind or ()))
     wanted.check()
-    run_until_signal(_watch(options, config, wanted))
+    if options.net and not wanted.is_everything:
+        reason, advice = "shows nets and nothing else", "leave out --only, --actor and --kind"
+        raise InputRefused(Fault(reason=reason, where="--net", advice=advice))
+    run_until_signal(_watch_nets(options, config) if options.net else _watch(options, config, wanted))
     return DONE
 
 
@@ -115,6 +120,26 @@ async def _watch(options: Options, config: Config, wanted: Wanted) -> None:
             async with asyncio.TaskGroup() as group:
                 group.create_task(tell_if_alone(bus, options.connect or ()), name="hint")
                 await forever()
+
+
+async def _watch_nets(options: Options, config: Config) -> None:
+    from engage_hri.services.bus.zenoh.neighbors import tell_if_alone
+
+    async with await options.open(config.robot) as hub:
+        bus = hub.join(unique_name("watch"))
+        console = Terminal()
+        with ExitStack() as shown:
+            if options.json:
+                show: Sink = as_json
+            elif console.is_terminal:
+                show = shown.enter_context(LiveNets(console))
+            else:
+                show = NetLog(console, bus.now())
+            async with following(bus, (show,), patterns=(keys.NET,)):
+                bus.declare_alive()
+                async with asyncio.TaskGroup() as group:
+                    group.create_task(tell_if_alone(bus, options.connect or ()), name="hint")
+                    await forever()
 
 
 def as_json(message: Message, at: Seconds) -> None:

@@ -1,6 +1,7 @@
-"""Two sinks that show a changing scene: redrawn in place on a terminal, or line by line anywhere else."""
+"""Sinks that show a changing scene, or running nets: redrawn in place on a terminal, or line by line elsewhere."""
 
 import asyncio
+from abc import ABC, abstractmethod
 from typing import Self
 
 from rich.console import Console, RenderableType
@@ -9,36 +10,38 @@ from rich.live import Live
 from engage_hri.schemas.messages import Message
 from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.utf8 import printable
-from engage_hri.services.console import log, view
+from engage_hri.services.console import log, nets, view, wording
+from engage_hri.services.console.net_drawing import picture
 from engage_hri.services.console.render import render
 
 REDRAW: Seconds = 0.1
 """Least time between two pictures; each is drawn because of a message."""
+CLOCK: Seconds = 0.5
+"""Time between two pictures of nets about which nothing is told."""
 
 
-class LiveView:
-    """Sink that keeps a picture of the scene on the terminal. Rich's own refresh thread stays off."""
+class _Picture(ABC):
+    """Picture that is kept on the terminal. Rich's own refresh thread stays off."""
 
-    def __init__(self, console: Console, robot: str, began: Seconds) -> None:
-        self.scene = view.empty(robot, began)
+    def __init__(self, console: Console) -> None:
         self._console = console
         self._live = Live(self._picture(), console=console, auto_refresh=False, vertical_overflow="crop")
         self._due: asyncio.TimerHandle | None = None
 
-    def __call__(self, message: Message, at: Seconds) -> None:
-        self.scene = view.feed(self.scene, message, at)
-        if self._due is None:
-            self._due = asyncio.get_running_loop().call_later(REDRAW, self._draw)
-
+    @abstractmethod
     def _picture(self) -> RenderableType:
-        return render(self.scene, self._console.width, self._console.height)
+        """Draw how things are now."""
+
+    def _draw_soon(self, delay: Seconds = REDRAW) -> None:
+        if self._due is None:
+            self._due = asyncio.get_running_loop().call_later(delay, self._draw)
 
     def _draw(self) -> None:
         self._due = None
         self._live.update(self._picture(), refresh=True)
 
     def __enter__(self) -> Self:
-        self._live.start()
+        self._live.start(refresh=True)
         return self
 
     def __exit__(self, *raised: object) -> None:
@@ -46,6 +49,60 @@ class LiveView:
             self._due.cancel()
         self._live.update(self._picture(), refresh=True)
         self._live.stop()
+
+
+class LiveView(_Picture):
+    """Sink that keeps a picture of the scene on the terminal."""
+
+    def __init__(self, console: Console, robot: str, began: Seconds) -> None:
+        self.scene = view.empty(robot, began)
+        super().__init__(console)
+
+    def __call__(self, message: Message, at: Seconds) -> None:
+        self.scene = view.feed(self.scene, message, at)
+        self._draw_soon()
+
+    def _picture(self) -> RenderableType:
+        return render(self.scene, self._console.width, self._console.height)
+
+
+class LiveNets(_Picture):
+    """Sink that keeps the nets of all live blocks on the terminal, with their tokens."""
+
+    def __init__(self, console: Console) -> None:
+        self.nets: nets.Nets = {}
+        super().__init__(console)
+
+    def __call__(self, message: Message, at: Seconds) -> None:
+        self.nets = nets.feed(self.nets, message, at, asyncio.get_running_loop().time())
+        self._draw_soon()
+
+    def _picture(self) -> RenderableType:
+        now = asyncio.get_running_loop().time()
+        self.nets = nets.without_old(self.nets, now)
+        return picture(tuple(self.nets.values()), self._console.width, self._console.height, now)
+
+    def _draw(self) -> None:
+        super()._draw()
+        if self.nets:  # One that has ended goes, and clocks run, though nothing is told.
+            self._draw_soon(CLOCK)
+
+
+class NetLog:
+    """Sink that prints a line for each change in the nets of live blocks."""
+
+    def __init__(self, console: Console, began: Seconds) -> None:
+        self.nets: nets.Nets = {}
+        self._console = console
+        self._began = began
+
+    def __call__(self, message: Message, at: Seconds) -> None:
+        now = asyncio.get_running_loop().time()
+        before, self.nets = self.nets, nets.without_old(nets.feed(self.nets, message, at, now), now)
+        for block, net in self.nets.items():
+            if net is not before.get(block):
+                for text in nets.told(before.get(block), net):
+                    _print(self._console, f"{wording.clock(now - self._began):>8}  {text}")
 
 
 class Log:
@@ -60,10 +117,14 @@ class Log:
         before, self.scene = self.scene, view.feed(self.scene, message, at)
         line = log.line(message, before, self.scene, at, self._telling)
         if line is not None:
-            self._console.print(printable(line), markup=False, highlight=False, soft_wrap=True)
+            _print(self._console, line)
 
     def __enter__(self) -> Self:
         return self
 
     def __exit__(self, *raised: object) -> None:
         return None
+
+
+def _print(console: Console, line: str) -> None:
+    console.print(printable(line), markup=False, highlight=False, soft_wrap=True)

@@ -6,14 +6,14 @@ and `tests/control/contract.py` is the suite that it has to pass.
 
 import asyncio
 from abc import ABC, abstractmethod
-from collections.abc import AsyncGenerator, Callable, Mapping
+from collections.abc import AsyncGenerator, Callable, Mapping, Sequence
 from typing import Literal
 
 from msgspec import Struct
 
 from engage_hri.schemas.behavior_types import sync_points
 from engage_hri.schemas.behaviors import BlockBehavior
-from engage_hri.schemas.body import BodyPose, Capabilities, Estimate, Ray
+from engage_hri.schemas.body import BodyPose, Capabilities, Estimate, EstimateItem, Ray
 from engage_hri.schemas.faults import EngageError
 from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.world import World
@@ -248,6 +248,14 @@ class Body(ABC):
         pose: joint angles from which it would begin, radians; None: from where the body is.
         world: the entities that targets name, in metres.
         """
+
+    def rehearse(self, items: Sequence[EstimateItem], world: World) -> Sequence[Estimate]:
+        """Estimate the behaviors of a plan. Not overridden, each is estimated by itself from its pose.
+
+        items: the behaviors, with the times at which they are to begin and to wait.
+        world: the entities that targets name, in metres.
+        """
+        return [self.estimate(item.behavior, item.pose, world) for item in items]
 
     @abstractmethod
     def perform(self, behavior: BlockBehavior, authority: MovementAuthority) -> AsyncGenerator[Progress, None]:

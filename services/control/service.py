@@ -12,7 +12,6 @@ from engage_hri.schemas.body import (
     AbortBehavior,
     BehaviorAborted,
     BehaviorOutcome,
-    BodyPose,
     DescribeBody,
     Estimate,
     EstimateBehaviors,
@@ -145,14 +144,10 @@ class _Control:
     def estimate(self, question: Message) -> Message:
         if not isinstance(question, EstimateBehaviors):
             raise InputRefused(Fault(reason="expected EstimateBehaviors", where=keys.ESTIMATE, service="control"))
-        return Estimates(items=tuple(self._estimated(item.behavior, item.pose) for item in question.items))
-
-    def _estimated(self, behavior: BlockBehavior, pose: BodyPose | None) -> Estimate:
-        try:
-            check_behavior(behavior)
-        except InputRefused as error:
-            return Estimate(behavior=behavior.id, feasible=False, fault=error.fault, warning="CANNOT_CREATE_BEHAVIOR")
-        return self._body.estimate(behavior, pose, self._world)
+        refused = [_refused(item.behavior) for item in question.items]
+        known = [item for item, refusal in zip(question.items, refused, strict=True) if refusal is None]
+        estimates = iter(self._body.rehearse(known, self._world))
+        return Estimates(items=tuple([next(estimates) if refusal is None else refusal for refusal in refused]))
 
     def describe(self, question: Message) -> Message:
         if not isinstance(question, DescribeBody):
@@ -393,3 +388,12 @@ class _Control:
     def close(self) -> None:
         self.desk.close()
         self._next_state.set(None)
+
+
+def _refused(behavior: BlockBehavior) -> Estimate | None:
+    """The estimate of a behavior that makes no sense; None: the body may be asked."""
+    try:
+        check_behavior(behavior)
+    except InputRefused as error:
+        return Estimate(behavior=behavior.id, feasible=False, fault=error.fault, warning="CANNOT_CREATE_BEHAVIOR")
+    return None

@@ -50,6 +50,10 @@ class GenerationConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=
     expected_delay: Seconds = 0.3
     """Expected delay of directed gaze, E[delay]: the mean of Table 2.1 (decision B7)."""
 
+    words_between: float = 3.0
+    """Words of plain speech between two references over which head and arm stay at the first one's target; after more
+    they have gone home. Decision 0024; the number is ours."""
+
     gaze_half_angle: Radians | None = None
     """Half the angle of the robot's gaze cone as people perceive it, < pi/2. None: the body's own. Thesis 3.3.2."""
     pointing_radius: Meters | None = None
@@ -153,5 +157,5 @@ _POSITIVE = (
 _NOT_NEGATIVE = (
     "seconds_per_head_degree", "seconds_per_arm_degree", "seconds_per_word", "wait_weight", "expected_delay",
     "figure_lead", "this_within", "dwell", "hand_speed", "hand_onset", "hand_stillness", "face_lost",
-    "mtbce_events", "body_patience",
+    "mtbce_events", "body_patience", "words_between",
 )  # fmt: skip

@@ -16,6 +16,7 @@ from engage_hri.services.generation.references.discourse import NO_DISCOURSE, Di
 from engage_hri.services.generation.references.motions import Motions
 from engage_hri.services.generation.references.phrases import proposed
 from engage_hri.services.generation.references.policy import Choices, ReferenceScene, choose
+from engage_hri.services.generation.references.posture import references_apart
 from engage_hri.services.generation.turns.continuation import NO_CONTINUATION, Continuation
 from engage_hri.services.generation.turns.policy import TurnPlan, vain_delay
 
@@ -53,10 +54,13 @@ def plan(
     was referred to before this fragment.
     """
     chosen = Choices()
+    order = ordered(fragment.behaviors, fragment.constraints, fragment.id)
+    apart = references_apart(order, fragment.constraints, config.words_between)
     made = proposed(references(fragment), world, config, discourse)
     if made.references:
-        chosen = choose(made.references, _scene(world, body, permits, config), motions, config)
-    emitted = Emission(fragment, turn, chosen.choices, config, permits, chosen.hands, before).plan()
+        motions = replace(motions, looks_last=config.profile == "figure-3.3")
+        chosen = choose(made.references, _scene(world, body, permits, config), motions, config, apart)
+    emitted = Emission(fragment, turn, chosen.choices, config, permits, chosen.hands, before, apart).plan()
     return replace(emitted, warnings=(*vain_delay(fragment), *made.warnings, *chosen.warnings, *emitted.warnings))
 
 

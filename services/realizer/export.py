@@ -4,11 +4,14 @@ import json
 
 from msgspec.structs import asdict
 
+from engage_hri.schemas.nets import NetPlanned
+from engage_hri.schemas.units import Stamp
 from engage_hri.services.realizer.net import pnml
 from engage_hri.services.realizer.net.petri_net import Bound, Place, is_live, is_safe
+from engage_hri.services.realizer.perform.net_message import described
 from engage_hri.services.realizer.plan.planner import Plan, plan_block
 
-__all__ = ["as_dot", "as_json", "as_pnml", "as_text", "plan_block"]
+__all__ = ["as_dot", "as_json", "as_message", "as_pnml", "as_text", "plan_block"]
 
 
 def as_text(plan: Plan) -> str:
@@ -67,6 +70,11 @@ def as_json(plan: Plan) -> str:
         ],
     }
     return json.dumps(document, indent=2, ensure_ascii=False)
+
+
+def as_message(plan: Plan) -> NetPlanned:
+    """The net as watchers are told of it, before the block has begun: with its initial marking."""
+    return described(plan, Stamp("", 0.0), plan.net.initial, {})
 
 
 def as_pnml(plan: Plan) -> str:

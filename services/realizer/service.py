@@ -1,13 +1,12 @@
 """The realizer on the bus: takes blocks, answers each exactly once, and performs any number of them at a time."""
 
 import asyncio
-from collections.abc import Collection, Coroutine, Iterable, Mapping
+from collections.abc import Coroutine, Mapping
 from typing import Any, TypeVar
 
 from msgspec.structs import replace
 
 from engage_hri.schemas import keys
-from engage_hri.schemas.behaviors import Hand, Speech
 from engage_hri.schemas.blocks import (
     BehaviorInterrupted,
     Block,
@@ -17,43 +16,30 @@ from engage_hri.schemas.blocks import (
     SteerPerformance,
 )
 from engage_hri.schemas.body import (
-    BodyPose,
-    Estimate,
-    EstimateBehaviors,
-    EstimateItem,
-    Estimates,
     GoHome,
     SyncPointArrived,
     SyncPointReached,
     WordSpoken,
 )
-from engage_hri.schemas.check import validated
-from engage_hri.schemas.faults import EngageError, Fault, NoReply
+from engage_hri.schemas.faults import EngageError, Fault
 from engage_hri.schemas.feedback import WarningFeedback
 from engage_hri.schemas.presence import PeerAlive, PeerGone
 from engage_hri.schemas.requests import Cancel, Outcome, Request, Unreadable
 from engage_hri.services.bus.interface import Bus, Received
 from engage_hri.services.realizer.config import RealizerConfig
 from engage_hri.services.realizer.perform.control_link import LONGEST_WAY
-from engage_hri.services.realizer.perform.knowledge import Asker, knowledge, may_share, parts_of
 from engage_hri.services.realizer.perform.live import Ending, Live
 from engage_hri.services.realizer.perform.live_blocks import LiveBlocks
 from engage_hri.services.realizer.perform.performance import BlockPerformance
+from engage_hri.services.realizer.perform.planning import Planning
 from engage_hri.services.realizer.perform.shared_context import Moving, Presence, SharedContext
 from engage_hri.services.realizer.perform.steering import Steering
-from engage_hri.services.realizer.plan.handover import hands_refused
-from engage_hri.services.realizer.plan.known import Known, is_foreign, is_named_in
-from engage_hri.services.realizer.plan.planner import Plan, plan_steps
-from engage_hri.services.realizer.plan.poses import poses_before
-from engage_hri.services.realizer.plan.relations import BlockRefused, extent, relation_steps
-from engage_hri.services.realizer.plan.steps import Steps, T
-from engage_hri.services.realizer.points import Point, performer
+from engage_hri.services.realizer.plan.planner import Plan
+from engage_hri.services.realizer.plan.relations import BlockRefused
 from engage_hri.services.requests.ends import Patience, RequestDesk, Requester
 from engage_hri.services.runtime.service import Ready
 
 Result = TypeVar("Result")
-SLICE = 512
-"""Elements that are worked on in one go (see `steps`): one to five milliseconds. Counted: equal runs stay equal."""
 
 
 class _Realizer:
@@ -70,6 +56,7 @@ class _Realizer:
         self.live_blocks = LiveBlocks()
         self.homing: set[asyncio.Future[Outcome]] = set()
         """Outcomes of the parts that are on their way home, sent by blocks that replace others."""
+        self.planning = Planning(bus, config, self.live_blocks, self.performing)
         self.steering = Steering(bus, self.desk, config, self.live, self.performances)
         self.shared = SharedContext(
             bus, self.requests, config, self.peers, self.routes, self.performing, self.live_blocks
@@ -183,7 +170,7 @@ class _Realizer:
             return
         with self.live_blocks.opened(block):
             try:
-                plan = await _result_or_stopped(live.ending, self._plan(live, elsewhere))
+                plan = await _result_or_stopped(live.ending, self.planning.plan(live, elsewhere))
             except EngageError as error:
                 self._refuse(live, error)
                 return
@@ -199,78 +186,6 @@ class _Realizer:
             )
             live.settle()
             await self._end(live, await performance.run())
-
-    async def _plan(self, live: Live, elsewhere: Mapping[str, Block]) -> Plan:
-        """The plan of a block.
-
-        The body is asked again from where it will be by then, and about the hands that the plan has chosen.
-        """
-        block = live.request.block
-        for each in block.behaviors:
-            if isinstance(each, Speech) and len(each.text) > self.config.utterance:
-                reason = f"{len(each.text)} characters of speech, at most {self.config.utterance} are said in one go"
-                advice = "say it in several; `realizer.utterance` is the limit"
-                raise BlockRefused(
-                    Fault(reason=reason, where=f"{block.id}: {each.id}", line=each.line, advice=advice)
-                )
-        if (held := extent(block)) > self.config.most:
-            reason = f"{held} behaviors, marks and sync references; at most {self.config.most} can be planned in time"
-            advice = "send several (blocks with APPEND, fragments of one turn); `realizer.most` is the limit"
-            raise BlockRefused(Fault(reason=reason, where=block.id, advice=advice))
-        relations = await unhurried(relation_steps(block, elsewhere))  # Bad references: before the body is asked.
-        named = frozenset(point for point in relations.named if is_foreign(point.behavior))
-        block = validated(block)
-        barred: set[tuple[str, Hand]] = set()
-        chosen, estimates = block, await self._estimates(block, {})
-        first, is_asked_again = estimates, False
-        await self._earlier(live, named)
-        while True:
-            known = self._known(block, elsewhere, named, estimates)
-            plan = await unhurried(plan_steps(chosen, estimates, known=known, barred=barred))
-            before = poses_before(plan, known)
-            if plan.block is chosen and (is_asked_again or not before):
-                return plan
-            chosen, is_asked_again = plan.block, True
-            estimates = await self._estimates(chosen, before)
-            if refused := hands_refused(block, chosen, estimates):
-                barred |= refused
-                chosen, estimates, is_asked_again = block, first, False
-
-    async def _earlier(self, live: Live, named: Iterable[Point]) -> None:
-        """Wait until those of the earlier blocks are planned that this one is to be planned with in mind."""
-        block = live.request.block
-        for other in live.earlier:
-            id = other.request.block.id
-            if not other.settled.done() and (is_named_in(id, named) or may_share(block, other.request.block)):
-                await asyncio.wait([other.settled])
-
-    def _known(
-        self, block: Block, elsewhere: Mapping[str, Block], named: Collection[Point], estimates: Iterable[Estimate]
-    ) -> Known:
-        now = self.bus.now()
-        parts = parts_of(block.behaviors, estimates)
-        return knowledge(Asker(block.id, now, now, named, parts, elsewhere), self.performing(), self.live_blocks)
-
-    async def _estimates(self, block: Block, before: Mapping[str, BodyPose]) -> tuple[Estimate, ...]:
-        """Estimates of the body. before: poses in which behaviors start; without one, from where the body is now."""
-        behaviors = [behavior for behavior in block.behaviors if performer(behavior) == "body"]
-        if not behaviors:
-            return ()
-        items = (EstimateItem(behavior=behavior, pose=before.get(behavior.id)) for behavior in behaviors)
-        question = EstimateBehaviors(items=tuple(items))
-        try:
-            answer = await self.bus.query(keys.ESTIMATE, question, timeout=self.config.estimate)
-        except NoReply as error:
-            fault = Fault(reason="there is no body to perform it", where=block.id, advice="start control")
-            raise BlockRefused(fault, "CANNOT_CREATE_BEHAVIOR") from error
-        except EngageError as error:
-            raise BlockRefused(error.fault, "CANNOT_CREATE_BEHAVIOR") from error
-        if not isinstance(answer, Estimates):
-            fault = Fault(
-                reason=f"control answered with a {type(answer).__name__}, not with estimates", where=block.id
-            )
-            raise BlockRefused(fault, "CANNOT_CREATE_BEHAVIOR")
-        return answer.items
 
     async def _await_turn(self, live: Live, plan: Plan, elsewhere: Mapping[str, Block]) -> Plan:
         """Wait for earlier blocks if composition asks for that. Returns the plan, made anew if that took time."""
@@ -296,10 +211,7 @@ class _Realizer:
         try:
             live.unsettle()
             # Asked again: the body is elsewhere by now.
-            known = self._known(plan.block, elsewhere, plan.foreign, plan.estimates.values())
-            estimates = await self._estimates(plan.block, poses_before(plan, known))
-            known = self._known(plan.block, elsewhere, plan.foreign, estimates)
-            return await unhurried(plan_steps(plan.block, estimates, known=known))
+            return await self.planning.again(plan, elsewhere)
         except EngageError as error:
             self._warn(live, error)
             live.stop(Ending("failed", error.fault))
@@ -374,22 +286,3 @@ async def realize(bus: Bus, ready: Ready, config: RealizerConfig) -> None:
     finally:
         realizer.desk.close()
         realizer.requests.close()
-
-
-async def unhurried(steps: Steps[T]) -> T:
-    """The result of long work, done a slice at a time: whatever else is due comes in between.
-
-    A cancellation takes effect at the end of the slice.
-    """
-    done = 0
-    try:
-        while True:
-            done += next(steps)
-            if done >= SLICE:
-                done = 0
-                await asyncio.sleep(0)
-    except StopIteration as end:
-        result: T = end.value
-        return result
-    finally:
-        steps.close()

@@ -247,4 +247,4 @@ def test_a_look_after_a_point_starts_where_the_glance_has_led_the_head(
 
     costs = {(pair["reference"], pair["gesture"]): pair["cost"] for pair in pairs}
     assert (costs["g-r", "gaze"] > costs["g-r", "none"]) == looks_away
-    assert costs["g-r", GESTURES[3]] == costs["g-r", GESTURES[2]]  # the arm is there
+    assert costs["g-r", GESTURES[3]] > costs["g-r", GESTURES[2]]  # the arm is raised once more, wherever it is

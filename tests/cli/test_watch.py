@@ -7,7 +7,7 @@ import asyncio
 import json
 import sys
 from asyncio.subprocess import PIPE, Process
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
 from pathlib import Path
 from typing import Any, NamedTuple, get_args
@@ -16,6 +16,7 @@ import pytest
 
 from engage_hri.schemas import keys, lines
 from engage_hri.schemas.actions import ActionBegan, ActionEnded
+from engage_hri.schemas.nets import Fired, NetMarked, NetPlace, NetPlanned, NetPoint, NetTransition
 from engage_hri.schemas.recognition import ConnectionEvent
 from engage_hri.services.bus.interface import Bus
 from engage_hri.services.bus.zenoh.hub import open_hub
@@ -145,6 +146,44 @@ async def test_a_reader_who_has_had_enough_ends_watch_without_a_word(endpoint: s
     assert (watch.returncode, told) == (0, b"")
 
 
+async def test_the_net_of_a_block_is_watched_as_lines_and_as_json(endpoint: str) -> None:
+    transitions = tuple(NetTransition(points=(NetPoint(sync=sync),)) for sync in ("start", "end"))
+    planned = (NetPlace(kind="order", source=0, target=1), NetPlace(kind="idle", source=1, target=0))
+    async with await open_hub("seen", listen=[endpoint]) as hub:
+        realizer = hub.join("realizer")
+
+        def tell() -> None:
+            start = NetPlanned(block="b", at=realizer.stamp(), transitions=transitions, places=planned, marked=(1,))
+            fired = NetMarked(block="b", fired=(Fired(transition=0, time=0.25),), put=(0,), taken=(1,))
+            realizer.publish(keys.NET, start)
+            realizer.publish(keys.NET, fired)
+
+        for form in ((), ("--json",)):
+            watch = await start("watch", "--net", *form, "--robot", "seen", "--connect", endpoint)
+            async with asyncio.TaskGroup() as group:
+                telling = group.create_task(_again(tell))
+                if form:
+                    made = parsed(await line(watch, "net_planned", log=False))
+                    moved = parsed(await line(watch, "net_marked", log=False))
+                    assert [each["points"][0]["sync"] for each in made["transitions"]] == ["start", "end"]
+                    assert (moved["fired"], moved["put"]) == ([{"transition": 0, "time": 0.25}], [0])
+                else:
+                    assert "b: bml:start fired at 0.25 s (planned 0.00 s)" in await line(watch, "fired", log=False)
+                    assert "b: ● order from bml:start to bml:end" in await line(watch, "●", log=False)
+                telling.cancel()
+            assert await stopped(watch) == 0
+
+
+async def _again(tell: Callable[[], None]) -> None:
+    """Tell it until it is heard: nobody says when a watcher is there."""
+    loop = asyncio.get_running_loop()
+    while True:
+        tell()
+        turn = loop.create_future()
+        loop.call_later(0.2, turn.set_result, None)
+        await turn
+
+
 @pytest.mark.parametrize(
     ("arguments", "told"),
     [
@@ -153,6 +192,7 @@ async def test_a_reader_who_has_had_enough_ends_watch_without_a_word(endpoint: s
             "--kind: unknown 'gaze' (known: directed_gaze, mutual_facial_gaze, adjacency_pair, backchannel)",
         ),
         (("--only", "all"), "--only: unknown 'all' (known: events, statistics, feedback, head, faults)"),
+        (("--net", "--only", "events"), "--net: shows nets and nothing else (leave out --only, --actor and --kind)"),
         (("--actor", "a/b"), "--actor: 'a/b' can't be in a key: "),
     ],
 )

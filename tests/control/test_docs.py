@@ -8,8 +8,9 @@ from pathlib import Path
 
 from engage_hri.schemas.behavior_types import TYPES
 from engage_hri.services.control.body import Body
-from engage_hri.services.control.torso.motion import Leg, Motion, resting
-from engage_hri.services.control.torso.motion import Path as Way
+from engage_hri.services.control.torso.motion import Motion
+from engage_hri.services.control.torso.path import Leg, resting
+from engage_hri.services.control.torso.path import Path as Way
 from tests.control.contract import BodyContract
 
 PAGE = Path(__file__).parents[2] / "docs" / "control.md"

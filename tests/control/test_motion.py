@@ -8,7 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from engage_hri.services.control.torso import tracks
-from engage_hri.services.control.torso.motion import JointMotion, Leg, Motion, Path, resting
+from engage_hri.services.control.torso.motion import Motion
+from engage_hri.services.control.torso.path import JointMotion, Leg, Path, resting
 
 LIMITS = tracks.LIMITS["right_arm"]
 HOME = tracks.HOME["right_arm"]

@@ -26,8 +26,8 @@ from engage_hri.services.control.config import ControlConfig
 from engage_hri.services.control.torso import kinematics
 from engage_hri.services.control.torso.body import SimulatedBody
 from engage_hri.services.control.torso.repertoire import BUILT_IN, TABLES, Absent, GesturePath, HeadPath, Repertoire
-from tests.control.contract import WORLD, Stage, performed, times
 from tests.control.motions import recorded, stops, violations
+from tests.control.suite import WORLD, Stage, performed, times
 
 PAGE = Path(__file__).parents[2] / "docs" / "control.md"
 LEXEMES: list[BlockBehavior] = [

@@ -212,7 +212,7 @@ async def test_estimates_chain_over_poses():
     assert two.arm_degrees > 40
     assert two.head_degrees == one.arm_degrees == 0.0
     assert three.head_degrees == pytest.approx(0.0, abs=1e-6)
-    assert four.arm_degrees == pytest.approx(0.0, abs=1e-6)
+    assert 30 < four.arm_degrees < two.arm_degrees  # the arm is raised a little and comes down on the target again
     assert two.ray is not None
     assert two.ray.tip is not None
 

@@ -1,6 +1,6 @@
 """Blocks made from fragments, and their constraints as lines of text."""
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
 from engage_hri.schemas.behaviors import (
     After,
@@ -41,6 +41,7 @@ def emission(
     permits: Permits | None = None,
     hands: dict[str, str] | None = None,
     before: Continuation = NO_CONTINUATION,
+    apart: Collection[str] = (),
 ) -> FragmentPlan:
     """`made`: gesture and phrase of each reference in document order."""
     references = [behavior for behavior in fragment.behaviors if isinstance(behavior, Reference)]
@@ -52,7 +53,7 @@ def emission(
     ]
     config = GenerationConfig(profile=profile)  # type: ignore[arg-type]
     turn = plan_turn(fragment, "turn", "human")
-    result = Emission(fragment, turn, choices, config, permits or Permits(), hands or {}, before).plan()  # type: ignore[arg-type]
+    result = Emission(fragment, turn, choices, config, permits or Permits(), hands or {}, before, apart).plan()  # type: ignore[arg-type]
     check(result.block)  # every reference of the block is sound
     return result
 

@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 from engage_hri.schemas.behaviors import Reference
 from engage_hri.services.generation.config import Channel
-from engage_hri.services.generation.references.motions import CURRENT_POSE, Motions
+from engage_hri.services.generation.references.motions import AT_REST, CURRENT_POSE, Motions
 from engage_hri.services.generation.references.policy import ReferenceScene
 from tests.generation.tables import body, flat_world, scene
 
@@ -26,7 +26,10 @@ LOOKS, WAITS, POINTS = (1, 2, 3), (2, 3), (3,)
 
 
 class Problem(NamedTuple):
-    """head, arm: degrees by (since, target). unable: what no arm can point at. refused: (since, target) of one."""
+    """head, arm: degrees by (since, target). unable: what no arm can point at. refused: (since, target) of one.
+
+    apart: ids of the references before which head and arms go home.
+    """
 
     places: dict[str, tuple[float, float]]
     references: list[Reference]
@@ -38,6 +41,7 @@ class Problem(NamedTuple):
     no_gaze: str = ""
     no_point: str = ""
     channel: Channel = "sum"
+    apart: frozenset[str] = frozenset()
 
     def scene(self) -> ReferenceScene:
         return scene(flat_world(self.places), no_gaze=self.no_gaze, no_point=self.no_point)
@@ -124,22 +128,32 @@ def optimum_by_gestures(problem: Problem) -> Best | None:
 
 def _least(problem: Problem, sequences: Iterable[Sequence[Choice]]) -> Best | None:
     targets = [reference.target for reference in problem.references]
+    alone = [reference.id in problem.apart for reference in problem.references]
     arms = [problem.arm_for(target) for target in targets]
 
     @cache
     def motion(gestures: tuple[int, ...]) -> int | None:
         """In 1/600 s; None where the arm cannot."""
-        head, at, total = CURRENT_POSE, {"left_arm": CURRENT_POSE, "right_arm": CURRENT_POSE}, 0
-        for gesture, target, arm in zip(gestures, targets, arms, strict=True):
+        total = 0
+        for number, (gesture, target, arm) in enumerate(zip(gestures, targets, arms, strict=True)):
             if gesture in LOOKS:
-                total += HEAD * problem.head[head, target]
-                head = target
+                looked = [each in LOOKS for each in gestures[:number]]
+                total += HEAD * problem.head[start(looked, number), target]
             if gesture in POINTS:
-                if (at[arm], target) in problem.refused:
+                pointed = [
+                    each in POINTS and other == arm for each, other in zip(gestures[:number], arms, strict=False)
+                ]
+                since = start(pointed, number)
+                if (since, target) in problem.refused:
                     return None
-                total += ARM * problem.arm[at[arm], target]
-                at[arm] = target
+                total += ARM * problem.arm[since, target]
         return total
+
+    def start(moved: Sequence[bool], number: int) -> str:
+        """Where a part is before a reference. moved: for each earlier one, whether it moved that part."""
+        if not any(moved):
+            return CURRENT_POSE
+        return targets[number - 1] if moved[-1] and not alone[number] else AT_REST
 
     def complete() -> Iterator[Best]:
         least: int | None = None

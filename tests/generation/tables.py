@@ -7,7 +7,7 @@ from engage_hri.schemas.body import Estimate, Ray
 from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.units import Vector
 from engage_hri.schemas.world import Entity, World
-from engage_hri.services.generation.references.motions import CURRENT_POSE, Motions
+from engage_hri.services.generation.references.motions import AT_REST, CURRENT_POSE, Motions
 from engage_hri.services.generation.references.policy import ReferenceScene
 
 TANGRAMS = (
@@ -50,7 +50,7 @@ def body(
         assert entity is not None
         x, y, _ = entity.position
         above: Vector = (x, y, HEIGHT)
-        for since in (CURRENT_POSE, *sequence):
+        for since in (CURRENT_POSE, AT_REST, *sequence):
             ray = Ray(origin=above, axis=(0.0, 0.0, -1.0), tip=above)
             gazes[since, target] = Estimate(behavior="g", feasible=True, head_degrees=head(since, target), ray=ray)
             reached = target not in out_of_reach and (since, target) not in refused

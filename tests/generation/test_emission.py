@@ -101,8 +101,23 @@ def test_the_next_reference_waits_for_the_glance_and_for_its_arm() -> None:
     made = block(fragment, [(POINT, "this"), (POINT, "that")], hands=hands)
 
     assert "r2-gaze:start after r1-glance:stroke" in lines(made)
-    assert "r2-point:start after r1-point:stroke_end" in lines(made)
+    assert "r2-point:start = r1-point:stroke_end" in lines(made)
     assert by_id(made)["r1-glance"] == Gaze(id="r1-glance", target="human")
+
+
+def test_after_a_long_speech_head_and_arm_begin_at_home() -> None:
+    long = Speech(id="s", text="and then put it carefully beside")
+    fragment = TurnFragment(
+        id="f", turn_status="middle", behaviors=(reference("r1"), long, reference("r2", "other"), reference("r3"))
+    )
+    hands = {"r1": "LEFT_HAND", "r2": "LEFT_HAND"}
+
+    pointed = block(fragment, [(POINT, "this"), (POINT, "that"), ("none", "it")], hands=hands, apart={"r2"})
+    looked = block(fragment, [(LOOK, "it"), (LOOK, "that"), (LOOK, "it")], apart={"r2"})
+
+    assert "r2-point:start after r1-point:end" in lines(pointed)
+    assert "r2-gaze:start after r1-gaze:end" in lines(looked)
+    assert "r3-gaze:start = r2-gaze:relax" in lines(looked)
 
 
 def test_points_of_different_arms_do_not_wait_for_each_other() -> None:

@@ -8,7 +8,7 @@ from engage_hri.schemas.behaviors import Reference, SpeechOption
 from engage_hri.schemas.faults import RunFailed
 from engage_hri.schemas.fragments import ReferenceChoice
 from engage_hri.services.generation.config import GenerationConfig
-from engage_hri.services.generation.references.motions import CURRENT_POSE
+from engage_hri.services.generation.references.motions import AT_REST, CURRENT_POSE
 from engage_hri.services.generation.references.policy import GESTURES, Choices, choose
 from tests.generation.oracle import Best, Problem, optimum, optimum_by_gestures
 from tests.generation.tables import option, refer
@@ -33,7 +33,7 @@ def options(draw: st.DrawFn, target: str, most: int) -> list[SpeechOption]:
 def problems(draw: st.DrawFn, fewest: int, most: int, phrases: int) -> Problem:
     spots = st.integers(0, 8).map(lambda steps: steps * 0.06)
     targets = draw(st.lists(st.sampled_from(NAMES), min_size=fewest, max_size=most))
-    places = (CURRENT_POSE, *NAMES)
+    places = (CURRENT_POSE, AT_REST, *NAMES)
     problem = Problem(
         places={name: (draw(spots), draw(spots)) for name in NAMES},
         references=[
@@ -48,13 +48,15 @@ def problems(draw: st.DrawFn, fewest: int, most: int, phrases: int) -> Problem:
         no_gaze=draw(st.sampled_from(["", "", "", "gaze is inhibited"])),
         no_point=draw(st.sampled_from(["", "", "", "pointing is inhibited"])),
         channel=draw(st.sampled_from(["sum", "independent"])),
+        apart=frozenset(draw(st.sets(st.sampled_from(["ref-1", "ref-2", "ref-3"])))),
     )
     assume(optimum_by_gestures(problem) is not None)
     return problem
 
 
 def chosen(problem: Problem) -> Choices:
-    return choose(problem.references, problem.scene(), problem.motions(), GenerationConfig(channel=problem.channel))
+    config = GenerationConfig(channel=problem.channel)
+    return choose(problem.references, problem.scene(), problem.motions(), config, problem.apart)
 
 
 def pairs_of(choices: Choices) -> list[tuple[int, int]]:
@@ -147,7 +149,7 @@ def test_the_order_of_the_options_decides_nothing_but_ties(problem: Problem, ran
 
 def pointing_at_both(refused: set[tuple[str, str]], *options: SpeechOption) -> Problem:
     places = {"a": (0.0, 0.0), "b": (9.0, 0.0)}
-    degrees = {(since, target): 30 for since in (CURRENT_POSE, "a", "b") for target in ("a", "b")}
+    degrees = {(since, target): 30 for since in (CURRENT_POSE, AT_REST, "a", "b") for target in ("a", "b")}
     this = option("this", 1, deictic=True)
     references = [refer("1", "a", 0.95, this), refer("2", "b", 0.95, this, *options)]
     return Problem(places, references, degrees, degrees, lambda target: "right_arm", refused=frozenset(refused))
@@ -172,7 +174,7 @@ def test_if_then_nothing_is_left_the_reference_cannot_be_made() -> None:
 
 def test_of_two_equally_dear_ways_to_one_posture_the_preferred_one_goes_on() -> None:
     """First a look without a word or a word without a look, both 0.35 s; the second look is needed either way."""
-    degrees = {(since, target): 35 for since in (CURRENT_POSE, "a", "b") for target in ("a", "b")}
+    degrees = {(since, target): 35 for since in (CURRENT_POSE, AT_REST, "a", "b") for target in ("a", "b")}
     references = [refer("1", "a", 0.05, option("", 0), option("it")), refer("2", "b", 0.8, option("it"))]
     problem = Problem({"a": (0.0, 0.0), "b": (9.0, 0.0)}, references, degrees, degrees, lambda target: "right_arm")
 

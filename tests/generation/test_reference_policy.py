@@ -10,13 +10,15 @@ from engage_hri.schemas.faults import RunFailed
 from engage_hri.schemas.fragments import ReferenceChoice
 from engage_hri.services.generation.config import GenerationConfig
 from engage_hri.services.generation.references.motions import (
+    AT_REST,
     CURRENT_POSE,
     Motions,
     collect,
     from_each_other,
     from_here,
 )
-from engage_hri.services.generation.references.policy import HeadAndArms, Pair, choose
+from engage_hri.services.generation.references.policy import Pair, choose
+from engage_hri.services.generation.references.posture import HeadAndArms
 from tests.generation.tables import apart, body, flat_world, option, refer, scene
 
 CONFIG = GenerationConfig()
@@ -288,12 +290,13 @@ def test_an_arm_that_is_near_already_changes_the_next_choice() -> None:
     assert "dearer over the sequence" not in {pair.reason for pair in together[1].pairs}
 
 
-def test_a_hand_that_has_pointed_elsewhere_starts_from_there_and_the_other_from_home() -> None:
+def test_a_hand_that_has_just_pointed_elsewhere_starts_from_there_and_the_other_from_home() -> None:
     world = apart()
-    targets = ["rectangle", "trapezoid", "pink-square"]
+    targets = ["rectangle", "pink-square", "trapezoid", "blue-square"]
     references = [refer(id, id, 0.95, option("it")) for id in targets]
-    sides = {"rectangle": "left_arm", "trapezoid": "right_arm", "pink-square": "left_arm"}
+    sides = dict.fromkeys(targets, "left_arm") | {"trapezoid": "right_arm"}
     degrees = {
+        (AT_REST, "blue-square"): 66.0,
         (CURRENT_POSE, "rectangle"): 60.0,
         (CURRENT_POSE, "trapezoid"): 120.0,
         ("rectangle", "pink-square"): 6.0,
@@ -302,9 +305,11 @@ def test_a_hand_that_has_pointed_elsewhere_starts_from_there_and_the_other_from_
 
     chosen = choose(references, scene(world), motions, CONFIG)
 
-    assert [choice.gesture for choice in chosen.choices] == [POINT] * 3
-    assert [choice.cost for choice in chosen.choices] == pytest.approx([0.85 + 1.0, 0.85 + 2.0, 0.85 + 0.1])
-    assert chosen.hands == {"rectangle": "LEFT_HAND", "trapezoid": "RIGHT_HAND", "pink-square": "LEFT_HAND"}
+    assert [choice.gesture for choice in chosen.choices] == [POINT] * 4
+    assert [choice.cost for choice in chosen.choices] == pytest.approx(
+        [0.85 + 1.0, 0.85 + 0.1, 0.85 + 2.0, 0.85 + 1.1]
+    )
+    assert list(chosen.hands.values()) == ["LEFT_HAND", "LEFT_HAND", "RIGHT_HAND", "LEFT_HAND"]
 
 
 def test_from_there_the_body_is_asked_about_the_hand_that_will_be_named_and_about_no_other() -> None:
@@ -318,9 +323,13 @@ def test_from_there_the_body_is_asked_about_the_hand_that_will_be_named_and_abou
 
     gazes = [behavior.target for behavior in asked if isinstance(behavior, Gaze)]
     points = [(behavior.target, behavior.mode) for behavior in asked if isinstance(behavior, Pointing)]
-    assert gazes == ["rectangle", "trapezoid", "trapezoid", "pink-square", "pink-square"]
-    assert points == [("trapezoid", "RIGHT_HAND"), ("pink-square", "LEFT_HAND")]
-    assert collect(sequence, here, from_each_other_answered(asked)).point("rectangle", "pink-square").behavior == "6"
+    from_rest = ["rectangle", "trapezoid", "pink-square"]
+    assert gazes == ["rectangle", "trapezoid", "trapezoid", "pink-square", "pink-square", *from_rest]
+    hands = {"right_arm": "RIGHT_HAND", "left_arm": "LEFT_HAND"}
+    assert points == [(target, hands[sides[target]]) for target in from_rest]
+    made = collect(sequence, here, from_each_other_answered(asked))
+    assert made.gaze("rectangle", "pink-square").behavior == "4"
+    assert made.point(AT_REST, "pink-square").behavior == "10"
 
 
 def from_each_other_answered(asked: Sequence[object]) -> list[Estimate]:
@@ -343,11 +352,11 @@ def test_a_glance_is_asked_about_once_and_only_for_what_comes_after_it() -> None
     onward = from_each_other(["a", "b"], here, glance="ann")
 
     assert [item.behavior.target for item in first] == ["a", "a", "b", "b", "ann"]  # type: ignore[union-attr]
-    assert [item.behavior.target for item in onward] == ["b", "b", "b"]  # type: ignore[union-attr]
-    assert collect(["a", "b"], here, here[:3], "ann").gaze("ann", "b") is here[2]
+    assert [item.behavior.target for item in onward] == ["b", "b", "b", "b", "b"]  # type: ignore[union-attr]
+    assert collect(["a", "b"], here, here, "ann").gaze("ann", "b") is here[4]
 
 
 def test_who_cannot_be_looked_at_is_not_glanced_at() -> None:
     here = [Estimate(behavior=str(number), feasible=number < 4) for number in range(5)]
 
-    assert collect(["a", "b"], here, here[:1] * 2, "ann").glance == ""
+    assert collect(["a", "b"], here, here[:1] * 4, "ann").glance == ""

@@ -10,13 +10,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from engage_hri.schemas import keys
-from engage_hri.schemas.behaviors import Gaze, Gesture, Mark, Speech, Wait
+from engage_hri.schemas.behaviors import Event, Gaze, Gesture, Mark, Speech, Wait
 from engage_hri.schemas.blocks import Block, BlockOutcome, PerformanceSteered, SteerPerformance
 from engage_hri.services.realizer.config import RealizerConfig
 from engage_hri.services.requests.ends import RequestRefused
 from engage_hri.services.runtime.virtual_time import run_virtual
 from tests.realizer.fake_body import FakeBody
-from tests.realizer.stage import Stage, after, block, stage, together
+from tests.realizer.stage import FakeRecognition, Stage, after, block, stage, together
 from tests.realizer.test_properties import blocks
 
 BEAT = Gesture(id="beat", lexeme="BEAT", mode="RIGHT_HAND")
@@ -146,6 +146,22 @@ async def test_what_is_held_for_too_long_is_stopped() -> None:
     assert outcome.status == "interrupted"
     assert "realizer.longest_hold" in str(outcome.fault)
     assert after_that.status == "done"
+
+
+async def test_an_event_is_given_its_time_without_that_for_which_it_was_held() -> None:
+    """Its decision never comes: it ends at its limit of 8 s and 10 s of patience."""
+    pair = Event(id="e", kind="adjacency_pair", responder="human")
+    made = block((pair, Wait(id="w")), together("e:end", "w:end"))
+    async with stage(recognition=FakeRecognition({"e": None}), config=RealizerConfig(longest_hold=1000.0)) as seen:
+        performing = seen.ask(made)
+        await asyncio.sleep(1.0)
+        await steered(seen, "hold")
+        await asyncio.sleep(100.0)
+        assert "e:end" not in seen.times()
+        await steered(seen, "continue")
+        await performing.outcome
+
+    assert seen.times()["e:end"] == pytest.approx(118.0)
 
 
 @pytest.mark.parametrize("named", [("nobody", ""), ("b", "nothing"), ("nobody", "beat")])

@@ -5,14 +5,12 @@ next sync point, or until its authority changes. So a part needs no task to go h
 """
 
 import asyncio
-from collections.abc import AsyncGenerator
+from collections.abc import AsyncGenerator, Sequence
 from contextlib import aclosing
 from math import inf, radians
 
-from msgspec.structs import replace
-
 from engage_hri.schemas.behaviors import BlockBehavior, Gaze, GazeShift, HeadDirectionShift, Speech, Wait
-from engage_hri.schemas.body import BodyPose, Capabilities, Estimate, NoPointZone
+from engage_hri.schemas.body import BodyPose, Capabilities, Estimate, EstimateItem, NoPointZone
 from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.references import type_name
 from engage_hri.schemas.units import Seconds
@@ -29,15 +27,14 @@ from engage_hri.services.control.body import (
     Reached,
 )
 from engage_hri.services.control.config import Variability
-from engage_hri.services.control.torso import choreography, head, kinematics, tracks
+from engage_hri.services.control.torso import choreography, kinematics, tracks
 from engage_hri.services.control.torso.beneath import pass_end
-from engage_hri.services.control.torso.course import Course, CoursePoint, Impossible, Situation
-from engage_hri.services.control.torso.estimates import infeasible, motion_estimate, speech_estimate, wait_estimate
-from engage_hri.services.control.torso.head import Fixation
-from engage_hri.services.control.torso.motion import Motion, Path, resting
+from engage_hri.services.control.torso.course import CoursePoint, Impossible
+from engage_hri.services.control.torso.estimates import infeasible, speech_estimate, wait_estimate
+from engage_hri.services.control.torso.moving import Torso
+from engage_hri.services.control.torso.rehearsal import Clock, beside, rehearsed
 from engage_hri.services.control.torso.repertoire import BUILT_IN, Repertoire
 from engage_hri.services.control.torso.runs import OVERHEAT, STALL, Run
-from engage_hri.services.control.torso.tracks import Track
 from engage_hri.services.control.voice import speaking
 from engage_hri.services.control.voice.timeline import utter
 from engage_hri.services.control.voice.voice import Voice
@@ -61,26 +58,31 @@ class SimulatedBody(Body):
             joints=kinematics.JOINTS, reach=kinematics.REACH, no_point_zones=zones,
         )  # fmt: skip
         self._deviations = deviations or Variability()
-        self._repertoire = repertoire
         self._loop = asyncio.get_running_loop()
         displaced = {joint.joint: radians(joint.angle) for joint in self._deviations.displaced}
-        self._misbelieved = {joint: kinematics.HOME[joint] for joint in displaced}
-        self._tracks = {part: Track(part, tracks.home_of(part, displaced)) for part in tracks.LIMITS}
-        self._runs: dict[str, Run] = {}
-        self._world = World(entities=())
-        self._attention = Fixation()
-        self._base: MovementAuthority | None = None
-        """Authority of the shift that has set the base gaze."""
+        self._torso = Torso(self._loop, zones, repertoire, displaced)
         self._voice = Voice(is_mute=bool(self._deviations.mute))
         self._occasions = 0
 
     # -- the contract -------------------------------------------------------------------------------------------
 
     def estimate(self, behavior: BlockBehavior, pose: BodyPose | None, world: World) -> Estimate:
-        try:
-            return self._estimate(behavior, self._situation(world, pose), moving=pose is None)
-        except Impossible as impossible:
-            return infeasible(behavior, impossible.kind, _fault(behavior, impossible.reason))
+        match behavior:
+            case Speech() if self._deviations.mute == "refuse":
+                return infeasible(behavior, Impossible("CANNOT_CREATE_BEHAVIOR", "the voice is mute"))
+            case Speech(text=text):
+                return speech_estimate(behavior, utter(text), self._torso.pose(world, pose))
+            case Wait(duration=duration):
+                return wait_estimate(behavior, duration or 0.0, self._torso.pose(world, pose))
+        return self._torso.estimate(behavior, pose, world)
+
+    def rehearse(self, items: Sequence[EstimateItem], world: World) -> Sequence[Estimate]:
+        moving = [item for item in items if item.times]
+        if self._torso.misbelieved or not moving:
+            return super().rehearse(items, world)
+        clock = Clock(self._loop.time())
+        told = dict(zip(map(id, moving), rehearsed(beside(self._torso, clock, world), clock, moving), strict=True))
+        return [told.get(id(item)) or self.estimate(item.behavior, item.pose, world) for item in items]
 
     def perform(self, behavior: BlockBehavior, authority: MovementAuthority) -> AsyncGenerator[Progress, None]:
         match behavior:
@@ -88,102 +90,55 @@ class SimulatedBody(Body):
                 return self._speak(behavior, authority)
             case Wait():
                 return speaking.wait(behavior, authority)
-            case GazeShift() | HeadDirectionShift() if self._is_overlaid():
+            case GazeShift() | HeadDirectionShift() if self._torso.is_overlaid():
                 return self._shift_beneath(behavior, authority)
             case _:
                 return self._move(behavior, authority)
 
     async def home(self, parts: tuple[str, ...] = ()) -> None:
-        going = {part for part in self._tracks if not parts or part.replace("nod", "head") in parts}
+        going = {part for part in self._torso.tracks if not parts or part.replace("nod", "head") in parts}
         if not parts or "voice" in parts:
             self._voice.hush()
-        for run in dict.fromkeys(run for part, run in self._runs.items() if part in going):
+        for run in dict.fromkeys(run for part, run in self._torso.runs.items() if part in going):
             going.update(run.course.parts)
-            self._release(run)
+            self._torso.release(run)
             run.authority.revoke()
-        tracks.rebase(self._tracks, [part for part in going if part != "nod"])
+        tracks.rebase(self._torso.tracks, [part for part in going if part != "nod"])
         if "head" in going:
-            self._attention.stay(tracks.HOME["head"])
-            if self._base is not None:
-                self._base.revoke()
-        self._relax(tuple(sorted(going)))
+            self._torso.attention.stay(tracks.HOME["head"])
+            if self._torso.base is not None:
+                self._torso.base.revoke()
+        self._torso.relax(tuple(sorted(going)))
         bell = Bell()
-        while not bell.is_past(until := max((self._tracks[part].motion.end for part in going), default=0.0)):
+        while not bell.is_past(until := max((self._torso.tracks[part].motion.end for part in going), default=0.0)):
             await bell.wait(until)
 
     def state(self) -> BodyState:
         now = self._loop.time()
-        pose = tracks.pose_at(self._tracks, now)
+        pose = tracks.pose_at(self._torso.tracks, now)
         return BodyState(
             pose=kinematics.pose_message(pose), gaze=kinematics.gaze(pose), left_arm=kinematics.arm(pose, "left"),
             right_arm=kinematics.arm(pose, "right"),
-            moving=self._voice.is_busy or any(track.is_moving(now) for track in self._tracks.values()),
-            looking_at=self._attention.fixated(now), speaking=self._voice.saying,
+            moving=self._voice.is_busy or any(track.is_moving(now) for track in self._torso.tracks.values()),
+            looking_at=self._torso.attention.fixated(now), speaking=self._voice.saying,
         )  # fmt: skip
 
     def see(self, world: World) -> None:
-        self._world = world
-        self._follow()
-
-    # -- planning -----------------------------------------------------------------------------------------------
-
-    def _situation(self, world: World, pose: BodyPose | None = None, *, real: bool = False) -> Situation:
-        """Describe what a course starts from. real: with the true joint angles, not those that the body believes."""
-        now = self._loop.time()
-        here = {"neck_roll": 0.0}
-        """A tilt is on top of the gaze, like a nod: it is no part of where the head is."""
-        for part, track in self._tracks.items():
-            if part != "nod":
-                # Head and arms aim for where the torso is going to be.
-                at = max(now, track.motion.end) if part == "torso" else now
-                here.update(zip(track.joints, track.angles(at), strict=True))
-        if not real:
-            here.update(self._misbelieved)
-        rest = {**tracks.bases(self._tracks), **dict(zip(tracks.NECK, self._attention.angles, strict=True))}
-        zones = self.capabilities.no_point_zones
-        busy = tuple(self._runs)
-        return Situation(tracks.updated(here, pose), rest, world, zones, busy, self._repertoire)
-
-    def _path(self, course: Course, situation: Situation | None = None) -> Path:
-        """Lay a path along `course`. Raises Impossible.
-
-        situation: start at rest in its pose; None: start from where the parts are, as they move.
-        """
-        if situation is not None and course.parts != ("nod",):
-            start = resting([situation.pose[joint] for joint in course.joints])
-        else:
-            now = self._loop.time()
-            start = tracks.joined([self._tracks[part].at(now) for part in course.parts])
-        path = Path(start, course.legs, tracks.limits_of(course.parts))
-        if tracks.meets_table(path, course.joints):
-            raise Impossible("CANNOT_CREATE_BEHAVIOR", "the table is in the way of the arm")
-        return path
-
-    def _estimate(self, behavior: BlockBehavior, situation: Situation, *, moving: bool) -> Estimate:
-        match behavior:
-            case Speech(text=text):
-                if self._deviations.mute == "refuse":
-                    raise Impossible("CANNOT_CREATE_BEHAVIOR", "the voice is mute")
-                return speech_estimate(behavior, utter(text), kinematics.pose_message(situation.pose))
-            case Wait(duration=duration):
-                return wait_estimate(behavior, duration or 0.0, kinematics.pose_message(situation.pose))
-        course = choreography.plan(behavior, situation)
-        path = self._path(course, None if moving and not self._misbelieved else situation)
-        on_target = kinematics.pose_message({**situation.pose, **course.on_target})
-        return motion_estimate(behavior, course, path, on_target)
+        self._torso.world = world
+        self._torso.follow()
 
     # -- motion -------------------------------------------------------------------------------------------------
 
     async def _move(self, behavior: BlockBehavior, authority: MovementAuthority) -> AsyncGenerator[Progress, None]:
         try:
-            course = choreography.plan(behavior, self._situation(self._world, real=True))
+            course = choreography.plan(behavior, self._torso.situation(self._torso.world, real=True))
             self._occasions += 1
             run = Run(behavior, course, authority, self._deviations, self._occasions)
-            path = self._path(run.course)
+            path = self._torso.path(run.course)
         except Impossible as impossible:
             raise BehaviorRefused(_fault(behavior, impossible.reason)) from impossible
         unwatch = authority.watch(run.bell.ring)
-        self._take_over(run, path)
+        self._torso.take_over(run, path)
         try:
             async with aclosing(self._pass_points(run)) as points:
                 async for progress in points:
@@ -193,53 +148,22 @@ class SimulatedBody(Body):
                 async with aclosing(pass_end(authority)) as points:
                     async for progress in points:
                         yield progress
-            if authority.revoked == "freeze" and self._owns(run):
+            if authority.revoked == "freeze" and self._torso.owns(run):
                 await self._freeze(run)
         finally:
             unwatch()
             # After an abort, a failure or a cancelled task the parts go home by themselves.
-            if self._owns(run):
-                self._release(run)
+            if self._torso.owns(run):
+                self._torso.release(run)
                 if run.pending:
-                    self._abandon(run)
-
-    def _take_over(self, run: Run, path: Path) -> None:
-        """Make `run` the owner of its parts, cut the runs that had them, and start its motion."""
-        for joint in run.course.joints:
-            self._misbelieved.pop(joint, None)
-        for earlier in dict.fromkeys(self._runs[part] for part in run.course.parts if part in self._runs):
-            self._release(earlier)
-            if head.is_shift(earlier.behavior) and isinstance(run.behavior, Gaze):
-                earlier.lie_beneath()
-            else:
-                earlier.authority.revoke("taken_over")
-            earlier.bell.ring()
-            self._relax(tuple(part for part in earlier.course.parts if part not in run.course.parts))
-        for part in run.course.parts:
-            self._runs[part] = run
-        if head.is_shift(run.behavior):
-            self._set_base(run.behavior, run.course, run.authority)
-        elif isinstance(run.behavior, choreography.SETTLING):
-            tracks.rebase(self._tracks, run.course.parts, run.course.on_target)
-        self._play(run, path)
-        if run.course.parts == ("torso",):
-            self._follow()
-
-    def _play(self, run: Run, path: Path) -> None:
-        now = self._loop.time()
-        run.play(Motion(path, now, cruise=run.cruise, limit=run.limit(path)))
-        column = 0
-        for part in run.course.parts:
-            self._tracks[part].play(run.motion, column)
-            column += len(self._tracks[part].joints)
-        self._attention.follow_run(run, now)
+                    self._torso.abandon(run)
 
     async def _pass_points(self, run: Run) -> AsyncGenerator[Progress, None]:
         """Report the sync points of `run` as it crosses them, until it is done, cut or revoked. Raises BodyFailed."""
         since = -inf
         while run.pending and not run.is_over:
             if not run.holding:
-                self._extend(run)
+                self._torso.extend(run)
             point = run.pending[0]
             due = run.due(point)
             if due is None or not run.bell.is_past(due):
@@ -256,50 +180,18 @@ class SimulatedBody(Body):
                 # What is taken over just as it may go on has passed the point, and goes no further.
                 if not run.is_over or (run.is_taken_over and run.may_pass(point.held_with)):
                     since = self._loop.time()
-                    for sync in self._leave_hold(run, point.held_with):
+                    for sync in self._torso.leave_hold(run, point.held_with):
                         yield Reached(sync, since, arrived)
             else:
                 run.pending.pop(0)
                 if point.sync == "relax" and isinstance(run.behavior, Gaze):
-                    self._turn_home(run)
-                self._attention.follow_run(run, self._loop.time())
+                    self._torso.turn_home(run)
+                self._torso.attention.follow_run(run, self._loop.time())
                 yield Reached(point.sync, due, due)
         if run.is_beneath or run.is_taken_over:
             for sync, due in run.passed_by(self._loop.time()):
                 run.pending.pop(0)
                 yield Reached(sync, at := max(due, since), at)
-
-    def _turn_home(self, run: Run) -> None:
-        """Lay the way home of a look anew if a shift has set another base since it began."""
-        track, base = self._tracks["head"], self._attention.angles
-        if head.differ(run.course.legs[-1].goal, base):
-            now = self._loop.time()
-            back = head.way_back(track.angles(now), base)
-            run.course = replace(run.course, legs=(*run.course.legs[:-1], back))
-            self._play(run, Path(track.at(now), run.with_faults((back,)), tracks.LIMITS["head"]))
-
-    def _leave_hold(self, run: Run, hold: str) -> list[str]:
-        """Let `run` go on from a hold point, on a new path if it stands still. Returns the sync points it passes."""
-        now = self._loop.time()
-        stood, passed = run.stands, run.leave(hold, now)
-        if stood and not run.holding and not run.is_over:
-            legs = run.motion.path.after(run.motion.s(now), [point.sync for point in run.pending])
-            if run.course.parts == ("head",):
-                legs = (head.way_back(self._tracks["head"].angles(now), self._attention.angles),)
-            start = tracks.joined([self._tracks[part].at(now) for part in run.course.parts])
-            self._play(run, Path(start, run.with_faults(legs), tracks.limits_of(run.course.parts)))
-        return passed
-
-    def _extend(self, run: Run) -> None:
-        now = self._loop.time()
-        if (path := run.hurry(now)) is not None:
-            self._play(run, path)
-        limit = run.limit(run.motion.path)
-        is_extended = limit > run.motion.limit
-        run.motion.extend(limit, now)
-        run.brake_for_hold(now)
-        if run.keep_pace(now) or is_extended:
-            self._attention.follow_run(run, now)
 
     async def _fail_or_stall(self, run: Run, point: CoursePoint) -> None:
         if point.sync == OVERHEAT:
@@ -312,84 +204,28 @@ class SimulatedBody(Body):
 
     async def _freeze(self, run: Run) -> None:
         run.motion.brake(self._loop.time())
-        self._attention.expect("", 0.0, self._loop.time())
+        self._torso.attention.expect("", 0.0, self._loop.time())
         until = run.motion.end + FREEZE
-        while self._owns(run) and not run.bell.is_past(until):
+        while self._torso.owns(run) and not run.bell.is_past(until):
             await run.bell.wait(until)
 
-    def _owns(self, run: Run) -> bool:
-        return any(owner is run for owner in self._runs.values())
-
-    def _release(self, run: Run) -> None:
-        for part in [part for part, owner in self._runs.items() if owner is run]:
-            del self._runs[part]
-
-    def _abandon(self, run: Run) -> None:
-        """Send the parts of `run` to rest. A shift of the head that is broken off stays where it can stop."""
-        if head.is_shift(run.behavior):
-            self._attention.stay(head.brake(run.motion, self._loop.time()))
-            self._attention.expect("", 0.0, self._loop.time())
-        else:
-            if isinstance(run.behavior, choreography.SETTLING):
-                tracks.rebase(self._tracks, run.course.parts)
-            self._relax(run.course.parts)
-
-    def _relax(self, parts: tuple[str, ...]) -> None:
-        now = self._loop.time()
-        for part in parts:
-            track = self._tracks[part]
-            track.return_to(self._attention.angles if part == "head" else track.base, now)
-            if part == "head":
-                self._attention.expect(self._attention.entity, track.motion.end, now)
-        if "torso" in parts:
-            self._follow()
-
     # -- gaze ---------------------------------------------------------------------------------------------------
-
-    def _is_overlaid(self) -> bool:
-        return "head" in self._runs and isinstance(self._runs["head"].behavior, Gaze)
 
     async def _shift_beneath(
         self, behavior: BlockBehavior, authority: MovementAuthority
     ) -> AsyncGenerator[Progress, None]:
         """Change the base gaze while a `Gaze` lies over it: nothing moves until that ends. `end` comes as asked."""
         try:
-            course = choreography.plan(behavior, self._situation(self._world))
+            course = choreography.plan(behavior, self._torso.situation(self._torso.world))
         except Impossible as impossible:
             raise BehaviorRefused(_fault(behavior, impossible.reason)) from impossible
-        self._set_base(behavior, course, authority)
-        self._follow()
+        self._torso.set_base(behavior, course, authority)
+        self._torso.follow()
         now = self._loop.time()
         yield Reached("start", now, now)
         async with aclosing(pass_end(authority)) as points:
             async for progress in points:
                 yield progress
-
-    def _set_base(self, behavior: BlockBehavior, course: Course, authority: MovementAuthority) -> None:
-        """Make the goal of a shift the direction to which the head returns. A shift before it that has not ended is
-        taken over."""
-        if self._base is not None:
-            self._base.revoke("taken_over")
-        self._attention.shift(behavior, course)
-        self._base = authority
-
-    def _follow(self) -> None:
-        """Turn the head to follow the entity that it looks at, or is about to look at."""
-        now, situation, track = self._loop.time(), self._situation(self._world, real=True), self._tracks["head"]
-        self._attention.update(situation)
-        if (run := self._runs.get("head")) is None:
-            head.turn(track, self._attention.angles, now)
-            return
-        try:
-            course = choreography.plan(run.behavior, situation)
-        except Impossible:
-            return
-        if run.stands:
-            head.turn(track, tuple(course.on_target.values()), now)
-        elif (path := head.retargeted(run, course, track, now)) is not None:
-            run.course = course
-            self._play(run, path)
-            run.bell.ring()
 
     # -- voice --------------------------------------------------------------------------------------------------
 

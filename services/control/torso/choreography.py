@@ -47,8 +47,8 @@ from engage_hri.services.control.torso.course import (
 )
 from engage_hri.services.control.torso.expressions import SETTLE, sides
 from engage_hri.services.control.torso.kinematics import Side, Unreachable
-from engage_hri.services.control.torso.motion import Leg
 from engage_hri.services.control.torso.pace import arm_time, return_time, turning_time
+from engage_hri.services.control.torso.path import Leg
 
 SLIDE: Seconds = 0.2
 OFFSETS: Mapping[str, tuple[int, int]] = {
@@ -143,7 +143,7 @@ def _glance(goal: tuple[float, float], situation: Situation) -> Course:
         Leg(goal=base, seconds=back, marks=marks(1.0, "end")),
     )
     ray = kinematics.gaze({**situation.pose, **dict(zip(joints, goal, strict=True))})
-    return course(("head",), joints, legs, held_on_target("stroke"), goal, situation, ray)
+    return course(("head",), joints, legs, held_on_target("stroke"), goal, ray)
 
 
 def _shift(goal: tuple[float, float], situation: Situation) -> Course:
@@ -153,7 +153,7 @@ def _shift(goal: tuple[float, float], situation: Situation) -> Course:
     goal = goal if seconds else (here[0], here[1])
     legs = (Leg(goal=goal, seconds=seconds, marks=(("start", 0.0), ("end", 1.0))),)
     ray = kinematics.gaze({**situation.pose, **dict(zip(joints, goal, strict=True))})
-    return course(("head",), joints, legs, (CoursePoint("start"), CoursePoint("end")), goal, situation, ray)
+    return course(("head",), joints, legs, (CoursePoint("start"), CoursePoint("end")), goal, ray)
 
 
 def _gaze_angles(behavior: Gaze | GazeShift, situation: Situation) -> tuple[float, float]:
@@ -212,7 +212,7 @@ def _point_with(side: Side, aim: kinematics.ArmAim, situation: Situation) -> Cou
         Leg(goal=home, seconds=back, marks=(("relax", 0.1 / back), ("end", 1.0))),
     )
     ray = kinematics.arm({**situation.pose, **dict(zip(joints, aim.held, strict=True))}, side)
-    return course((f"{side}_arm",), joints, legs, held_around_stroke(), aim.held, situation, ray)
+    return course((f"{side}_arm",), joints, legs, held_around_stroke(), aim.held, ray)
 
 
 def _clamped(joint: str, angle: float, reserve: float) -> float:

@@ -7,10 +7,8 @@ from msgspec import Struct
 from engage_hri.schemas.body import NoPointZone, Ray
 from engage_hri.schemas.feedback import WarningKind
 from engage_hri.schemas.syncref import SYNC_POINTS
-from engage_hri.schemas.units import Degrees
 from engage_hri.schemas.world import World
-from engage_hri.services.control.torso import kinematics
-from engage_hri.services.control.torso.motion import Leg
+from engage_hri.services.control.torso.path import Leg
 from engage_hri.services.control.torso.repertoire import BUILT_IN, Repertoire
 
 
@@ -43,8 +41,6 @@ class Course(Struct, frozen=True, kw_only=True):
     points: tuple[CoursePoint, ...]
     on_target: Mapping[str, float] = {}
     """Joint angles at the stroke, or at the end of a shift."""
-    degrees: Degrees = 0.0
-    """Degrees of joint motion from the start to there."""
     ray: Ray | None = None
     is_resizable: bool = False
     """True if it may be made smaller for want of time; false for a motion with a target."""
@@ -66,12 +62,12 @@ class Situation(Struct, frozen=True):
 
 def course(
     parts: tuple[str, ...], joints: tuple[str, ...], legs: tuple[Leg, ...], points: tuple[CoursePoint, ...],
-    goal: tuple[float, ...], situation: Situation, ray: Ray | None = None, note: str = "",
+    goal: tuple[float, ...], ray: Ray | None = None, note: str = "",
 ) -> Course:  # fmt: skip
     """Make the course of a motion to `goal`."""
     return Course(
-        parts=parts, joints=joints, legs=legs, points=points, on_target=dict(zip(joints, goal, strict=True)),
-        degrees=kinematics.degrees_between(angles(joints, situation.pose), goal), ray=ray, note=note,
+        parts=parts, joints=joints, legs=legs, points=points, on_target=dict(zip(joints, goal, strict=True)), ray=ray,
+        note=note,
     )  # fmt: skip
 
 

@@ -1,21 +1,25 @@
 """Estimates of the simulated body, from the paths that it then moves along: without deviations they are exact."""
 
+import math
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
+from math import inf
 
 from engage_hri.schemas.behavior_types import sync_points
 from engage_hri.schemas.behaviors import BlockBehavior, Speech, Wait
 from engage_hri.schemas.body import BodyPose, Estimate, Phase
 from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.units import Seconds
-from engage_hri.services.control.torso.course import Course, CoursePoint
-from engage_hri.services.control.torso.motion import SLOWEST, Path
+from engage_hri.services.control.torso.course import Course, CoursePoint, Impossible
+from engage_hri.services.control.torso.motion import SLOWEST
+from engage_hri.services.control.torso.path import Path
 from engage_hri.services.control.torso.sizing import quickest
 from engage_hri.services.control.voice.timeline import Utterance
 
 
-def infeasible(behavior: BlockBehavior, warning: str, fault: Fault) -> Estimate:
-    return Estimate(behavior=behavior.id, feasible=False, fault=fault, warning=warning)
+def infeasible(behavior: BlockBehavior, impossible: Impossible) -> Estimate:
+    fault = Fault(reason=impossible.reason, where=behavior.id, service="control")
+    return Estimate(behavior=behavior.id, feasible=False, fault=fault, warning=impossible.kind)
 
 
 def speech_estimate(behavior: Speech, utterance: Utterance, pose: BodyPose) -> Estimate:
@@ -24,27 +28,33 @@ def speech_estimate(behavior: Speech, utterance: Utterance, pose: BodyPose) -> E
     times["end"] = utterance.seconds
     gaps = {mark.id for mark in behavior.marks if utterance.is_gap(mark.position)}
     phases = _phases([CoursePoint(sync, sync if sync in gaps else "") for sync in sync_points(behavior)], times)
-    return Estimate(behavior=behavior.id, feasible=True, parts=("voice",), phases=phases, pose_after=pose)
+    return Estimate(
+        behavior=behavior.id, feasible=True, parts=("voice",), phases=phases, pose_after=pose, pose_end=pose
+    )
 
 
 def wait_estimate(behavior: Wait, duration: Seconds, pose: BodyPose) -> Estimate:
     phases = _phases((CoursePoint("start"), CoursePoint("end", "end")), {"start": 0.0, "end": duration})
-    return Estimate(behavior=behavior.id, feasible=True, phases=phases, pose_after=pose)
+    return Estimate(behavior=behavior.id, feasible=True, phases=phases, pose_after=pose, pose_end=pose)
 
 
-def motion_estimate(behavior: BlockBehavior, course: Course, path: Path, pose: BodyPose) -> Estimate:
-    """Estimate a behavior that moves along `path`. pose: joint angles on target."""
+def motion_estimate(
+    behavior: BlockBehavior, course: Course, path: Path, pose: BodyPose, pose_end: BodyPose
+) -> Estimate:
+    """Estimate a behavior that moves along `path`. pose, pose_end: joint angles on target, and at the end."""
     is_gaze, is_arm = course.parts == ("head",), course.parts[0].endswith("_arm")
+    degrees = math.degrees(path.travel(path.marks.get("stroke", path.length))) if is_gaze or is_arm else 0.0
     return Estimate(
         behavior=behavior.id,
         feasible=True,
         degraded=course.note,
         parts=("head",) if course.parts == ("nod",) else course.parts,
-        phases=_phases(course.points, path.marks, quickest(course, path), SLOWEST),
-        head_degrees=course.degrees if is_gaze else 0.0,
-        arm_degrees=course.degrees if is_arm else 0.0,
+        phases=_phases(course.points, path.marks, quickest(course, path), SLOWEST, path.gentlest_brake),
+        head_degrees=degrees if is_gaze else 0.0,
+        arm_degrees=degrees if is_arm else 0.0,
         ray=course.ray,
         pose_after=pose,
+        pose_end=pose_end,
     )
 
 
@@ -53,10 +63,12 @@ def _phases(
     times: Mapping[str, Seconds],
     quickest: Mapping[str, Seconds] | None = None,
     slowest: float = 1.0,
+    brake: float = inf,
 ) -> tuple[Phase, ...]:
     """Phases from each sync point to the next. One that ends at a hold point or takes no time has no longest time.
 
-    times: of the points, at natural pace. quickest: in the greatest hurry.
+    times: of the points, at natural pace. quickest: in the greatest hurry. slowest: the least rate. brake: how fast
+    the rate may change, in 1/s: who passes a hold point without a stop cannot dawdle right behind it.
     """
     least = times if quickest is None else quickest
     return tuple(
@@ -65,8 +77,15 @@ def _phases(
             to=to.sync,
             shortest=min(least[to.sync] - least[since.sync], natural := times[to.sync] - times[since.sync]),
             natural=natural,
-            longest=None if to.held_with or not natural else natural / slowest,
+            longest=None
+            if to.held_with or not natural
+            else _longest(natural, slowest, brake if since.held_with else inf),
             hold=to.held_with == to.sync,
         )
         for since, to in pairwise(points)
     )
+
+
+def _longest(natural: Seconds, slowest: float, brake: float) -> Seconds:
+    """Seconds for a phase that is entered at the natural rate. A short one is over before the motion is slow."""
+    return natural if 2 * brake * natural < 1.0 else natural / slowest

@@ -32,8 +32,8 @@ from engage_hri.services.control.torso.course import (
     marks,
 )
 from engage_hri.services.control.torso.kinematics import Side
-from engage_hri.services.control.torso.motion import Leg
 from engage_hri.services.control.torso.pace import arm_time, moving_time, return_time
+from engage_hri.services.control.torso.path import Leg
 from engage_hri.services.control.torso.repertoire import Absent, Found, GesturePath, HeadPath, Table
 
 SETTLE: Seconds = 0.08
@@ -81,7 +81,7 @@ def gesture(lexeme: str, mode: Hand | None, situation: Situation) -> Course:
         Leg(goal=home, seconds=seconds[3], marks=(("relax", 0.1 / seconds[3]), ("end", 1.0))),
     )  # fmt: skip
     parts = tuple(f"{side}_arm" for side in both)
-    made = course(parts, joints, legs, held_around_stroke(), stroke, situation, note=found.note)
+    made = course(parts, joints, legs, held_around_stroke(), stroke, note=found.note)
     return replace(made, is_resizable=True)
 
 
@@ -97,7 +97,7 @@ def head(behavior: Head, situation: Situation) -> Course:
     )
     return Course(
         parts=("nod",), joints=NOD_JOINTS, legs=legs, points=held_around_stroke(strokes), note=found.note,
-        degrees=math.degrees(size), is_resizable=True,
+        is_resizable=True,
     )  # fmt: skip
 
 
@@ -205,7 +205,7 @@ def excursion(goals: Mapping[str, Mapping[str, float]], situation: Situation, no
         Leg(goal=rest, seconds=back, marks=marks(1.0, "end")),
     )
     points = held_on_target("ready", "stroke_start", "stroke")
-    return course(tuple(goals), joints, legs, points, goal, situation, note=note)
+    return course(tuple(goals), joints, legs, points, goal, note=note)
 
 
 def shift(goals: Mapping[str, Mapping[str, float]], situation: Situation, note: str = "") -> Course:
@@ -216,7 +216,7 @@ def shift(goals: Mapping[str, Mapping[str, float]], situation: Situation, note: 
     goal = goal if seconds else here
     legs = (Leg(goal=goal, seconds=seconds, marks=(("start", 0.0), ("end", 1.0))),)
     points = (CoursePoint("start"), CoursePoint("end"))
-    return course(tuple(goals), joints, legs, points, goal, situation, note=note)
+    return course(tuple(goals), joints, legs, points, goal, note=note)
 
 
 def sides(mode: str | None, rank: Callable[[Side], float], situation: Situation) -> list[Side]:

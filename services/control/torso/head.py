@@ -10,8 +10,9 @@ from engage_hri.schemas.behaviors import BlockBehavior, Gaze, GazeShift, HeadDir
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.control.torso import choreography, tracks
 from engage_hri.services.control.torso.course import Course, Impossible, Situation
-from engage_hri.services.control.torso.motion import Leg, Motion, Path
+from engage_hri.services.control.torso.motion import Motion
 from engage_hri.services.control.torso.pace import turning_time
+from engage_hri.services.control.torso.path import Leg, Path
 from engage_hri.services.control.torso.runs import Run
 from engage_hri.services.control.torso.tracks import Track
 

@@ -10,7 +10,8 @@ from engage_hri.services.control import variability
 from engage_hri.services.control.body import MovementAuthority
 from engage_hri.services.control.config import Stall, Variability
 from engage_hri.services.control.torso.course import Course, CoursePoint
-from engage_hri.services.control.torso.motion import Leg, Motion, Path
+from engage_hri.services.control.torso.motion import Motion
+from engage_hri.services.control.torso.path import Leg, Path
 from engage_hri.services.control.torso.sizing import hurried
 from engage_hri.services.control.waiting import Bell
 
@@ -60,6 +61,11 @@ class Run:
 
     def awaits(self, sync: str) -> bool:
         return any(point.sync == sync for point in self.pending)
+
+    @property
+    def is_setting_out(self) -> bool:
+        """True if it has not left its target yet. A shift never does."""
+        return self.awaits("stroke_end") or len(self.course.points) == 2
 
     @property
     def is_over(self) -> bool:

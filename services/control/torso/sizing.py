@@ -10,7 +10,8 @@ from msgspec.structs import replace
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.control.torso import tracks
 from engage_hri.services.control.torso.course import Course
-from engage_hri.services.control.torso.motion import Leg, Motion, Path
+from engage_hri.services.control.torso.motion import Motion
+from engage_hri.services.control.torso.path import Leg, Path
 
 SIZES = (0.9, 0.8, 0.7, 0.6, 0.5, 0.4)
 """Shares of the full amplitude, largest first. Anything smaller than the last would not be taken for a gesture."""

@@ -12,8 +12,9 @@ import numpy as np
 from engage_hri.schemas.body import BodyPose, JointLimit
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.control.torso import kinematics
-from engage_hri.services.control.torso.motion import JointMotion, Leg, Motion, Path, resting
+from engage_hri.services.control.torso.motion import Motion
 from engage_hri.services.control.torso.pace import return_time, turning_time
+from engage_hri.services.control.torso.path import JointMotion, Leg, Path, resting
 
 NECK = ("neck_yaw", "neck_pitch")
 GAZE_SHARES = (0.56, 0.42)

@@ -5,7 +5,7 @@ their timing inline: the constraints that remain, but for the hold of a point un
 plain BML.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 
 import msgspec
 from msgspec import Struct
@@ -33,7 +33,7 @@ from engage_hri.schemas.fragments import ReferenceChoice, TurnFragment
 from engage_hri.schemas.references import type_name
 from engage_hri.services.generation.block.ordering import ordered
 from engage_hri.services.generation.block.parts import FreshIds, Mention, Parts
-from engage_hri.services.generation.block.profiles import after, as_in_the_figure, checking_back, same
+from engage_hri.services.generation.block.profiles import after, as_in_the_figure, checking_back, from_there, same
 from engage_hri.services.generation.block.punctuation import moved_punctuation
 from engage_hri.services.generation.block.rewriting import Operator, Rewriting, instants, points_named
 from engage_hri.services.generation.config import GenerationConfig
@@ -59,7 +59,8 @@ class Emission:
     """The making of the block that performs a fragment: its behaviors and constraints so far.
 
     choices: one for each reference. hands: the one to point with, by reference; where none is given, two points count
-    as made with the same arm. before: what the turn's earlier fragments still have to do.
+    as made with the same arm. before: what the turn's earlier fragments still have to do. apart: the references
+    before which head and arms go home.
     """
 
     def __init__(
@@ -71,9 +72,10 @@ class Emission:
         permits: Permits,
         hands: Mapping[str, Hand],
         before: Continuation = NO_CONTINUATION,
+        apart: Collection[str] = (),
     ) -> None:
         self.fragment, self.turn, self.config, self.permits, self.hands = fragment, turn, config, permits, hands
-        self.choices, self.before = choices, before
+        self.choices, self.before, self.apart = choices, before, apart
         self.names = FreshIds(fragment)
         self.figure = config.profile == "figure-3.3"
         self.dropped = [behavior for behavior in fragment.behaviors if not permits.allows(behavior)]
@@ -194,6 +196,8 @@ class Emission:
         preceding = self.before.speech  # the speech or phrase before; "": the block start stands for it
         glance = self.before.glance
         points: dict[Hand | None, str] = {}  # hand -> its last point
+        previous: Parts | None = None  # of the reference before this one
+        look = ""  # the last look of a reference, unless a glance or another look has followed it
         gazes = 0
         last = self._last_reference()
         for behavior in self.order:
@@ -209,13 +213,23 @@ class Emission:
                     lines = as_in_the_figure(parts, preceding, self.before.speech, is_timed, self.config.figure_lead)
                     operators += [each for each in lines if not self._is_said(each, operators)]
                 else:
-                    previous_point = points.get(hand, "")
-                    operators += checking_back(parts, preceding, self.before.speech, is_timed, glance, previous_point)
+                    operators += checking_back(parts, preceding, self.before.speech, is_timed, glance)
+                    held = previous if previous is not None and behavior.id not in self.apart else None
+                    if parts.gaze and look:
+                        operators.append(
+                            from_there(look, "relax", parts.gaze, held is not None and held.gaze == look)
+                        )
+                    if parts.point and (point := points.get(hand)):
+                        stays = held is not None and held.point == point
+                        operators.append(from_there(point, "stroke_end", parts.point, stays))
+                    look = parts.gaze or look
                     if parts.point:
                         points[hand] = parts.point
                         if behavior.id != last:
                             operators.append(self._glance(parts))
-                            glance = self.last_glance = parts.glance
+                            glance, look = parts.glance, ""
+                            self.last_glance = glance
+                previous = parts
                 if operators:
                     id = self.names.fresh(f"{behavior.id}-timing")
                     self.constraints.append(Constraint(id=id, operators=tuple(operators), line=behavior.line))
@@ -227,7 +241,7 @@ class Emission:
                 self._keep_in_line(behavior, preceding)
                 preceding = behavior.id
             elif isinstance(behavior, Gaze):
-                gazes += 1
+                gazes, look = gazes + 1, ""
                 free = not {(behavior.id, "relax"), (behavior.id, "end")} & self.named.keys()
                 # An unnamed gaze follows the one before it; naming it would make it start with the block.
                 unnamed_follower = gazes > 1 and behavior.id not in self.named_behaviors

@@ -6,14 +6,11 @@ from engage_hri.services.generation.block.parts import Parts
 from engage_hri.services.generation.block.rewriting import Operator
 
 
-def checking_back(
-    parts: Parts, preceding: str, earlier: str, is_timed: bool, glance: str, previous_point: str
-) -> list[Operator]:
+def checking_back(parts: Parts, preceding: str, earlier: str, is_timed: bool, glance: str) -> list[Operator]:
     """Profile `check-back`: phrase, look and point begin together and last until the other has looked.
 
     preceding: the speech or phrase before this one. earlier: the last one of the turn's earlier fragments. is_timed:
-    the author has said when the reference starts. glance: the last one before it. previous_point: the last one of the
-    same arm. "": there is none.
+    the author has said when the reference starts. glance: the last one before it. "": there is none.
     """
     gaze, point, phrase, event = parts.gaze, parts.point, parts.phrase, parts.event
     operators: list[Operator] = []
@@ -36,9 +33,15 @@ def checking_back(
             operators.append(same(f"{point}:stroke_start", f"{phrase}:start"))
             operators.append(after(f"{phrase}:end", f"{point}:stroke_end"))
         operators.append(after(f"{event}:end", f"{point}:stroke_end"))
-        if previous_point:
-            operators.append(after(f"{previous_point}:stroke_end", f"{point}:start"))
     return operators
+
+
+def from_there(earlier: str, leaves: str, later: str, stays: bool) -> Operator:
+    """Order that says where a look or point begins: on the target of the `earlier` one, or at home (decision 0024).
+
+    leaves: the sync point at which the earlier leaves its target. stays: it does so no sooner than the later begins.
+    """
+    return same(f"{earlier}:{leaves}", f"{later}:start") if stays else after(f"{earlier}:end", f"{later}:start")
 
 
 def as_in_the_figure(parts: Parts, preceding: str, earlier: str, is_timed: bool, lead: Seconds) -> list[Operator]:

@@ -1,6 +1,7 @@
 """Motions that references may need: the questions to the body, and its estimates by pose."""
 
 from collections.abc import Iterator, Sequence
+from itertools import pairwise
 
 from msgspec import Struct
 
@@ -9,17 +10,21 @@ from engage_hri.schemas.body import BodyPose, Estimate, EstimateItem
 
 CURRENT_POSE = ""
 """Start of a motion: where the body is now."""
+AT_REST = ":rest"
+"""Start of a motion: where head or arm go when they have nothing to do. No entity has such an id."""
 
 
 class Motions(Struct, frozen=True):
-    """Estimates by (since, target): a head or an arm that is on `since`, or CURRENT_POSE, goes to `target`.
+    """Estimates by (since, target): a head or an arm that is on `since`, CURRENT_POSE or AT_REST, goes to `target`.
 
     glance: the person looked at after each point, before the next reference is made; "": nobody, the head stays.
+    looks_last: a look lasts until the next one, whatever comes between, as in profile `figure-3.3`.
     """
 
     gazes: dict[tuple[str, str], Estimate]
     points: dict[tuple[str, str], Estimate]
     glance: str = ""
+    looks_last: bool = False
 
     def gaze(self, since: str, target: str) -> Estimate:
         return self.gazes[since, target]
@@ -88,9 +93,10 @@ def from_here(
 def from_each_other(
     sequence: Sequence[str], answers: Sequence[Estimate], hand: Hand | None = None, glance: str = ""
 ) -> tuple[EstimateItem, ...]:
-    """Second question: the same from the pose that an earlier reference of the `sequence` of targets leaves.
+    """Second question: the same from the poses that an earlier reference of the `sequence` of targets may leave.
 
-    A point only where one arm makes both. answers: to `from_here` of `distinct(sequence)`.
+    Those are: on its target, at rest again, and for the head on who was glanced at. A point starts on a target only
+    where one arm makes both, one right after the other. answers: to `from_here` of `distinct(sequence)`.
     """
     first = _from_here(sequence, answers, glance)
     items = []
@@ -102,6 +108,12 @@ def from_each_other(
             named = hand_of(first.point(CURRENT_POSE, target)) or hand
             pointing = Pointing(id=f"point at {target}", target=target, mode=named)
             items.append(EstimateItem(behavior=pointing, pose=first.point(CURRENT_POSE, since).pose_after))
+    for target in distinct(sequence[1:]):
+        gaze, point = first.gaze(CURRENT_POSE, target), first.point(CURRENT_POSE, target)
+        items.append(EstimateItem(behavior=_gaze(target), pose=gaze.pose_end))
+        if point.feasible:
+            pointing = Pointing(id=f"point at {target}", target=target, mode=hand_of(point) or hand)
+            items.append(EstimateItem(behavior=pointing, pose=point.pose_end))
     for target in _after_glances(sequence, first):
         items.append(EstimateItem(behavior=_gaze(target), pose=first.gaze(CURRENT_POSE, glance).pose_after))
     return tuple(items)
@@ -117,6 +129,10 @@ def collect(
         motions.gazes[since, target] = next(answers)
         if one_arm:
             motions.points[since, target] = next(answers)
+    for target in distinct(sequence[1:]):
+        motions.gazes[AT_REST, target] = next(answers)
+        here_too = motions.point(CURRENT_POSE, target)
+        motions.points[AT_REST, target] = next(answers) if here_too.feasible else here_too
     for target in _after_glances(sequence, motions):
         motions.gazes[glance, target] = next(answers)
     return motions
@@ -148,13 +164,17 @@ def _from_here(sequence: Sequence[str], answers: Sequence[Estimate], glance: str
 
 
 def _steps(sequence: Sequence[str], motions: Motions) -> Iterator[tuple[str, str, bool]]:
-    """Pairs of a target and a later one, each once, and whether one arm points at both."""
+    """Pairs of a target and a later one, each once, and whether one arm points at both, one after the other.
+
+    A look lasts over references without one only in profile `figure-3.3`, where nobody is glanced at.
+    """
+    next_to_each_other = set(pairwise(sequence))
     seen: set[tuple[str, str]] = set()
     for index, target in enumerate(sequence):
         there = motions.point(CURRENT_POSE, target)
-        for since in sequence[:index]:
+        for since in sequence[index - 1 : index] if motions.glance and index else sequence[:index]:
             if (since, target) not in seen:
                 seen.add((since, target))
                 before = motions.point(CURRENT_POSE, since)
                 one_arm = before.feasible and there.feasible and arm_of(before) == arm_of(there)
-                yield since, target, one_arm
+                yield since, target, one_arm and (since, target) in next_to_each_other

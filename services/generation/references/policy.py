@@ -27,6 +27,7 @@ from engage_hri.services.generation.references.distractors import (
     laid_out,
 )
 from engage_hri.services.generation.references.motions import CURRENT_POSE, Motions, arm_of, hand_of
+from engage_hri.services.generation.references.posture import HeadAndArms
 from engage_hri.services.generation.references.reliability import channel_reliability, reliability
 
 GESTURES: tuple[GestureChoice, ...] = get_args(GestureChoice)
@@ -79,26 +80,6 @@ class Pair(Struct, frozen=True, kw_only=True):
         )  # fmt: skip
 
 
-class HeadAndArms(Struct, frozen=True):
-    """Targets of the head and of each arm: that of a reference, the person glanced at, or CURRENT_POSE."""
-
-    head: str = CURRENT_POSE
-    arms: tuple[tuple[str, str], ...] = ()
-    """(arm, target) of the arms that have moved, by arm."""
-
-    def arm(self, arm: str) -> str:
-        return dict(self.arms).get(arm, CURRENT_POSE)
-
-    def after(self, gesture: GestureChoice, target: str, motions: Motions) -> "HeadAndArms":
-        """The posture that a gesture at `target` leaves."""
-        if gesture == "none":
-            return self
-        if gesture != "directed_gaze_with_pointing":
-            return HeadAndArms(target, self.arms)
-        arms = {**dict(self.arms), arm_of(motions.point(CURRENT_POSE, target)): target}
-        return HeadAndArms(motions.glance or target, tuple(sorted(arms.items())))
-
-
 class Choices(Struct, frozen=True):
     """The choices for a fragment's references. hands: the one that points, by reference, if the body says which."""
 
@@ -133,10 +114,15 @@ class _Way(Struct, frozen=True):
 
 
 def choose(
-    references: Sequence[Reference], scene: ReferenceScene, motions: Motions, config: GenerationConfig
+    references: Sequence[Reference],
+    scene: ReferenceScene,
+    motions: Motions,
+    config: GenerationConfig,
+    apart: Collection[str] = (),
 ) -> Choices:
     """Choose the pairs of least total cost for `references` in this order, each with the table it was chosen from.
 
+    apart: ids of the references before which head and arms go home (see `posture`).
     A reference with no pair that reaches its minimum gets one of its most reliable, with a warning (decision B10).
     Raises Unreferable where a reference cannot be made at all.
     """
@@ -144,7 +130,7 @@ def choose(
     for reference in references:
         warnings += _deictic_warnings(reference, scene)
     tables = [considered(reference, scene, motions, config) for reference in references]
-    best = _cheapest_way(references, tables, motions, config)
+    best = _cheapest_way(references, tables, motions, config, apart)
     choices = tuple(
         _explain(reference, table, pair, posture, motions, config)
         for reference, table, pair, posture in zip(references, tables, best.pairs, best.postures, strict=False)
@@ -277,7 +263,11 @@ def _candidates(
 
 
 def _cheapest_way(
-    references: Sequence[Reference], tables: Sequence[tuple[Pair, ...]], motions: Motions, config: GenerationConfig
+    references: Sequence[Reference],
+    tables: Sequence[tuple[Pair, ...]],
+    motions: Motions,
+    config: GenerationConfig,
+    apart: Collection[str],
 ) -> _Way:
     """The sequence of pairs with the least total cost, each from the posture before it (decision B11).
 
@@ -285,6 +275,8 @@ def _cheapest_way(
     """
     ways = [_Way(0.0, (0.0, ()), (), (HeadAndArms(),))]
     for reference, table in zip(references, tables, strict=True):
+        if reference.id in apart:
+            ways = _gone_home(ways, motions)
         possible = [pair for pair in table if not pair.ruled_out]
         onward: list[_Way] = []
         while possible and not onward:
@@ -295,6 +287,16 @@ def _cheapest_way(
             replace(way, pairs=(*way.pairs, None), postures=(*way.postures, way.posture)) for way in ways
         ]
     return min(ways, key=lambda way: way.rank)
+
+
+def _gone_home(ways: Sequence[_Way], motions: Motions) -> list[_Way]:
+    """The ways with head and arms at rest in the end; of those that thereby become one posture, the best."""
+    best: dict[HeadAndArms, _Way] = {}
+    for way in ways:
+        posture = way.posture.home_again(motions)
+        if posture not in best or way.rank < best[posture].rank:
+            best[posture] = replace(way, postures=(*way.postures[:-1], posture))
+    return list(best.values())
 
 
 def _continued(

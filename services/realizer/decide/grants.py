@@ -189,8 +189,9 @@ def _pauses(plan: Plan) -> frozenset[Point]:
     found: set[Point] = set()
     for id, chain in plan.chains.items():
         if isinstance(chain.behavior, Speech) and (estimate := plan.estimates.get(id)) is not None:
-            gaps = (Point(id, phase.to) for phase in estimate.phases if phase.hold)
-            found.update(
-                point for point in gaps if plan.at[point] in constrained or len(plan.members[plan.at[point]]) > 1
-            )
+            for phase in estimate.phases:
+                gap, at = Point(id, phase.to), plan.at.get(Point(id, phase.to), 0)
+                waits = at and plan.predicted(gap) - plan.predicted(Point(id, phase.since)) > phase.natural + EPSILON
+                if phase.hold and (waits or at in constrained or len(plan.members[at]) > 1):
+                    found.add(gap)
     return frozenset(found)

@@ -16,7 +16,7 @@ from engage_hri.services.realizer.net.running import RunningNet
 from engage_hri.services.realizer.plan.known import BLOCK_END, BLOCK_START
 from engage_hri.services.realizer.plan.planner import Plan
 from engage_hri.services.realizer.plan.schedule import EPSILON
-from engage_hri.services.realizer.points import Member, Point, performer
+from engage_hri.services.realizer.points import SHIFTS, Member, Point, performer
 
 SURPRISE: Seconds = 0.1
 """Difference from the expected time, in seconds, from which predictions are computed again."""
@@ -138,8 +138,10 @@ class Foresight:
         if chain is None or number == 0 or chain.points[number] != point or self.paces.get(point.behavior):
             return
         if performer(chain.behavior) == "body":
-            took = at - self._facts.reached[chain.points[number - 1]]
-            changed = self.experience.learn(point.behavior, chain.segments[number - 1].natural, took)
+            before, natural = chain.points[number - 1], chain.segments[number - 1].natural
+            if self.plan.predicted(point) - self.plan.predicted(before) < natural - EPSILON:
+                return  # it was to be cut short
+            changed = self.experience.learn(point.behavior, natural, at - self._facts.reached[before])
             if self.forecast is not None and changed:
                 self._news.append((self.forecast.relearn, changed))
 
@@ -221,17 +223,20 @@ class Foresight:
     def pace(self, behavior: str, now: Seconds, may_pass: Callable[[Point], bool]) -> Pace:
         """Instants for the behavior's points up to the next where it must ask; empty if it comes to them anyway."""
         forecast, plan, facts = self.forecast, self.plan, self._facts
-        if forecast is None or behavior not in plan.chains:
-            return ()
-        points = plan.chains[behavior].points
+        if forecast is None or behavior not in self._minded:
+            return ()  # No bound can make it hurry, or wait on its way.
+        points, segments = plan.chains[behavior].points, plan.chains[behavior].segments
+        is_moving = plan.chains[behavior].type not in SHIFTS  # a shift beneath a look takes no time
         number = facts.next_number(behavior)
         at = facts.reached[points[number - 1]] if number else now
         is_paced = forecast.is_hurried(behavior)
         planned: list[tuple[str, Seconds]] = []
         before = plan.at[points[number - 1]] if number else -1
-        for point in points[number:]:
+        for index, point in enumerate(points[number:], start=number):
             here = plan.at[point]
             if here != before:
+                if is_moving and index and forecast.phase(behavior, here) == 0.0 < segments[index - 1].natural:
+                    break  # another takes its part before this point: it need not hurry there
                 natural, latest = at + forecast.phase(behavior, here), at + forecast.longest(behavior, here)
                 if point is points[number] and not self.paces.get(behavior):
                     natural = max(natural, self.not_before.get(behavior, natural))  # overdue, not slower on purpose

@@ -258,7 +258,8 @@ class RunningNet:
     def _fire_one(self, transition: int, at: Seconds) -> None:
         self.instants[transition] = at
         for place in self._inputs[transition]:
-            self._set(place, EMPTY)
+            if self.net.places[place].source not in self.instants or self.net.places[place].kind != "idle":
+                self._set(place, EMPTY)
         for observer in self.observers:
             observer.on_fired(transition, at)
         for place in self._outputs[transition]:
@@ -272,6 +273,9 @@ class RunningNet:
         target = place.target
         if target in self.instants and place.kind != "idle":
             return  # Only where the target does not wait for it.
+        if place.kind == "idle" and self._tokens[number]:
+            return  # An event that is decided before all of its first instant are there.
+        assert not self._tokens[number], f"{place.kind} place {number} would hold two tokens"
         self._set(number, TOKEN if place.lag > 0.0 else RIPE)
         if place.kind in ("handover", "idle") or target == self.end:
             return

@@ -179,8 +179,8 @@ class BehaviorRun:
         if pending is not None:
             self.pending = pending
         try:
-            reached = block.decisions.facts.reached
-            decision = await block.recognition.decision(event, block.plan.block, pending, reached)
+            facts = block.decisions.facts
+            decision = await block.recognition.decision(event, block.plan.block, pending, facts)
         except RequestRefused as error:
             block.lose(event.id, error.fault, kind="CANNOT_CREATE_BEHAVIOR")
         else:

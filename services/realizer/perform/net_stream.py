@@ -1,12 +1,24 @@
-"""The running net of a block, published for whoever watches: what has changed, in one message for each round."""
+"""The running net of a block, published for whoever watches: what has changed, at most twenty times a second.
+
+Messages of a stream may be dropped, and watchers may come late. So all of it is told again every two seconds.
+"""
+
+from msgspec.structs import replace
 
 from engage_hri.schemas import keys
-from engage_hri.schemas.nets import Fired, NetMarked, NetPlace, NetPlanned, NetTransition
+from engage_hri.schemas.nets import NetMarked
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.interface import Bus
 from engage_hri.services.realizer.net.running import RunningNet
+from engage_hri.services.realizer.perform.net_message import described, firings, tokens
 from engage_hri.services.realizer.plan.planner import Plan
 from engage_hri.services.realizer.points import Point
+from engage_hri.services.runtime.alarm import Timer
+
+EVERY: Seconds = 0.05
+"""Least time between two messages about what has changed: nobody sees more of it."""
+AGAIN: Seconds = 2.0
+"""Time between two messages that tell all."""
 
 
 class NetStream:
@@ -15,38 +27,48 @@ class NetStream:
     def __init__(self, bus: Bus, block: str) -> None:
         self._bus = bus
         self._block = block
-        self._fired: list[Fired] = []
+        self._fired: dict[int, Seconds] = {}
+        """Transitions that have fired since the last message."""
+        self._soon = Timer(self._tell)
+        self._again = Timer(self._tell_all)
 
     def planned(self, plan: Plan, net: RunningNet, began: Seconds) -> None:
         """Publish the net that runs from now on."""
         self._net = net
         self._began = began
-        net.changes()
-        transitions = [
-            NetTransition(name=each.name, time=time)
-            for each, time in zip(plan.net.transitions, plan.schedule, strict=True)
-        ]
-        places = [
-            NetPlace(kind=each.kind, source=each.source, target=each.target, lag=each.lag, behavior=each.behavior)
-            for each in plan.net.places
-        ]
-        marked = [number for number, content in enumerate(net.marking) if content]
-        message = NetPlanned(
-            block=self._block,
-            at=self._bus.stamp(began),
-            transitions=tuple(transitions),
-            places=tuple(places),
-            marked=tuple(marked),
-        )
-        self._bus.publish(keys.NET, message)
+        self._message = described(plan, self._bus.stamp(began), net.marking, {})
+        self._tell_all()
 
-    def changed(self, *, is_over: bool = False) -> None:
-        """Publish what has changed since the last message, if anything has."""
+    def tell_soon(self) -> None:
+        """Publish what has changed since the last message, in a moment."""
+        if self._soon.at is None:
+            self._soon.set(self._bus.now() + EVERY)
+
+    def end(self) -> None:
+        """Publish the last changes: the block has ended."""
+        self._tell(is_over=True)
+        self.close()
+
+    def close(self) -> None:
+        """Publish nothing any more."""
+        self._soon.set(None)
+        self._again.set(None)
+
+    def _tell(self, *, is_over: bool = False) -> None:
         put, taken = self._net.changes()
-        fired, self._fired = self._fired, []
+        fired, self._fired = self._fired, {}
         if fired or put or taken or is_over:
-            message = NetMarked(block=self._block, fired=tuple(fired), put=put, taken=taken, is_over=is_over)
+            told = firings({each: at - self._began for each, at in fired.items()})
+            message = NetMarked(block=self._block, fired=told, put=put, taken=taken, is_over=is_over)
             self._bus.publish(keys.NET, message)
+
+    def _tell_all(self) -> None:
+        self._net.changes()
+        self._fired.clear()
+        fired = {each: at - self._began for each, at in self._net.instants.items()}
+        message = replace(self._message, marked=tokens(self._net.marking), fired=firings(fired))
+        self._bus.publish(keys.NET, message)
+        self._again.set(self._bus.now() + AGAIN)
 
     # -- what happens (see `Observer`) ---------------------------------------------------------------------------
 
@@ -63,4 +85,4 @@ class NetStream:
         """Nothing: no token moves."""
 
     def on_fired(self, transition: int, at: Seconds) -> None:
-        self._fired.append(Fired(transition=transition, time=at - self._began))
+        self._fired[transition] = at

@@ -36,9 +36,6 @@ from engage_hri.services.realizer.plan.relations import DROPPED
 from engage_hri.services.realizer.points import FINISH, Point
 from engage_hri.services.runtime.alarm import Afterwards, Timer
 
-NET_EVERY: Seconds = 0.05
-"""Least time between two messages about the marking of a net: nobody sees more of it."""
-
 
 class News(NamedTuple):
     """A sync point that is yet to be told: in feedback, and to other blocks."""
@@ -72,7 +69,6 @@ class BlockPerformance:
         self.futures = SyncPointFutures()
         self._held = held
         self._net = NetStream(shared.bus, plan.block.id)
-        self._net_timer = Timer(self._net.changed)
         self.report = Reporter(shared.bus, plan.block.id, shared.config.skew)
         self._runs = {id: BehaviorRun(self, id) for id in plan.chains}
         self._tasks: dict[str, asyncio.Task[None]] = {}
@@ -217,13 +213,13 @@ class BlockPerformance:
             self.decisions.net.let_go()
         else:
             self.decisions.net.clear()
-        self._net.changed(is_over=True)
+        self._net.end()
         if ending.status == "failed":
             self._go_home(self.parts_used)
 
     def _close(self) -> None:
         self._timer.set(None)
-        self._net_timer.set(None)
+        self._net.close()
         self._afterwards.stop()
         self._tell()
         for id in self._runs:
@@ -253,8 +249,7 @@ class BlockPerformance:
             self.report.expect(self.decisions.plan, self.decisions.began, foresight.expected(self.bus.now()))
         self._shared.live_blocks.foresee(self.plan.block.id, foresight.ahead)
         self._timer.set(None if self._ending.done() else self.decisions.deadline)
-        if self._net_timer.at is None:
-            self._net_timer.set(self.bus.now() + NET_EVERY)
+        self._net.tell_soon()
 
     def _apply(self, effect: Effect) -> bool:
         """Carry out one decision; True if there is more to be decided then."""

@@ -1,7 +1,6 @@
 """Requests of one block to recognition: connection events and turn signals. The clock decides if it is not there."""
 
 import asyncio
-from collections.abc import Mapping
 from typing import Any
 
 from msgspec import Struct
@@ -15,6 +14,7 @@ from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.interface import Bus
 from engage_hri.services.realizer.config import RealizerConfig
 from engage_hri.services.realizer.decide.lateness import event_deadline
+from engage_hri.services.realizer.net.facts import Facts
 from engage_hri.services.realizer.perform.shared_context import Presence
 from engage_hri.services.realizer.plan.schedule import EPSILON
 from engage_hri.services.realizer.points import Point
@@ -52,10 +52,12 @@ class RecognitionLink:
         request = RequestEvent(id=id, block=block, event=event, at=self._bus.stamp(began))
         return self._requests.send(keys.EVENT, request)
 
-    async def decision(
-        self, event: Event, block: Block, pending: Pending | None, reached: Mapping[Point, Seconds]
-    ) -> Decision:
-        """Wait for the decision of an event. reached: the facts so far, as they grow. Raises RequestRefused."""
+    async def decision(self, event: Event, block: Block, pending: Pending | None, facts: Facts) -> Decision:
+        """Wait for the decision of an event, not counting the time for which it is held. Raises RequestRefused.
+
+        facts: those of the block, as they grow.
+        """
+        began = facts.reached[Point(event.id, "start")]
         while True:
             if pending is not None and pending.outcome.done():
                 try:
@@ -70,8 +72,9 @@ class RecognitionLink:
                 at = self._bus.local(decided.at) if isinstance(decided, EventOutcome) else self._bus.now()
                 return Decision(at, True)
             is_received = pending is not None and "recognition" in self._peers
-            deadline = event_deadline(event, block, reached, self._config, is_received=is_received)
-            remaining = deadline - self._bus.now()
+            now = self._bus.now()
+            deadline = event_deadline(event, block, facts.reached, self._config, is_received=is_received)
+            remaining = deadline + facts.held_between(began, now, event.id) - now
             if remaining <= EPSILON:
                 if pending is not None:
                     self._requests.cancel(pending.request.id, "no decision in time")

@@ -22,7 +22,7 @@ from engage_hri.services.realizer.plan.assembly import Assembler, Assembly, asse
 from engage_hri.services.realizer.plan.deadlocks import Losses, clashes, judge
 from engage_hri.services.realizer.plan.foresight import foreseen, losses_to_others, too_late, unkept, without_date
 from engage_hri.services.realizer.plan.given_up import times_of
-from engage_hri.services.realizer.plan.handover import Arrangement, Conflict, Turn, arrange, kept_points
+from engage_hri.services.realizer.plan.handover import Arrangement, Conflict, Turn, arrange, entering, kept_points
 from engage_hri.services.realizer.plan.instants import Classes
 from engage_hri.services.realizer.plan.known import BLOCK_END, NOTHING, Known, is_foreign
 from engage_hri.services.realizer.plan.phases import Chain, chain, natural_ends
@@ -53,6 +53,7 @@ class Plan(Struct, frozen=True, kw_only=True):
     long as it is, from first to last.
     kept: for each behavior, the last point that it must pass itself. Who takes its part, in whatever block, may save
     it the rest.
+    entering: behaviors in the order in which they take their parts: of two that begin at one instant, too.
     behaviors: those that will be performed, in document order. dropped: those that will not, with `problems`.
     natural: behaviors that end when something takes their place, or with the block.
     waited_for: behaviors that the end of the block waits for. given_up: speeches that lack a time they should have.
@@ -73,6 +74,7 @@ class Plan(Struct, frozen=True, kw_only=True):
     required: frozenset[str]
     waited_for: frozenset[str]
     kept: Mapping[str, Point]
+    entering: tuple[str, ...]
     constrained: frozenset[Point] = frozenset()
     successors: Mapping[str, tuple[str, Point]] = {}
     takes: Mapping[str, str] = {}
@@ -256,6 +258,7 @@ class _Planner:
                 break
             else:
                 arrangement = arranged
+        mentioned = {point.behavior for point in present.constrained}
         return Plan(
             block=self._block(),
             behaviors=tuple([chain.behavior for chain in self.chains.values()]),
@@ -269,6 +272,7 @@ class _Planner:
             required=present.required,
             waited_for=waited_for,
             kept=kept_points(self.chains, present, arrangement.handovers),
+            entering=entering(self.chains, mentioned, times, rounds),
             constrained=present.constrained,
             successors=arrangement.successors,
             takes=arrangement.takes,
@@ -281,7 +285,7 @@ class _Planner:
         )
 
     def _is_open(self, conflict: Conflict) -> bool:
-        """Whether anything can be done about a conflict: who has begun waits no more, and keeps its arm."""
+        """True if a conflict can be settled: who has begun waits no more, and uses the arm that it has."""
         if conflict.hand:
             return conflict.hand[0] not in self.known.begun
         assert conflict.turn is not None

@@ -1,14 +1,24 @@
-"""Poses of the body when a behavior starts: on the target of the one before it, or home again."""
+"""Questions to the body about a plan: the poses in which behaviors start, and when they begin, wait and hurry."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from itertools import pairwise
+from math import inf
 
-from engage_hri.schemas.body import BodyPose, Estimate
+from engage_hri.schemas.body import BodyPose, Estimate, PlannedTime
 from engage_hri.schemas.units import Seconds
-from engage_hri.services.realizer.plan.known import NOTHING, Known
+from engage_hri.services.realizer.plan.known import NOTHING, Known, is_foreign
 from engage_hri.services.realizer.plan.phases import Chain
 from engage_hri.services.realizer.plan.planner import Plan
 from engage_hri.services.realizer.plan.schedule import EPSILON
 from engage_hri.services.realizer.points import SHIFTS, Point, family
+
+NOTICEABLE: Seconds = 0.0005
+"""Seconds by which a phase may differ before it makes another plan."""
+
+APART: Seconds = 2e-6
+"""Seconds after all else has ended: a look that lasts so long goes home then, and not together with it."""
+CUT: Seconds = 1.0
+"""Seconds after it has been cut: a behavior that is to be cut at a hold point is never let go there."""
 
 
 def poses_before(plan: Plan, known: Known = NOTHING) -> dict[str, BodyPose]:
@@ -43,6 +53,69 @@ def poses_before(plan: Plan, known: Known = NOTHING) -> dict[str, BodyPose]:
         if is_shift and is_ours and estimate is not None:
             base = estimate.pose_after
     return poses
+
+
+def planned_times(plan: Plan) -> dict[str, tuple[PlannedTime, ...]]:
+    """Times at which behaviors begin, wait, hurry and dawdle, by their ids, in the order in which they begin.
+
+    Empty if no behavior makes a difference to another or to itself: then its first estimates hold.
+    """
+    order = sorted(plan.entering, key=lambda id: round(plan.predicted(plan.chains[id].points[0]), 6))
+    moving = [id for id in order if (estimate := plan.estimates.get(id)) is not None and estimate.parts]
+    times = {id: _times(plan, id) for id in moving if plan.estimates[id].parts != ("voice",)}
+    used = [part for id in times for part in plan.estimates[id].parts]
+    if len(set(used)) == len(used) and "torso" not in used and all(len(each) == 1 for each in times.values()):
+        return {}
+    return times
+
+
+def _times(plan: Plan, id: str) -> tuple[PlannedTime, ...]:
+    chain = plan.chains[id]
+    times = [PlannedTime(sync=chain.points[0].sync, at=plan.predicted(chain.points[0]))]
+    taken = _taken(plan, id)
+    for (since, to), segment in zip(pairwise(chain.points), chain.segments, strict=True):
+        begins, comes = plan.predicted(since), plan.predicted(to)
+        surplus = comes - begins - segment.natural
+        if comes >= taken - EPSILON:
+            if segment.hold:  # It may not pass: it waits there until it is cut.
+                times.append(PlannedTime(sync=to.sync, at=taken + CUT))
+            elif chain.type in SHIFTS:  # It hurries to be there.
+                times.append(PlannedTime(sync=to.sync, at=taken))
+            if segment.hold or chain.type in SHIFTS:
+                break
+        elif surplus > NOTICEABLE or (_is_met_there(plan, to) if segment.hold else surplus < -NOTICEABLE):
+            times.append(PlannedTime(sync=to.sync, at=comes + (APART if id in plan.natural else 0.0)))
+    return tuple(times)
+
+
+def _is_met_there(plan: Plan, hold: Point) -> bool:
+    """True if one comes to this instant who cannot wait: who is at the hold point waits until that is measured."""
+    members = plan.members[plan.at[hold]]
+    return any(each.behavior != hold.behavior and each.kind in ("passive", "prompt") for each in members)
+
+
+def _taken(plan: Plan, id: str) -> Seconds:
+    """Time at which another takes a part of this behavior. A shift takes nothing from what lies over it."""
+    is_shift = plan.chains[id].type in SHIFTS
+    begun, parts = plan.predicted(plan.chains[id].points[0]), set(plan.chains[id].parts)
+    later = plan.entering[plan.entering.index(id) + 1 :]
+    rivals = [plan.chains[each] for each in later if is_shift or plan.chains[each].type not in SHIFTS]
+    starts = [plan.predicted(each.points[0]) for each in rivals if parts & set(each.parts)]
+    if id in plan.successors and is_foreign(successor := plan.successors[id][0]):
+        starts.append(plan.predicted(Point(successor, "start")))
+    return min((start for start in starts if start >= begun), default=inf)
+
+
+def changed(before: Sequence[Estimate], after: Sequence[Estimate]) -> bool:
+    """True if a plan made with the estimates `before` is not the one that they call for `after`."""
+    known = {each.behavior: each for each in before}
+    return any(
+        one.feasible != other.feasible
+        or one.parts != other.parts
+        or len(one.phases) != len(other.phases)
+        or any(abs(a.natural - b.natural) > NOTICEABLE for a, b in zip(one.phases, other.phases, strict=True))
+        for one, other in ((known[each.behavior], each) for each in after)
+    )
 
 
 def _is_overlaid(plan: Plan, shift: str) -> bool:

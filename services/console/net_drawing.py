@@ -1,0 +1,304 @@
+"""Drawing of a net with its tokens, as lines of text. No state: the same net gives the same lines.
+
+Each instant is a column, each behavior a line: its sync points as letters, a circle for each phase between them, the
+token as a filled one. Below stand the places between instants of different behaviors.
+"""
+
+from collections.abc import Iterable, Mapping, Sequence
+from typing import NamedTuple
+
+from rich.cells import cell_len, set_cell_size
+from rich.text import Text
+
+from engage_hri.schemas.nets import NetPlace, NetTransition
+from engage_hri.schemas.units import Seconds
+from engage_hri.schemas.utf8 import printable
+from engage_hri.services.console.nets import NetInView
+from engage_hri.services.console.view import OWN_BLOCKS
+from engage_hri.services.console.wording import number
+
+TOKEN, EMPTY = "●", "○"
+LETTERS = {
+    "start": "s", "ready": "r", "stroke_start": "[", "stroke": "*", "stroke_end": "]", "relax": "x", "end": "e",
+}  # fmt: skip
+MARK = "m"
+"""Letter of a sync point that the behavior itself names: a mark in a speech."""
+BLOCK = "bml"
+"""Name of the line of the block itself."""
+NARROWEST, WIDEST = 3, 9
+"""Cells of a column."""
+LABEL = 20
+"""Most cells of a name."""
+SMALLEST = 6
+"""Lines of a net below which it is not drawn beside others."""
+REST = 2
+"""Cells between names and columns, with the tokens at rest."""
+WAITING, AHEAD, DONE = "┄", "─", "━"
+CROSSED = {" ": "┊", WAITING: "┊", AHEAD: "┼", DONE: "┿"}
+"""Line of an instant through the lines of behaviors that have no part in it."""
+TIES = ("delay", "order", "handover", "series")
+"""Places between behaviors, the most interesting first."""
+
+
+class _Columns(NamedTuple):
+    """The instants that are shown: the cell where each begins, the width of one, and what is cut off."""
+
+    at: Mapping[int, int]
+    """For each transition, its cell; left of the first for those that are cut off there."""
+    width: int
+    size: int
+    cut: tuple[int, int]
+
+
+class _Row(NamedTuple):
+    """A line to draw. points: transitions with their letters. places: those on the line, in order."""
+
+    name: str
+    points: Mapping[int, str]
+    places: Sequence[int]
+    is_tie: bool = False
+
+
+def drawing(net: NetInView, width: int = 80, height: int | None = None, now: Seconds | None = None) -> list[str]:
+    """The lines of a net. width, height: most cells and lines; None: as many as it takes. now: local time."""
+    rows, ties = _behaviors(net), _ties(net)
+    left = min(LABEL, max(cell_len(printable(row.name)) for row in (*rows, *ties))) if rows else 0
+    left = max(7, min(left, width // 3)) + 1
+    columns = _columns(net, max(NARROWEST + 2, width - left - REST - 1))
+    head = [_title(net, now), _times(net, columns, "planned", left)]
+    if net.fired:
+        head.append(_times(net, columns, "fired", left))
+    in_view = [row for row in ties if _is_in_view(row, columns)]
+    shown, hidden = _fitting(net, [*rows, *in_view], None if height is None else height - len(head))
+    hidden += [row for row in ties if row not in in_view]
+    cells = [_cells(net, row, columns) for row in shown]
+    _connect(shown, cells, columns)
+    lines = head + [
+        _assembled(printable(row.name), _at_rest(net, row), "".join(line), columns, left)
+        for row, line in zip(shown, cells, strict=True)
+    ]
+    if hidden:
+        tokens = sum(each in net.marked for row in hidden for each in row.places)
+        lines.append(f"… {len(hidden)} more lines, with {tokens} {TOKEN}")
+    return [_cut(line, width) for line in lines]
+
+
+def picture(nets: Sequence[NetInView], width: int, height: int, now: Seconds) -> Text:
+    """Draw the nets of all live blocks, as large as the terminal: the newest first, those of mere looks last."""
+    if not nets:
+        return Text("no block runs", style="dim")
+    lines: list[str] = []
+    newest = [net for own in (False, True) for net in reversed(nets) if net.block.startswith(OWN_BLOCKS) == own]
+    for net in newest:
+        room = height - len(lines) - 2  # the legend, and the line where the cursor stands
+        if room < SMALLEST and lines:
+            lines[-1] = "… other blocks"
+            break
+        lines += [*drawing(net, width, max(SMALLEST, room), now), ""]
+    lines.append(_cut(legend(nets), width))
+    text = Text("\n".join(lines), no_wrap=True)
+    text.highlight_regex(f"{TOKEN}+", "bold green")
+    text.highlight_regex("(?m)^block .*$", "bold")
+    return text
+
+
+def legend(nets: Iterable[NetInView]) -> str:
+    """The letters that stand in the drawings of these nets, with what they mean."""
+    used = {_letter(each.sync) for net in nets for instant in net.transitions for each in instant.points}
+    words = [f"{letter}={sync}" for sync, letter in (*LETTERS.items(), ("mark", MARK)) if letter in used]
+    return " ".join((f"{TOKEN}=token", *words))
+
+
+def _letter(sync: str) -> str:
+    return LETTERS.get(sync, MARK)
+
+
+def _title(net: NetInView, now: Seconds | None) -> str:
+    parts = [f"block {printable(net.block)}:"]
+    if net.is_over:
+        parts.append("over,")
+    elif now is not None:
+        parts.append(f"{max(0.0, now - net.began):.1f} s,")
+    fired = f"{len(net.fired)} of {len(net.transitions)} instants have fired"
+    return " ".join((*parts, f"{fired}, {len(net.marked)} {TOKEN}"))
+
+
+# -- what is drawn -----------------------------------------------------------------------------------------------
+
+
+def _behaviors(net: NetInView) -> list[_Row]:
+    """The block itself, then its behaviors by their first instant."""
+    points: dict[str, dict[int, str]] = {}
+    for transition in _ordered(net):
+        for point in net.transitions[transition].points:
+            here = points.setdefault(point.behavior, {})
+            here[transition] = here.get(transition, "") + _letter(point.sync)
+    places: dict[str, list[int]] = {name: [] for name in points}
+    for each, place in enumerate(net.places):
+        if (name := _owner(net, place)) is not None:
+            places.setdefault(name, []).append(each)
+    names = sorted(places, key=lambda name: name != "")
+    return [_Row(name or BLOCK, points.get(name, {}), places[name]) for name in names]
+
+
+def _owner(net: NetInView, place: NetPlace) -> str | None:
+    """The behavior on whose line a place lies; None: it lies between behaviors."""
+    end = len(net.transitions) - 1
+    if place.kind in ("phase", "idle") or (not place.lag and (place.source == 0 or place.target == end)):
+        return place.behavior
+    return None
+
+
+def _ties(net: NetInView) -> list[_Row]:
+    """A line for each place between behaviors; one for those that say the same."""
+    found: dict[tuple[str, int, int, Seconds], list[int]] = {}
+    for each, place in enumerate(net.places):
+        if _owner(net, place) is None:
+            found.setdefault((place.kind, place.source, place.target, place.lag), []).append(each)
+    ranks = {kind: rank for rank, kind in enumerate(TIES)}
+    ordered = sorted(found, key=lambda tie: ranks.get(tie[0], len(TIES)))
+    return [
+        _Row(f"{kind} {lag:g} s" if lag else kind, {source: "├", target: "┤"}, found[kind, source, target, lag], True)
+        for kind, source, target, lag in ordered
+    ]
+
+
+def _is_in_view(row: _Row, columns: _Columns) -> bool:
+    cells = [columns.at[each] for each in row.points]
+    return max(cells) >= 0 and min(cells) < columns.size
+
+
+def _fitting(net: NetInView, rows: list[_Row], height: int | None) -> tuple[list[_Row], list[_Row]]:
+    """The rows that are drawn, and those for which there is no room: what holds a token on its way comes first."""
+    if height is None or len(rows) <= height:
+        return rows, []
+
+    def rank(here: int) -> tuple[bool, bool, bool]:
+        row = rows[here]
+        moving = any(net.places[each].source for each in net.marked.intersection(row.places))
+        return here > 0, row.is_tie, not moving
+
+    kept = frozenset(sorted(range(len(rows)), key=rank)[: max(1, height - 1)])
+    return [rows[each] for each in sorted(kept)], [row for each, row in enumerate(rows) if each not in kept]
+
+
+# -- where it is drawn -------------------------------------------------------------------------------------------
+
+
+def _ordered(net: NetInView) -> list[int]:
+    """Transitions by their planned times; the end of the block is the last."""
+    end = len(net.transitions) - 1
+    return sorted(range(end + 1), key=lambda each: (each == end, net.transitions[each].time, each))
+
+
+def _columns(net: NetInView, space: int) -> _Columns:
+    """Columns for as many instants as there is space for, around the one that fired last."""
+    order = _ordered(net)
+    fits = max(1, space // NARROWEST)
+    first = 0
+    if len(order) > fits:
+        latest = max((place for place, each in enumerate(order) if each in net.fired), default=0)
+        first = max(0, min(latest - fits // 3, len(order) - fits))
+    shown = order[first : first + fits]
+    width = max(NARROWEST, min(WIDEST, space // len(shown)))
+    at = {each: (place - first) * width for place, each in enumerate(order)}
+    return _Columns(at, width, len(shown) * width, (first, len(order) - first - len(shown)))
+
+
+def _times(net: NetInView, columns: _Columns, name: str, left: int) -> str:
+    """A line of times, of as many instants as there is room for: shared ones first, or those that fired last."""
+    cells = [" "] * columns.size
+    transitions = range(len(net.transitions))
+    if name == "planned":
+        times = {each: net.transitions[each].time for each in transitions}
+        order = sorted(transitions, key=lambda each: -_sharing(net.transitions[each]))
+    else:
+        times = dict(net.fired)
+        order = sorted(times, key=lambda each: -times[each])
+    for each in order:
+        text, at = number(times[each]), columns.at[each]
+        free = cells[max(0, at - 1) : at + len(text) + 1]
+        if at >= 0 and at + len(text) <= columns.size and not "".join(free).strip():
+            cells[at : at + len(text)] = text
+    for each in times:
+        at = columns.at[each]
+        if 0 <= at < columns.size and cells[at] == " " and (not at or cells[at - 1] in " ·"):
+            cells[at] = "·"
+    return _assembled(name, " ", "".join(cells), columns, left)
+
+
+def _sharing(instant: NetTransition) -> int:
+    return len({each.behavior for each in instant.points})
+
+
+def _at_rest(net: NetInView, row: _Row) -> str:
+    """The idle place of a line, if it has one."""
+    idle = [each for each in row.places if net.places[each].kind == "idle"]
+    return (TOKEN if idle[0] in net.marked else EMPTY) if idle else " "
+
+
+def _cells(net: NetInView, row: _Row, columns: _Columns) -> list[str]:
+    """The columns of a line: its points, and its places between them."""
+    cells = [" "] * columns.size
+    done = max((place.source for place in _held(net, row)), default=None, key=lambda each: columns.at[each])
+    ends = max(row.points, default=0, key=lambda each: columns.at[each])
+    last = len(net.transitions) - 1
+    for each in sorted(row.places, key=lambda each: net.places[each].kind == "phase"):  # phases above what waits
+        place = net.places[each]
+        if place.kind == "idle":
+            continue
+        token = TOKEN if each in net.marked else EMPTY
+        is_over = columns.at[place.target] <= columns.at[done] if done is not None else ends in net.fired
+        waits = row.is_tie or (place.kind != "phase" and row.name != BLOCK)
+        style = WAITING if waits else DONE if is_over else AHEAD
+        # What waits for the end of the block stands behind the last point of the behavior.
+        source = ends if waits and place.target == last and ends != last else place.source
+        letters = max(1, min(len(row.points.get(source, "")), columns.width - 2))
+        _draw(cells, columns.at[source] + letters, columns.at[place.target], style, token)
+    for each, text in row.points.items():
+        at, text = columns.at[each], text[: max(1, columns.width - 2)]
+        if 0 <= at < columns.size:
+            cells[at : at + len(text)] = text
+    return cells
+
+
+def _held(net: NetInView, row: _Row) -> list[NetPlace]:
+    """The places of a line that hold a token of what is under way."""
+    return [net.places[each] for each in row.places if each in net.marked and net.places[each].kind != "idle"]
+
+
+def _draw(cells: list[str], since: int, to: int, style: str, token: str) -> None:
+    """Draw a place from cell to cell, as far as it is in view."""
+    since, to = max(0, since), min(len(cells), to)
+    if since < to:
+        cells[since:to] = style * (to - since)
+        cells[(since + to - 1) // 2] = token
+
+
+def _connect(rows: Sequence[_Row], cells: Sequence[list[str]], columns: _Columns) -> None:
+    """Draw each instant that several behaviors share through the lines between them."""
+    first: dict[int, int] = {}
+    for here, row in enumerate(rows):
+        for each in () if row.is_tie else row.points:
+            at = columns.at[each]
+            if 0 <= at < columns.size:
+                for between in range(first.setdefault(each, here) + 1, here):
+                    if (crossed := cells[between][at]) in CROSSED:
+                        cells[between][at] = CROSSED[crossed]
+
+
+def _assembled(name: str, rest: str, cells: str, columns: _Columns, left: int) -> str:
+    before, behind = columns.cut
+    line = _fill(name, left) + rest + ("…" if before else " ") + cells
+    return f"{line}…" if behind else line.rstrip()
+
+
+def _fill(text: str, cells: int) -> str:
+    """Text of exactly so many cells, with a space at its end."""
+    if cell_len(text) >= cells:
+        text = set_cell_size(text, cells - 2) + "…"
+    return set_cell_size(text, cells)
+
+
+def _cut(line: str, width: int) -> str:
+    return line if cell_len(line) <= width else set_cell_size(line, max(0, width - 1)) + "…"

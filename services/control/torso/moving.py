@@ -1,0 +1,229 @@
+"""The parts of the simulated torso: which behavior has each, and along which path it moves. Nothing waits here.
+
+Time is that of a clock: of the event loop for the body, of its own for a rehearsal.
+"""
+
+from typing import Protocol
+
+from msgspec.structs import replace
+
+from engage_hri.schemas.behaviors import BlockBehavior, Gaze
+from engage_hri.schemas.body import BodyPose, Estimate, NoPointZone
+from engage_hri.schemas.units import Seconds
+from engage_hri.schemas.world import World
+from engage_hri.services.control.body import MovementAuthority
+from engage_hri.services.control.torso import choreography, head, kinematics, tracks
+from engage_hri.services.control.torso.course import Course, Impossible, Situation
+from engage_hri.services.control.torso.estimates import infeasible, motion_estimate
+from engage_hri.services.control.torso.head import Fixation
+from engage_hri.services.control.torso.motion import Motion
+from engage_hri.services.control.torso.path import Path, resting
+from engage_hri.services.control.torso.repertoire import Repertoire
+from engage_hri.services.control.torso.runs import Run
+from engage_hri.services.control.torso.tracks import Track
+
+
+class Clock(Protocol):
+    """Source of the time."""
+
+    def time(self) -> Seconds: ...
+
+
+class Torso:
+    """The parts of a torso. runs: the behavior that has a part, by the part. attention: where the head belongs.
+
+    misbelieved: angles at which the body believes joints that are elsewhere.
+    """
+
+    def __init__(
+        self, clock: Clock, zones: tuple[NoPointZone, ...], repertoire: Repertoire, displaced: dict[str, float]
+    ) -> None:
+        self.clock = clock
+        self.zones = zones
+        self.repertoire = repertoire
+        self.misbelieved = {joint: kinematics.HOME[joint] for joint in displaced}
+        self.tracks = {part: Track(part, tracks.home_of(part, displaced)) for part in tracks.LIMITS}
+        self.runs: dict[str, Run] = {}
+        self.world = World(entities=())
+        self.attention = Fixation()
+        self.base: MovementAuthority | None = None
+        """Authority of the shift that has set the base gaze."""
+
+    # -- planning -----------------------------------------------------------------------------------------------
+
+    def estimate(self, behavior: BlockBehavior, pose: BodyPose | None, world: World) -> Estimate:
+        """Estimate a movement by itself, from `pose` or from where its parts are."""
+        try:
+            return self._estimate(behavior, self.situation(world, pose), moving=pose is None)
+        except Impossible as impossible:
+            return infeasible(behavior, impossible)
+
+    def pose(self, world: World, pose: BodyPose | None) -> BodyPose:
+        """Pose of all joints: those of `pose`, and where the others are."""
+        return kinematics.pose_message(self.situation(world, pose).pose)
+
+    def _estimate(self, behavior: BlockBehavior, situation: Situation, *, moving: bool) -> Estimate:
+        course = choreography.plan(behavior, situation)
+        path = self.path(course, None if moving and not self.misbelieved else situation)
+        # A nod is on top of the gaze, and leaves the neck where that has it.
+        moved = () if course.parts == ("nod",) else zip(course.joints, course.legs[-1].goal, strict=True)
+        on_target, end = {**situation.pose, **course.on_target}, {**situation.pose, **dict(moved)}
+        return motion_estimate(
+            behavior, course, path, kinematics.pose_message(on_target), kinematics.pose_message(end)
+        )
+
+    def situation(self, world: World, pose: BodyPose | None = None, *, real: bool = False) -> Situation:
+        """Describe what a course starts from. real: with the true joint angles, not those that the body believes."""
+        now = self.clock.time()
+        here = {"neck_roll": 0.0}
+        """A tilt is on top of the gaze, like a nod: it is no part of where the head is."""
+        for part, track in self.tracks.items():
+            if part != "nod":
+                here.update(zip(track.joints, track.angles(now), strict=True))
+        # Head and arms aim for where the torso is going to be.
+        torso, leaning = self.tracks["torso"], self.runs.get("torso")
+        here.update(zip(torso.joints, torso.angles(max(now, torso.motion.end)), strict=True))
+        if leaning is not None and leaning.is_setting_out and torso.is_moving(now):
+            here.update((joint, leaning.course.on_target[joint]) for joint in torso.joints)
+        if not real:
+            here.update(self.misbelieved)
+        rest = {**tracks.bases(self.tracks), **dict(zip(tracks.NECK, self.attention.angles, strict=True))}
+        return Situation(tracks.updated(here, pose), rest, world, self.zones, tuple(self.runs), self.repertoire)
+
+    def path(self, course: Course, situation: Situation | None = None) -> Path:
+        """Lay a path along `course`. Raises Impossible.
+
+        situation: start at rest in its pose; None: start from where the parts are, as they move.
+        """
+        if situation is not None and course.parts != ("nod",):
+            start = resting([situation.pose[joint] for joint in course.joints])
+        else:
+            now = self.clock.time()
+            start = tracks.joined([self.tracks[part].at(now) for part in course.parts])
+        path = Path(start, course.legs, tracks.limits_of(course.parts))
+        if tracks.meets_table(path, course.joints):
+            raise Impossible("CANNOT_CREATE_BEHAVIOR", "the table is in the way of the arm")
+        return path
+
+    # -- motion -------------------------------------------------------------------------------------------------
+
+    def take_over(self, run: Run, path: Path) -> None:
+        """Make `run` the owner of its parts, cut the runs that had them, and start its motion."""
+        for joint in run.course.joints:
+            self.misbelieved.pop(joint, None)
+        for earlier in dict.fromkeys(self.runs[part] for part in run.course.parts if part in self.runs):
+            self.release(earlier)
+            if head.is_shift(earlier.behavior) and isinstance(run.behavior, Gaze):
+                earlier.lie_beneath()
+            else:
+                earlier.authority.revoke("taken_over")
+            earlier.bell.ring()
+            self.relax(tuple(part for part in earlier.course.parts if part not in run.course.parts))
+        for part in run.course.parts:
+            self.runs[part] = run
+        if head.is_shift(run.behavior):
+            self.set_base(run.behavior, run.course, run.authority)
+        elif isinstance(run.behavior, choreography.SETTLING):
+            tracks.rebase(self.tracks, run.course.parts, run.course.on_target)
+        self._play(run, path)
+        if "torso" in run.course.parts:
+            self.follow()
+
+    def _play(self, run: Run, path: Path) -> None:
+        now = self.clock.time()
+        run.play(Motion(path, now, cruise=run.cruise, limit=run.limit(path)))
+        column = 0
+        for part in run.course.parts:
+            self.tracks[part].play(run.motion, column)
+            column += len(self.tracks[part].joints)
+        self.attention.follow_run(run, now)
+
+    def turn_home(self, run: Run) -> None:
+        """Lay the way home of a look anew if a shift has set another base since it began."""
+        track, base = self.tracks["head"], self.attention.angles
+        if head.differ(run.course.legs[-1].goal, base):
+            now = self.clock.time()
+            back = head.way_back(track.angles(now), base)
+            run.course = replace(run.course, legs=(*run.course.legs[:-1], back))
+            self._play(run, Path(track.at(now), run.with_faults((back,)), tracks.LIMITS["head"]))
+
+    def leave_hold(self, run: Run, hold: str) -> list[str]:
+        """Let `run` go on from a hold point, on a new path if it stands still. Returns the sync points it passes."""
+        now = self.clock.time()
+        stood, passed = run.stands, run.leave(hold, now)
+        if stood and not run.holding and not run.is_over:
+            legs = run.motion.path.after(run.motion.s(now), [point.sync for point in run.pending])
+            if run.course.parts == ("head",):
+                legs = (head.way_back(self.tracks["head"].angles(now), self.attention.angles),)
+            start = tracks.joined([self.tracks[part].at(now) for part in run.course.parts])
+            self._play(run, Path(start, run.with_faults(legs), tracks.limits_of(run.course.parts)))
+        return passed
+
+    def extend(self, run: Run) -> None:
+        now = self.clock.time()
+        if (path := run.hurry(now)) is not None:
+            self._play(run, path)
+        limit = run.limit(run.motion.path)
+        is_extended = limit > run.motion.limit
+        run.motion.extend(limit, now)
+        run.brake_for_hold(now)
+        if run.keep_pace(now) or is_extended:
+            self.attention.follow_run(run, now)
+
+    def owns(self, run: Run) -> bool:
+        return any(owner is run for owner in self.runs.values())
+
+    def release(self, run: Run) -> None:
+        for part in [part for part, owner in self.runs.items() if owner is run]:
+            del self.runs[part]
+
+    def abandon(self, run: Run) -> None:
+        """Send the parts of `run` to rest. A shift of the head that is broken off stays where it can stop."""
+        if head.is_shift(run.behavior):
+            self.attention.stay(head.brake(run.motion, self.clock.time()))
+            self.attention.expect("", 0.0, self.clock.time())
+        else:
+            if isinstance(run.behavior, choreography.SETTLING):
+                tracks.rebase(self.tracks, run.course.parts)
+            self.relax(run.course.parts)
+
+    def relax(self, parts: tuple[str, ...]) -> None:
+        now = self.clock.time()
+        for part in parts:
+            track = self.tracks[part]
+            track.return_to(self.attention.angles if part == "head" else track.base, now)
+            if part == "head":
+                self.attention.expect(self.attention.entity, track.motion.end, now)
+        if "torso" in parts:
+            self.follow()
+
+    # -- gaze ---------------------------------------------------------------------------------------------------
+
+    def is_overlaid(self) -> bool:
+        return "head" in self.runs and isinstance(self.runs["head"].behavior, Gaze)
+
+    def set_base(self, behavior: BlockBehavior, course: Course, authority: MovementAuthority) -> None:
+        """Make the goal of a shift the direction to which the head returns. A shift before it that has not ended is
+        taken over."""
+        if self.base is not None:
+            self.base.revoke("taken_over")
+        self.attention.shift(behavior, course)
+        self.base = authority
+
+    def follow(self) -> None:
+        """Turn the head to follow the entity that it looks at, or is about to look at."""
+        now, situation, track = self.clock.time(), self.situation(self.world, real=True), self.tracks["head"]
+        self.attention.update(situation)
+        if (run := self.runs.get("head")) is None:
+            head.turn(track, self.attention.angles, now)
+            return
+        try:
+            course = choreography.plan(run.behavior, situation)
+        except Impossible:
+            return
+        if run.stands:
+            head.turn(track, tuple(course.on_target.values()), now)
+        elif (path := head.retargeted(run, course, track, now)) is not None:
+            run.course = course
+            self._play(run, path)
+            run.bell.ring()

@@ -1,0 +1,240 @@
+"""Path of a motion through joint space, in closed form.
+
+A twice differentiable curve q(s), where s is the time in seconds at natural speed; each sync point lies at some s.
+
+Speed and acceleration limits: q'' alone stays within `SHARE` of the acceleration, which leaves the rest to changes of
+the rate: |q''| rate^2 + |q'| |rate'| <= limit.
+"""
+
+from collections.abc import Collection, Sequence
+from math import sqrt
+from typing import Any
+
+import numpy as np
+from msgspec import Struct
+from msgspec.structs import replace
+from numpy.typing import NDArray
+
+from engage_hri.schemas.body import JointLimit
+from engage_hri.schemas.units import Seconds
+
+Array = NDArray[np.float64]
+
+SHARE = 0.6
+MARGIN = 0.97
+"""Share of a limit that sampled peaks may reach: between two samples a peak may be higher."""
+AT_REST = 1e-9
+SAMPLES = np.linspace(0.0, 1.0, 33)
+_STRETCHES = tuple(1.1**step for step in range(40)) + tuple(0.9**step for step in range(1, 12))
+
+
+class JointMotion(Struct, frozen=True):
+    """Position, velocity and acceleration of some joints, in the order of their limits."""
+
+    q: Array
+    v: Array
+    a: Array
+
+    @property
+    def at_rest(self) -> bool:
+        return bool(np.all(np.abs(self.v) < AT_REST) and np.all(np.abs(self.a) < AT_REST))
+
+
+def resting(q: Sequence[float] | Array) -> JointMotion:
+    position = np.asarray(q, dtype=np.float64)
+    return JointMotion(position, np.zeros_like(position), np.zeros_like(position))
+
+
+class Leg(Struct, frozen=True, kw_only=True):
+    """A stretch of a path. Its end is passed with `velocity` (empty: rest) and without acceleration.
+
+    seconds: natural duration; longer if the limits ask for it.
+    marks: sync points, with the fraction of the leg's duration at which they lie.
+    """
+
+    goal: tuple[float, ...]
+    seconds: Seconds
+    velocity: tuple[float, ...] = ()
+    marks: tuple[tuple[str, float], ...] = ()
+
+
+class _Segment(Struct, frozen=True):
+    """One leg of a path as a polynomial. start: in seconds at natural speed."""
+
+    start: Seconds
+    seconds: Seconds
+    coefficients: Array
+    """Array of 6 x joints, for ascending powers of the time since `start`."""
+
+
+class Path:
+    """Legs joined into one curve, from a state that may be in motion.
+
+    marks: sync point -> s. length: seconds at natural speed.
+    """
+
+    def __init__(self, start: JointMotion, legs: Sequence[Leg], limits: Sequence[JointLimit]) -> None:
+        self.legs = tuple(legs)
+        self.start = start
+        self.marks: dict[str, Seconds] = {}
+        self._limits = _Limits(limits)
+        self._segments: list[_Segment] = []
+        self._peaks: list[tuple[float, float]] = []
+        self._leg_starts: list[Seconds] = []
+        self.length = 0.0
+        state = self._limits.softened(start)
+        for leg in self.legs:
+            state = self._append(leg, state)
+
+    def _append(self, leg: Leg, state: JointMotion) -> JointMotion:
+        goal = np.asarray(leg.goal, dtype=np.float64)
+        velocity = np.asarray(leg.velocity or np.zeros_like(goal), dtype=np.float64)
+        end = JointMotion(goal, velocity, np.zeros_like(goal))
+        self._leg_starts.append(self.length)
+        still = state.at_rest and not velocity.any() and bool(np.all(np.abs(state.q - goal) < 1e-7))
+        seconds = 0.0
+        if not (still and leg.seconds <= 0.0):
+            connection = self._limits.connect(state, end, max(leg.seconds, 0.02))
+            seconds = connection.seconds
+            self._segments.append(_Segment(self.length, seconds, connection.coefficients))
+            self._peaks.append((connection.speed, connection.acceleration))
+        for sync, fraction in leg.marks:
+            self.marks[sync] = self.length + fraction * seconds
+        self.length += seconds
+        return end
+
+    def at(self, s: Seconds) -> JointMotion:
+        """Position q at s, and its derivatives q' and q''."""
+        if not self._segments:
+            return resting(self.legs[-1].goal if self.legs else self.start.q)
+        segment = self._segment(s)
+        return JointMotion(*_evaluated(segment.coefficients, min(max(s - segment.start, 0.0), segment.seconds)))
+
+    def after(self, s: Seconds, unreported: Collection[str] = ()) -> tuple[Leg, ...]:
+        """Legs that are left at s, with the sync points beyond s. Those in `unreported` that are not come at once."""
+        index = max((i for i, start in enumerate(self._leg_starts) if start <= s + 1e-12), default=0)
+        ends = [*self._leg_starts[1:], self.length]
+        legs = []
+        for leg, start, end in list(zip(self.legs, self._leg_starts, ends, strict=True))[index:]:
+            since = max(start, s)
+            left = end - since
+            if left <= 1e-12 and end - start > 0.0:
+                continue
+            marks = tuple(
+                (sync, (self.marks[sync] - since) / left if left > 0.0 else 1.0)
+                for sync, _ in leg.marks
+                if self.marks[sync] > s + 1e-12
+            )
+            legs.append(Leg(goal=leg.goal, velocity=leg.velocity, seconds=left, marks=marks))
+        missed = tuple([(sync, 0.0) for sync in self.marks if sync in unreported and self.marks[sync] <= s + 1e-12])
+        if missed:
+            first = legs[0] if legs else Leg(goal=self.legs[-1].goal, seconds=0.0)
+            legs[:1] = [replace(first, marks=(*missed, *first.marks))]
+        return tuple(legs)
+
+    def travel(self, s: Seconds) -> float:
+        """Way of all joints from the start to s, there and back counted twice; in their units."""
+        parts = [(each, min(each.seconds, s - each.start)) for each in self._segments if each.start < s]
+        ways = [_evaluated(each.coefficients, (SAMPLES * seconds)[:, None])[0] for each, seconds in parts]
+        return sum(float(np.sum(np.abs(np.diff(way, axis=0)))) for way in ways)
+
+    @property
+    def fastest(self) -> float:
+        """The highest steady rate that the limits permit; at least 1."""
+        speed = max((speed for speed, _ in self._peaks), default=0.0)
+        acceleration = max((acceleration for _, acceleration in self._peaks), default=0.0)
+        return max(1.0, min(4.0, MARGIN / max(speed, 0.01), sqrt(MARGIN * SHARE / max(acceleration, 0.01))))
+
+    def steepest_brake(self, s: Seconds, rate: float = 1.0) -> float:
+        """Speed at which the rate may fall to 0 at s, in 1/s: high where the path is slow anyway."""
+        brake = 40.0
+        while brake > 0.5:
+            window = np.linspace(max(0.0, s - rate * rate / (2 * brake)), s, 9)
+            if all(self._limits.permits_brake(self.at(float(point)), brake) for point in window):
+                break
+            brake *= 0.8
+        return brake
+
+    @property
+    def gentlest_brake(self) -> float:
+        """Speed at which the rate may change anywhere on this path, in 1/s."""
+        return self._limits.brake_anywhere
+
+    def _segment(self, s: Seconds) -> _Segment:
+        for segment in self._segments:
+            if s < segment.start + segment.seconds:
+                return segment
+        return self._segments[-1]
+
+
+class _Limits:
+    def __init__(self, limits: Sequence[JointLimit]) -> None:
+        self.low = np.array([limit.low for limit in limits])
+        self.high = np.array([limit.high for limit in limits])
+        self.speed = np.array([limit.speed for limit in limits])
+        self.acceleration = np.array([limit.acceleration for limit in limits])
+        self.brake_anywhere = float(np.min((1 - SHARE) * self.acceleration / self.speed)) if len(limits) else 1.0
+
+    def softened(self, state: JointMotion) -> JointMotion:
+        """The state with an acceleration that a path may have."""
+        bound = MARGIN * SHARE * self.acceleration
+        return JointMotion(state.q, state.v, np.clip(state.a, -bound, bound))
+
+    def connect(self, start: JointMotion, end: JointMotion, seconds: Seconds) -> "_Connection":
+        """The quintic between two states that takes `seconds`, or as near to it as keeps the limits."""
+        best: _Connection | None = None
+        for stretch in _STRETCHES:
+            connection = self._with_peaks(_quintic(start, end, seconds * stretch), seconds * stretch)
+            if connection.excess <= 0.0:
+                return connection
+            if best is None or connection.excess < best.excess:
+                best = connection
+        assert best is not None
+        return best
+
+    def permits_brake(self, state: JointMotion, brake: float) -> bool:
+        return bool(np.all(np.abs(state.v) * brake <= (1 - SHARE) * self.acceleration))
+
+    def _with_peaks(self, coefficients: Array, seconds: Seconds) -> "_Connection":
+        position, velocity, change = _evaluated(coefficients, (SAMPLES * seconds)[:, None])
+        speed = float(np.max(np.abs(velocity) / self.speed))
+        acceleration = float(np.max(np.abs(change) / self.acceleration))
+        outside = float(np.max(np.maximum(self.low - position, position - self.high) / (self.high - self.low)))
+        excess = max(speed / MARGIN - 1.0, acceleration / (MARGIN * SHARE) - 1.0, outside - 1e-9)
+        return _Connection(coefficients, seconds, speed, acceleration, excess)
+
+
+class _Connection(Struct, frozen=True):
+    """A quintic with its peaks, as fractions of the joints' limits. excess: of the worst; <= 0: all are kept."""
+
+    coefficients: Array
+    seconds: Seconds
+    speed: float
+    acceleration: float
+    excess: float
+
+
+def _quintic(start: JointMotion, end: JointMotion, seconds: Seconds) -> Array:
+    """Coefficients of the polynomial of degree five that joins two states in `seconds`."""
+    t, h = seconds, end.q - start.q
+    return np.array(
+        [
+            start.q,
+            start.v,
+            start.a / 2,
+            (20 * h - (8 * end.v + 12 * start.v) * t - (3 * start.a - end.a) * t**2) / (2 * t**3),
+            (-30 * h + (14 * end.v + 16 * start.v) * t + (3 * start.a - 2 * end.a) * t**2) / (2 * t**4),
+            (12 * h - 6 * (end.v + start.v) * t + (end.a - start.a) * t**2) / (2 * t**5),
+        ]
+    )
+
+
+_POWERS = np.arange(6)
+_FIRST = np.arange(1, 6)
+_SECOND = np.arange(2, 6) * np.arange(1, 5)
+
+
+def _evaluated(c: Array, t: Seconds | Array) -> tuple[Any, Any, Any]:
+    """Value and first two derivatives of the polynomials at t, or at each t of a column."""
+    powers = t**_POWERS
+    return powers @ c, (powers[..., :5] * _FIRST) @ c[1:], (powers[..., :4] * _SECOND) @ c[2:]

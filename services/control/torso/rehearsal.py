@@ -1,0 +1,284 @@
+"""Rehearsal of a plan on the simulated body: what its motions are if the behaviors begin and wait as planned.
+
+A copy of the body moves on a clock of its own, by the very methods by which the body moves. So a behavior begins
+where the others have brought its part by then, in motion if they are, and a stop costs what it will cost.
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
+from copy import copy
+from heapq import heapify, heappop, heappush
+from itertools import pairwise
+from math import inf
+
+from msgspec.structs import replace
+
+from engage_hri.schemas.behaviors import BlockBehavior, Gaze
+from engage_hri.schemas.body import BodyPose, Estimate, EstimateItem, Phase
+from engage_hri.schemas.units import Seconds
+from engage_hri.schemas.world import World
+from engage_hri.services.control.body import MovementAuthority
+from engage_hri.services.control.config import Variability
+from engage_hri.services.control.torso import choreography, head, tracks
+from engage_hri.services.control.torso.course import Impossible
+from engage_hri.services.control.torso.motion import Motion
+from engage_hri.services.control.torso.moving import Torso
+from engage_hri.services.control.torso.path import Path, resting
+from engage_hri.services.control.torso.runs import Run
+from engage_hri.services.control.waiting import EARLY, Bell
+
+START, RELEASE, BEGIN = "start", 0, 1
+"""Name of the first sync point; and the two kinds of events, in the order in which those of one instant happen."""
+ROUNDING = 6
+"""Decimals of seconds that tell instants apart."""
+TRANSPARENT = 1e-6
+"""Seconds: changes of a phase that are not worth telling."""
+
+
+class Clock(Bell):
+    """An instant that only the rehearsal moves: in place of the loop, and of the bell of each run."""
+
+    def __init__(self, at: Seconds) -> None:
+        self.at = at
+
+    def time(self) -> Seconds:
+        return self.at
+
+    def now(self) -> Seconds:
+        return self.at
+
+    def is_past(self, at: Seconds) -> bool:
+        return self.at >= at - EARLY
+
+    def ring(self) -> None:
+        """Wake nobody: nobody waits."""
+
+
+def beside(torso: Torso, clock: Clock, world: World) -> Torso:
+    """A copy of the torso that moves on `clock`; what it does changes nothing of the torso."""
+    motions: dict[int, Motion] = {}
+
+    def copied(motion: Motion) -> Motion:
+        return motions.setdefault(id(motion), copy(motion))
+
+    other = copy(torso)
+    other.clock, other.world, other.attention = clock, world, copy(torso.attention)
+    other.misbelieved = dict(torso.misbelieved)
+    other.tracks = {part: copy(track) for part, track in torso.tracks.items()}
+    for track in other.tracks.values():
+        track.motion = copied(track.motion)
+    runs = {id(run): copy(run) for run in torso.runs.values()}
+    for run in runs.values():
+        run.motion, run.bell, run.pending = copied(run.motion), clock, list(run.pending)
+        run.authority = _alike(run)
+    other.runs = {part: runs[id(run)] for part, run in torso.runs.items()}
+    other.base = None
+    return other
+
+
+def _alike(run: Run) -> MovementAuthority:
+    """An authority like that of `run`, which the rehearsal may revoke."""
+    authority = MovementAuthority(run.behavior, run.authority.through, run.authority.pace)
+    if run.authority.held:
+        authority.hold()
+    if run.authority.revoked is not None:
+        authority.revoke(run.authority.revoked)
+    return authority
+
+
+class _Part:
+    """One behavior of the rehearsal: its run, when its points were passed, and how long its phases take."""
+
+    def __init__(self, run: Run, estimate: Estimate, waits: Mapping[str, Seconds], *, paced: bool) -> None:
+        self.run = run
+        self.estimate = estimate
+        self.waits = dict(waits)
+        self.passed: dict[str, Seconds] = {}
+        self._is_paced = paced
+        self._phases: dict[str, Seconds] = {}
+
+    def settle(self, torso: Torso, clock: Clock, now: Seconds) -> None:
+        """Note the points that it has passed by now. At a hold point where it waits it stays."""
+        run = self.run
+        while run.pending and not run.is_over and not run.holding:
+            point = run.pending[0]
+            due = run.due(point)
+            if due is None or due > now + EARLY:
+                return
+            if point.held_with and not run.authority.covers(point.held_with):
+                run.holding = True
+                return
+            run.pending.pop(0)
+            self.passed[point.sync] = due
+            if point.sync == "relax" and isinstance(run.behavior, Gaze):
+                clock.at = due
+                torso.turn_home(run)
+
+    def leave(self, passed: Sequence[str], now: Seconds, *, waited: bool) -> None:
+        """Note that it has passed these points. waited: at the first of them; else it stood there already."""
+        self.passed |= dict.fromkeys(passed, now)
+        if not waited:
+            self._phases |= dict.fromkeys(passed, 0.0)
+
+    def foresee(self, torso: Torso, now: Seconds) -> None:
+        """Take the times of the phases to come from the motion as it is now, if nothing stopped it."""
+        if self.run.is_over:
+            return
+        if self._is_paced:
+            self._foresee_unpaced(now)
+            return
+        trial = copy(self.run.motion)
+        trial.extend(inf, now)
+        at, come = dict(self.passed), set(self.passed)
+        for point in self.run.pending:
+            crossing = trial.crossing(self.run.motion.path.marks[point.sync])
+            assert crossing is not None, "nothing limits the trial"
+            at[point.sync] = crossing
+            if self.run.holding and point.held_with == self.run.pending[0].held_with:
+                come.add(point.sync)
+        if isinstance(self.run.behavior, Gaze) and self.run.awaits("relax"):
+            self._foresee_way_home(torso, trial, at)
+        for since, to in pairwise([point.sync for point in self.run.course.points]):
+            if to not in come:
+                self._phases[to] = at[to] - at[since]
+
+    def _foresee_way_home(self, torso: Torso, trial: Motion, at: dict[str, Seconds]) -> None:
+        """Take the way home of a look to where looks go home by now, if a shift has changed that."""
+        base = torso.attention.angles
+        if head.differ(self.run.course.legs[-1].goal, base):
+            start = trial.at(at["relax"])
+            back = head.way_back(tuple(start.q.tolist()), base)
+            at["end"] = at["relax"] + Path(start, (back,), tracks.LIMITS["head"]).length
+
+    def _foresee_unpaced(self, now: Seconds) -> None:
+        """Take the times from the path of a behavior that runs at another pace, if it has just left a hold point."""
+        path, here = self.run.motion.path, self.run.motion.s(now)
+        syncs = [point.sync for point in self.run.course.points]
+        number = len(self.passed)
+        if number and self.passed.get(syncs[number - 1]) == now:
+            at = {syncs[number - 1]: here, **{sync: path.marks[sync] for sync in syncs[number:]}}
+            self._phases |= {to: at[to] - at[since] for since, to in pairwise(syncs[number - 1 :])}
+
+    def told(self) -> Estimate:
+        """The estimate with the phases as they turned out."""
+        phases = tuple([self._updated(phase) for phase in self.estimate.phases])
+        return replace(self.estimate, phases=phases)
+
+    def _updated(self, phase: Phase) -> Phase:
+        natural = max(0.0, self._phases.get(phase.to, phase.natural))
+        if abs(natural - phase.natural) < TRANSPARENT:
+            return phase
+        longest = phase.longest
+        if longest is not None:
+            longest = max(longest, natural) if phase.natural else None
+        share = phase.shortest / phase.natural if phase.natural else 1.0
+        return replace(phase, natural=natural, shortest=share * natural, longest=longest)
+
+
+def rehearsed(torso: Torso, clock: Clock, items: Sequence[EstimateItem]) -> tuple[Estimate, ...]:
+    """Estimate behaviors as one after the other moves the torso, a copy that `beside` has made.
+
+    A pose counts for the parts that none of the others moves before.
+    """
+    began = clock.at
+    times: list[Mapping[str, Seconds]] = [
+        {each.sync: round(began + each.at, ROUNDING) for each in item.times} for item in items
+    ]
+    events = [(at[START], BEGIN, number, "") for number, at in enumerate(times)]
+    heapify(events)
+    parts: dict[int, _Part] = {}
+    moved: set[str] = set()
+    told: dict[int, Estimate] = {}
+    while events:
+        at, kind, number, hold = heappop(events)
+        for part in parts.values():
+            part.settle(torso, clock, at)
+            if not part.run.pending:
+                torso.release(part.run)
+        clock.at = max(at + EARLY, clock.at)  # What ends then has ended.
+        if kind == RELEASE:
+            _let_go(torso, parts[number], hold, clock.at)
+        else:
+            begun = _begin(torso, clock, items[number], times[number], moved)
+            if isinstance(begun, Estimate):
+                told[number] = begun
+                continue
+            parts[number] = begun
+            for sync, until in begun.waits.items():
+                heappush(events, (until, RELEASE, number, sync))
+            for until in begun.run.authority.pace.values():
+                heappush(events, (until, RELEASE, number, ""))
+        for part in parts.values():
+            part.foresee(torso, clock.at)
+    told |= {number: part.told() for number, part in parts.items()}
+    return tuple([told[number] for number in range(len(items))])
+
+
+def _begin(
+    torso: Torso, clock: Clock, item: EstimateItem, times: Mapping[str, Seconds], moved: set[str]
+) -> _Part | Estimate:
+    """Begin a behavior on the copy. Returns its estimate alone if it moves nothing."""
+    behavior = item.behavior
+    if head.is_shift(behavior) and torso.is_overlaid():
+        estimate = torso.estimate(behavior, None, torso.world)
+        if estimate.feasible:
+            torso.attention.shift(behavior, choreography.plan(behavior, torso.situation(torso.world)))
+        return estimate
+    try:
+        course = choreography.plan(behavior, torso.situation(torso.world))
+        _place(torso, item.pose, [part for part in course.parts if part not in moved])
+        course = choreography.plan(behavior, torso.situation(torso.world))
+    except Impossible:
+        return torso.estimate(behavior, None, torso.world)
+    estimate = torso.estimate(behavior, None, torso.world)
+    if not estimate.feasible:
+        return estimate
+    held = {point.sync: point.held_with for point in course.points}
+    waits = {held[sync]: at for sync, at in times.items() if held.get(sync)}
+    paced = {sync: at for sync, at in times.items() if sync != START and not held.get(sync)}
+    authority = MovementAuthority(behavior, _through(behavior, list(waits)), paced)
+    run = Run(behavior, course, authority, Variability(), 0)
+    run.bell = clock
+    torso.take_over(run, torso.path(course))
+    moved.update(course.parts)
+    part = _Part(run, estimate, waits, paced=bool(paced))
+    if paced:
+        torso.extend(run)
+    return part
+
+
+def _place(torso: Torso, pose: BodyPose | None, parts: Sequence[str]) -> None:
+    """Put parts to rest where `pose` has them, or leave them where they are if it does not say."""
+    angles = {joint.joint: joint.angle for joint in pose.joints} if pose is not None else {}
+    for part in parts:
+        track = torso.tracks[part]
+        if part != "nod" and all(joint in angles for joint in track.joints):
+            start = resting([angles[joint] for joint in track.joints])
+            track.play(Motion(Path(start, (), tracks.LIMITS[part]), torso.clock.time()))
+
+
+def _let_go(torso: Torso, part: _Part, hold: str, now: Seconds) -> None:
+    """Let a behavior pass the hold point at which it waits, or to which it is still on its way.
+
+    hold: empty to let it go on at another pace.
+    """
+    run = part.run
+    if run.is_over or not run.pending:
+        return
+    part.waits.pop(hold, None)
+    run.authority.extend(_through(run.behavior, list(part.waits)))
+    waited = True
+    while hold and run.holding and run.authority.covers(hold):
+        part.leave(torso.leave_hold(run, hold), now, waited=waited)
+        hold, waited = run.pending[0].held_with, False
+    if not run.holding:
+        torso.extend(run)
+
+
+def _through(behavior: BlockBehavior, waits: Sequence[str]) -> str:
+    """The last sync point that a behavior may pass if it has to wait at the first of `waits`."""
+    return next(_before(behavior, waits[:1]), "end")
+
+
+def _before(behavior: BlockBehavior, waits: Sequence[str]) -> Iterator[str]:
+    points = MovementAuthority(behavior, START).points
+    yield from (points[points.index(sync) - 1] for sync in waits)

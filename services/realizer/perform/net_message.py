@@ -1,0 +1,42 @@
+"""Net of a block as the message that tells watchers of it."""
+
+from collections.abc import Mapping
+
+from engage_hri.schemas.nets import Fired, NetPlace, NetPlanned, NetPoint, NetTransition
+from engage_hri.schemas.units import Seconds, Stamp
+from engage_hri.services.realizer.net.petri_net import Marking
+from engage_hri.services.realizer.plan.planner import Plan
+from engage_hri.services.realizer.points import FINISH
+
+
+def described(plan: Plan, began: Stamp, marking: Marking, fired: Mapping[int, Seconds]) -> NetPlanned:
+    """The net of a plan with its tokens. began: when the block started. fired: transitions, seconds after that."""
+    transitions = [
+        NetTransition(
+            points=tuple(NetPoint(behavior=point.behavior, sync=point.sync) for point in each.points or (FINISH,)),
+            time=time,
+        )
+        for each, time in zip(plan.net.transitions, plan.schedule, strict=True)
+    ]
+    places = [
+        NetPlace(kind=each.kind, source=each.source, target=each.target, lag=each.lag, behavior=each.behavior)
+        for each in plan.net.places
+    ]
+    return NetPlanned(
+        block=plan.block.id,
+        at=began,
+        transitions=tuple(transitions),
+        places=tuple(places),
+        marked=tokens(marking),
+        fired=firings(fired),
+    )
+
+
+def tokens(marking: Marking) -> tuple[int, ...]:
+    """Numbers of the places that hold a token."""
+    return tuple(number for number, content in enumerate(marking) if content)
+
+
+def firings(fired: Mapping[int, Seconds]) -> tuple[Fired, ...]:
+    """Transitions with their times, in the order in which they fired."""
+    return tuple(Fired(transition=transition, time=time) for transition, time in fired.items())

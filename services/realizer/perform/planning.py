@@ -1,0 +1,153 @@
+"""Planning of a block on the bus: the body is asked what its behaviors take, and asked again about the plan."""
+
+import asyncio
+from collections.abc import Callable, Collection, Iterable, Mapping
+
+from engage_hri.schemas import keys
+from engage_hri.schemas.behaviors import Hand, Speech
+from engage_hri.schemas.blocks import Block
+from engage_hri.schemas.body import BodyPose, Estimate, EstimateBehaviors, EstimateItem, Estimates, PlannedTime
+from engage_hri.schemas.check import validated
+from engage_hri.schemas.faults import EngageError, Fault, NoReply
+from engage_hri.services.bus.interface import Bus
+from engage_hri.services.realizer.config import RealizerConfig
+from engage_hri.services.realizer.perform.knowledge import Asker, Performed, knowledge, may_share, parts_of
+from engage_hri.services.realizer.perform.live import Live
+from engage_hri.services.realizer.perform.live_blocks import LiveBlocks
+from engage_hri.services.realizer.plan.handover import hands_refused
+from engage_hri.services.realizer.plan.known import Known, is_foreign, is_named_in
+from engage_hri.services.realizer.plan.planner import Plan, plan_steps
+from engage_hri.services.realizer.plan.poses import changed, planned_times, poses_before
+from engage_hri.services.realizer.plan.relations import BlockRefused, extent, relation_steps
+from engage_hri.services.realizer.plan.steps import Steps, T
+from engage_hri.services.realizer.points import Point, performer
+
+SLICE = 512
+"""Elements that are worked on in one go (see `steps`): one to five milliseconds. Counted: equal runs stay equal."""
+ROUNDS = 3
+"""How often the body is asked about a plan anew, at most: each answer may make another plan."""
+
+
+class Planning:
+    """Planning of blocks with the body and with what is known of the other live blocks."""
+
+    def __init__(
+        self, bus: Bus, config: RealizerConfig, live_blocks: LiveBlocks, performing: Callable[[], Iterable[Performed]]
+    ) -> None:
+        self._bus = bus
+        self._config = config
+        self._live_blocks = live_blocks
+        self._performing = performing
+
+    async def plan(self, live: Live, elsewhere: Mapping[str, Block]) -> Plan:
+        """Plan a block. elsewhere: other live blocks, by id."""
+        block = live.request.block
+        for each in block.behaviors:
+            if isinstance(each, Speech) and len(each.text) > self._config.utterance:
+                reason = f"{len(each.text)} characters of speech, at most {self._config.utterance} are said in one go"
+                advice = "say it in several; `realizer.utterance` is the limit"
+                raise BlockRefused(
+                    Fault(reason=reason, where=f"{block.id}: {each.id}", line=each.line, advice=advice)
+                )
+        if (held := extent(block)) > self._config.most:
+            reason = f"{held} behaviors, marks and sync references; at most {self._config.most} are planned in time"
+            advice = "send several (blocks with APPEND, fragments of one turn); `realizer.most` is the limit"
+            raise BlockRefused(Fault(reason=reason, where=block.id, advice=advice))
+        relations = await unhurried(relation_steps(block, elsewhere))  # Bad references: before the body is asked.
+        named = frozenset(point for point in relations.named if is_foreign(point.behavior))
+        block = validated(block)
+        estimates = await self._estimates(block, {})
+        await self._earlier(live, named)
+        return await self._agreed(block, estimates, elsewhere, named)
+
+    async def again(self, plan: Plan, elsewhere: Mapping[str, Block]) -> Plan:
+        """Plan a block that had to wait: by now the body and the other blocks are elsewhere."""
+        known = self._known(plan.block, elsewhere, plan.foreign, plan.estimates.values())
+        estimates = await self._estimates(plan.block, poses_before(plan, known), planned_times(plan))
+        return await self._agreed(plan.block, estimates, elsewhere, plan.foreign)
+
+    async def _agreed(
+        self, block: Block, first: tuple[Estimate, ...], elsewhere: Mapping[str, Block], named: Collection[Point]
+    ) -> Plan:
+        """Plan with `first`, and ask the body about the plan and the hands it has chosen, until its answer changes
+        nothing."""
+        barred: set[tuple[str, Hand]] = set()
+        chosen, estimates, rounds = block, first, 0
+        while True:
+            known = self._known(block, elsewhere, named, estimates)
+            plan = await unhurried(plan_steps(chosen, estimates, known=known, barred=barred))
+            before, times = poses_before(plan, known), planned_times(plan)
+            if plan.block is chosen and (rounds >= ROUNDS or not (before or times)):
+                return plan
+            told = await self._estimates(plan.block, before, times)
+            if plan.block is chosen and not changed(estimates, told):
+                return plan
+            chosen, estimates, rounds = plan.block, told, rounds + 1
+            if refused := hands_refused(block, chosen, estimates):
+                barred |= refused
+                chosen, estimates, rounds = block, first, 0
+
+    async def _earlier(self, live: Live, named: Iterable[Point]) -> None:
+        """Wait until those of the earlier blocks are planned that this one is to be planned with in mind."""
+        block = live.request.block
+        for other in live.earlier:
+            id = other.request.block.id
+            if not other.settled.done() and (is_named_in(id, named) or may_share(block, other.request.block)):
+                await asyncio.wait([other.settled])
+
+    def _known(
+        self, block: Block, elsewhere: Mapping[str, Block], named: Collection[Point], estimates: Iterable[Estimate]
+    ) -> Known:
+        now = self._bus.now()
+        parts = parts_of(block.behaviors, estimates)
+        return knowledge(Asker(block.id, now, now, named, parts, elsewhere), self._performing(), self._live_blocks)
+
+    async def _estimates(
+        self, block: Block, before: Mapping[str, BodyPose], times: Mapping[str, tuple[PlannedTime, ...]] = {}
+    ) -> tuple[Estimate, ...]:
+        """Estimates of the body. before: poses in which behaviors start; without one, from where the body is now.
+
+        times: when they are planned to begin and to wait, in the order in which they begin.
+        """
+        behaviors = [behavior for behavior in block.behaviors if performer(behavior) == "body"]
+        if not behaviors:
+            return ()
+        rank = {id: number for number, id in enumerate(times)}
+        behaviors.sort(key=lambda behavior: rank.get(behavior.id, len(rank)))
+        items = (
+            EstimateItem(behavior=behavior, pose=before.get(behavior.id), times=times.get(behavior.id, ()))
+            for behavior in behaviors
+        )
+        question = EstimateBehaviors(items=tuple(items))
+        try:
+            answer = await self._bus.query(keys.ESTIMATE, question, timeout=self._config.estimate)
+        except NoReply as error:
+            fault = Fault(reason="there is no body to perform it", where=block.id, advice="start control")
+            raise BlockRefused(fault, "CANNOT_CREATE_BEHAVIOR") from error
+        except EngageError as error:
+            raise BlockRefused(error.fault, "CANNOT_CREATE_BEHAVIOR") from error
+        if not isinstance(answer, Estimates):
+            fault = Fault(
+                reason=f"control answered with a {type(answer).__name__}, not with estimates", where=block.id
+            )
+            raise BlockRefused(fault, "CANNOT_CREATE_BEHAVIOR")
+        return answer.items
+
+
+async def unhurried(steps: Steps[T]) -> T:
+    """The result of long work, done a slice at a time: whatever else is due comes in between.
+
+    A cancellation takes effect at the end of the slice.
+    """
+    done = 0
+    try:
+        while True:
+            done += next(steps)
+            if done >= SLICE:
+                done = 0
+                await asyncio.sleep(0)
+    except StopIteration as end:
+        result: T = end.value
+        return result
+    finally:
+        steps.close()

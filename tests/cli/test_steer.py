@@ -1,0 +1,55 @@
+"""`engage steer` beside a realizer of its own process, over real sockets. The test itself is the body."""
+
+import asyncio
+from asyncio.subprocess import Process
+
+import pytest
+
+from engage_hri.schemas.behaviors import Gesture
+from engage_hri.services.bus.zenoh.hub import open_hub
+from engage_hri.services.client.robot import connect
+from tests.bus.places import free_endpoint
+from tests.cli.command import start
+from tests.cli.test_processes import PATIENCE, line, stopped
+from tests.realizer.fake_body import FakeBody
+
+pytestmark = pytest.mark.real_time
+BEAT = Gesture(id="beat", lexeme="BEAT", mode="RIGHT_HAND")
+
+
+async def said(process: Process) -> tuple[int, str, str]:
+    out, err = await asyncio.wait_for(process.communicate(), PATIENCE)
+    assert process.returncode is not None
+    return process.returncode, out.decode().strip(), err.decode().strip()
+
+
+async def test_a_robot_is_held_goes_on_and_is_stopped_from_the_command_line() -> None:
+    endpoint = free_endpoint()
+    where = ("--robot", "steered", "--connect", endpoint)
+    async with await open_hub("steered", listen=[endpoint]) as hub, connect(hub=hub) as robot:
+        body = asyncio.create_task(FakeBody().serve(hub.join("control"), lambda: None))
+        realizer = await start("run", "realizer", *where)
+        try:
+            await line(realizer, "realizer is ready")
+            assert await said(await start("steer", "hold", *where)) == (
+                0, "held: nothing is being performed; so is what comes, until `engage steer continue`", ""
+            )  # fmt: skip
+            with robot.feedback() as feedback:
+                performing = asyncio.create_task(robot.realize("b", [BEAT]))
+                assert await feedback.next(PATIENCE) is not None
+            assert await said(await start("steer", "continue", "b", *where)) == (0, "continued: b", "")
+            code, _, error = await said(await start("steer", "hold", "b", "wave", *where))
+            assert (code, error) == (2, "b: wave: it is not being performed")
+            assert not performing.done()  # the robot is held still
+            assert await said(await start("steer", "continue", *where)) == (0, "continued: b", "")
+            assert (await asyncio.wait_for(performing, PATIENCE)).status == "done"
+        finally:
+            await stopped(realizer)
+            body.cancel()
+            await asyncio.gather(body, return_exceptions=True)
+
+
+async def test_a_behavior_without_a_block_is_refused() -> None:
+    code, _, error = await said(await start("steer", "stop", "", "wave"))
+
+    assert (code, error) == (2, "wave: a behavior without its block")
