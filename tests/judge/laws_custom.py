@@ -39,10 +39,14 @@ def customs(case: Case) -> Iterator[Finding]:
 
 
 def _without_the_lost(case: Case, block: Reading) -> Reading:
-    """The block without what was lost, as if that had never been written."""
+    """The block without what was lost before it was there, as if that had never been written."""
     relations = []
     for each in block.relations:
-        left = tuple(term for term in each.terms if (term.place.block, term.place.behavior) not in case.lost)
+        left = tuple(
+            term
+            for term in each.terms
+            if (term.place.block, term.place.behavior) not in case.lost or term.place in case.times
+        )
         if len(left) > 1:
             relations.append(replace(each, terms=left))
     return replace(block, relations=tuple(relations))

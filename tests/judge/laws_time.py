@@ -2,10 +2,11 @@
 
 from collections.abc import Iterator, Mapping
 from itertools import combinations, pairwise, permutations
+from math import inf
 
 from engage_hri.schemas.feedback import WarningFeedback
 from tests.judge.case import Case, Finding, merged, within
-from tests.judge.reading import Place, Reading, Relation, Term
+from tests.judge.reading import SHIFTS, WITH_STROKE, Place, Reading, Relation, Term
 
 EXACT = 0.0101
 """Seconds: how much an exact body may miss an instant, or a prediction."""
@@ -57,10 +58,24 @@ def _counts(place: Place, block: str, case: Case) -> bool:
 
 def _held(case: Case, relation: Relation, *places: Place) -> float:
     """Seconds that a relation may be off since something of these blocks was held between its points, or near."""
+    if any(_ends_by_itself(case, place) for place in places):
+        return inf
     times = [case.times[place] for place in places]
     held = merged(span for block in {place.block for place in places} for span in case.holds(block))
     seconds = within(held, min(times) - STANDING, max(times))
     return seconds + STANDING if seconds else 0.0
+
+
+def _ends_by_itself(case: Case, place: Place) -> bool:
+    """True if the behavior was held on its way to a point before which it cannot wait: it goes on to the next one."""
+    asked = case.blocks[place.block].behaviors.get(place.behavior)
+    start = case.times.get(Place(place.block, place.behavior, "start"))
+    if asked is None or start is None:
+        return False
+    is_before_a_wait = asked.type in WITH_STROKE and place.sync == "ready"
+    if not (asked.type in SHIFTS or is_before_a_wait or place.sync in ("relax", "end")):
+        return False
+    return within(case.holds(place.block, place.behavior), start, case.times[place]) > 0.0
 
 
 def _gap(relation: Relation, one: float, other: float) -> float:

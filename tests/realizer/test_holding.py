@@ -10,12 +10,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from engage_hri.schemas import keys
-from engage_hri.schemas.behaviors import Event, Gaze, Gesture, Mark, Speech, Wait
-from engage_hri.schemas.blocks import Block, BlockOutcome, PerformanceSteered, SteerPerformance
+from engage_hri.schemas.behaviors import Event, Gaze, Gesture, Head, Mark, Speech, Wait
+from engage_hri.schemas.blocks import Block, BlockOutcome, InterruptBehavior, PerformanceSteered, SteerPerformance
 from engage_hri.services.realizer.config import RealizerConfig
 from engage_hri.services.requests.ends import RequestRefused
 from engage_hri.services.runtime.virtual_time import run_virtual
 from tests.realizer.fake_body import FakeBody
+from tests.realizer.planning import timed
 from tests.realizer.stage import FakeRecognition, Stage, after, block, stage, together
 from tests.realizer.test_properties import blocks
 
@@ -203,3 +204,51 @@ def test_whatever_is_held_and_let_go_at_random_each_block_has_the_end_that_it_ha
 
     assert held[:2] == without[:2]
     assert set(held[2]) <= set(without[2])
+
+
+@pytest.mark.parametrize("is_planned_again", [False, True])
+async def test_a_fixed_time_is_later_by_the_time_of_the_hold(is_planned_again: bool) -> None:
+    """Also for what comes there by prediction, and if the block is planned again after the hold."""
+    nod = Head(id="n", lexeme="NOD")
+    made = block((timed(BEAT, start="0.2", end="6"), timed(nod, stroke="5"), Wait(id="w", duration=2.0)))
+    async with stage() as seen:
+        performing = seen.ask(made)
+        await asyncio.sleep(0.1)
+        await steered(seen, "hold", "b")
+        await asyncio.sleep(3.0)
+        await steered(seen, "continue", "b")
+        if is_planned_again:
+            await asyncio.sleep(0.5)
+            seen.requests.send(keys.BLOCK, InterruptBehavior(id="i", requester="test", block="b", behavior="w"))
+        await performing.outcome
+
+    times = seen.times()
+    assert (times["beat:start"], times["beat:end"]) == (pytest.approx(3.2), pytest.approx(9.0))
+    assert times["n:stroke"] == pytest.approx(8.0)
+    assert [each.kind for each in seen.warnings()] == ["INTERRUPTED"] * is_planned_again
+
+
+async def test_who_comes_late_to_an_instant_since_it_was_held_is_not_late() -> None:
+    async with stage() as seen:
+        performing = seen.ask(block((BEAT, STORY), together("beat:stroke", "s:m1")))
+        await asyncio.sleep(0.9)  # the stroke is under way, and comes at 1.0
+        await steered(seen, "hold", "b", "s")
+        await asyncio.sleep(5.0)
+        await steered(seen, "continue", "b")
+        await performing.outcome
+
+    assert seen.warnings() == []
+
+
+async def test_what_is_tied_to_words_that_were_held_comes_with_them() -> None:
+    async with stage() as seen:
+        performing = seen.ask(block((timed(BEAT, stroke_start="s:m2-0.2"), STORY)))
+        await asyncio.sleep(1.5)
+        await steered(seen, "hold", "b")
+        await asyncio.sleep(5.0)
+        await steered(seen, "continue", "b")
+        await performing.outcome
+
+    times = seen.times()
+    assert times["beat:stroke_start"] == pytest.approx(times["s:m2"] - 0.2)
+    assert seen.warnings() == []

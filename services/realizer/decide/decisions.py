@@ -49,8 +49,8 @@ class Decisions:
         self.bounds = Bounds(plan)
         self.foresight.look_ahead(plan, net)
         self.grants.adopt(plan, net)
-        net.hold(self.facts.held, self.began)
         self.facts.adopt(net, {id: chain.points for id, chain in plan.chains.items()})
+        self.foresight.prolong()
         net.observers += tuple(self._observers(plan, net, self.began))
         for behavior in self.facts.begun:
             if behavior not in plan.chains:
@@ -92,6 +92,10 @@ class Decisions:
         before = {each for each in facts.begun if facts.is_held(each)}
         facts.hold(behaviors, now)
         self.net.hold(behaviors, now)
+        self.foresight.prolong()
+        for behavior in before:
+            if not facts.is_held(behavior) and not facts.has_ended(behavior):
+                self.foresight.go_on(behavior, now)
         effects: list[Effect] = []
         for behavior in sorted(facts.begun):
             is_held = facts.is_held(behavior)
@@ -112,12 +116,17 @@ class Decisions:
         at = self.facts.reached.get(point)
         if at is None or point not in self.plan.at:
             return 0.0
-        return self.bounds.lateness(self.plan.at[point], at, self.net.passed, self.facts.held_between)
+        return self.bounds.lateness(self.plan.at[point], at, self.net.passed, self.facts.held_about)
 
     def earliness(self, point: Point) -> Seconds:
-        """Seconds by which a point was reached before the time that the block fixes for it; 0 if it fixes none."""
+        """Seconds by which a point was reached before the time that the block fixes for it; 0 if it fixes none.
+
+        What was held on its way, and cannot wait there, ends by itself: it is not early.
+        """
         at = self.facts.reached.get(point)
         if at is None or point not in self.plan.at:
+            return 0.0
+        if self.facts.held_between(self.facts.begun.get(point.behavior, at), at, point.behavior):
             return 0.0
         return max(0.0, self.began + self.bounds.fixed(self.plan.at[point]) - at)
 

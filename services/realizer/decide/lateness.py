@@ -114,15 +114,15 @@ class Bounds:
         transition: int,
         at: Seconds,
         passed: Mapping[int, Seconds],
-        held_between: Callable[[Seconds, Seconds], Seconds],
+        held_about: Callable[[Seconds, Seconds], Seconds],
     ) -> Seconds:
         """Seconds by which a transition at `at` is later than it may be.
 
-        passed: the times of the transitions that all their behaviors have passed. held_between: the seconds for which
-        behaviors were held between two times. They do not count.
+        passed: the times of the transitions that all their behaviors have passed. held_about: the seconds for which
+        behaviors were held about two times. They do not count.
         """
         known = [(passed[each], seconds) for each, seconds in self._not_after[transition] if each in passed]
-        late = (at - since - seconds - held_between(since, at) for since, seconds in known)
+        late = (at - since - seconds - held_about(min(since, since + seconds), at) for since, seconds in known)
         return max((0.0, *late))
 
 

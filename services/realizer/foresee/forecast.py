@@ -40,6 +40,8 @@ class Forecast(LongestPaths):
         """Of the arcs of phases: `asked` and `least` as estimated."""
         self._of_behavior: dict[str, list[int]] = {}
         self._node_of: dict[str, int] = {}
+        self._stopped: dict[int, Seconds] = {}
+        """Seconds by which arcs are longer than planned; see `prolong`."""
         self._given_way: set[int] = set()
         self._broken: set[int] = set()
         for rank, transition in enumerate(order(net) or range(size)):
@@ -185,6 +187,20 @@ class Forecast(LongestPaths):
             self._loosen(number)
         self._touch(node)
 
+    def prolong(self, source: int, target: int, seconds: Seconds) -> None:
+        """Let the delay from one instant to another take so much longer than planned: its clock was stopped."""
+        delays = [n for n in self._out[source] if self._arcs[n].target == target and not self._arcs[n].is_bound]
+        bounds = [n for n in self._out[target] if self._arcs[n].target == source and self._arcs[n].is_bound]
+        for number in (*delays, *bounds):
+            arc = self._arcs[number]
+            longer = -seconds if arc.is_bound else seconds
+            more = longer - self._stopped.get(number, 0.0)
+            if not arc.behavior and more:
+                self._stopped[number] = longer
+                arc.asked, arc.least = arc.asked + more, arc.least + more
+                if arc.is_on:
+                    self._set_seconds(number, arc.asked)
+
     def relearn(self, behaviors: Iterable[str]) -> None:
         """Take over the changed factors of these behaviors."""
         for behavior in behaviors:
@@ -298,9 +314,12 @@ def full_forecast(
     reached: Mapping[Point, Seconds],
     arrived: Mapping[Point, Seconds],
     instants: Mapping[int, Seconds],
+    prolonged: Iterable[tuple[int, int, Seconds]] = (),
 ) -> Forecast:
-    """Forecast of every instant, from scratch. instants: those that are over."""
+    """Forecast of every instant, from scratch. instants: those that are over. prolonged: see `Forecast.prolong`."""
     forecast = Forecast(plan, began, factor, foreseen)
+    for source, target, seconds in prolonged:
+        forecast.prolong(source, target, seconds)
     for point, at in reached.items():
         if point in plan.at:
             forecast.passed(point.behavior, plan.at[point], at)

@@ -99,6 +99,26 @@ class Foresight:
         if (forecast := self.forecast) is not None:
             self._news.append((forecast.fix, transition, at))
 
+    def prolong(self) -> None:
+        """Take in for how long clocks of the net were stopped: what they lead to is later by that."""
+        if (forecast := self.forecast) is not None:
+            self._news += [(forecast.prolong, *each) for each in self._prolonged]
+
+    def go_on(self, behavior: str, now: Seconds) -> None:
+        """Expect a behavior that was held, and is not any more, at its next point as much later, at most."""
+        number, chain = self._facts.next_number(behavior), self.plan.chains[behavior]
+        if (forecast := self.forecast) is None or not number:
+            return
+        before, point = self._facts.reached[chain.points[number - 1]], chain.points[number]
+        at = before + self._phase(behavior, number) + self._facts.held_between(before, now, behavior)
+        at = now if self._facts.holds(point) else max(now, at)
+        self._news.append((forecast.overdue, self.plan.at[point], at))
+
+    @property
+    def _prolonged(self) -> list[tuple[int, int, Seconds]]:
+        places = self._net.net.places
+        return [(places[each].source, places[each].target, by) for each, by in self._net.prolonged.items()]
+
     # -- other blocks --------------------------------------------------------------------------------------------
 
     def foresee(self, point: Point, at: Seconds) -> None:
@@ -174,7 +194,8 @@ class Foresight:
     def update(self, now: Seconds) -> Iterable[int]:
         """Draw the conclusions of all that happened; returns the instants that are expected at another time now.
 
-        A behavior that is overdue by a second is expected a second from now.
+        A behavior that is overdue by a second is expected a second from now; the time for which it is held does not
+        count.
         """
         if self.forecast is None:
             return ()
@@ -186,9 +207,11 @@ class Foresight:
             if chain is None or facts.next_number(behavior) != number or facts.holds(chain.points[number]):
                 continue
             expected = max(expected, self.asked(chain.points[number], expected))
-            until = expected
-            if expected < now - EPSILON:  # and not slower on purpose
-                until = self.not_before[behavior] = now + (now - expected)
+            until = due = expected + facts.held_between(facts.reached[chain.points[number - 1]], now, behavior)
+            if facts.is_held(behavior):
+                until = max(now, due)
+            elif due < now - EPSILON:  # and not slower on purpose
+                until = self.not_before[behavior] = now + (now - due)
                 self.forecast.overdue(self.plan.at[chain.points[number]], until)
             heapq.heappush(self._arrivals, (until, expected, behavior, number))
         return self.forecast.update()
@@ -287,7 +310,7 @@ class Foresight:
         now: what has not come is expected no earlier.
         """
         facts = (self.foreseen, self._facts.reached, self._facts.arrived, self._net.instants)
-        forecast = full_forecast(self.plan, self._facts.began, self.experience.factor, *facts)
+        forecast = full_forecast(self.plan, self._facts.began, self.experience.factor, *facts, self._prolonged)
         if now is not None:
             for transition in range(len(self.plan.members)):
                 forecast.overdue(transition, now)

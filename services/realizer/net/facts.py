@@ -4,7 +4,8 @@ Bodies report late, twice, out of order, and about what was never asked of them.
 changes nothing.
 """
 
-from collections.abc import Collection, Mapping
+from collections.abc import Callable, Collection, Mapping
+from functools import partial
 from math import isfinite
 
 from engage_hri.schemas.units import Seconds
@@ -37,12 +38,17 @@ class Facts:
         self._net = net
         self._points = points
         net.start(self.began)
-        for behavior, at in self.begun.items():
-            net.begin(behavior, at)
-        for point, at in self.reached.items():
-            net.reach(point, at)
-        for point in self.arrived.keys() - self.reached.keys():
-            net.arrive(point, self.arrived[point])
+        waiting = self.arrived.keys() - self.reached.keys()
+        happened: list[tuple[Seconds, Callable[[], None]]] = [
+            *((at, partial(net.begin, behavior, at)) for behavior, at in self.begun.items()),
+            *((at, partial(net.reach, point, at)) for point, at in self.reached.items()),
+            *((self.arrived[each], partial(net.arrive, each, self.arrived[each])) for each in waiting),
+        ]
+        if self._holds:  # What was held stopped the clocks of its time; else the order of these does not matter.
+            happened += [(at, partial(net.stop_and_go, held, at)) for at, held in self._holds]
+            happened.sort(key=lambda each: each[0])
+        for _, happen in happened:
+            happen()
 
     # -- what is measured ----------------------------------------------------------------------------------------
 
@@ -121,6 +127,20 @@ class Facts:
     def is_held(self, behavior: str) -> bool:
         """True if the behavior is to wait where it next can."""
         return self.held is None or behavior in self.held
+
+    def held_about(self, since: Seconds, until: Seconds) -> Seconds:
+        """Seconds of the holds, of whatever behaviors, that were in force between these times; each from its begin.
+
+        What was held before `since` may have its effect only after that.
+        """
+        runs: list[tuple[Seconds, Seconds]] = []
+        was_held = False
+        for (at, held), end in zip(self._holds, [*(at for at, _ in self._holds[1:]), until], strict=True):
+            is_held = held is None or bool(held)
+            if is_held and at < until:
+                runs[-1:] = [(runs[-1][0], min(end, until))] if was_held else [*runs[-1:], (at, min(end, until))]
+            was_held = is_held
+        return sum(end - at for at, end in runs if end > since)
 
     def held_between(self, since: Seconds, until: Seconds, behavior: str = "") -> Seconds:
         """Seconds between these times in which the behavior was held; empty: in which any was."""

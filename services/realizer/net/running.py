@@ -71,6 +71,8 @@ class RunningNet:
         self._before: dict[int, int] = {}
         """Places whose token was put or taken since `changes` was asked last, with what was there then."""
         self._clocks = Clocks()
+        self.prolonged: dict[int, Seconds] = {}
+        """Places whose clocks were stopped for a while, and for how long."""
         self._held: Collection[str] | None = ()
         """Behaviors whose clocks are stopped; None: all clocks are."""
         self._latest = [-inf] * size
@@ -223,9 +225,15 @@ class RunningNet:
     def hold(self, behaviors: Collection[str] | None, now: Seconds) -> None:
         """Stop the clocks before the transitions of these behaviors (None: all), and let all others go on."""
         self._held = behaviors
-        for place, at in self._clocks.stop(self._is_held, now).items():
-            target = self.net.places[place].target
-            self._ripe[target] = max(self._ripe[target], at)
+        for number, at in self._clocks.stop(self._is_held, now).items():
+            place = self.net.places[number]
+            self._ripe[place.target] = max(self._ripe[place.target], at)
+            self.prolonged[number] = at - self.instants[place.source] - place.lag
+
+    def stop_and_go(self, behaviors: Collection[str] | None, at: Seconds) -> None:
+        """`tick`, and `hold`: what was held at a time in the past."""
+        self.tick(at)
+        self.hold(behaviors, at)
 
     def _is_held(self, place: int) -> bool:
         held = self._held

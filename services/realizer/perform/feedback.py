@@ -113,7 +113,8 @@ class Reporter:
                     character_id=self._character,
                 )
             )
-        if (late := max(skew, decisions.lateness(point))) > self._tolerance:
+        moved = skew - facts.held_about(at - skew, at)
+        if (late := max(moved, decisions.lateness(point))) > self._tolerance:
             self.late(decisions.net.part_of[point].point, f"{point.sync} came {late:.2f} s later than it should")
         elif (early := decisions.earliness(point)) > self._tolerance:
             instant = decisions.net.part_of[point].point
