@@ -108,14 +108,17 @@ def _taken(plan: Plan, id: str) -> Seconds:
 
 
 def changed(before: Sequence[Estimate], after: Sequence[Estimate]) -> bool:
-    """True if a plan made with the estimates `before` is not the one that they call for `after`."""
+    """True if a plan made with the estimates `before` is not the one that they call for `after`.
+
+    Estimates of what was not asked about say nothing: bodies err.
+    """
     known = {each.behavior: each for each in before}
     return any(
         one.feasible != other.feasible
         or one.parts != other.parts
         or len(one.phases) != len(other.phases)
         or any(abs(a.natural - b.natural) > NOTICEABLE for a, b in zip(one.phases, other.phases, strict=True))
-        for one, other in ((known[each.behavior], each) for each in after)
+        for one, other in ((known[each.behavior], each) for each in after if each.behavior in known)
     )
 
 
