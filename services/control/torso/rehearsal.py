@@ -95,6 +95,7 @@ class _Part:
         self.estimate = estimate
         self.waits = dict(waits)
         self.passed: dict[str, Seconds] = {}
+        self._stops = {point.sync for point in run.course.points if point.held_with in waits}
         self._forced = forced
         """Points for which it hurries or dawdles: the phases to them are told as they would be by themselves."""
         self._phases: dict[str, Seconds] = {}
@@ -173,7 +174,7 @@ class _Part:
         if self._forced:
             syncs = [point.sync for point in self.run.course.points]
             for since, to in pairwise([sync for sync in syncs if sync in self.passed]):
-                if to not in self._forced:
+                if to not in self._forced and to not in self._stops:
                     self._phases[to] = self.passed[to] - self.passed[since]
         phases = tuple([self._updated(phase) for phase in self.estimate.phases])
         return replace(self.estimate, phases=phases)
