@@ -204,6 +204,8 @@ def rehearsed(torso: Torso, clock: Clock, items: Sequence[EstimateItem]) -> tupl
     parts: dict[int, _Part] = {}
     moved: set[str] = set()
     told: dict[int, Estimate] = {}
+    awaited: dict[int, Seconds] = {}
+    """When each paced behavior passes its next point, by its number."""
     while events:
         at, kind, number, hold = heappop(events)
         for part in parts.values():
@@ -223,8 +225,9 @@ def rehearsed(torso: Torso, clock: Clock, items: Sequence[EstimateItem]) -> tupl
                 heappush(events, (until, RELEASE, number, sync))
         for each, part in parts.items():
             part.foresee(torso, clock.at)
-            if (due := part.next_due()) is not None and due > clock.at:
-                heappush(events, (due, RELEASE, each, ""))
+            if (due := part.next_due()) is not None and due != awaited.get(each):
+                awaited[each] = due
+                heappush(events, (max(due, clock.at), RELEASE, each, ""))
     told |= {number: part.told() for number, part in parts.items()}
     return tuple([told[number] for number in range(len(items))])
 
