@@ -219,10 +219,10 @@ def rehearsed(torso: Torso, clock: Clock, items: Sequence[EstimateItem]) -> tupl
             begun = _begin(torso, clock, items[number], times[number], moved)
             if isinstance(begun, Estimate):
                 told[number] = begun
-                continue
-            parts[number] = begun
-            for sync, until in begun.waits.items():
-                heappush(events, (until, RELEASE, number, sync))
+            else:
+                parts[number] = begun
+                for sync, until in begun.waits.items():
+                    heappush(events, (until, RELEASE, number, sync))
         for each, part in parts.items():
             part.foresee(torso, clock.at)
             if (due := part.next_due()) is not None and due != awaited.get(each):
@@ -240,7 +240,9 @@ def _begin(
     if head.is_shift(behavior) and torso.is_overlaid():
         estimate = torso.estimate(behavior, None, torso.world)
         if estimate.feasible:
-            torso.attention.shift(behavior, choreography.plan(behavior, torso.situation(torso.world)))
+            course = choreography.plan(behavior, torso.situation(torso.world))
+            torso.set_base(behavior, course, MovementAuthority(behavior, START))
+            torso.follow()
         return estimate
     try:
         course = choreography.plan(behavior, torso.situation(torso.world))
