@@ -13,6 +13,7 @@ from engage_hri.schemas.behaviors import (
     Head,
     Pointing,
     Posture,
+    PostureShift,
     Speech,
     Synchronize,
 )
@@ -57,6 +58,12 @@ TO_WHERE_IT_IS = (
     timed(GazeShift(id="t", target="ball"), start="1"),
 )
 LEANING = (Posture(id="l", lexeme="LEAN_FORWARD"), Pointing(id="p", target="cup"), Gaze(id="g", target="cup"))
+HURRIED_FOR_THE_NEXT = (
+    Gaze(id="g", target="box"),
+    timed(Gaze(id="h", target="cup"), start="1.0"),
+    PostureShift(id="p", lexeme="LEAN_FORWARD"),
+)
+HURRIED_ON_ITS_WAY = (timed(Head(id="n", lexeme="NOD", repetition=2), stroke_end="0.6"),)
 OVER_A_SMILE = (
     timed(FaceLexeme(id="f", lexeme="SMILE"), start="0"),
     timed(FaceLexeme(id="h", lexeme="RAISE_BROWS"), start="0.1"),
@@ -73,8 +80,20 @@ OVER_A_SMILE = (
         (TO_WHERE_IT_IS, ()),
         (LEANING, ()),
         (OVER_A_SMILE, ()),
+        (HURRIED_FOR_THE_NEXT, (("g:end", "p:start"),)),
+        (HURRIED_ON_ITS_WAY, ()),
     ],
-    ids=["cut", "cut on its way", "held", "home after a shift", "to where it is", "leaning", "over a smile"],
+    ids=[
+        "cut",
+        "cut on its way",
+        "held",
+        "home after a shift",
+        "to where it is",
+        "leaning",
+        "over a smile",
+        "hurried for the next",
+        "hurried on its way",
+    ],
 )
 def test_the_plan_knows_where_a_behavior_begins(
     behaviors: tuple[BlockBehavior, ...], ties: tuple[tuple[str, str], ...]

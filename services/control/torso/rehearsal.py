@@ -95,6 +95,7 @@ class _Part:
         self.estimate = estimate
         self.waits = dict(waits)
         self.passed: dict[str, Seconds] = {}
+        self._stops = {point.sync for point in run.course.points if point.held_with in waits}
         self._forced = forced
         """Points for which it hurries or dawdles: the phases to them are told as they would be by themselves."""
         self._phases: dict[str, Seconds] = {}
@@ -173,7 +174,7 @@ class _Part:
         if self._forced:
             syncs = [point.sync for point in self.run.course.points]
             for since, to in pairwise([sync for sync in syncs if sync in self.passed]):
-                if to not in self._forced:
+                if to not in self._forced and to not in self._stops:
                     self._phases[to] = self.passed[to] - self.passed[since]
         phases = tuple([self._updated(phase) for phase in self.estimate.phases])
         return replace(self.estimate, phases=phases)
@@ -203,6 +204,8 @@ def rehearsed(torso: Torso, clock: Clock, items: Sequence[EstimateItem]) -> tupl
     parts: dict[int, _Part] = {}
     moved: set[str] = set()
     told: dict[int, Estimate] = {}
+    awaited: dict[int, Seconds] = {}
+    """When each paced behavior passes its next point, by its number."""
     while events:
         at, kind, number, hold = heappop(events)
         for part in parts.values():
@@ -216,14 +219,15 @@ def rehearsed(torso: Torso, clock: Clock, items: Sequence[EstimateItem]) -> tupl
             begun = _begin(torso, clock, items[number], times[number], moved)
             if isinstance(begun, Estimate):
                 told[number] = begun
-                continue
-            parts[number] = begun
-            for sync, until in begun.waits.items():
-                heappush(events, (until, RELEASE, number, sync))
+            else:
+                parts[number] = begun
+                for sync, until in begun.waits.items():
+                    heappush(events, (until, RELEASE, number, sync))
         for each, part in parts.items():
             part.foresee(torso, clock.at)
-            if (due := part.next_due()) is not None and due > clock.at:
-                heappush(events, (due, RELEASE, each, ""))
+            if (due := part.next_due()) is not None and due != awaited.get(each):
+                awaited[each] = due
+                heappush(events, (max(due, clock.at), RELEASE, each, ""))
     told |= {number: part.told() for number, part in parts.items()}
     return tuple([told[number] for number in range(len(items))])
 
@@ -236,7 +240,9 @@ def _begin(
     if head.is_shift(behavior) and torso.is_overlaid():
         estimate = torso.estimate(behavior, None, torso.world)
         if estimate.feasible:
-            torso.attention.shift(behavior, choreography.plan(behavior, torso.situation(torso.world)))
+            course = choreography.plan(behavior, torso.situation(torso.world))
+            torso.set_base(behavior, course, MovementAuthority(behavior, START))
+            torso.follow()
         return estimate
     try:
         course = choreography.plan(behavior, torso.situation(torso.world))

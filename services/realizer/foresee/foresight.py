@@ -254,8 +254,10 @@ class Foresight:
     def pace(self, behavior: str, now: Seconds, may_pass: Callable[[Point], bool]) -> Pace:
         """Instants for the behavior's points up to the next where it must ask; empty if it comes to them anyway."""
         forecast, plan, facts = self.forecast, self.plan, self._facts
-        if forecast is None or behavior not in self._minded:
-            return ()  # No bound can make it hurry, or wait on its way.
+        if forecast is None or behavior not in plan.chains:
+            return ()
+        if behavior not in self._minded and not forecast.is_hurried(behavior):
+            return ()  # No bound makes it hurry, for itself or for who comes after it, or wait on its way.
         points, segments = plan.chains[behavior].points, plan.chains[behavior].segments
         is_moving = plan.chains[behavior].type not in SHIFTS  # a shift beneath a look takes no time
         number = facts.next_number(behavior)

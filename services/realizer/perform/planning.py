@@ -17,15 +17,16 @@ from engage_hri.services.realizer.perform.live_blocks import LiveBlocks
 from engage_hri.services.realizer.plan.handover import hands_refused
 from engage_hri.services.realizer.plan.known import Known, is_foreign, is_named_in
 from engage_hri.services.realizer.plan.planner import Plan, plan_steps
-from engage_hri.services.realizer.plan.poses import changed, planned_times, poses_before
+from engage_hri.services.realizer.plan.poses import between, changed, planned_times, poses_before
 from engage_hri.services.realizer.plan.relations import BlockRefused, extent, relation_steps
 from engage_hri.services.realizer.plan.steps import Steps, T
 from engage_hri.services.realizer.points import Point, performer
 
 SLICE = 512
 """Elements that are worked on in one go (see `steps`): one to five milliseconds. Counted: equal runs stay equal."""
-ROUNDS = 3
-"""How often the body is asked about a plan anew, at most: each answer may make another plan."""
+STRAIGHT, ROUNDS = 2, 8
+"""How often the body is asked about a plan anew: each answer may make another plan. After the first so many times
+estimates go half-way only; at most, in all."""
 
 
 class Planning:
@@ -82,6 +83,8 @@ class Planning:
             told = await self._estimates(plan.block, before, times)
             if plan.block is chosen and not changed(estimates, told):
                 return plan
+            if plan.block is chosen and rounds >= STRAIGHT:
+                told = between(estimates, told)
             chosen, estimates, rounds = plan.block, told, rounds + 1
             if refused := hands_refused(block, chosen, estimates):
                 barred |= refused

@@ -4,6 +4,8 @@ from collections.abc import Mapping, Sequence
 from itertools import pairwise
 from math import inf
 
+from msgspec.structs import replace
+
 from engage_hri.schemas.body import BodyPose, Estimate, PlannedTime
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.realizer.plan.known import NOTHING, Known, is_foreign
@@ -120,6 +122,26 @@ def changed(before: Sequence[Estimate], after: Sequence[Estimate]) -> bool:
         or any(abs(a.natural - b.natural) > NOTICEABLE for a, b in zip(one.phases, other.phases, strict=True))
         for one, other in ((known[each.behavior], each) for each in after if each.behavior in known)
     )
+
+
+def between(before: Sequence[Estimate], after: Sequence[Estimate]) -> tuple[Estimate, ...]:
+    """Estimates half-way from `before` to `after`: where each answer of the body makes the plan that calls for the
+    other, the right one lies between."""
+    known = {each.behavior: each for each in before}
+    return tuple([_halfway(known[each.behavior], each) for each in after])
+
+
+def _halfway(one: Estimate, other: Estimate) -> Estimate:
+    if [each.to for each in one.phases] != [each.to for each in other.phases]:
+        return other
+    phases = []
+    for a, b in zip(one.phases, other.phases, strict=True):
+        natural = (a.natural + b.natural) / 2
+        longest = None if b.longest is None else max(b.longest, natural)
+        phases.append(
+            replace(b, natural=natural, shortest=min(natural, (a.shortest + b.shortest) / 2), longest=longest)
+        )
+    return replace(other, phases=tuple(phases))
 
 
 def _is_overlaid(plan: Plan, shift: str) -> bool:
