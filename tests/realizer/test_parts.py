@@ -96,9 +96,12 @@ def test_who_has_begun_waits_for_nobody_any_more(tie: dict[str, str]) -> None:
 
 def test_who_keeps_the_part_of_a_lost_one_may_be_without_its_points() -> None:
     """A shift has no stroke, which the third was to wait for."""
-    faces = (FaceShift(id="f", lexeme="SMILE"), FaceLexeme(id="g", lexeme="SMILE"), FaceLexeme(id="h", lexeme="SMILE"))
+    smile = FaceLexeme(id="g", lexeme="SMILE")
+    faces = (FaceShift(id="f", lexeme="SMILE"), smile, replace(smile, id="h"))
     chains = {each.id: chain(each, FakeBody().estimate(each)) for each in faces}
     classes = Classes()
+    for point in (point for each in chains.values() for point in each.points):
+        classes.add(point)
     classes.tie(Equal((Term(Point("f", "end"), 0.0, ""), Term(Point("g", "stroke"), 0.0, ""))), "b")
 
     losses = finished(clashes([("g", Point("f", "end")), ("h", Point("g", "stroke"))], chains, (), classes))
