@@ -30,6 +30,7 @@ async def speak(behavior: Speech, authority: MovementAuthority, pace: float = 1.
     utterance = utter(behavior.text, pace)
     gaps = {mark.id for mark in behavior.marks if utterance.is_gap(mark.position)}
     unwatch = authority.watch(bell.ring)
+    said = 0
     try:
         for progress in _score(behavior, utterance):
             while not bell.is_past(begin + progress.at) and authority.revoked is None:
@@ -48,10 +49,14 @@ async def speak(behavior: Speech, authority: MovementAuthority, pace: float = 1.
                 begin += at - arrived
             if authority.revoked is not None:
                 break
-            yield Reached(progress.sync, at, arrived) if isinstance(progress, Reached) else replace(progress, at=at)
+            if isinstance(progress, Reached):
+                yield Reached(progress.sync, at, arrived)
+                continue
+            said = progress.position
+            yield replace(progress, at=at)
         since = bell.now() - begin
         for word in utterance.words:
-            if authority.revoked is not None and word.start < since < word.end:
+            if authority.revoked is not None and word.position > said and word.start < since < word.end:
                 while not bell.is_past(begin + word.end):
                     await bell.wait(begin + word.end)
                 yield Spoke(word.text, word.position, begin + word.end)
