@@ -1,10 +1,16 @@
 """The time line of an utterance."""
 
+import asyncio
+
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from engage_hri.schemas.behaviors import Mark, Speech
+from engage_hri.services.control.body import MovementAuthority, Spoke
+from engage_hri.services.control.voice.speaking import speak
 from engage_hri.services.control.voice.timeline import utter
+from engage_hri.services.runtime.virtual_time import run_virtual
 
 
 def test_words_take_time_by_their_letters_and_pauses_by_their_punctuation():
@@ -121,3 +127,16 @@ def test_more_text_never_takes_less_time(text: str, more: str):
     times = [utterance.said_by(position) for position in range(len(text + more) + 1)]
 
     assert times == sorted(times)
+
+
+@pytest.mark.parametrize("tenths", range(8))
+def test_a_voice_that_is_ended_where_it_waits_says_no_word_twice(tenths: int) -> None:
+    """Whatever is rounded: the mark is where the word before it ends."""
+
+    async def said() -> list[str]:
+        await asyncio.sleep(0.1 * tenths)
+        authority = MovementAuthority(speech := Speech(id="s", text="This one here.", marks=(Mark("m", 5),)), "start")
+        asyncio.get_running_loop().call_later(3.9, authority.revoke)
+        return [each.word async for each in speak(speech, authority) if isinstance(each, Spoke)]
+
+    assert run_virtual(said()) == ["This"]

@@ -4,14 +4,14 @@ It is the simulated body behind a curtain: what it does is left as it is, what i
 """
 
 import asyncio
-from collections.abc import AsyncGenerator
+from collections.abc import AsyncGenerator, Sequence
 from contextlib import aclosing
 from random import Random
 
 from msgspec import Struct
 
 from engage_hri.schemas.behaviors import BlockBehavior
-from engage_hri.schemas.body import BodyPose, Estimate
+from engage_hri.schemas.body import BodyPose, Estimate, EstimateItem
 from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.world import World
 from engage_hri.services.control.body import (
@@ -57,6 +57,9 @@ class LyingBody(Body):
 
     def estimate(self, behavior: BlockBehavior, pose: BodyPose | None, world: World) -> Estimate:
         return self._body.estimate(behavior, pose, world)
+
+    def rehearse(self, items: Sequence[EstimateItem], world: World) -> Sequence[Estimate]:
+        return self._body.rehearse(items, world)
 
     async def perform(self, behavior: BlockBehavior, authority: MovementAuthority) -> AsyncGenerator[Progress, None]:
         lies, chance = self._lies, self._chance

@@ -49,7 +49,7 @@ def play(story: Story, *, asks: bool = False) -> Record:
     record = Record()
     if story.is_held:
         calm = play(story.let_go())
-        record.late_anyhow = {(it.block, it.behavior) for block in calm.ends for it in calm.late(block)}
+        record.late_anyhow = {(block, it.behavior) for block in calm.ends for it in calm.late(block)}
     bugs = _Bugs(record)
     LOG.addHandler(bugs)
     before, LOG.propagate = LOG.propagate, False

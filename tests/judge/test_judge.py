@@ -18,7 +18,7 @@ from tests.judge.story import Deed, Story
 
 ENFORCED = (
     "hang", "crash", "end", "points", "losses", "required", "words", "wrong length", "out of turn", "parts",
-    "in the air", "spoken order", "needless loss",
+    "in the air", "spoken order", "needless loss", "unmade end of a stroke", "moves though held", "late for a hold",
 )  # fmt: skip
 """Laws that no story may break."""
 SEED = 12
@@ -27,6 +27,8 @@ MANY: dict[tuple[Kind, bool], int] = {
     ("alone", True): 15, ("streams", True): 10,
 }  # fmt: skip
 """Number of stories of each kind, without and with a body that has faults."""
+HELD = 20
+"""Number of stories of which parts are held for a while."""
 WHOLE: dict[Kind, tuple[int, ...]] = {
     "alone": (0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 15), "streams": (0, 1, 2, 3, 4, 6, 8, 10, 11, 16),
     "sentences": (0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11),
@@ -42,6 +44,17 @@ def test_no_story_breaks_a_law_that_is_enforced(kind: Kind, faults: bool) -> Non
         story = generate.story(SEED, number, kind, faults=faults)
         record = playing.play(story, asks=kind == "sentences")
         assert record.told, story.seed
+        found += [f"{story.seed}: {each}" for each in judge(story, record) if each.law in ENFORCED]
+
+    assert found == []
+
+
+def test_what_is_held_makes_nothing_late_and_goes_on_where_it_stopped() -> None:
+    found = []
+    for number in range(HELD):
+        story = generate.story(SEED, number, "alone", holds=True)
+        record = playing.play(story)
+        assert record.steered, story.seed
         found += [f"{story.seed}: {each}" for each in judge(story, record) if each.law in ENFORCED]
 
     assert found == []

@@ -11,7 +11,7 @@ from engage_hri.schemas.body import Ray
 from engage_hri.schemas.feedback import BlockProgress, SyncPointProgress, WarningFeedback
 from tests.judge import laws_motion, playing, reading
 from tests.judge.laws import LAWS, judge
-from tests.judge.record import Record
+from tests.judge.record import Record, Steered, Told
 from tests.judge.story import Deed, Story
 
 EVERYTHING = f"""<bml id="b" xmlns="{reading.BML_1_0}">
@@ -178,6 +178,17 @@ def swapped(text: str) -> str:
     return " ".join((second, first, *rest))
 
 
+def held(behavior: str, since: float = -0.5) -> Callable[[Record], Record]:
+    """A behavior has been held for a while; since: seconds after its start."""
+
+    def tamper(record: Record) -> Record:
+        start = next(each for each in record.points("b") if (each.behavior, each.sync) == (behavior, "start"))
+        times = (start.at.seconds + since, True), (start.at.seconds + 8.0, False)
+        return replace(record, steered=[Steered(at, is_held, "b", behavior) for at, is_held in times])
+
+    return tamper
+
+
 # -- the claims ------------------------------------------------------------------------------------------------------
 
 
@@ -217,12 +228,15 @@ TAMPERED = [
     ("a wait does not wait for the one before it", shifted("v", -1.0), "out of turn"),
     ("two speeches are said at once", shifted("t", -0.8), "parts"),
     ("an arm is still raised in the end", raised, "in the air"),
+    ("something begins while it is held", held("q"), "moves though held"),
+    ("a voice goes on while it is held", held("s", since=0.01), "moves though held"),
+    ("a word is said twice", lambda record: replace(record, words=[*record.words, record.words[-1]]), "words"),
     ("a bug was logged", lambda record: replace(record, errors=["KeyError"]), "crash"),
 ]  # fmt: skip
 
 
 def test_every_law_is_tried() -> None:
-    elsewhere = {"required", "spoken order", "needless loss", "broken, point was past"}
+    elsewhere = {"required", "spoken order", "needless loss", "broken, point was past", "late for a hold"}
 
     assert {law for *_, law in TAMPERED} | elsewhere == LAWS.keys()
 
@@ -259,3 +273,15 @@ def test_a_point_that_was_past_is_asked_for_in_vain() -> None:
     record = told(without_warnings)(playing.play(story))
 
     assert {each.law for each in judge(story, record)} == {"broken, point was past"}
+
+
+def test_something_is_late_for_a_hold() -> None:
+    hold, go_on = Deed(0.3, "hold", "b"), Deed(0.9, "continue", "b")
+    story = Story((Deed(0.0, "perform", "b", NECESSARY), hold, go_on))
+    record = playing.play(story)
+    late = WarningFeedback(block="b", kind="LATE", message="w is late", behavior="w")
+
+    assert judge(story, record) == []
+    assert {each.law for each in judge(story, replace(record, told=[*record.told, Told(1.0, late)]))} == {
+        "late for a hold"
+    }

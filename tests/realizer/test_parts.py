@@ -3,9 +3,14 @@
 import pytest
 from msgspec.structs import replace
 
-from engage_hri.schemas.behaviors import Gaze, Gesture, Head
+from engage_hri.schemas.behaviors import FaceLexeme, FaceShift, Gaze, Gesture, Head
+from engage_hri.services.realizer.plan.deadlocks import clashes
+from engage_hri.services.realizer.plan.instants import Classes
 from engage_hri.services.realizer.plan.known import Known
+from engage_hri.services.realizer.plan.phases import chain
 from engage_hri.services.realizer.plan.planner import plan_block
+from engage_hri.services.realizer.plan.relations import Equal, Term
+from engage_hri.services.realizer.plan.steps import finished
 from engage_hri.services.realizer.points import Point
 from tests.realizer.fake_body import FakeBody
 from tests.realizer.planning import GAZE, LEFT, LEFT_TOO, SPEECH, at, plan, timed, warnings
@@ -87,3 +92,18 @@ def test_who_has_begun_waits_for_nobody_any_more(tie: dict[str, str]) -> None:
     made = plan_block(example, [FakeBody().estimate(each) for each in example.behaviors], known=known)
 
     assert (made.dropped, made.problems) == ((), ())
+
+
+def test_who_keeps_the_part_of_a_lost_one_may_be_without_its_points() -> None:
+    """A shift has no stroke, which the third was to wait for."""
+    smile = FaceLexeme(id="g", lexeme="SMILE")
+    faces = (FaceShift(id="f", lexeme="SMILE"), smile, replace(smile, id="h"))
+    chains = {each.id: chain(each, FakeBody().estimate(each)) for each in faces}
+    classes = Classes()
+    for point in (point for each in chains.values() for point in each.points):
+        classes.add(point)
+    classes.tie(Equal((Term(Point("f", "end"), 0.0, ""), Term(Point("g", "stroke"), 0.0, ""))), "b")
+
+    losses = finished(clashes([("g", Point("f", "end")), ("h", Point("g", "stroke"))], chains, (), classes))
+
+    assert [each.behavior for each in losses] == ["g"]

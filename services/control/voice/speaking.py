@@ -12,6 +12,9 @@ from engage_hri.services.control.body import Arrived, MovementAuthority, Progres
 from engage_hri.services.control.voice.timeline import Utterance, utter
 from engage_hri.services.control.waiting import Bell
 
+ROUNDING: Seconds = 1e-6
+"""Seconds by which sums of times may be off: a voice that waits between two words is in neither."""
+
 
 class _Gap(Struct, frozen=True):
     """Silence before a word, at `at` seconds from the start of the utterance."""
@@ -51,7 +54,7 @@ async def speak(behavior: Speech, authority: MovementAuthority, pace: float = 1.
             yield Reached(progress.sync, at, arrived) if isinstance(progress, Reached) else replace(progress, at=at)
         since = bell.now() - begin
         for word in utterance.words:
-            if authority.revoked is not None and word.start < since < word.end:
+            if authority.revoked is not None and word.start + ROUNDING < since < word.end - ROUNDING:
                 while not bell.is_past(begin + word.end):
                     await bell.wait(begin + word.end)
                 yield Spoke(word.text, word.position, begin + word.end)

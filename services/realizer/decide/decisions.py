@@ -116,7 +116,20 @@ class Decisions:
         at = self.facts.reached.get(point)
         if at is None or point not in self.plan.at:
             return 0.0
-        return self.bounds.lateness(self.plan.at[point], at, self.net.passed, self.facts.held_about)
+        passed = self.net.passed
+        if self.facts.held_about(self.began, at):
+            passed = {each: then for each, then in passed.items() if not self._went_on(each)}
+        return self.bounds.lateness(self.plan.at[point], at, passed, self.facts.held_about)
+
+    def _went_on(self, transition: int) -> bool:
+        """True if a behavior was held just before, and came since it cannot wait there: nobody has planned that."""
+        for member in self.plan.members[transition]:
+            if member.kind == "passive" and (chain := self.plan.chains.get(member.behavior)) is not None:
+                number = chain.points.index(member.point)
+                before, here = (self.facts.reached.get(each) for each in chain.points[number - 1 : number + 1])
+                if before is not None and here is not None and self.facts.held_between(before, here, member.behavior):
+                    return True
+        return False
 
     def earliness(self, point: Point) -> Seconds:
         """Seconds by which a point was reached before the time that the block fixes for it; 0 if it fixes none.

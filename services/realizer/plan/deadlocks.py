@@ -49,7 +49,9 @@ def clashes(
     """For each lost behavior, the one that keeps the part instead."""
     for later, (earlier, sync) in sorted(turns, key=lambda turn: (rank[turn[0]], rank[turn[1].behavior])):
         yield 16
-        earlier = stays.get(earlier, earlier)
+        if (stayed := stays.get(earlier, earlier)) != earlier:
+            # Of another type, perhaps, without that point.
+            earlier, sync = stayed, next((each.sync for each in chains[stayed].points if each.sync == sync), "end")
         free = [id for id in (earlier, later) if id not in required]
         if free and later not in losses and _clash(chains[earlier], sync, chains[later], classes):
             lost = max(free, key=rank.__getitem__)
