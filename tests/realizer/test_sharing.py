@@ -8,6 +8,8 @@ import pytest
 from engage_hri.schemas.behaviors import FaceLexeme, Gaze, GazeShift, Gesture, Head, Mark, Pointing, Posture, Speech
 from engage_hri.schemas.blocks import Block, BlockOutcome
 from engage_hri.schemas.feedback import SyncPointProgress
+from engage_hri.services.realizer.plan.assembly import Assembler
+from engage_hri.services.realizer.plan.handover import Arrangement
 from engage_hri.services.requests.ends import RequestRefused
 from tests.realizer.fake_body import FakeBody, Script
 from tests.realizer.planning import timed
@@ -296,3 +298,23 @@ async def test_to_follow_what_one_replaces_is_refused() -> None:
         await first.outcome
 
     assert seen.times("one")["s:end"] == 4.0
+
+
+async def test_many_blocks_that_queue_for_the_voice_are_planned_in_few_rounds(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Who comes waits for the last in the queue, and does not find out about each of the others one by one."""
+    rounds = 0
+    assemble = Assembler.assemble
+
+    def counted(assembler: Assembler, arrangement: Arrangement) -> object:
+        nonlocal rounds
+        rounds += 1
+        return assemble(assembler, arrangement)
+
+    monkeypatch.setattr(Assembler, "assemble", counted)
+    speeches = tuple(Speech(id=f"s{number}", text="one two") for number in range(3))
+    seen, outcomes = await told(*((0.0, block(speeches, id=f"b{number}")) for number in range(12)))
+
+    assert [each.status for each in outcomes] == ["done"] * 12
+    assert rounds < 12 * 12

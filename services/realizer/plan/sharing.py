@@ -153,12 +153,24 @@ class _Sharing:
             last = len(holder.chain.points) - 1
         return None if last is None else holder.chain.points[last]
 
+    def _behind_all(self, id: str, point: Point) -> Point:
+        """The point that a behavior waits for if it waits for `point`, and for whoever is in its way from then on."""
+        since, to = self._window(self.chains[id])
+        names = dict.fromkeys(name for part in self.chains[id].parts for name in self.users.get(part, ()))
+        behind = sorted(names, key=lambda name: (self._window(self.known.holders[name].chain), name))
+        for name in behind:
+            holder, at = self.known.holders[name], self.times[point]
+            begins, ends = self._window(holder.chain)
+            if at < ends - EPSILON and at - EPSILON <= begins < at + to - since - EPSILON:
+                point = self._release(id, holder, 1)
+        return point
+
     def _release(self, id: str, holder: Holder, first: int) -> Point:
         """The point from which on the holder may lose its part to a behavior of this block."""
         return self._needed(id, holder, first) or holder.chain.points[first]
 
     def _wait(self, id: str, point: Point) -> None:
-        turn: Turn = (id, point)
+        turn: Turn = (id, self._behind_all(id, point))
         if turn in self.turns:
             return
         others = {**self.chains, **{name: holder.chain for name, holder in self.known.holders.items()}}
