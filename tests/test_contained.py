@@ -42,12 +42,12 @@ def breaking(attribute: str) -> Callable[..., Any]:
         ("engage_hri.services.generation.fragment_runner.FragmentRunner.admit", "perform"),
         ("engage_hri.services.generation.pipeline.plan", "perform"),
         ("engage_hri.services.generation.fragment_runner.plan", "perform"),
-        ("engage_hri.services.realizer.service.plan_steps", "realize"),
+        ("engage_hri.services.realizer.perform.planning.plan_steps", "realize"),
         ("engage_hri.services.realizer.perform.performance.Decisions", "realize"),
         ("engage_hri.services.realizer.decide.decisions.Decisions.advance", "realize"),
         ("engage_hri.services.realizer.decide.decisions.Decisions.reach", "realize"),
         ("engage_hri.services.realizer.perform.feedback.Reporter.reached", "realize"),
-        ("engage_hri.services.realizer.perform.performance.BlockPerformance._by_body", "realize"),
+        ("engage_hri.services.realizer.perform.behavior_run.BehaviorRun._by_body", "realize"),
         ("engage_hri.services.control.service._Control._begin", "realize"),
         ("engage_hri.services.control.service._Control._report", "realize"),
         ("engage_hri.services.control.torso.body.SimulatedBody.perform", "realize"),
@@ -205,7 +205,8 @@ async def test_an_error_of_a_driver_that_cannot_even_be_written_down_ends_one_be
     async with whole_robot(hub) as robot:
         with monkeypatch.context() as patch:
             patch.setattr("engage_hri.services.control.torso.body.SimulatedBody.perform", broken)
-            await asyncio.wait_for(robot.realize("b", [Speech(id="s", text="one")]), 60.0)
+            with pytest.raises(PerformFailed):  # It had nothing else in it.
+                await asyncio.wait_for(robot.realize("b", [Speech(id="s", text="one")]), 60.0)
         await asyncio.sleep(5.0)
         assert (await robot.realize("c", [Speech(id="s", text="one")])).spoken[0].text == "one"
 

@@ -17,6 +17,7 @@ from engage_hri.schemas import (
     faults,
     feedback,
     fragments,
+    nets,
     perception,
     presence,
     recognition,
@@ -27,7 +28,7 @@ from engage_hri.schemas import (
 )
 
 MODULES: tuple[ModuleType, ...] = (
-    fragments, blocks, behaviors, feedback, recognition, attention, actions, perception, world, body, requests,
+    fragments, blocks, behaviors, feedback, nets, recognition, attention, actions, perception, world, body, requests,
     faults, presence, status, units,
 )  # fmt: skip
 

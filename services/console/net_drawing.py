@@ -206,25 +206,29 @@ def _columns(net: NetInView, space: int) -> _Columns:
 
 
 def _times(net: NetInView, columns: _Columns, name: str, left: int) -> str:
-    """A line of times, of as many instants as there is room for: shared ones first, or those that fired last."""
-    cells = [" "] * columns.size
-    transitions = range(len(net.transitions))
-    if name == "planned":
-        times = {each: net.transitions[each].time for each in transitions}
-        order = sorted(transitions, key=lambda each: -_sharing(net.transitions[each]))
-    else:
-        times = dict(net.fired)
-        order = sorted(times, key=lambda each: -times[each])
-    for each in order:
-        text, at = number(times[each]), columns.at[each]
-        free = cells[max(0, at - 1) : at + len(text) + 1]
-        if at >= 0 and at + len(text) <= columns.size and not "".join(free).strip():
-            cells[at : at + len(text)] = text
-    for each in times:
+    """A line of times, below one another for as many instants as there is room for: those that are shared first."""
+    transitions = sorted(range(len(net.transitions)), key=lambda each: -_sharing(net.transitions[each]))
+    planned = {each: net.transitions[each].time for each in transitions}
+    cells, readable = _written(planned, columns)
+    if name == "fired":
+        cells, _ = _written({each: net.fired[each] for each in readable if each in net.fired}, columns)
+    for each in net.fired if name == "fired" else transitions:
         at = columns.at[each]
         if 0 <= at < columns.size and cells[at] == " " and (not at or cells[at - 1] in " ·"):
             cells[at] = "·"
     return _assembled(name, " ", "".join(cells), columns, left)
+
+
+def _written(times: Mapping[int, Seconds], columns: _Columns) -> tuple[list[str], list[int]]:
+    """Cells with times at their columns, and the transitions that there was room for."""
+    cells, readable = [" "] * columns.size, []
+    for each, time in times.items():
+        text, at = number(time), columns.at[each]
+        free = cells[max(0, at - 1) : at + len(text) + 1]
+        if at >= 0 and at + len(text) <= columns.size and not "".join(free).strip():
+            cells[at : at + len(text)] = text
+            readable.append(each)
+    return cells, readable
 
 
 def _sharing(instant: NetTransition) -> int:

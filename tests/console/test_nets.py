@@ -3,7 +3,7 @@
 import asyncio
 from io import StringIO
 
-from hypothesis import given, settings
+from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from rich.cells import cell_len
 from rich.console import Console
@@ -153,7 +153,7 @@ IDS = st.text(max_size=8) | st.sampled_from(("a:b", "[red]", "\x1b[2J", "手", "
 
 @st.composite
 def any_nets(draw: st.DrawFn) -> NetPlanned:
-    size = draw(st.integers(0, 30))
+    size = draw(st.integers(0, 12))
     number = st.integers(-1, size + 1)
     point = st.builds(NetPoint, behavior=IDS, sync=IDS | st.sampled_from(("start", "stroke", "end")))
     return NetPlanned(
@@ -174,7 +174,7 @@ def any_nets(draw: st.DrawFn) -> NetPlanned:
     )  # fmt: skip
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=100, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(any_nets(), any_nets(), st.integers(1, 120), st.integers(1, 40))
 def test_whatever_is_told_is_drawn_within_the_terminal(
     first: NetPlanned, second: NetPlanned, width: int, height: int

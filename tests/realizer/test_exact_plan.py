@@ -13,6 +13,7 @@ from engage_hri.schemas.behaviors import (
     Head,
     Pointing,
     Posture,
+    PostureShift,
     Speech,
     Synchronize,
 )
@@ -43,7 +44,10 @@ def performed_block(*behaviors: BlockBehavior, ties: tuple[tuple[str, str], ...]
 
 
 CUT_NOD = (timed(Head(id="n", lexeme="NOD"), start="0"), timed(Head(id="m", lexeme="NOD"), start="0.4"))
-CUT_ON_ITS_WAY = (timed(Gaze(id="g", target="ball"), start="0"), timed(Gaze(id="h", target="box"), start="0.2"))
+CUT_ON_ITS_WAY = (
+    timed(Gaze(id="g", target="ball"), start="0", relax="1"),
+    timed(Gaze(id="h", target="box"), start="1.2"),
+)
 HELD = (Pointing(id="p", target="cup"), Speech(id="s", text="this is the one that I mean"))
 HOME_AFTER_A_SHIFT = (
     timed(GazeShift(id="s", target="ball"), start="0"),
@@ -54,6 +58,12 @@ TO_WHERE_IT_IS = (
     timed(GazeShift(id="t", target="ball"), start="1"),
 )
 LEANING = (Posture(id="l", lexeme="LEAN_FORWARD"), Pointing(id="p", target="cup"), Gaze(id="g", target="cup"))
+HURRIED_FOR_THE_NEXT = (
+    Gaze(id="g", target="box"),
+    timed(Gaze(id="h", target="cup"), start="1.0"),
+    PostureShift(id="p", lexeme="LEAN_FORWARD"),
+)
+HURRIED_ON_ITS_WAY = (timed(Head(id="n", lexeme="NOD", repetition=2), stroke_end="0.6"),)
 OVER_A_SMILE = (
     timed(FaceLexeme(id="f", lexeme="SMILE"), start="0"),
     timed(FaceLexeme(id="h", lexeme="RAISE_BROWS"), start="0.1"),
@@ -70,8 +80,20 @@ OVER_A_SMILE = (
         (TO_WHERE_IT_IS, ()),
         (LEANING, ()),
         (OVER_A_SMILE, ()),
+        (HURRIED_FOR_THE_NEXT, (("g:end", "p:start"),)),
+        (HURRIED_ON_ITS_WAY, ()),
     ],
-    ids=["cut", "cut on its way", "held", "home after a shift", "to where it is", "leaning", "over a smile"],
+    ids=[
+        "cut",
+        "cut on its way",
+        "held",
+        "home after a shift",
+        "to where it is",
+        "leaning",
+        "over a smile",
+        "hurried for the next",
+        "hurried on its way",
+    ],
 )
 def test_the_plan_knows_where_a_behavior_begins(
     behaviors: tuple[BlockBehavior, ...], ties: tuple[tuple[str, str], ...]

@@ -225,6 +225,20 @@ async def test_what_is_dropped_on_the_way_is_gone_from_the_net_and_the_others_ke
     assert watcher.seen[-1] == watcher.initial()
 
 
+async def test_what_fires_in_the_moment_of_a_new_plan_is_told_once() -> None:
+    """With the number that it has in the new net."""
+    body = FakeBody({"point-1": Script(fail="ready")})
+
+    watcher, outcome = await watched(block((GAZE, POINT, SPEECH)), body)
+
+    assert outcome.dropped == ("point-1",)
+    anew = watcher.plans[1]
+    told = [anew.transitions[each.transition].name for each in anew.fired]
+    assert "gaze-1:stroke" in told
+    assert {each.transition for each in anew.fired} > {each.transition for each in watcher.plans[0].fired}
+    assert watcher.seen[-1] == watcher.initial()
+
+
 async def test_who_comes_late_knows_all_within_two_seconds() -> None:
     early, late = Watcher(), Watcher()
     async with stage() as seen, watching(seen, early):

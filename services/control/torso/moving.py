@@ -16,6 +16,7 @@ from engage_hri.services.control.torso import choreography, head, kinematics, tr
 from engage_hri.services.control.torso.course import Course, Impossible, Situation
 from engage_hri.services.control.torso.estimates import infeasible, motion_estimate
 from engage_hri.services.control.torso.head import Fixation
+from engage_hri.services.control.torso.laid_paths import laid_path
 from engage_hri.services.control.torso.motion import Motion
 from engage_hri.services.control.torso.path import Path, resting
 from engage_hri.services.control.torso.repertoire import Repertoire
@@ -100,10 +101,7 @@ class Torso:
         else:
             now = self.clock.time()
             start = tracks.joined([self.tracks[part].at(now) for part in course.parts])
-        path = Path(start, course.legs, tracks.limits_of(course.parts))
-        if tracks.meets_table(path, course.joints):
-            raise Impossible("CANNOT_CREATE_BEHAVIOR", "the table is in the way of the arm")
-        return path
+        return laid_path(start, course)
 
     # -- motion -------------------------------------------------------------------------------------------------
 

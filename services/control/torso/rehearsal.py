@@ -4,7 +4,7 @@ A copy of the body moves on a clock of its own, by the very methods by which the
 where the others have brought its part by then, in motion if they are, and a stop costs what it will cost.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Container, Iterator, Mapping, Sequence
 from copy import copy
 from heapq import heapify, heappop, heappush
 from itertools import pairwise
@@ -19,7 +19,7 @@ from engage_hri.schemas.world import World
 from engage_hri.services.control.body import MovementAuthority
 from engage_hri.services.control.config import Variability
 from engage_hri.services.control.torso import choreography, head, tracks
-from engage_hri.services.control.torso.course import Impossible
+from engage_hri.services.control.torso.course import Course, Impossible
 from engage_hri.services.control.torso.motion import Motion
 from engage_hri.services.control.torso.moving import Torso
 from engage_hri.services.control.torso.path import Path, resting
@@ -30,6 +30,8 @@ START, RELEASE, BEGIN = "start", 0, 1
 """Name of the first sync point; and the two kinds of events, in the order in which those of one instant happen."""
 ROUNDING = 6
 """Decimals of seconds that tell instants apart."""
+HURRIED: Seconds = 0.0005
+"""Seconds by which a point comes too early for a behavior that does not hurry."""
 TRANSPARENT = 1e-6
 """Seconds: changes of a phase that are not worth telling."""
 
@@ -88,12 +90,14 @@ def _alike(run: Run) -> MovementAuthority:
 class _Part:
     """One behavior of the rehearsal: its run, when its points were passed, and how long its phases take."""
 
-    def __init__(self, run: Run, estimate: Estimate, waits: Mapping[str, Seconds], *, paced: bool) -> None:
+    def __init__(self, run: Run, estimate: Estimate, waits: Mapping[str, Seconds], forced: Container[str]) -> None:
         self.run = run
         self.estimate = estimate
         self.waits = dict(waits)
         self.passed: dict[str, Seconds] = {}
-        self._is_paced = paced
+        self._stops = {point.sync for point in run.course.points if point.held_with in waits}
+        self._forced = forced
+        """Points for which it hurries or dawdles: the phases to them are told as they would be by themselves."""
         self._phases: dict[str, Seconds] = {}
 
     def settle(self, torso: Torso, clock: Clock, now: Seconds) -> None:
@@ -113,6 +117,13 @@ class _Part:
                 clock.at = due
                 torso.turn_home(run)
 
+    def next_due(self) -> Seconds | None:
+        """When it passes its next point, if it is paced: then it is given the next instant."""
+        run = self.run
+        if not self._forced or run.is_over or run.holding or not run.pending:
+            return None
+        return run.due(run.pending[0])
+
     def leave(self, passed: Sequence[str], now: Seconds, *, waited: bool) -> None:
         """Note that it has passed these points. waited: at the first of them; else it stood there already."""
         self.passed |= dict.fromkeys(passed, now)
@@ -123,7 +134,7 @@ class _Part:
         """Take the times of the phases to come from the motion as it is now, if nothing stopped it."""
         if self.run.is_over:
             return
-        if self._is_paced:
+        if self._forced:
             self._foresee_unpaced(now)
             return
         trial = copy(self.run.motion)
@@ -160,6 +171,11 @@ class _Part:
 
     def told(self) -> Estimate:
         """The estimate with the phases as they turned out."""
+        if self._forced:
+            syncs = [point.sync for point in self.run.course.points]
+            for since, to in pairwise([sync for sync in syncs if sync in self.passed]):
+                if to not in self._forced and to not in self._stops:
+                    self._phases[to] = self.passed[to] - self.passed[since]
         phases = tuple([self._updated(phase) for phase in self.estimate.phases])
         return replace(self.estimate, phases=phases)
 
@@ -188,6 +204,8 @@ def rehearsed(torso: Torso, clock: Clock, items: Sequence[EstimateItem]) -> tupl
     parts: dict[int, _Part] = {}
     moved: set[str] = set()
     told: dict[int, Estimate] = {}
+    awaited: dict[int, Seconds] = {}
+    """When each paced behavior passes its next point, by its number."""
     while events:
         at, kind, number, hold = heappop(events)
         for part in parts.values():
@@ -201,14 +219,15 @@ def rehearsed(torso: Torso, clock: Clock, items: Sequence[EstimateItem]) -> tupl
             begun = _begin(torso, clock, items[number], times[number], moved)
             if isinstance(begun, Estimate):
                 told[number] = begun
-                continue
-            parts[number] = begun
-            for sync, until in begun.waits.items():
-                heappush(events, (until, RELEASE, number, sync))
-            for until in begun.run.authority.pace.values():
-                heappush(events, (until, RELEASE, number, ""))
-        for part in parts.values():
+            else:
+                parts[number] = begun
+                for sync, until in begun.waits.items():
+                    heappush(events, (until, RELEASE, number, sync))
+        for each, part in parts.items():
             part.foresee(torso, clock.at)
+            if (due := part.next_due()) is not None and due != awaited.get(each):
+                awaited[each] = due
+                heappush(events, (max(due, clock.at), RELEASE, each, ""))
     told |= {number: part.told() for number, part in parts.items()}
     return tuple([told[number] for number in range(len(items))])
 
@@ -221,7 +240,9 @@ def _begin(
     if head.is_shift(behavior) and torso.is_overlaid():
         estimate = torso.estimate(behavior, None, torso.world)
         if estimate.feasible:
-            torso.attention.shift(behavior, choreography.plan(behavior, torso.situation(torso.world)))
+            course = choreography.plan(behavior, torso.situation(torso.world))
+            torso.set_base(behavior, course, MovementAuthority(behavior, START))
+            torso.follow()
         return estimate
     try:
         course = choreography.plan(behavior, torso.situation(torso.world))
@@ -232,18 +253,51 @@ def _begin(
     estimate = torso.estimate(behavior, None, torso.world)
     if not estimate.feasible:
         return estimate
-    held = {point.sync: point.held_with for point in course.points}
-    waits = {held[sync]: at for sync, at in times.items() if held.get(sync)}
-    paced = {sync: at for sync, at in times.items() if sync != START and not held.get(sync)}
+    path = torso.path(course)
+    waits, forced = _told_apart(course, path, times)
+    paced = _paced(course, path, times[START], forced)
     authority = MovementAuthority(behavior, _through(behavior, list(waits)), paced)
     run = Run(behavior, course, authority, Variability(), 0)
     run.bell = clock
-    torso.take_over(run, torso.path(course))
+    torso.take_over(run, path)
     moved.update(course.parts)
-    part = _Part(run, estimate, waits, paced=bool(paced))
+    part = _Part(run, estimate, waits, forced)
     if paced:
         torso.extend(run)
     return part
+
+
+def _told_apart(
+    course: Course, path: Path, times: Mapping[str, Seconds]
+) -> tuple[dict[str, Seconds], dict[str, Seconds]]:
+    """Times of hold points at which it has to wait, and of points for which it hurries or dawdles.
+
+    It hurries to a hold point if it would come there later by itself.
+    """
+    waits: dict[str, Seconds] = {}
+    forced: dict[str, Seconds] = {}
+    before, at = START, times[START]
+    for point in course.points[1:]:
+        if point.sync in times:
+            natural = path.marks[point.sync] - path.marks[before]
+            is_hurried = times[point.sync] - at < natural - HURRIED
+            if point.held_with and not is_hurried:
+                waits[point.held_with] = times[point.sync]
+            else:
+                forced[point.sync] = times[point.sync]
+            before, at = point.sync, times[point.sync]
+    return waits, forced
+
+
+def _paced(course: Course, path: Path, began: Seconds, forced: Mapping[str, Seconds]) -> dict[str, Seconds]:
+    """Instants for all points up to the last that is forced: the others are asked for as they come by themselves."""
+    paced: dict[str, Seconds] = {}
+    at = began
+    for since, to in pairwise([point.sync for point in course.points]):
+        if len(forced.keys() & paced.keys()) == len(forced):
+            break
+        at = paced[to] = forced.get(to, at + path.marks[to] - path.marks[since])
+    return paced
 
 
 def _place(torso: Torso, pose: BodyPose | None, parts: Sequence[str]) -> None:

@@ -182,7 +182,7 @@ class Decisions:
         for behavior in sorted(touched.difference(beginning)):
             if behavior in self.facts.begun and not self.facts.has_ended(behavior):
                 effects += self._extension(behavior, now)
-        for behavior in beginning:
+        for behavior in self.plan.begun_in_order(beginning) if len(beginning) > 1 else beginning:
             through = self.grants.extend(behavior, now)
             pace = self.foresight.paces[behavior] = self.foresight.pace(behavior, now, self.grants.may_pass)
             effects.append(Begin(behavior, self.plan.chains[behavior].points[through].sync, pace))

@@ -112,7 +112,8 @@ class BlockPerformance:
         try:
             async with asyncio.TaskGroup() as tasks:
                 self._tasks = {
-                    id: tasks.create_task(run.perform(), name=f"{block}/{id}") for id, run in self._runs.items()
+                    id: tasks.create_task(self._runs[id].perform(), name=f"{block}/{id}")
+                    for id in self.plan.begun_in_order(self._runs)  # Those that begin with the block do so in order.
                 }
                 self._shared.live_blocks.perform(block, self)
                 with self._shared.live_blocks.followed(self.ties, set(self.ties.foreign), self.ties.blocks):

@@ -17,15 +17,16 @@ from engage_hri.services.realizer.perform.live_blocks import LiveBlocks
 from engage_hri.services.realizer.plan.handover import hands_refused
 from engage_hri.services.realizer.plan.known import Known, is_foreign, is_named_in
 from engage_hri.services.realizer.plan.planner import Plan, plan_steps
-from engage_hri.services.realizer.plan.poses import changed, planned_times, poses_before
+from engage_hri.services.realizer.plan.poses import between, changed, planned_times, poses_before
 from engage_hri.services.realizer.plan.relations import BlockRefused, extent, relation_steps
 from engage_hri.services.realizer.plan.steps import Steps, T
 from engage_hri.services.realizer.points import Point, performer
 
 SLICE = 512
 """Elements that are worked on in one go (see `steps`): one to five milliseconds. Counted: equal runs stay equal."""
-ROUNDS = 3
-"""How often the body is asked about a plan anew, at most: each answer may make another plan."""
+STRAIGHT, ROUNDS = 2, 8
+"""How often the body is asked about a plan anew: each answer may make another plan. After the first so many times
+estimates go half-way only; at most, in all."""
 
 
 class Planning:
@@ -56,41 +57,53 @@ class Planning:
         relations = await unhurried(relation_steps(block, elsewhere))  # Bad references: before the body is asked.
         named = frozenset(point for point in relations.named if is_foreign(point.behavior))
         block = validated(block)
-        estimates = await self._estimates(block, {})
+        question = question_about(block)
+        estimates = await self._estimates(block, question)
         await self._earlier(live, named)
-        return await self._agreed(block, estimates, elsewhere, named)
+        return await self._agreed(block, question, estimates, elsewhere, named)
 
     async def again(self, plan: Plan, elsewhere: Mapping[str, Block]) -> Plan:
         """Plan a block that had to wait: by now the body and the other blocks are elsewhere."""
         known = self._known(plan.block, elsewhere, plan.foreign, plan.estimates.values())
-        estimates = await self._estimates(plan.block, poses_before(plan, known), planned_times(plan))
-        return await self._agreed(plan.block, estimates, elsewhere, plan.foreign)
+        question = question_about(plan.block, poses_before(plan, known), planned_times(plan))
+        estimates = await self._estimates(plan.block, question)
+        return await self._agreed(plan.block, question, estimates, elsewhere, plan.foreign)
 
     async def _agreed(
-        self, block: Block, first: tuple[Estimate, ...], elsewhere: Mapping[str, Block], named: Collection[Point]
+        self,
+        block: Block,
+        question: EstimateBehaviors,
+        first: tuple[Estimate, ...],
+        elsewhere: Mapping[str, Block],
+        named: Collection[Point],
     ) -> Plan:
-        """Plan with `first`, and ask the body about the plan and the hands it has chosen, until its answer changes
-        nothing."""
+        """Plan with `first`, and ask the body about the plan and the hands it has chosen, until that changes nothing:
+        the answer, or already the question. question: the one that `first` answers."""
         barred: set[tuple[str, Hand]] = set()
-        chosen, estimates, rounds = block, first, 0
+        chosen, asked, estimates, rounds = block, question, first, 0
         while True:
             known = self._known(block, elsewhere, named, estimates)
             plan = await unhurried(plan_steps(chosen, estimates, known=known, barred=barred))
             before, times = poses_before(plan, known), planned_times(plan)
             if plan.block is chosen and (rounds >= ROUNDS or not (before or times)):
                 return plan
-            told = await self._estimates(plan.block, before, times)
+            about_plan = question_about(plan.block, before, times)
+            if plan.block is chosen and about_plan == asked:
+                return plan
+            told = await self._estimates(plan.block, about_plan)
             if plan.block is chosen and not changed(estimates, told):
                 return plan
-            chosen, estimates, rounds = plan.block, told, rounds + 1
+            if plan.block is chosen and rounds >= STRAIGHT:
+                told = between(estimates, told)
+            chosen, asked, estimates, rounds = plan.block, about_plan, told, rounds + 1
             if refused := hands_refused(block, chosen, estimates):
                 barred |= refused
-                chosen, estimates, rounds = block, first, 0
+                chosen, asked, estimates, rounds = block, question, first, 0
 
     async def _earlier(self, live: Live, named: Iterable[Point]) -> None:
         """Wait until those of the earlier blocks are planned that this one is to be planned with in mind."""
         block = live.request.block
-        for other in live.earlier:
+        for other in reversed(live.earlier):  # The last one waits for the others itself: one wait for all, mostly.
             id = other.request.block.id
             if not other.settled.done() and (is_named_in(id, named) or may_share(block, other.request.block)):
                 await asyncio.wait([other.settled])
@@ -102,23 +115,10 @@ class Planning:
         parts = parts_of(block.behaviors, estimates)
         return knowledge(Asker(block.id, now, now, named, parts, elsewhere), self._performing(), self._live_blocks)
 
-    async def _estimates(
-        self, block: Block, before: Mapping[str, BodyPose], times: Mapping[str, tuple[PlannedTime, ...]] = {}
-    ) -> tuple[Estimate, ...]:
-        """Estimates of the body. before: poses in which behaviors start; without one, from where the body is now.
-
-        times: when they are planned to begin and to wait, in the order in which they begin.
-        """
-        behaviors = [behavior for behavior in block.behaviors if performer(behavior) == "body"]
-        if not behaviors:
+    async def _estimates(self, block: Block, question: EstimateBehaviors) -> tuple[Estimate, ...]:
+        """Estimates of the body for behaviors of a block. Raises BlockRefused."""
+        if not question.items:
             return ()
-        rank = {id: number for number, id in enumerate(times)}
-        behaviors.sort(key=lambda behavior: rank.get(behavior.id, len(rank)))
-        items = (
-            EstimateItem(behavior=behavior, pose=before.get(behavior.id), times=times.get(behavior.id, ()))
-            for behavior in behaviors
-        )
-        question = EstimateBehaviors(items=tuple(items))
         try:
             answer = await self._bus.query(keys.ESTIMATE, question, timeout=self._config.estimate)
         except NoReply as error:
@@ -132,6 +132,24 @@ class Planning:
             )
             raise BlockRefused(fault, "CANNOT_CREATE_BEHAVIOR")
         return answer.items
+
+
+def question_about(
+    block: Block, before: Mapping[str, BodyPose] = {}, times: Mapping[str, tuple[PlannedTime, ...]] = {}
+) -> EstimateBehaviors:
+    """The question to the body about the behaviors of a block that it performs.
+
+    before: poses in which behaviors start; without one, from where the body is now. times: when they are planned to
+    begin and to wait, in the order in which they begin.
+    """
+    behaviors = [behavior for behavior in block.behaviors if performer(behavior) == "body"]
+    rank = {id: number for number, id in enumerate(times)}
+    behaviors.sort(key=lambda behavior: rank.get(behavior.id, len(rank)))
+    items = [
+        EstimateItem(behavior=behavior, pose=before.get(behavior.id), times=times.get(behavior.id, ()))
+        for behavior in behaviors
+    ]
+    return EstimateBehaviors(items=tuple(items))
 
 
 async def unhurried(steps: Steps[T]) -> T:

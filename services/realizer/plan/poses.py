@@ -4,6 +4,8 @@ from collections.abc import Mapping, Sequence
 from itertools import pairwise
 from math import inf
 
+from msgspec.structs import replace
+
 from engage_hri.schemas.body import BodyPose, Estimate, PlannedTime
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.realizer.plan.known import NOTHING, Known, is_foreign
@@ -60,7 +62,8 @@ def planned_times(plan: Plan) -> dict[str, tuple[PlannedTime, ...]]:
 
     Empty if no behavior makes a difference to another or to itself: then its first estimates hold.
     """
-    order = sorted(plan.entering, key=lambda id: round(plan.predicted(plan.chains[id].points[0]), 6))
+    order = plan.begun_in_order(plan.chains)
+    order.sort(key=lambda id: round(plan.predicted(plan.chains[id].points[0]), 6))
     moving = [id for id in order if (estimate := plan.estimates.get(id)) is not None and estimate.parts]
     times = {id: _times(plan, id) for id in moving if plan.estimates[id].parts != ("voice",)}
     used = [part for id in times for part in plan.estimates[id].parts]
@@ -76,14 +79,14 @@ def _times(plan: Plan, id: str) -> tuple[PlannedTime, ...]:
     for (since, to), segment in zip(pairwise(chain.points), chain.segments, strict=True):
         begins, comes = plan.predicted(since), plan.predicted(to)
         surplus = comes - begins - segment.natural
-        if comes >= taken - EPSILON:
+        if comes >= taken - EPSILON and (segment.hold or chain.type in SHIFTS or surplus < -NOTICEABLE):
             if segment.hold:  # It may not pass: it waits there until it is cut.
                 times.append(PlannedTime(sync=to.sync, at=taken + CUT))
             elif chain.type in SHIFTS:  # It hurries to be there.
                 times.append(PlannedTime(sync=to.sync, at=taken))
             if segment.hold or chain.type in SHIFTS:
                 break
-        elif surplus > NOTICEABLE or (_is_met_there(plan, to) if segment.hold else surplus < -NOTICEABLE):
+        elif abs(surplus) > NOTICEABLE or (segment.hold and _is_met_there(plan, to)):
             times.append(PlannedTime(sync=to.sync, at=comes + (APART if id in plan.natural else 0.0)))
     return tuple(times)
 
@@ -107,15 +110,38 @@ def _taken(plan: Plan, id: str) -> Seconds:
 
 
 def changed(before: Sequence[Estimate], after: Sequence[Estimate]) -> bool:
-    """True if a plan made with the estimates `before` is not the one that they call for `after`."""
+    """True if a plan made with the estimates `before` is not the one that they call for `after`.
+
+    Estimates of what was not asked about say nothing: bodies err.
+    """
     known = {each.behavior: each for each in before}
     return any(
         one.feasible != other.feasible
         or one.parts != other.parts
         or len(one.phases) != len(other.phases)
         or any(abs(a.natural - b.natural) > NOTICEABLE for a, b in zip(one.phases, other.phases, strict=True))
-        for one, other in ((known[each.behavior], each) for each in after)
+        for one, other in ((known[each.behavior], each) for each in after if each.behavior in known)
     )
+
+
+def between(before: Sequence[Estimate], after: Sequence[Estimate]) -> tuple[Estimate, ...]:
+    """Estimates half-way from `before` to `after`: where each answer of the body makes the plan that calls for the
+    other, the right one lies between."""
+    known = {each.behavior: each for each in before}
+    return tuple([_halfway(known[each.behavior], each) for each in after])
+
+
+def _halfway(one: Estimate, other: Estimate) -> Estimate:
+    if [each.to for each in one.phases] != [each.to for each in other.phases]:
+        return other
+    phases = []
+    for a, b in zip(one.phases, other.phases, strict=True):
+        natural = (a.natural + b.natural) / 2
+        longest = None if b.longest is None else max(b.longest, natural)
+        phases.append(
+            replace(b, natural=natural, shortest=min(natural, (a.shortest + b.shortest) / 2), longest=longest)
+        )
+    return replace(other, phases=tuple(phases))
 
 
 def _is_overlaid(plan: Plan, shift: str) -> bool:
