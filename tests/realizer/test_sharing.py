@@ -13,7 +13,7 @@ from engage_hri.services.realizer.plan.handover import Arrangement
 from engage_hri.services.requests.ends import RequestRefused
 from tests.realizer.fake_body import FakeBody, Script
 from tests.realizer.planning import timed
-from tests.realizer.stage import Stage, after, block, stage
+from tests.realizer.stage import Stage, after, block, stage, together
 
 WORDS = Speech(id="s", text="one two three four", marks=(Mark("m1", 3), Mark("m2", 7), Mark("m3", 13)))
 """Four seconds, told of each second."""
@@ -262,6 +262,16 @@ async def test_a_point_that_is_expected_after_a_fixed_time_is_not_waited_for() -
     assert (planned.block, planned.kind) == ("two", "LATE")
     assert "one:s:end is not waited for: expected 4.00 s after the start of the block" in planned.message
     assert outcomes[1].dropped == ()
+    times = instants(seen)
+    assert (times["two:f:start"], times["two:f:relax"]) == (1.0, 1.5)
+
+
+async def test_who_cannot_set_out_for_a_point_that_comes_too_late_keeps_its_own_time() -> None:
+    tied = block((timed(LOOK, stroke="1"),), together("one:s:end", "g:stroke"), id="two")
+    seen, _ = await told((0.0, block((WORDS,), id="one")), (0.0, tied))
+
+    assert instants(seen)["two:g:stroke"] == 1.0
+    assert [each.kind for each in seen.warnings()] == ["LATE"]
 
 
 @pytest.mark.parametrize("is_required", [True, False])

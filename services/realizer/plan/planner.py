@@ -44,7 +44,7 @@ from engage_hri.services.realizer.plan.relations import (
     at_line,
     relation_steps,
 )
-from engage_hri.services.realizer.plan.remaining import remaining
+from engage_hri.services.realizer.plan.remaining import remaining, untied
 from engage_hri.services.realizer.plan.schedule import Solution, critical_path
 from engage_hri.services.realizer.plan.sharing import naming_others, share, waits_elsewhere
 from engage_hri.services.realizer.plan.speaking_order import Misordered, SpeakingOrder
@@ -342,6 +342,9 @@ class _Planner:
             if late := too_late(impossible, assembly) - self.doubted:
                 self.doubted |= late
                 self.problems += unkept(late, self.known)
+                if any(is_foreign(point.behavior) for point in late):
+                    self.relations = untied(self.relations, late)
+                    raise Misordered from None
                 return (yield from self._solved(assembler, arrangement, classes))
             if waits := assembly.waits(tie for circle in impossible.circles for tie, _ in circle):
                 assembler.waive(waits)

@@ -8,6 +8,7 @@ from msgspec.structs import replace
 from engage_hri.schemas.behavior_types import TYPES
 from engage_hri.schemas.behaviors import Head
 from engage_hri.services.realizer.plan.instants import Classes
+from engage_hri.services.realizer.plan.known import is_foreign
 from engage_hri.services.realizer.plan.phases import Chain
 from engage_hri.services.realizer.plan.relations import Equal, Order, Relations, Term
 from engage_hri.services.realizer.plan.steps import Steps, portions
@@ -42,6 +43,26 @@ def remaining(
         frozenset(id for id in relations.required if id not in dropped),
     )
     return present, classes
+
+
+def untied(relations: Relations, points: Container[Point]) -> Relations:
+    """The relations without what they say of these points of other blocks."""
+    equals = [
+        (equal, tuple([term for term in equal.terms if not _is_of_others(term, points)]))
+        for equal in relations.equals
+    ]
+    orders = [
+        each for each in relations.orders if not any(_is_of_others(end, points) for end in (each.earlier, each.later))
+    ]
+    return replace(
+        relations,
+        equals=tuple([replace(equal, terms=left) for equal, left in equals if left == equal.terms or len(left) > 1]),
+        orders=tuple(orders),
+    )
+
+
+def _is_of_others(term: Term, points: Container[Point]) -> bool:
+    return is_foreign(term.point.behavior) and term.point in points
 
 
 def _left_over(relations: Relations, chains: Mapping[str, Chain], dropped: Container[str]) -> list[Equal]:
