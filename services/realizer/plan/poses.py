@@ -82,7 +82,7 @@ def _times(plan: Plan, id: str) -> tuple[PlannedTime, ...]:
         if comes >= taken - EPSILON and (segment.hold or chain.type in SHIFTS or surplus < -NOTICEABLE):
             if segment.hold:  # It may not pass: it waits there until it is cut.
                 times.append(PlannedTime(sync=to.sync, at=taken + CUT))
-            elif chain.type in SHIFTS:  # It hurries to be there.
+            elif chain.type in SHIFTS and plan.successors.get(id, ("", None))[1] != to:  # It hurries to be there.
                 times.append(PlannedTime(sync=to.sync, at=taken))
             if segment.hold or chain.type in SHIFTS:
                 break
