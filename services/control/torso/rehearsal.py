@@ -118,7 +118,7 @@ class _Part:
                 torso.turn_home(run)
 
     def next_due(self) -> Seconds | None:
-        """When it passes its next point, if it is paced: then it is given the next instant."""
+        """Instant at which a paced behavior passes its next point: then it is given the next one."""
         run = self.run
         if not self._forced or run.is_over or run.holding or not run.pending:
             return None
