@@ -24,8 +24,9 @@ from tests.realizer.exact_blocks import OFF, WORLD, Performed, perform, performe
 from tests.realizer.planning import timed
 
 BLOCKS = 120
-MOST = 0.09
-"""Share of blocks that may be off: without rehearsal 0.29, with shifts 0.45. docs/realizer.md says what is left."""
+MOST = {False: 0.035, True: 0.055}
+"""Share of blocks that may be off, without shifts and with: 0.29 and 0.45 without a rehearsal. docs/realizer.md
+says what is left."""
 
 
 @pytest.mark.parametrize("shifts", [False, True])
@@ -34,7 +35,7 @@ def test_few_random_blocks_are_off_their_plan(shifts: bool) -> None:
     off = [each.block.id for each in seen if each.worst > OFF]
 
     assert sum(len(each.at) for each in seen) > 15 * BLOCKS
-    assert len(off) <= MOST * BLOCKS, off
+    assert len(off) <= MOST[shifts] * BLOCKS, off
 
 
 def performed_block(*behaviors: BlockBehavior, ties: tuple[tuple[str, str], ...] = ()) -> Performed:

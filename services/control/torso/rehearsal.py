@@ -118,7 +118,7 @@ class _Part:
                 torso.turn_home(run)
 
     def next_due(self) -> Seconds | None:
-        """When it passes its next point, if it is paced: then it is given the next instant."""
+        """Instant at which a paced behavior passes its next point: then it is given the next one."""
         run = self.run
         if not self._forced or run.is_over or run.holding or not run.pending:
             return None
@@ -255,7 +255,7 @@ def _begin(
         return estimate
     path = torso.path(course)
     waits, forced = _told_apart(course, path, times)
-    paced = _paced(course, path, times[START], forced)
+    paced = _paced(course, path, times, forced)
     authority = MovementAuthority(behavior, _through(behavior, list(waits)), paced)
     run = Run(behavior, course, authority, Variability(), 0)
     run.bell = clock
@@ -289,14 +289,16 @@ def _told_apart(
     return waits, forced
 
 
-def _paced(course: Course, path: Path, began: Seconds, forced: Mapping[str, Seconds]) -> dict[str, Seconds]:
+def _paced(
+    course: Course, path: Path, times: Mapping[str, Seconds], forced: Mapping[str, Seconds]
+) -> dict[str, Seconds]:
     """Instants for all points up to the last that is forced: the others are asked for as they come by themselves."""
     paced: dict[str, Seconds] = {}
-    at = began
+    at = times[START]
     for since, to in pairwise([point.sync for point in course.points]):
         if len(forced.keys() & paced.keys()) == len(forced):
             break
-        at = paced[to] = forced.get(to, at + path.marks[to] - path.marks[since])
+        at = paced[to] = times.get(to, at + path.marks[to] - path.marks[since])
     return paced
 
 

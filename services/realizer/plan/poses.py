@@ -75,18 +75,18 @@ def planned_times(plan: Plan) -> dict[str, tuple[PlannedTime, ...]]:
 def _times(plan: Plan, id: str) -> tuple[PlannedTime, ...]:
     chain = plan.chains[id]
     times = [PlannedTime(sync=chain.points[0].sync, at=plan.predicted(chain.points[0]))]
-    taken = _taken(plan, id)
+    taken, (_, cut) = _taken(plan, id), plan.successors.get(id, ("", None))
     for (since, to), segment in zip(pairwise(chain.points), chain.segments, strict=True):
         begins, comes = plan.predicted(since), plan.predicted(to)
         surplus = comes - begins - segment.natural
-        if comes >= taken - EPSILON and (segment.hold or chain.type in SHIFTS or surplus < -NOTICEABLE):
-            if segment.hold:  # It may not pass: it waits there until it is cut.
-                times.append(PlannedTime(sync=to.sync, at=taken + CUT))
-            elif chain.type in SHIFTS:  # It hurries to be there.
-                times.append(PlannedTime(sync=to.sync, at=taken))
-            if segment.hold or chain.type in SHIFTS:
-                break
-        elif abs(surplus) > NOTICEABLE or (segment.hold and _is_met_there(plan, to)):
+        if segment.hold and comes >= taken - EPSILON:  # It may not pass: it waits there until it is cut.
+            times.append(PlannedTime(sync=to.sync, at=taken + CUT))
+            break
+        if to == cut and surplus < -NOTICEABLE:
+            break
+        is_just_in_time = chain.type in SHIFTS and comes >= taken - EPSILON
+        is_due = _is_met_there(plan, to) if segment.hold else is_just_in_time
+        if abs(surplus) > NOTICEABLE or is_due:
             times.append(PlannedTime(sync=to.sync, at=comes + (APART if id in plan.natural else 0.0)))
     return tuple(times)
 
