@@ -310,7 +310,7 @@ async def test_to_follow_what_one_replaces_is_refused() -> None:
     assert seen.times("one")["s:end"] == 4.0
 
 
-async def test_many_blocks_that_queue_for_the_voice_are_planned_in_few_rounds(
+async def test_blocks_that_queue_for_the_voice_are_planned_in_few_rounds(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """Who comes waits for the last in the queue, and does not find out about each of the others one by one."""
@@ -324,7 +324,7 @@ async def test_many_blocks_that_queue_for_the_voice_are_planned_in_few_rounds(
 
     monkeypatch.setattr(Assembler, "assemble", counted)
     speeches = tuple(Speech(id=f"s{number}", text="one two") for number in range(3))
-    seen, outcomes = await told(*((0.0, block(speeches, id=f"b{number}")) for number in range(12)))
+    _, outcomes = await told(*((0.0, block(speeches, id=f"b{number}")) for number in range(12)))
 
     assert [each.status for each in outcomes] == ["done"] * 12
     assert rounds < 12 * 12
