@@ -1,6 +1,6 @@
 """Sync points of live blocks that other live blocks refer to: expected, reached or lost."""
 
-from collections import deque
+from collections import Counter, deque
 from collections.abc import Iterable, Iterator, Mapping, Set
 from contextlib import contextmanager
 from math import inf
@@ -12,6 +12,10 @@ from engage_hri.schemas.units import Seconds
 from engage_hri.services.realizer.plan.known import block_of, qualified
 from engage_hri.services.realizer.plan.schedule import EPSILON
 from engage_hri.services.realizer.points import Point
+
+MOST_TELLINGS = 20
+"""Most changes of one expected time that are told in a row. Blocks that wait for each other, by a tie and by a part
+that changes hands, may never agree on a time; they go on when something is measured."""
 
 
 class TiedBlock(Protocol):
@@ -117,8 +121,12 @@ class LiveBlocks:
             return  # The call below tells it: a chain of blocks may be longer than calls may be nested.
         self._is_telling = True
         try:
+            told: Counter[tuple[str, Point]] = Counter()
             while self._untold:
                 tracked, point, at = self._untold.popleft()
+                told[tracked.block.id, point] += 1
+                if told[tracked.block.id, point] > MOST_TELLINGS:
+                    continue
                 for follower in list(tracked.followers):
                     follower.foresee(qualified(tracked.block.id, point), at)
         finally:
