@@ -135,7 +135,7 @@ class Facts:
         """
         runs: list[tuple[Seconds, Seconds]] = []
         was_held = False
-        for (at, held), end in zip(self._holds, [*(at for at, _ in self._holds[1:]), until], strict=True):
+        for (at, held), end in zip(self._holds, [*(at for at, _ in self._holds[1:]), until], strict=False):
             is_held = held is None or bool(held)
             if is_held and at < until:
                 runs[-1:] = [(runs[-1][0], min(end, until))] if was_held else [*runs[-1:], (at, min(end, until))]

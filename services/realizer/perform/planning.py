@@ -131,7 +131,8 @@ class Planning:
                 reason=f"control answered with a {type(answer).__name__}, not with estimates", where=block.id
             )
             raise BlockRefused(fault, "CANNOT_CREATE_BEHAVIOR")
-        return answer.items
+        asked = {item.behavior.id for item in question.items}
+        return tuple([each for each in answer.items if each.behavior in asked])  # bodies err
 
 
 def question_about(

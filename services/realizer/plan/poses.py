@@ -128,7 +128,7 @@ def between(before: Sequence[Estimate], after: Sequence[Estimate]) -> tuple[Esti
     """Estimates half-way from `before` to `after`: where each answer of the body makes the plan that calls for the
     other, the right one lies between."""
     known = {each.behavior: each for each in before}
-    return tuple([_halfway(known[each.behavior], each) for each in after])
+    return tuple([_halfway(known.get(each.behavior, each), each) for each in after])
 
 
 def _halfway(one: Estimate, other: Estimate) -> Estimate:
