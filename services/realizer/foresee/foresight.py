@@ -13,7 +13,7 @@ from engage_hri.services.realizer.foresee.experience import Experience
 from engage_hri.services.realizer.foresee.forecast import Forecast, full_forecast, is_predictive
 from engage_hri.services.realizer.net.facts import Facts
 from engage_hri.services.realizer.net.running import RunningNet
-from engage_hri.services.realizer.plan.known import BLOCK_END, BLOCK_START, FAR
+from engage_hri.services.realizer.plan.known import BLOCK_END, BLOCK_START
 from engage_hri.services.realizer.plan.planner import Plan
 from engage_hri.services.realizer.plan.schedule import EPSILON
 from engage_hri.services.realizer.points import SHIFTS, Member, Point, performer
@@ -40,7 +40,7 @@ class Foresight:
         self.experience = Experience(plan.estimates)
         self.paces: dict[str, Pace] = {}
         self.not_before: dict[str, Seconds] = {}
-        self.foreseen: dict[Point, Seconds] = {}
+        self.foreseen = {point: facts.began + plan.predicted(point) for point in plan.foreign}
         self.is_surprised = False
         self._facts = facts
         self._followed: set[Point] = set()
@@ -52,10 +52,6 @@ class Foresight:
         self.plan = plan
         self._net = net
         self.is_surprised = True
-        began = self._facts.began
-        for point in plan.foreign:
-            # Nobody is to set out for what nobody knows the time of.
-            self.foreseen.setdefault(point, began + (FAR if point in plan.undated else plan.predicted(point)))
         self._news: list[tuple[Any, ...]] = []
         """What the forecast has yet to be told: a function, and its arguments."""
         self._arrivals: list[tuple[Seconds, Seconds, str, int]] = []
@@ -144,11 +140,7 @@ class Foresight:
             return {}
         times, reached = self.forecast.times, self._facts.reached
         coming = {point: self.plan.transition(point) for point in self._followed if point not in reached}
-        expected = {point: times[transition] for point, transition in coming.items() if transition is not None}
-        return {point: at for point, at in expected.items() if self._has_date(at)}
-
-    def _has_date(self, at: Seconds) -> bool:
-        return at - self._facts.began < FAR / 2
+        return {point: times[transition] for point, transition in coming.items() if transition is not None}
 
     def _transitions_followed(self) -> list[int]:
         found = [self.plan.transition(point) for point in self._followed]
@@ -286,17 +278,11 @@ class Foresight:
     # -- expected times ------------------------------------------------------------------------------------------
 
     def expected(self, now: Seconds) -> dict[Point, Seconds]:
-        """Expected times of all points of the block that are still to come, in seconds from the block's start.
-
-        Those are left out of which nobody knows when they come.
-        """
+        """Expected times of all points of the block that are still to come, in seconds from the block's start."""
         forecast = self.from_scratch(now)
         points = {point for chain in self.plan.chains.values() for point in chain.points}
-        times = {
-            point: max(now, forecast.times[self.plan.at[point]]) for point in points - self._facts.reached.keys()
-        }
-        coming = {point: at for point, at in times.items() if self._has_date(at)}
-        self._expected |= coming
+        coming = points - self._facts.reached.keys()
+        self._expected |= {point: max(now, forecast.times[self.plan.at[point]]) for point in coming}
         self.is_surprised = False
         return {point: self._expected[point] - self._facts.began for point in coming}
 

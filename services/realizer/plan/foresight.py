@@ -7,7 +7,7 @@ from engage_hri.schemas.units import Seconds
 from engage_hri.services.realizer.plan.assembly import Assembly
 from engage_hri.services.realizer.plan.deadlocks import Loss
 from engage_hri.services.realizer.plan.handover import Turn
-from engage_hri.services.realizer.plan.known import Known, has_date, is_foreign
+from engage_hri.services.realizer.plan.known import Known, is_foreign
 from engage_hri.services.realizer.plan.phases import Chain
 from engage_hri.services.realizer.plan.prediction import Circle, Foresight, Impossible
 from engage_hri.services.realizer.plan.relations import Problem
@@ -19,8 +19,8 @@ def foreseen(assembly: Assembly, known: Known, doubted: Collection[Point]) -> di
     found: dict[int, Seconds] = {}
     if known.points:
         for point, transition in assembly.at.items():
-            if point not in doubted and has_date(known.points, point):
-                found[transition] = max(known.points[point], found.get(transition, -inf))
+            if point not in doubted and (at := known.points.get(point)) is not None:
+                found[transition] = max(at, found.get(transition, -inf))
     return found
 
 
@@ -73,14 +73,8 @@ def unkept(late: Container[Point], known: Known) -> list[Problem]:
     ]
 
 
-def undated(assembly: Assembly, known: Known) -> frozenset[Point]:
-    """Points of other blocks of which it is not known when they come."""
-    return frozenset(
-        point for point in assembly.at if is_foreign(point.behavior) and not has_date(known.points, point)
-    )
-
-
 def without_date(assembly: Assembly, known: Known) -> set[str]:
     """Behaviors that come after points of other blocks of which it is not known when they come."""
-    later = assembly.net.later([assembly.at[point] for point in undated(assembly, known)])
+    unknown = [at for point, at in assembly.at.items() if is_foreign(point.behavior) and point not in known.points]
+    later = assembly.net.later(unknown)
     return {point.behavior for point, at in assembly.at.items() if at in later}

@@ -12,9 +12,6 @@ from engage_hri.services.realizer.plan.phases import Chain
 from engage_hri.services.realizer.plan.relations import Elsewhere
 from engage_hri.services.realizer.points import Point
 
-FAR: Seconds = 1e6
-"""Time to a point of which nobody knows when it comes: its block still waits for its turn, or for such a point."""
-
 
 class Holder(Struct, frozen=True):
     """A behavior of another live block that has parts of the body, or will have them.
@@ -59,11 +56,6 @@ def qualified(block: str, point: Point) -> Point:
 def block_of(point: Point) -> str:
     """Id of the block of a point that is named as other blocks name it."""
     return point.behavior.partition(":")[0]
-
-
-def has_date(points: Mapping[Point, Seconds], point: Point) -> bool:
-    """True if it is known, roughly, when the point comes. points: seconds from a block's start."""
-    return points.get(point, FAR) < FAR / 2
 
 
 def is_foreign(name: str) -> bool:

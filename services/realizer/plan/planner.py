@@ -20,14 +20,7 @@ from engage_hri.services.realizer.net.petri_net import PetriNet
 from engage_hri.services.realizer.plan import unsupported
 from engage_hri.services.realizer.plan.assembly import Assembler, Assembly, assembling
 from engage_hri.services.realizer.plan.deadlocks import Losses, clashes, judge
-from engage_hri.services.realizer.plan.foresight import (
-    foreseen,
-    losses_to_others,
-    too_late,
-    undated,
-    unkept,
-    without_date,
-)
+from engage_hri.services.realizer.plan.foresight import foreseen, losses_to_others, too_late, unkept, without_date
 from engage_hri.services.realizer.plan.given_up import times_of
 from engage_hri.services.realizer.plan.handover import Arrangement, Conflict, Turn, arrange, entering, kept_points
 from engage_hri.services.realizer.plan.instants import Classes
@@ -67,7 +60,6 @@ class Plan(Struct, frozen=True, kw_only=True):
     constrained: points that something waits for, or that are timed.
     successors: behaviors that hand their parts over, each with the one that takes them (`block:behavior` of another
     block), and the first of its points that comes by that. takes: behaviors of other blocks whose parts are taken.
-    undated: points of other blocks of which it is not known when they come.
     """
 
     block: Block
@@ -86,7 +78,6 @@ class Plan(Struct, frozen=True, kw_only=True):
     constrained: frozenset[Point] = frozenset()
     successors: Mapping[str, tuple[str, Point]] = {}
     takes: Mapping[str, str] = {}
-    undated: frozenset[Point] = frozenset()
     critical: tuple[int, ...] = ()
     dropped: tuple[str, ...] = ()
     given_up: tuple[str, ...] = ()
@@ -255,9 +246,9 @@ class _Planner:
             arranged, conflicts = yield from arrange(
                 self.chains, present, classes, arrangement, {**times, **self.known.points}, rounds, self.barred, given
             )
-            waiting = without_date(assembly, self.known) if given else ()
+            undated = without_date(assembly, self.known) if given else ()
             arranged, others = yield from share(
-                self.chains, present, self.known, arranged, times, self.barred, waiting
+                self.chains, present, self.known, arranged, times, self.barred, undated
             )
             conflicts = [each for each in (*conflicts, *others) if self._is_open(each)]
             turns = [each.turn for each in conflicts if each.turn and not (each.hand or waits_elsewhere(each.turn))]
@@ -291,7 +282,6 @@ class _Planner:
             constrained=present.constrained,
             successors=arrangement.successors,
             takes=arrangement.takes,
-            undated=undated(assembly, self.known),
             critical=critical_path(solution),
             dropped=tuple(self.dropped),
             given_up=tuple(self.given_up),
