@@ -26,6 +26,9 @@ class Point(NamedTuple):
         return f"{self.behavior or 'bml'}:{self.sync}"
 
 
+EPSILON: Seconds = 1e-6
+"""Seconds; instants that differ by less are one."""
+
 ORIGIN = Point("", "start")
 """The start of the block itself."""
 FINISH = Point("", "end")

@@ -26,8 +26,7 @@ from engage_hri.services.commandline.plan import estimated
 from engage_hri.services.commandline.roster import service
 from engage_hri.services.commandline.sources import still
 from engage_hri.services.realizer.plan.planner import Plan, plan_block
-from engage_hri.services.realizer.plan.schedule import EPSILON
-from engage_hri.services.realizer.points import Point
+from engage_hri.services.realizer.points import EPSILON, Point
 from engage_hri.services.requests.ends import Requester
 from engage_hri.services.runtime.service import Service, running
 from engage_hri.services.runtime.virtual_time import run_virtual

@@ -12,14 +12,13 @@ from engage_hri.schemas.units import Seconds
 from engage_hri.services.realizer.config import RealizerConfig
 from engage_hri.services.realizer.foresee.foresight import Foresight
 from engage_hri.services.realizer.net.facts import Facts
-from engage_hri.services.realizer.net.running import RunningNet
+from engage_hri.services.realizer.net.running import Observer, RunningNet
 from engage_hri.services.realizer.plan.planner import Plan
-from engage_hri.services.realizer.plan.schedule import EPSILON
-from engage_hri.services.realizer.points import Member, Point
+from engage_hri.services.realizer.points import EPSILON, Member, Point
 
 
-class Grants:
-    """Permissions to pass instants. An observer of the net (see net/running.py).
+class Grants(Observer):
+    """Permissions to pass instants.
 
     touched: behaviors that may go further, or at another pace, than they were told. granted_at: when each behavior
     was last allowed to go further.
@@ -47,9 +46,6 @@ class Grants:
 
     # -- what happens (see `Observer`) ---------------------------------------------------------------------------
 
-    def on_began(self, behavior: str, at: Seconds) -> None:
-        """Nothing: its instants open."""
-
     def on_arrived(self, point: Point, at: Seconds) -> None:
         self._dirty.add(self._plan.at[point])
 
@@ -58,9 +54,6 @@ class Grants:
 
     def on_opened(self, transition: int) -> None:
         self._dirty.add(transition)
-
-    def on_fired(self, transition: int, at: Seconds) -> None:
-        """Nothing: what it opens is told."""
 
     # -- what is to be decided -----------------------------------------------------------------------------------
 

@@ -12,8 +12,7 @@ from engage_hri.schemas.syncref import SyncRef
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.realizer.config import RealizerConfig
 from engage_hri.services.realizer.plan.planner import Plan
-from engage_hri.services.realizer.plan.schedule import EPSILON
-from engage_hri.services.realizer.points import Point
+from engage_hri.services.realizer.points import EPSILON, Point
 from engage_hri.services.requests.deadlines import Deadlines
 
 

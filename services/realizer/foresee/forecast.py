@@ -11,8 +11,7 @@ from engage_hri.schemas.units import Seconds
 from engage_hri.services.realizer.foresee.longest_paths import FINEST, Arc, Circle, LongestPaths
 from engage_hri.services.realizer.net.petri_net import order
 from engage_hri.services.realizer.plan.planner import Plan
-from engage_hri.services.realizer.plan.schedule import EPSILON
-from engage_hri.services.realizer.points import Point
+from engage_hri.services.realizer.points import EPSILON, Point
 
 REPAIRS = 200
 """Most bounds that are made way for in one `update`; those that cannot be kept then are given up for this time."""

@@ -12,11 +12,10 @@ from engage_hri.schemas.units import Seconds
 from engage_hri.services.realizer.foresee.experience import Experience
 from engage_hri.services.realizer.foresee.forecast import Forecast, full_forecast, is_predictive
 from engage_hri.services.realizer.net.facts import Facts
-from engage_hri.services.realizer.net.running import RunningNet
+from engage_hri.services.realizer.net.running import Observer, RunningNet
 from engage_hri.services.realizer.plan.known import BLOCK_END, BLOCK_START
 from engage_hri.services.realizer.plan.planner import Plan
-from engage_hri.services.realizer.plan.schedule import EPSILON
-from engage_hri.services.realizer.points import SHIFTS, Member, Point, performer
+from engage_hri.services.realizer.points import EPSILON, SHIFTS, Member, Point, performer
 
 SURPRISE: Seconds = 0.1
 """Difference from the expected time, in seconds, from which predictions are computed again."""
@@ -26,8 +25,8 @@ Pace = tuple[tuple[str, Seconds], ...]
 """Sync points and their instants, by loop time, where the behavior's natural pace would miss them; else empty."""
 
 
-class Foresight:
-    """Expectations of a block. An observer of its net (see net/running.py).
+class Foresight(Observer):
+    """Expectations of a block.
 
     paces: the pace that each behavior was last told. is_surprised: something has moved by `SURPRISE` since the last
     call of `expected`. not_before: when a behavior that is overdue is expected at its next point. foreseen: expected

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from msgspec import Struct
 
 from engage_hri.schemas.units import Seconds
-from engage_hri.services.realizer.plan.schedule import EPSILON
+from engage_hri.services.realizer.points import EPSILON
 
 FINEST: Seconds = 1e-8
 """Seconds; smaller changes are rounding."""

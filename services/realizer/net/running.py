@@ -13,20 +13,17 @@ has gone home by itself, and a token that comes too late is taken at once.
 
 from collections.abc import Collection, Mapping, Sequence
 from math import inf
-from typing import Protocol
 
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.realizer.net.clocks import Clocks
 from engage_hri.services.realizer.net.petri_net import Marking, PetriNet
-from engage_hri.services.realizer.points import Member, Point
+from engage_hri.services.realizer.points import EPSILON, Member, Point
 
 EMPTY, TOKEN, RIPE = 0, 1, 2
 """Contents of a place."""
-EPSILON: Seconds = 1e-6
-"""Seconds; instants that differ by less are one."""
 
 
-class Observer(Protocol):
+class Observer:
     """A part of the realizer that is told what happens in a running net, as it happens."""
 
     def on_began(self, behavior: str, at: Seconds) -> None:

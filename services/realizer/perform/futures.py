@@ -1,21 +1,20 @@
 """Futures of one block, which its running net resolves: one for each sync point and each instant that is awaited."""
 
 import asyncio
-from typing import Any, TypeVar
+from typing import TypeVar
 
 from engage_hri.schemas.units import Seconds
-from engage_hri.services.realizer.net.running import RunningNet
+from engage_hri.services.realizer.net.running import Observer, RunningNet
 from engage_hri.services.realizer.points import FINISH, Point
 
 T = TypeVar("T")
 
 
-class SyncPointFutures:
-    """Futures by sync point, each made when first awaited. They outlive the net. An observer (see net/running.py)."""
+class SyncPointFutures(Observer):
+    """Futures by sync point, each made when first awaited. They outlive the net."""
 
     def __init__(self) -> None:
         self._granted: dict[Point, asyncio.Future[None]] = {}
-        self._reached: dict[Point, asyncio.Future[Seconds]] = {}
         self._fired: dict[Point, asyncio.Future[Seconds]] = {}
 
     def adopt(self, net: RunningNet) -> "SyncPointFutures":
@@ -28,10 +27,6 @@ class SyncPointFutures:
     def granted(self, point: Point) -> "asyncio.Future[None]":
         """Resolved when the behavior may pass `point`; of its start: when it is to begin."""
         return _future(self._granted, point)
-
-    def reached(self, point: Point) -> "asyncio.Future[Seconds]":
-        """Resolved when `point` is reached, with the time. For points that are still to come."""
-        return _future(self._reached, point)
 
     def fired(self, point: Point) -> "asyncio.Future[Seconds]":
         """Resolved when the transition of `point` fires, with the time. `FINISH`: when the block is over."""
@@ -48,25 +43,11 @@ class SyncPointFutures:
 
     def cancel(self) -> None:
         """Cancel all that is still awaited: the block has ended."""
-        futures: list[asyncio.Future[Any]] = [
-            *self._granted.values(), *self._reached.values(), *self._fired.values()
-        ]  # fmt: skip
-        for future in futures:
-            future.cancel()
+        for futures in (self._granted, self._fired):
+            for future in futures.values():
+                future.cancel()
 
     # -- what happens (see `Observer`) ---------------------------------------------------------------------------
-
-    def on_began(self, behavior: str, at: Seconds) -> None:
-        """Nothing: its points are still to come."""
-
-    def on_arrived(self, point: Point, at: Seconds) -> None:
-        """Nothing: it has not passed."""
-
-    def on_opened(self, transition: int) -> None:
-        """Nothing: it has not fired."""
-
-    def on_reached(self, point: Point, at: Seconds) -> None:
-        _resolve(self._reached, point, at)
 
     def on_fired(self, transition: int, at: Seconds) -> None:
         if self._fired:

@@ -10,8 +10,7 @@ from engage_hri.schemas.blocks import Block
 from engage_hri.schemas.syncref import BLOCK_ITSELF
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.realizer.plan.known import block_of, qualified
-from engage_hri.services.realizer.plan.schedule import EPSILON
-from engage_hri.services.realizer.points import Point
+from engage_hri.services.realizer.points import EPSILON, Point
 
 MOST_TELLINGS = 20
 """Most changes of one expected time that are told in a row. Blocks that wait for each other, by a tie and by a part

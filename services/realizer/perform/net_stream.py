@@ -9,10 +9,9 @@ from engage_hri.schemas import keys
 from engage_hri.schemas.nets import NetMarked
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.interface import Bus
-from engage_hri.services.realizer.net.running import RunningNet
+from engage_hri.services.realizer.net.running import Observer, RunningNet
 from engage_hri.services.realizer.perform.net_message import described, firings, tokens
 from engage_hri.services.realizer.plan.planner import Plan
-from engage_hri.services.realizer.points import Point
 from engage_hri.services.runtime.alarm import Timer
 
 EVERY: Seconds = 0.05
@@ -21,8 +20,8 @@ AGAIN: Seconds = 2.0
 """Time between two messages that tell all."""
 
 
-class NetStream:
-    """Publisher of one block's marking. An observer of the net (see net/running.py)."""
+class NetStream(Observer):
+    """Publisher of one block's marking."""
 
     def __init__(self, bus: Bus, block: str) -> None:
         self._bus = bus
@@ -71,18 +70,6 @@ class NetStream:
         self._again.set(self._bus.now() + AGAIN)
 
     # -- what happens (see `Observer`) ---------------------------------------------------------------------------
-
-    def on_began(self, behavior: str, at: Seconds) -> None:
-        """Nothing: no token moves."""
-
-    def on_arrived(self, point: Point, at: Seconds) -> None:
-        """Nothing: the token stays in its place."""
-
-    def on_reached(self, point: Point, at: Seconds) -> None:
-        """Nothing: the net knows which places have changed."""
-
-    def on_opened(self, transition: int) -> None:
-        """Nothing: no token moves."""
 
     def on_fired(self, transition: int, at: Seconds) -> None:
         self._fired[transition] = at

@@ -16,8 +16,7 @@ from engage_hri.services.realizer.config import RealizerConfig
 from engage_hri.services.realizer.decide.lateness import event_deadline
 from engage_hri.services.realizer.net.facts import Facts
 from engage_hri.services.realizer.perform.shared_context import Presence
-from engage_hri.services.realizer.plan.schedule import EPSILON
-from engage_hri.services.realizer.points import Point
+from engage_hri.services.realizer.points import EPSILON, Point
 from engage_hri.services.requests.ends import Pending, Requester, RequestRefused, ServerRestarted
 
 

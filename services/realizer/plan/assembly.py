@@ -17,9 +17,17 @@ from engage_hri.services.realizer.plan.instants import Classes, Instant, instant
 from engage_hri.services.realizer.plan.numbering import numbered
 from engage_hri.services.realizer.plan.phases import Chain
 from engage_hri.services.realizer.plan.relations import Order, Relations
-from engage_hri.services.realizer.plan.schedule import EPSILON
 from engage_hri.services.realizer.plan.steps import PORTION, Steps, portions
-from engage_hri.services.realizer.points import ORIGIN, WITH_STROKE, Member, Point, gate, gate_point, performer
+from engage_hri.services.realizer.points import (
+    EPSILON,
+    ORIGIN,
+    WITH_STROKE,
+    Member,
+    Point,
+    gate,
+    gate_point,
+    performer,
+)
 
 
 class Assembly(Struct, frozen=True):

@@ -16,9 +16,8 @@ from engage_hri.schemas.units import Seconds
 from engage_hri.services.realizer.plan.instants import Classes
 from engage_hri.services.realizer.plan.phases import Chain
 from engage_hri.services.realizer.plan.relations import Relations
-from engage_hri.services.realizer.plan.schedule import EPSILON
 from engage_hri.services.realizer.plan.steps import Steps
-from engage_hri.services.realizer.points import ON_TARGET, SHIFTS, WITH_STROKE, Point
+from engage_hri.services.realizer.points import EPSILON, ON_TARGET, SHIFTS, WITH_STROKE, Point
 
 _OTHER: dict[str, tuple[str, Hand]] = {
     "left_arm": ("right_arm", "RIGHT_HAND"),

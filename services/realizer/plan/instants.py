@@ -11,9 +11,8 @@ from msgspec import Struct
 from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.realizer.plan.relations import BlockRefused, Equal, Term
-from engage_hri.services.realizer.plan.schedule import EPSILON
 from engage_hri.services.realizer.plan.steps import PORTION, Steps, portions
-from engage_hri.services.realizer.points import ORIGIN, Point
+from engage_hri.services.realizer.points import EPSILON, ORIGIN, Point
 
 
 class Instant(Struct, frozen=True, gc=False):

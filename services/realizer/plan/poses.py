@@ -11,8 +11,7 @@ from engage_hri.schemas.units import Seconds
 from engage_hri.services.realizer.plan.known import NOTHING, Known, is_foreign
 from engage_hri.services.realizer.plan.phases import Chain
 from engage_hri.services.realizer.plan.planner import Plan
-from engage_hri.services.realizer.plan.schedule import EPSILON
-from engage_hri.services.realizer.points import SHIFTS, Point, family
+from engage_hri.services.realizer.points import EPSILON, SHIFTS, Point, family
 
 NOTICEABLE: Seconds = 0.0005
 """Seconds by which a phase may differ before it makes another plan."""

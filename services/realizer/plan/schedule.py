@@ -5,9 +5,7 @@ from typing import NamedTuple
 
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.realizer.plan.steps import Steps
-
-EPSILON: Seconds = 1e-6
-"""Seconds; times closer than this are the same instant."""
+from engage_hri.services.realizer.points import EPSILON
 
 LAGS_AN_ELEMENT = 32
 """Number of lags that take as long as one element of a block: see `steps`."""

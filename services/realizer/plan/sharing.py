@@ -15,9 +15,8 @@ from engage_hri.services.realizer.plan.handover import Arrangement, Conflict, Tu
 from engage_hri.services.realizer.plan.known import Holder, Known, is_foreign
 from engage_hri.services.realizer.plan.phases import Chain
 from engage_hri.services.realizer.plan.relations import Equal, Relations, Term
-from engage_hri.services.realizer.plan.schedule import EPSILON
 from engage_hri.services.realizer.plan.steps import Steps
-from engage_hri.services.realizer.points import SHIFTS, WITH_STROKE, Point
+from engage_hri.services.realizer.points import EPSILON, SHIFTS, WITH_STROKE, Point
 
 _STROKE, _STROKE_END, _RELAX = (SYNC_POINTS.index(each) for each in ("stroke", "stroke_end", "relax"))
 
