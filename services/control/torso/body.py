@@ -9,7 +9,7 @@ from collections.abc import AsyncGenerator, Sequence
 from contextlib import aclosing
 from math import inf, radians
 
-from engage_hri.schemas.behaviors import BlockBehavior, Gaze, GazeShift, HeadDirectionShift, Speech, Wait
+from engage_hri.schemas.behaviors import BlockBehavior, GazeShift, HeadDirectionShift, Speech, Wait
 from engage_hri.schemas.body import BodyPose, Capabilities, Estimate, EstimateItem, NoPointZone
 from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.references import type_name
@@ -31,7 +31,7 @@ from engage_hri.services.control.torso import choreography, kinematics, tracks
 from engage_hri.services.control.torso.beneath import pass_end
 from engage_hri.services.control.torso.course import CoursePoint, Impossible
 from engage_hri.services.control.torso.estimates import infeasible, speech_estimate, wait_estimate
-from engage_hri.services.control.torso.moving import Torso
+from engage_hri.services.control.torso.moving import Torso, is_last_on_target
 from engage_hri.services.control.torso.rehearsal import Clock, beside, rehearsed
 from engage_hri.services.control.torso.repertoire import BUILT_IN, Repertoire
 from engage_hri.services.control.torso.runs import OVERHEAT, STALL, Run
@@ -184,8 +184,8 @@ class SimulatedBody(Body):
                         yield Reached(sync, since, arrived)
             else:
                 run.pending.pop(0)
-                if point.sync == "relax" and isinstance(run.behavior, Gaze):
-                    self._torso.turn_home(run)
+                if is_last_on_target(run.behavior, point.sync):
+                    self._torso.leave_target(run)
                 self._torso.attention.follow_run(run, self._loop.time())
                 yield Reached(point.sync, due, due)
         if run.is_beneath or run.is_taken_over:

@@ -12,11 +12,11 @@ import numpy as np
 from engage_hri.schemas.body import BodyPose, JointLimit
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.control.torso import kinematics
+from engage_hri.services.control.torso.aiming import NECK, Aim
 from engage_hri.services.control.torso.motion import Motion
 from engage_hri.services.control.torso.pace import return_time, turning_time
 from engage_hri.services.control.torso.path import JointMotion, Leg, Path, resting
 
-NECK = ("neck_yaw", "neck_pitch")
 GAZE_SHARES = (0.56, 0.42)
 """Shares of the neck's speed and of its acceleration for gaze; the rest is for nods, which are short and quick."""
 
@@ -62,38 +62,52 @@ def home_of(part: str, displaced: Mapping[str, float]) -> tuple[float, ...]:
 class Track:
     """The motion of one part. Two arms that move as one share a motion, each with its columns of it.
 
-    base: angles to which the part goes back; those of the safe pose until a shift changes them.
+    base: angles to which the part goes back; those of the safe pose until a shift changes them. aim: the place that
+    it is on, or on its way to; None: it moves with the trunk. trunk: the track of the torso.
     """
 
     def __init__(self, part: str, angles: Sequence[float]) -> None:
         self.part = part
         self.base = HOME[part]
+        self.aim: Aim | None = None
+        self.trunk = self
         self.joints = tuple(limit.joint for limit in LIMITS[part])
         self.motion = Motion(Path(resting(angles), (), LIMITS[part]), 0.0)
         self._column = 0
 
-    def play(self, motion: Motion, column: int = 0) -> None:
-        self.motion, self._column = motion, column
+    def play(self, motion: Motion, column: int = 0, aim: Aim | None = None) -> None:
+        self.motion, self._column, self.aim = motion, column, aim
 
     def at(self, t: Seconds) -> JointMotion:
         state, columns = self.motion.at(t), slice(self._column, self._column + len(self.joints))
-        return JointMotion(state.q[columns], state.v[columns], state.a[columns])
+        state = JointMotion(state.q[columns], state.v[columns], state.a[columns])
+        return state if self.aim is None else self.aim.added(state, self.trunk.at(t))
+
+    def start_at(self, t: Seconds, aim: Aim | None) -> JointMotion:
+        """State in which a path with this aim begins."""
+        state = self.at(t)
+        return state if aim is None else aim.removed(state, self.trunk.at(t))
 
     def angles(self, t: Seconds) -> tuple[float, ...]:
-        columns = self.motion.at(t).q.tolist()
-        return tuple(columns[self._column : self._column + len(self.joints)])
+        columns = self.motion.at(t).q[self._column : self._column + len(self.joints)]
+        if self.aim is not None:
+            columns = columns + self.aim.offset(self.trunk.angles(t))
+        return tuple(columns.tolist())
 
     def is_moving(self, t: Seconds) -> bool:
         return t < self.motion.end
 
-    def return_to(self, goal: tuple[float, ...], now: Seconds) -> None:
-        """Leave the current motion and go to rest at `goal`, by a path that is clear of the table."""
-        start = self.at(now)
+    def return_to(self, goal: tuple[float, ...], now: Seconds, aim: Aim | None = None) -> None:
+        """Leave the current motion and go to rest at `goal`, by a path that is clear of the table.
+
+        aim: the place that it is on at `goal`.
+        """
+        start = self.start_at(now, aim)
         time = turning_time if self.part in ("head", "nod") else return_time
-        seconds = time(self.angles(now), goal)
+        seconds = time(start.q.tolist(), goal)
         direct = Path(start, (Leg(goal=goal, seconds=seconds),), LIMITS[self.part])
         if not meets_table(direct, self.joints):
-            self.play(Motion(direct, now))
+            self.play(Motion(direct, now), aim=aim)
             return
         # Up first: the elbow bends and the upper arm lifts, which takes elbow and hand away from the table.
         yaw, pitch, elbow = self.angles(now)
