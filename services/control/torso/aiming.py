@@ -63,6 +63,12 @@ class Aim(Struct, frozen=True, kw_only=True):
     def joints(self) -> tuple[str, ...]:
         return NECK if self.side is None else kinematics.joints_of(f"{self.side}_arm")
 
+    def within(self, angles: Array) -> Array:
+        """The angles, or the nearest that the joints can take."""
+        limits = [kinematics.LIMIT[joint] for joint in self.joints]
+        low, high = ([getattr(limit, end) for limit in limits] for end in ("low", "high"))
+        return np.clip(angles, np.add(low, self.reserve), np.subtract(high, self.reserve))
+
     def at(self, trunk: Trunk) -> "Aim":
         """The same aim of a path that is laid for another place of the trunk."""
         return replace(self, trunk=trunk)

@@ -170,6 +170,8 @@ class SimulatedBody(Body):
                 await run.bell.wait(inf if due is None else due)
             elif point.sync in (STALL, OVERHEAT):
                 await self._fail_or_stall(run, point)
+            elif not run.holding and self._torso.is_off_target(run, point.sync):
+                raise _out_of_reach(run)
             elif point.held_with and (run.holding or not run.may_pass(point.held_with)):
                 arrived = max(due, since)
                 if not run.may_pass(point.held_with):
@@ -177,6 +179,8 @@ class SimulatedBody(Body):
                     yield Arrived(point.held_with, arrived)
                 while not run.may_pass(point.held_with) and not run.is_over:
                     await run.bell.wait(inf)
+                if not run.is_over and self._torso.is_off_target(run, point.sync):
+                    raise _out_of_reach(run)
                 # What is taken over just as it may go on has passed the point, and goes no further.
                 if not run.is_over or (run.is_taken_over and run.may_pass(point.held_with)):
                     since = self._loop.time()
@@ -244,3 +248,7 @@ class SimulatedBody(Body):
 
 def _fault(behavior: BlockBehavior, reason: str) -> Fault:
     return Fault(reason=reason, where=behavior.id, service="control")
+
+
+def _out_of_reach(run: Run) -> BodyFailed:
+    return BodyFailed(_fault(run.behavior, "its target is out of reach where the torso is now"))

@@ -120,7 +120,7 @@ def retargeted(run: Run, course: Course, track: Track, now: Seconds) -> Path | N
     if not differ(_target(course.on_target), going_to(run.course, course)):
         return None
     legs = (replace(course.legs[0], seconds=_left(run, now)), *course.legs[1:])
-    return Path(track.start_at(now, course.aim), run.with_faults(legs), tracks.LIMITS["head"])
+    return Path(track.start_at(now, course.aim), run.with_faults(legs), track.limits(now, course.aim))
 
 
 def homeward(run: Run, base: tuple[float, ...], track: Track, now: Seconds, aim: Aim | None) -> Path | None:
@@ -128,7 +128,7 @@ def homeward(run: Run, base: tuple[float, ...], track: Track, now: Seconds, aim:
     if not differ(base, going(track, aim)):
         return None
     leg = replace(run.course.legs[-1], goal=base, seconds=_left(run, now))
-    return Path(track.start_at(now, aim), run.with_faults((leg,)), tracks.LIMITS["head"])
+    return Path(track.start_at(now, aim), run.with_faults((leg,)), track.limits(now, aim))
 
 
 def going_to(old: Course, new: Course) -> tuple[float, ...]:

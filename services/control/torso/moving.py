@@ -3,7 +3,11 @@
 Time is that of a clock: of the event loop for the body, of its own for a rehearsal.
 """
 
+import math
+from collections.abc import Sequence
 from typing import Protocol
+
+from msgspec.structs import replace
 
 from engage_hri.schemas.behaviors import BlockBehavior, Gaze, Pointing
 from engage_hri.schemas.body import BodyPose, Estimate, NoPointZone
@@ -21,6 +25,9 @@ from engage_hri.services.control.torso.path import JointMotion, Leg, Path, resti
 from engage_hri.services.control.torso.repertoire import Repertoire
 from engage_hri.services.control.torso.runs import Run
 from engage_hri.services.control.torso.tracks import Track
+
+STEP: Seconds = 0.02
+"""Seconds between two looks at where the trunk will be."""
 
 
 class Clock(Protocol):
@@ -105,7 +112,46 @@ class Torso:
         else:
             now = self.clock.time()
             start = tracks.joined([self.tracks[part].start_at(now, course.aim) for part in course.parts])
+            if course.aim is not None and not course.aim.is_still(self.tracks["torso"].at(now)):
+                return self._path_on_the_move(start, course)
         return laid_path(start, course)
+
+    def _path_on_the_move(self, start: JointMotion, course: Course) -> Path:
+        """Lay a path to a target while the trunk moves: it arrives when the target is in reach. Raises Impossible."""
+        path = laid_path(start, course, is_free=True)
+        arrival = _arrival(course)
+        if delay := self._delay(course.aim, self.clock.time() + path.marks[arrival]):
+            path = laid_path(start, replace(course, legs=_delayed(course.legs, arrival, delay)), is_free=True)
+        return path
+
+    def _delay(self, aim: Aim | None, at: Seconds) -> Seconds:
+        """Seconds from that instant on until the target comes into reach of the trunk as it moves; 0: never."""
+        torso = self.tracks["torso"]
+        for step in range(1 + max(0, math.ceil((torso.motion.end - at) / STEP))):
+            if aim is None or aim.is_in_reach(torso.angles(at + step * STEP)):
+                return step * STEP
+        return 0.0
+
+    def _wait_for_reach(self) -> None:
+        """Delay what is on its way to a target that is not in reach by then, since the trunk moves otherwise."""
+        now = self.clock.time()
+        for run in dict.fromkeys(self.runs.values()):
+            arrival = _arrival(run.course)
+            if run.course.aim is None or run.is_over or not run.awaits(arrival):
+                continue
+            at = run.motion.crossing(run.motion.path.marks[arrival])
+            if at is not None and at > now and (delay := self._delay(run.course.aim, at)):
+                track = self.tracks[run.course.parts[0]]
+                left = run.motion.path.after(run.motion.s(now), [point.sync for point in run.pending])
+                start, legs = track.start_at(now, run.course.aim), _delayed(left, arrival, delay)
+                path = Path(start, run.with_faults(legs), track.limits(now, run.course.aim))
+                self._play(run, path, run.course.aim)
+                run.bell.ring()
+
+    def is_off_target(self, run: Run, sync: str) -> bool:
+        """True if `sync` says that a behavior is on its target, which is out of reach, since the trunk has moved."""
+        aim, trunk = run.course.aim, self.tracks["torso"].angles(self.clock.time())
+        return aim is not None and sync == _arrival(run.course) and not aim.is_in_reach(trunk)
 
     # -- motion -------------------------------------------------------------------------------------------------
 
@@ -128,6 +174,8 @@ class Torso:
         elif isinstance(run.behavior, choreography.SETTLING):
             tracks.rebase(self.tracks, run.course.parts, run.course.on_target)
         self._play(run, path, run.course.aim)
+        if "torso" in run.course.parts:
+            self._wait_for_reach()
 
     def _play(self, run: Run, path: Path, aim: Aim | None) -> None:
         now = self.clock.time()
@@ -161,7 +209,9 @@ class Torso:
                 return None
         start = run.course.aim.added(motion.at(at), trunk)
         start = start if aim is None else aim.removed(start, trunk)
-        return Path(start, run.with_faults((_leg_home(run, start, goal),)), tracks.limits_of(run.course.parts))
+        return Path(
+            start, run.with_faults((_leg_home(run, start, goal),)), self.tracks[run.course.parts[0]].limits(at, aim)
+        )
 
     def _home(self, run: Run) -> tuple[tuple[float, ...], Aim | None]:
         """Angles to which a behavior goes home, and the place that its part is on there."""
@@ -232,6 +282,8 @@ class Torso:
                 self.attention.expect(self.attention.entity, track.motion.end, now)
             else:
                 track.return_to(track.base, now)
+        if "torso" in parts:
+            self._wait_for_reach()
 
     # -- gaze ---------------------------------------------------------------------------------------------------
 
@@ -276,6 +328,16 @@ def is_last_on_target(behavior: BlockBehavior, sync: str) -> bool:
     return (isinstance(behavior, Gaze) and sync == "relax") or (
         isinstance(behavior, Pointing) and sync == "stroke_end"
     )
+
+
+def _arrival(course: Course) -> str:
+    """The sync point that says that a behavior has come to its target."""
+    return "stroke" if any(point.sync == "stroke" for point in course.points) else "end"
+
+
+def _delayed(legs: Sequence[Leg], arrival: str, by: Seconds) -> tuple[Leg, ...]:
+    """Legs whose arrival comes later."""
+    return tuple(replace(leg, seconds=leg.seconds + by) if arrival in dict(leg.marks) else leg for leg in legs)
 
 
 def _leg_home(run: Run, start: JointMotion, goal: tuple[float, ...]) -> Leg:

@@ -4,6 +4,7 @@ The head has two tracks: gaze, and a nod on top of it. They share the neck's lim
 Only the nod tilts the head.
 """
 
+import math
 from collections.abc import Mapping, Sequence
 
 import msgspec
@@ -81,17 +82,24 @@ class Track:
     def at(self, t: Seconds) -> JointMotion:
         state, columns = self.motion.at(t), slice(self._column, self._column + len(self.joints))
         state = JointMotion(state.q[columns], state.v[columns], state.a[columns])
-        return state if self.aim is None else self.aim.added(state, self.trunk.at(t))
+        if self.aim is None:
+            return state
+        state = self.aim.added(state, self.trunk.at(t))
+        return JointMotion(self.aim.within(state.q), state.v, state.a)
 
     def start_at(self, t: Seconds, aim: Aim | None) -> JointMotion:
         """State in which a path with this aim begins."""
         state = self.at(t)
         return state if aim is None else aim.removed(state, self.trunk.at(t))
 
+    def limits(self, t: Seconds, aim: Aim | None) -> tuple[JointLimit, ...]:
+        """Limits of a path with this aim that begins then."""
+        return limits_of((self.part,), is_free=aim is not None and not aim.is_still(self.trunk.at(t)))
+
     def angles(self, t: Seconds) -> tuple[float, ...]:
         columns = self.motion.at(t).q[self._column : self._column + len(self.joints)]
         if self.aim is not None:
-            columns = columns + self.aim.offset(self.trunk.angles(t))
+            columns = self.aim.within(columns + self.aim.offset(self.trunk.angles(t)))
         return tuple(columns.tolist())
 
     def is_moving(self, t: Seconds) -> bool:
@@ -105,7 +113,7 @@ class Track:
         start = self.start_at(now, aim)
         time = turning_time if self.part in ("head", "nod") else return_time
         seconds = time(start.q.tolist(), goal)
-        direct = Path(start, (Leg(goal=goal, seconds=seconds),), LIMITS[self.part])
+        direct = Path(start, (Leg(goal=goal, seconds=seconds),), self.limits(now, aim))
         if not meets_table(direct, self.joints):
             self.play(Motion(direct, now), aim=aim)
             return
@@ -132,8 +140,12 @@ def rebase(tracks: Mapping[str, Track], parts: Sequence[str], angles: Mapping[st
         track.base = tuple(angles.get(joint, angle) for joint, angle in zip(track.joints, track.base, strict=True))
 
 
-def limits_of(parts: Sequence[str]) -> tuple[JointLimit, ...]:
-    return tuple(limit for part in parts for limit in LIMITS[part])
+def limits_of(parts: Sequence[str], *, is_free: bool = False) -> tuple[JointLimit, ...]:
+    """Limits of some parts. is_free: without their ranges, for a path to which a moving trunk adds its share."""
+    limits = tuple(limit for part in parts for limit in LIMITS[part])
+    if not is_free:
+        return limits
+    return tuple(msgspec.structs.replace(limit, low=-math.pi, high=math.pi) for limit in limits)
 
 
 def joined(states: Sequence[JointMotion]) -> JointMotion:
