@@ -4,9 +4,11 @@ The oracle takes nothing from the body but where its eyes and forearms point, at
 """
 
 import asyncio
+import math
 from collections.abc import Callable
 from random import Random
 
+import numpy as np
 import pytest
 
 from engage_hri.schemas.behavior_types import sync_points
@@ -20,18 +22,19 @@ from engage_hri.schemas.behaviors import (
     Posture,
     PostureShift,
 )
-from engage_hri.services.control.body import Arrived, BehaviorRefused, BodyState, Spoke
+from engage_hri.services.control.body import Arrived, BehaviorRefused, BodyFailed, BodyState, Spoke
 from engage_hri.services.control.torso.body import SimulatedBody
 from engage_hri.services.control.torso.repertoire import BUILT_IN, extended
 from tests.control.contract_truth import arms, beside, one_hand
 from tests.control.motions import STEP, recorded, violations
-from tests.control.suite import ON_AXIS, WORLD, Stage, aside
+from tests.control.suite import ON_AXIS, WORLD, Stage, aside, performed, times
 
 TARGETS = ("human", "near-right", "far-left")
 LEANS = ("LEAN_FORWARD", "LEAN_BACK", "TURN_LEFT", "TURN_RIGHT", "FAR_LEFT", "BOW")
 WIDE = """
 [pose]
 FAR_LEFT = { torso = { turn = 24, lean = 6 } }
+DEEP = { torso = { lean = 25 } }
 BOW = { torso = { lean = 16, turn = -8 } }
 """
 POINTED = 0.02
@@ -120,6 +123,79 @@ class WatchedStage(Stage):
             pass
         finally:
             self.is_on = False
+
+
+async def test_eyes_stay_on_a_face_while_the_trunk_turns_and_leans(body: SimulatedBody) -> None:
+    stage = Stage(body, Gaze(id="look", target="human"))
+    await asyncio.sleep(1.0)
+    leaning = asyncio.create_task(performed(body, PostureShift(id="lean", lexeme="FAR_LEFT")))
+    async with recorded(body, ["torso_turn"]) as recording:
+        off = []
+        while not leaning.done():
+            off.append(aside(body.state().gaze, (1.3, 0.0, 1.2)))
+            await asyncio.sleep(STEP)
+
+    assert np.ptp(recording.angles) == pytest.approx(math.radians(24))
+    assert len(off) > 100
+    assert max(off) < 1e-6
+    stage.authority.revoke()
+    await stage.over()
+
+
+@pytest.mark.parametrize("since", [0.0, 0.1, 0.2])
+async def test_a_look_comes_later_where_the_trunk_is_still_in_its_way(body: SimulatedBody, since: float) -> None:
+    """Bent down it cannot see a face. It gets up; the look says that it has come when it has, as was estimated."""
+    await performed(body, PostureShift(id="down", lexeme="DEEP"))
+    look = Gaze(id="look", target="human")
+    assert not body.estimate(look, None, WORLD).feasible
+    rising = asyncio.create_task(performed(body, PostureShift(id="up", lexeme="UPRIGHT")))
+    await asyncio.sleep(since)
+    told = {phase.to: phase.natural for phase in body.estimate(look, None, WORLD).phases}
+    scene, began = Scene(body), asyncio.get_running_loop().time()
+    stage = WatchedStage(scene, look, "end")
+    await stage.over()
+    await rising
+
+    at = times(stage.progress)
+    standing = SimulatedBody()
+    assert scene.lies == []
+    assert scene.checks == 2
+    assert at["stroke"] - began == pytest.approx(told["stroke"])
+    natural = {phase.to: phase.natural for phase in standing.estimate(look, None, WORLD).phases}
+    assert told["stroke"] > natural["stroke"] + 0.1
+
+
+async def test_a_look_whose_target_the_trunk_has_taken_out_of_reach_fails(body: SimulatedBody) -> None:
+    stage = Stage(body, Gaze(id="look", target="human"))
+    await asyncio.sleep(1.0)
+    await performed(body, PostureShift(id="down", lexeme="DEEP"))
+    stage.authority.extend("end")
+
+    with pytest.raises(BodyFailed, match="out of reach"):
+        await stage.over()
+    assert stage.waits_at == ["stroke"]
+    assert "stroke" not in stage.passed
+
+
+async def test_estimated_degrees_are_those_that_the_head_then_turns(body: SimulatedBody) -> None:
+    """The trunk turns towards what is looked at: the neck turns less than it would alone."""
+    look = Gaze(id="look", target="near-right")
+    alone = body.estimate(look, None, WORLD)
+    turning = asyncio.create_task(performed(body, Posture(id="turn", lexeme="TURN_RIGHT")))
+    await asyncio.sleep(0.3)
+    estimate = body.estimate(look, None, WORLD)
+    stage = Stage(body, look)
+    async with recorded(body, ["neck_yaw", "neck_pitch"]) as recording:
+        for _ in range(250):
+            if stage.waits_at:
+                break
+            await asyncio.sleep(STEP)
+    stage.authority.extend("end")
+    await asyncio.gather(turning, stage.over())
+
+    turned = math.degrees(float(np.abs(np.diff(recording.angles, axis=0)).sum()))
+    assert estimate.head_degrees == pytest.approx(turned, rel=0.05)
+    assert estimate.head_degrees < 0.9 * alone.head_degrees
 
 
 @pytest.mark.parametrize("seed", range(24))

@@ -17,7 +17,7 @@ from engage_hri.services.control.body import MovementAuthority
 from engage_hri.services.control.torso import choreography, head, kinematics, tracks
 from engage_hri.services.control.torso.aiming import NECK, Aim
 from engage_hri.services.control.torso.course import Course, Impossible, Situation
-from engage_hri.services.control.torso.estimates import infeasible, motion_estimate
+from engage_hri.services.control.torso.estimates import Added, infeasible, motion_estimate
 from engage_hri.services.control.torso.head import Fixation
 from engage_hri.services.control.torso.laid_paths import laid_path
 from engage_hri.services.control.torso.motion import Motion
@@ -77,9 +77,17 @@ class Torso:
         # A nod is on top of the gaze, and leaves the neck where that has it.
         moved = () if course.parts == ("nod",) else zip(course.joints, course.legs[-1].goal, strict=True)
         on_target, end = {**situation.pose, **course.on_target}, {**situation.pose, **dict(moved)}
+        added = self._added(course) if moving and not self.misbelieved else None
         return motion_estimate(
-            behavior, course, path, kinematics.pose_message(on_target), kinematics.pose_message(end)
+            behavior, course, path, kinematics.pose_message(on_target), kinematics.pose_message(end), added
         )
+
+    def _added(self, course: Course) -> Added | None:
+        """What the trunk adds to a path that begins now; None: nothing."""
+        now, aim, torso = self.clock.time(), course.aim, self.tracks["torso"]
+        if aim is None or aim.is_still(torso.at(now)):
+            return None
+        return lambda seconds: aim.offset(torso.angles(now + seconds))
 
     def situation(self, world: World, pose: BodyPose | None = None, *, real: bool = False) -> Situation:
         """Describe what a course starts from. real: with the true joint angles, not those that the body believes."""
