@@ -16,6 +16,7 @@ from engage_hri.schemas.behaviors import (
     BlockBehavior,
     Gaze,
     GazeShift,
+    Hand,
     Head,
     HeadDirectionShift,
     Pointing,
@@ -25,11 +26,12 @@ from engage_hri.schemas.behaviors import (
 from engage_hri.services.control.body import Arrived, BehaviorRefused, BodyFailed, BodyState, Spoke
 from engage_hri.services.control.torso.body import SimulatedBody
 from engage_hri.services.control.torso.repertoire import BUILT_IN, extended
-from tests.control.contract_truth import arms, beside, one_hand
+from tests.control.contract_truth import arms, beside
 from tests.control.motions import STEP, recorded, violations
 from tests.control.suite import ON_AXIS, WORLD, Stage, aside, performed, times
 
 TARGETS = ("human", "near-right", "far-left")
+HANDS: tuple[Hand, ...] = ("LEFT_HAND", "RIGHT_HAND")
 LEANS = ("LEAN_FORWARD", "LEAN_BACK", "TURN_LEFT", "TURN_RIGHT", "FAR_LEFT", "BOW")
 WIDE = """
 [pose]
@@ -43,7 +45,7 @@ AIMED: tuple[Callable[[str, Random], BlockBehavior], ...] = (
     lambda id, chance: Gaze(id=id, target=chance.choice(TARGETS)),
     lambda id, chance: GazeShift(id=id, target=chance.choice(TARGETS)),
     lambda id, chance: HeadDirectionShift(id=id, target=chance.choice(TARGETS)),
-    lambda id, chance: Pointing(id=id, target=chance.choice(TARGETS[1:]), mode=one_hand(chance)),
+    lambda id, chance: Pointing(id=id, target=chance.choice(TARGETS[1:]), mode=chance.choice(HANDS)),
 )
 LEANING: tuple[Callable[[str, Random], BlockBehavior], ...] = (
     lambda id, chance: Posture(id=id, lexeme=chance.choice(LEANS)),

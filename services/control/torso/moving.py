@@ -10,7 +10,7 @@ from typing import Protocol
 from msgspec.structs import replace
 
 from engage_hri.schemas.behaviors import BlockBehavior, Gaze, Pointing
-from engage_hri.schemas.body import BodyPose, Estimate, NoPointZone
+from engage_hri.schemas.body import BodyPose, Estimate, JointLimit, NoPointZone
 from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.world import World
 from engage_hri.services.control.body import MovementAuthority
@@ -133,7 +133,7 @@ class Torso:
         return path
 
     def _delay(self, aim: Aim | None, at: Seconds) -> Seconds:
-        """Seconds from that instant on until the target comes into reach of the trunk as it moves; 0: never."""
+        """Seconds from that instant on until the target comes into reach as the trunk moves; 0: it is, or never."""
         torso = self.tracks["torso"]
         for step in range(1 + max(0, math.ceil((torso.motion.end - at) / STEP))):
             if aim is None or aim.is_in_reach(torso.angles(at + step * STEP)):
@@ -152,7 +152,7 @@ class Torso:
                 track = self.tracks[run.course.parts[0]]
                 left = run.motion.path.after(run.motion.s(now), [point.sync for point in run.pending])
                 start, legs = track.start_at(now, run.course.aim), _delayed(left, arrival, delay)
-                path = Path(start, run.with_faults(legs), track.limits(now, run.course.aim))
+                path = Path(start, run.with_faults(legs), self._limits(run, run.course.aim, now))
                 self._play(run, path, run.course.aim)
                 run.bell.ring()
 
@@ -217,9 +217,7 @@ class Torso:
                 return None
         start = run.course.aim.added(motion.at(at), trunk)
         start = start if aim is None else aim.removed(start, trunk)
-        return Path(
-            start, run.with_faults((_leg_home(run, start, goal),)), self.tracks[run.course.parts[0]].limits(at, aim)
-        )
+        return Path(start, run.with_faults((_leg_home(run, start, goal),)), self._limits(run, aim, at))
 
     def _home(self, run: Run) -> tuple[tuple[float, ...], Aim | None]:
         """Angles to which a behavior goes home, and the place that its part is on there."""
@@ -239,8 +237,13 @@ class Torso:
             legs = run.motion.path.after(run.motion.s(now), [point.sync for point in run.pending])
             if is_homeward:
                 legs = (_leg_home(run, start, goal),)
-            self._play(run, Path(start, run.with_faults(legs), tracks.limits_of(run.course.parts)), aim)
+            self._play(run, Path(start, run.with_faults(legs), self._limits(run, aim, now)), aim)
         return passed
+
+    def _limits(self, run: Run, aim: Aim | None, at: Seconds) -> tuple[JointLimit, ...]:
+        """Limits of a path with this aim that begins then."""
+        is_free = aim is not None and not aim.is_still(self.tracks["torso"].at(at))
+        return tracks.limits_of(run.course.parts, is_free=is_free)
 
     def extend(self, run: Run) -> None:
         now = self.clock.time()
