@@ -78,7 +78,7 @@ class Aim(Struct, frozen=True, kw_only=True):
         return trunk.at_rest and bool(np.all(np.abs(trunk.q - self.trunk) < SAME))
 
     def offset(self, trunk: Sequence[float] | Array) -> Array:
-        """What has to be added to the joint angles of the path, with the trunk at `trunk`."""
+        """Difference that has to be added to the joint angles of the path, with the trunk at `trunk`."""
         turn, lean = trunk
         if abs(turn - self.trunk[0]) < SAME and abs(lean - self.trunk[1]) < SAME:
             return np.zeros(len(self.joints))

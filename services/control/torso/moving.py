@@ -83,7 +83,7 @@ class Torso:
         )
 
     def _added(self, course: Course) -> Added | None:
-        """What the trunk adds to a path that begins now; None: nothing."""
+        """Tell what the trunk adds to a path that begins now; None: nothing."""
         now, aim, torso = self.clock.time(), course.aim, self.tracks["torso"]
         if aim is None or aim.is_still(torso.at(now)):
             return None
