@@ -5,7 +5,8 @@ it takes to be on target change; this difference is added to the path at each in
 the head. So who is on target stays there, and comes there at the instant that the path says.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from functools import lru_cache
 
 import numpy as np
 from msgspec import Struct
@@ -22,6 +23,18 @@ NECK = ("neck_yaw", "neck_pitch")
 TRUNK = ("torso_turn", "torso_lean")
 SAME = 1e-9
 """Radians that tell no two places of the trunk apart."""
+
+
+def _joints(side: Side | None) -> tuple[str, ...]:
+    return NECK if side is None else kinematics.joints_of(f"{side}_arm")
+
+
+_SIDES: tuple[Side | None, ...] = (None, "left", "right")
+_RANGES: Mapping[Side | None, tuple[tuple[float, float], ...]] = {
+    side: tuple((kinematics.LIMIT[joint].low, kinematics.LIMIT[joint].high) for joint in _joints(side))
+    for side in _SIDES
+}
+"""Lowest and highest angle of each joint of an arm, or of the head."""
 _FIRST, _SECOND = 1e-4, 1e-3
 """Radians of the trunk over which first and second derivatives are taken."""
 
@@ -42,59 +55,60 @@ class Aim(Struct, frozen=True, kw_only=True):
 
     def angles(self, trunk: Trunk) -> tuple[float, ...]:
         """Joint angles on target with the trunk at `trunk`, as near as the joints come."""
-        limits = [kinematics.LIMIT[joint] for joint in self.joints]
-        free = self._free(trunk)
+        return self.nearest(self._free(trunk))
+
+    def nearest(self, angles: Sequence[float]) -> tuple[float, ...]:
+        """Joint angles nearest to those on target, of which a gaze goes beside."""
         if self.side is None:
-            free = (free[0] + self.beside[0], free[1] + self.beside[1])
+            angles = (angles[0] + self.beside[0], angles[1] + self.beside[1])
+        reserve = self.reserve
         return tuple(
-            min(max(angle, limit.low + self.reserve), limit.high - self.reserve)
-            for angle, limit in zip(free, limits, strict=True)
+            [
+                min(max(angle, low + reserve), high - reserve)
+                for angle, (low, high) in zip(angles, _RANGES[self.side], strict=True)
+            ]
         )
 
     def is_in_reach(self, trunk: Trunk) -> bool:
         """True if the joints come to where they are on target."""
-        limits = [kinematics.LIMIT[joint] for joint in self.joints]
+        reserve = self.reserve - SAME
         return all(
-            limit.low + self.reserve - SAME <= angle <= limit.high - self.reserve + SAME
-            for angle, limit in zip(self._free(trunk), limits, strict=True)
+            low + reserve <= angle <= high - reserve
+            for angle, (low, high) in zip(self._free(trunk), _RANGES[self.side], strict=True)
         )
 
     @property
     def joints(self) -> tuple[str, ...]:
-        return NECK if self.side is None else kinematics.joints_of(f"{self.side}_arm")
+        return _joints(self.side)
 
     def within(self, angles: Array) -> Array:
         """The angles, or the nearest that the joints can take."""
-        limits = [kinematics.LIMIT[joint] for joint in self.joints]
-        low, high = ([getattr(limit, end) for limit in limits] for end in ("low", "high"))
+        low, high = zip(*_RANGES[self.side], strict=True)
         return np.clip(angles, np.add(low, self.reserve), np.subtract(high, self.reserve))
 
     def at(self, trunk: Trunk) -> "Aim":
         """The same aim of a path that is laid for another place of the trunk."""
         return replace(self, trunk=trunk)
 
-    def is_still(self, trunk: JointMotion) -> bool:
-        """True if the trunk rests where the path is laid for."""
-        return trunk.at_rest and bool(np.all(np.abs(trunk.q - self.trunk) < SAME))
+    def is_laid_for(self, trunk: Sequence[float] | Array) -> bool:
+        """True if the path is laid for the trunk at `trunk`."""
+        turn, lean = trunk
+        return bool(abs(turn - self.trunk[0]) < SAME and abs(lean - self.trunk[1]) < SAME)
 
     def offset(self, trunk: Sequence[float] | Array) -> Array:
         """Difference that has to be added to the joint angles of the path, with the trunk at `trunk`."""
+        if self.is_laid_for(trunk):
+            return np.zeros(len(_RANGES[self.side]))
         turn, lean = trunk
-        if abs(turn - self.trunk[0]) < SAME and abs(lean - self.trunk[1]) < SAME:
-            return np.zeros(len(self.joints))
-        return np.subtract(self.angles((turn, lean)), self.angles(self.trunk))
+        return np.subtract(self.angles((float(turn), float(lean))), _supposed(self))
 
     def added(self, path: JointMotion, trunk: JointMotion) -> JointMotion:
         """The state of the joints whose path is in the state `path`, while the trunk is in the state `trunk`."""
-        if self.is_still(trunk):
-            return path
         by = self._moved(trunk)
         return JointMotion(path.q + by.q, path.v + by.v, path.a + by.a)
 
     def removed(self, joints: JointMotion, trunk: JointMotion) -> JointMotion:
         """The state of a path on which the joints are in the state `joints`."""
-        if self.is_still(trunk):
-            return joints
         by = self._moved(trunk)
         return JointMotion(joints.q - by.q, joints.v - by.v, joints.a - by.a)
 
@@ -120,3 +134,9 @@ class Aim(Struct, frozen=True, kw_only=True):
         if self.side is None:
             return kinematics.neck_angles(self.target, pose)
         return kinematics.arm_angles(self.side, self.target, self.pitch, pose)
+
+
+@lru_cache(16)
+def _supposed(aim: Aim) -> tuple[float, ...]:
+    """Angles on target with the trunk where the path supposes it."""
+    return aim.angles(aim.trunk)

@@ -65,6 +65,9 @@ TYPES: tuple[type[BlockBehavior], ...] = (
 )  # fmt: skip
 """Types of behaviors that this body performs."""
 
+Looked = tuple[Aim, tuple[float, ...]]
+"""The place of a look, and the angles of the neck on it."""
+
 
 def plan(behavior: BlockBehavior, situation: Situation) -> Course:
     """Plan the course of `behavior` in `situation`. Speech and wait move nothing and have none. Raises Impossible."""
@@ -106,20 +109,22 @@ def _entity(target: str, world: World) -> Entity:
     return entity
 
 
-def _neck_aim(target: str, offset: Degrees, direction: str, situation: Situation) -> Aim:
+def _neck_aim(target: str, offset: Degrees, direction: str, situation: Situation) -> Looked:
     entity = _entity(target, situation.world)
     try:
-        kinematics.look_at(entity.position, situation.pose, kinematics.NOD_RESERVE)
+        free = kinematics.look_at(entity.position, situation.pose, kinematics.NOD_RESERVE)
     except Unreachable as error:
         raise Impossible("CANNOT_CREATE_BEHAVIOR", f"cannot look at {target!r}: {error}") from error
     right, up = OFFSETS.get(normal(direction), (0, 0))
     beside, trunk = (-right * radians(offset), up * radians(offset)), angles(TRUNK, situation.pose)
-    return Aim(target=entity.position, trunk=trunk, beside=beside, reserve=kinematics.NOD_RESERVE)
+    aim = Aim(target=entity.position, trunk=trunk, beside=beside, reserve=kinematics.NOD_RESERVE)
+    return aim, aim.nearest(free)
 
 
-def _glance(aim: Aim, situation: Situation) -> Course:
-    joints = aim.joints
-    here, goal, base = situation.start(aim), aim.angles(aim.trunk), angles(joints, situation.rest)
+def _glance(looked: Looked, situation: Situation) -> Course:
+    aim, goal = looked
+    joints, here = aim.joints, situation.start(aim)
+    base = angles(joints, situation.rest)
     out, back = turning_time(here, goal), turning_time(goal, base)
     if out == 0.0:
         goal = here
@@ -140,8 +145,9 @@ def _glance(aim: Aim, situation: Situation) -> Course:
     return course(("head",), joints, legs, held_on_target("stroke"), goal, ray, aim=aim)
 
 
-def _shift(aim: Aim, situation: Situation) -> Course:
-    joints, here, goal = aim.joints, situation.start(aim), aim.angles(aim.trunk)
+def _shift(looked: Looked, situation: Situation) -> Course:
+    aim, goal = looked
+    joints, here = aim.joints, situation.start(aim)
     seconds = turning_time(here, goal)
     goal = goal if seconds else here
     legs = (Leg(goal=goal, seconds=seconds, marks=(("start", 0.0), ("end", 1.0))),)
@@ -149,7 +155,7 @@ def _shift(aim: Aim, situation: Situation) -> Course:
     return course(("head",), joints, legs, (CoursePoint("start"), CoursePoint("end")), goal, ray, aim=aim)
 
 
-def _gaze_aim(behavior: Gaze | GazeShift, situation: Situation) -> Aim:
+def _gaze_aim(behavior: Gaze | GazeShift, situation: Situation) -> Looked:
     return _neck_aim(behavior.target, behavior.offset_angle, behavior.offset_direction, situation)
 
 

@@ -70,7 +70,11 @@ class Situation(Struct, frozen=True):
     def start(self, aim: Aim) -> tuple[float, ...]:
         """Angles from which the path of a part begins that is going to be on a place."""
         here = angles(aim.joints, self.pose)
-        return here if self.trunk is None else tuple(np.subtract(here, aim.offset(self.trunk)).tolist())
+        return (
+            here
+            if self.trunk is None or aim.is_laid_for(self.trunk)
+            else tuple(np.subtract(here, aim.offset(self.trunk)).tolist())
+        )
 
 
 def course(

@@ -14,7 +14,7 @@ from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.control.torso.course import Course, CoursePoint, Impossible
 from engage_hri.services.control.torso.motion import SLOWEST
-from engage_hri.services.control.torso.path import SAMPLES, Array, Path
+from engage_hri.services.control.torso.path import Array, Path
 from engage_hri.services.control.torso.sizing import quickest
 from engage_hri.services.control.voice.timeline import Utterance
 
@@ -76,7 +76,7 @@ def motion_estimate(
 
 def _travel(path: Path, until: Seconds, added: Added) -> float:
     """Way of all joints along `path` to which the trunk adds its share."""
-    seen = [path.at(s).q + added(s) for s in (SAMPLES * until).tolist()]
+    seen = [path.at(s).q + added(s) for s in np.linspace(0.0, until, 9).tolist()]
     return sum(float(np.sum(np.abs(after - before))) for before, after in pairwise(seen))
 
 

@@ -85,7 +85,7 @@ class Torso:
     def _added(self, course: Course) -> Added | None:
         """Tell what the trunk adds to a path that begins now; None: nothing."""
         now, aim, torso = self.clock.time(), course.aim, self.tracks["torso"]
-        if aim is None or aim.is_still(torso.at(now)):
+        if aim is None or torso.is_still(now, aim):
             return None
         return lambda seconds: aim.offset(torso.angles(now + seconds))
 
@@ -120,7 +120,7 @@ class Torso:
         else:
             now = self.clock.time()
             start = tracks.joined([self.tracks[part].start_at(now, course.aim) for part in course.parts])
-            if course.aim is not None and not course.aim.is_still(self.tracks["torso"].at(now)):
+            if course.aim is not None and not self.tracks["torso"].is_still(now, course.aim):
                 return self._path_on_the_move(start, course)
         return laid_path(start, course)
 
@@ -209,12 +209,12 @@ class Torso:
     def way_home(self, run: Run, motion: Motion, at: Seconds) -> Path | None:
         """The way home of a behavior that leaves its target then; None: as it was laid."""
         assert run.course.aim is not None
-        trunk, (goal, aim) = self.tracks["torso"].at(at), self._home(run)
-        laid = run.course.legs[-1].goal
-        if run.course.aim.is_still(trunk):
-            base = goal if aim is None else tuple((aim.offset(trunk.q) + goal).tolist())
-            if not head.differ(laid, base):
+        torso, (goal, aim) = self.tracks["torso"], self._home(run)
+        if torso.is_still(at, run.course.aim):
+            base = goal if aim is None else tuple((aim.offset(torso.angles(at)) + goal).tolist())
+            if not head.differ(run.course.legs[-1].goal, base):
                 return None
+        trunk = torso.at(at)
         start = run.course.aim.added(motion.at(at), trunk)
         start = start if aim is None else aim.removed(start, trunk)
         return Path(start, run.with_faults((_leg_home(run, start, goal),)), self._limits(run, aim, at))
@@ -242,7 +242,7 @@ class Torso:
 
     def _limits(self, run: Run, aim: Aim | None, at: Seconds) -> tuple[JointLimit, ...]:
         """Limits of a path with this aim that begins then."""
-        is_free = aim is not None and not aim.is_still(self.tracks["torso"].at(at))
+        is_free = aim is not None and not self.tracks["torso"].is_still(at, aim)
         return tracks.limits_of(run.course.parts, is_free=is_free)
 
     def extend(self, run: Run) -> None:
@@ -277,7 +277,7 @@ class Torso:
         """Stop a shift of the head, and make the direction where it stops the base gaze."""
         now, track = self.clock.time(), self.tracks["head"]
         goal = head.brake(run.motion, now)
-        if track.aim is not None and not track.aim.is_still(track.trunk.at(now)):
+        if track.aim is not None and not track.is_still(now, track.aim):
             goal = tuple((track.aim.offset(track.trunk.angles(run.motion.end)) + goal).tolist())
             leg = Leg(goal=goal, seconds=max(run.motion.end - now, head.SHORTEST))
             track.play(Motion(Path(track.at(now), (leg,), tracks.LIMITS["head"]), now))

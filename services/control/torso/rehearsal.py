@@ -99,6 +99,9 @@ class _Part:
         self._forced = forced
         """Points for which it hurries or dawdles: the phases to them are told as they would be by themselves."""
         self._phases: dict[str, Seconds] = {}
+        self._known: tuple[object, ...] = ()
+        """What its way home depends on, as it was when that was last laid."""
+        self._marks: Mapping[str, Seconds] = {}
 
     def settle(self, torso: Torso, clock: Clock, now: Seconds) -> None:
         """Note the points that it has passed by now. At a hold point where it waits it stays."""
@@ -148,11 +151,20 @@ class _Part:
                 come.add(point.sync)
         pending = [point.sync for point in self.run.pending]
         last = next((sync for sync in pending if is_last_on_target(self.run.behavior, sync)), "")
-        if last and (back := torso.way_home(self.run, trial, at[last])) is not None:
-            at |= {sync: at[last] + s for sync, s in back.marks.items()}
+        if last:
+            at |= {sync: at[last] + s for sync, s in self._way_home(torso, trial, at[last]).items()}
         for since, to in pairwise([point.sync for point in self.run.course.points]):
             if to not in come:
                 self._phases[to] = at[to] - at[since]
+
+    def _way_home(self, torso: Torso, trial: Motion, at: Seconds) -> Mapping[str, Seconds]:
+        """Seconds from its target to each point on its way home, if that has to be laid anew."""
+        leaning, base = torso.tracks["torso"].motion, torso.attention.angles
+        known = (at, trial.path, leaning, leaning.end, base)
+        if known != self._known:
+            self._known, back = known, torso.way_home(self.run, trial, at)
+            self._marks = {} if back is None else back.marks
+        return self._marks
 
     def _foresee_unpaced(self, now: Seconds) -> None:
         """Take the times from the path of a behavior that runs at another pace, if it has just left a hold point."""

@@ -82,7 +82,7 @@ class Track:
     def at(self, t: Seconds) -> JointMotion:
         state, columns = self.motion.at(t), slice(self._column, self._column + len(self.joints))
         state = JointMotion(state.q[columns], state.v[columns], state.a[columns])
-        if self.aim is None:
+        if self.aim is None or self.is_still(t, self.aim):
             return state
         state = self.aim.added(state, self.trunk.at(t))
         return JointMotion(self.aim.within(state.q), state.v, state.a)
@@ -90,15 +90,19 @@ class Track:
     def start_at(self, t: Seconds, aim: Aim | None) -> JointMotion:
         """State in which a path with this aim begins."""
         state = self.at(t)
-        return state if aim is None else aim.removed(state, self.trunk.at(t))
+        return state if aim is None or self.is_still(t, aim) else aim.removed(state, self.trunk.at(t))
 
     def limits(self, t: Seconds, aim: Aim | None) -> tuple[JointLimit, ...]:
         """Limits of a path with this aim that begins then."""
-        return limits_of((self.part,), is_free=aim is not None and not aim.is_still(self.trunk.at(t)))
+        return limits_of((self.part,), is_free=aim is not None and not self.is_still(t, aim))
+
+    def is_still(self, t: Seconds, aim: Aim) -> bool:
+        """True if the trunk rests where the path of an aim supposes it."""
+        return not self.trunk.is_moving(t) and aim.is_laid_for(self.trunk.angles(t))
 
     def angles(self, t: Seconds) -> tuple[float, ...]:
         columns = self.motion.at(t).q[self._column : self._column + len(self.joints)]
-        if self.aim is not None:
+        if self.aim is not None and not self.is_still(t, self.aim):
             columns = self.aim.within(columns + self.aim.offset(self.trunk.angles(t)))
         return tuple(columns.tolist())
 
