@@ -23,6 +23,7 @@ from engage_hri.schemas.behaviors import (
     Posture,
     PostureShift,
 )
+from engage_hri.schemas.body import EstimateItem, PlannedTime
 from engage_hri.services.control.body import Arrived, BehaviorRefused, BodyFailed, BodyState, Spoke
 from engage_hri.services.control.torso.body import SimulatedBody
 from engage_hri.services.control.torso.repertoire import BUILT_IN, extended
@@ -198,6 +199,35 @@ async def test_estimated_degrees_are_those_that_the_head_then_turns(body: Simula
     turned = math.degrees(float(np.abs(np.diff(recording.angles, axis=0)).sum()))
     assert estimate.head_degrees == pytest.approx(turned, rel=0.05)
     assert estimate.head_degrees < 0.9 * alone.head_degrees
+
+
+@pytest.mark.parametrize("leaning", [Posture(id="lean", lexeme="TURN_LEFT"), PostureShift(id="lean", lexeme="BOW")])
+@pytest.mark.parametrize("since", [0.1, 0.5, 0.8])
+async def test_a_plan_is_performed_as_it_was_rehearsed(
+    body: SimulatedBody, leaning: BlockBehavior, since: float
+) -> None:
+    """The torso sets out after, with or before a look and an arm, which go home while it moves, or once it has."""
+    begins = [
+        (Gaze(id="look", target="human"), 0.0),
+        (Pointing(id="point", target="far-left", mode="LEFT_HAND"), 0.3),
+        (Gaze(id="next", target="near-right"), 1.2),
+        (leaning, since),
+    ]
+    begins.sort(key=lambda each: each[1])
+    items = [EstimateItem(behavior=each, times=(PlannedTime(sync="start", at=at),)) for each, at in begins]
+    told = {each.behavior: each.phases for each in body.rehearse(items, WORLD)}
+    began = asyncio.get_running_loop().time()
+    stages = {}
+    for behavior, at in begins:
+        await asyncio.sleep(began + at - asyncio.get_running_loop().time())
+        stages[behavior.id] = Stage(body, behavior, "end")
+    for stage in stages.values():
+        await stage.over()
+
+    for id in ("look", "point", "next", "lean"):
+        at = times(stages[id].progress)
+        taken = [at[phase.to] - at[phase.since] for phase in told[id]]
+        assert taken == pytest.approx([phase.natural for phase in told[id]], abs=1e-3), id
 
 
 @pytest.mark.parametrize("seed", range(24))
