@@ -12,7 +12,7 @@ from math import inf
 
 from msgspec.structs import replace
 
-from engage_hri.schemas.behaviors import BlockBehavior, Gaze
+from engage_hri.schemas.behaviors import BlockBehavior
 from engage_hri.schemas.body import BodyPose, Estimate, EstimateItem, Phase
 from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.world import World
@@ -21,7 +21,7 @@ from engage_hri.services.control.config import Variability
 from engage_hri.services.control.torso import choreography, head, tracks
 from engage_hri.services.control.torso.course import Course, Impossible
 from engage_hri.services.control.torso.motion import Motion
-from engage_hri.services.control.torso.moving import Torso
+from engage_hri.services.control.torso.moving import Torso, is_last_on_target
 from engage_hri.services.control.torso.path import Path, resting
 from engage_hri.services.control.torso.runs import Run
 from engage_hri.services.control.waiting import EARLY, Bell
@@ -67,7 +67,7 @@ def beside(torso: Torso, clock: Clock, world: World) -> Torso:
     other.misbelieved = dict(torso.misbelieved)
     other.tracks = {part: copy(track) for part, track in torso.tracks.items()}
     for track in other.tracks.values():
-        track.motion = copied(track.motion)
+        track.motion, track.trunk = copied(track.motion), other.tracks["torso"]
     runs = {id(run): copy(run) for run in torso.runs.values()}
     for run in runs.values():
         run.motion, run.bell, run.pending = copied(run.motion), clock, list(run.pending)
@@ -99,6 +99,9 @@ class _Part:
         self._forced = forced
         """Points for which it hurries or dawdles: the phases to them are told as they would be by themselves."""
         self._phases: dict[str, Seconds] = {}
+        self._known: tuple[object, ...] = ()
+        """What its way home depends on, as it was when that was last laid."""
+        self._marks: Mapping[str, Seconds] = {}
 
     def settle(self, torso: Torso, clock: Clock, now: Seconds) -> None:
         """Note the points that it has passed by now. At a hold point where it waits it stays."""
@@ -113,9 +116,9 @@ class _Part:
                 return
             run.pending.pop(0)
             self.passed[point.sync] = due
-            if point.sync == "relax" and isinstance(run.behavior, Gaze):
+            if is_last_on_target(run.behavior, point.sync):
                 clock.at = due
-                torso.turn_home(run)
+                torso.leave_target(run)
 
     def next_due(self) -> Seconds | None:
         """Instant at which a paced behavior passes its next point: then it is given the next one."""
@@ -146,19 +149,22 @@ class _Part:
             at[point.sync] = crossing
             if self.run.holding and point.held_with == self.run.pending[0].held_with:
                 come.add(point.sync)
-        if isinstance(self.run.behavior, Gaze) and self.run.awaits("relax"):
-            self._foresee_way_home(torso, trial, at)
+        pending = [point.sync for point in self.run.pending]
+        last = next((sync for sync in pending if is_last_on_target(self.run.behavior, sync)), "")
+        if last:
+            at |= {sync: at[last] + s for sync, s in self._way_home(torso, trial, at[last]).items()}
         for since, to in pairwise([point.sync for point in self.run.course.points]):
             if to not in come:
                 self._phases[to] = at[to] - at[since]
 
-    def _foresee_way_home(self, torso: Torso, trial: Motion, at: dict[str, Seconds]) -> None:
-        """Take the way home of a look to where looks go home by now, if a shift has changed that."""
-        base = torso.attention.angles
-        if head.differ(self.run.course.legs[-1].goal, base):
-            start = trial.at(at["relax"])
-            back = head.way_back(tuple(start.q.tolist()), base)
-            at["end"] = at["relax"] + Path(start, (back,), tracks.LIMITS["head"]).length
+    def _way_home(self, torso: Torso, trial: Motion, at: Seconds) -> Mapping[str, Seconds]:
+        """Seconds from its target to each point on its way home, if that has to be laid anew."""
+        leaning, base = torso.tracks["torso"].motion, torso.attention.angles
+        known = (at, trial.path, leaning, leaning.end, base)
+        if known != self._known:
+            self._known, back = known, torso.way_home(self.run, trial, at)
+            self._marks = {} if back is None else back.marks
+        return self._marks
 
     def _foresee_unpaced(self, now: Seconds) -> None:
         """Take the times from the path of a behavior that runs at another pace, if it has just left a hold point."""

@@ -144,12 +144,16 @@ def arrange(
     return arranged, conflicts
 
 
+_BENEATH = ("gazeShift", "headDirectionShift")
+"""Types from which a look takes nothing: who takes over such a shift is another, and it did not come to its end."""
+
+
 def kept_points(
     chains: Mapping[str, Chain], relations: Relations, handovers: Mapping[str, Handover]
 ) -> Mapping[str, Point]:
     """For each behavior, the last point that it must pass itself, whoever takes its part."""
     held = relations.held
-    kept = {id: each.kept for id, each in handovers.items()}
+    kept = {id: each.kept for id, each in handovers.items() if chains[id].type not in _BENEATH}
     for id, chain in chains.items():
         if id not in kept:
             numbers = [number for number, point in enumerate(chain.points) if point in held]
