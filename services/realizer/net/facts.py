@@ -134,19 +134,21 @@ class Facts:
         What was held before `since` may have its effect only after that.
         """
         runs: list[tuple[Seconds, Seconds]] = []
-        was_held = False
-        for (at, held), end in zip(self._holds, [*(at for at, _ in self._holds[1:]), until], strict=False):
-            is_held = held is None or bool(held)
-            if is_held and at < until:
-                runs[-1:] = [(runs[-1][0], min(end, until))] if was_held else [*runs[-1:], (at, min(end, until))]
-            was_held = is_held
+        for at, end in self._spans(until):
+            if runs and runs[-1][1] == at:
+                at = runs.pop()[0]
+            runs.append((at, end))
         return sum(end - at for at, end in runs if end > since)
 
     def held_between(self, since: Seconds, until: Seconds, behavior: str = "") -> Seconds:
         """Seconds between these times in which the behavior was held; empty: in which any was."""
-        ends = [at for at, _ in self._holds[1:]] + [until]
-        return sum(
-            max(0.0, min(end, until) - max(at, since))
+        return sum(max(0.0, end - max(at, since)) for at, end in self._spans(until, behavior))
+
+    def _spans(self, until: Seconds, behavior: str = "") -> list[tuple[Seconds, Seconds]]:
+        """The times before `until` in which the behavior was held, in order; empty: in which any was."""
+        ends = [*(at for at, _ in self._holds[1:]), until]
+        return [
+            (at, min(end, until))
             for (at, held), end in zip(self._holds, ends, strict=False)
-            if held is None or (behavior in held if behavior else held)
-        )
+            if at < until and (held is None or (behavior in held if behavior else held))
+        ]
