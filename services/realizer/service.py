@@ -284,5 +284,6 @@ async def realize(bus: Bus, ready: Ready, config: RealizerConfig) -> None:
                     with bus.containing(received):
                         realizer.take(received, tasks)
     finally:
+        realizer.steering.close()
         realizer.desk.close()
         realizer.requests.close()
