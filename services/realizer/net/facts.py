@@ -128,27 +128,11 @@ class Facts:
         """True if the behavior is to wait where it next can."""
         return self.held is None or behavior in self.held
 
-    def held_about(self, since: Seconds, until: Seconds) -> Seconds:
-        """Seconds of the holds, of whatever behaviors, that were in force between these times; each from its begin.
-
-        What was held before `since` may have its effect only after that.
-        """
-        runs: list[tuple[Seconds, Seconds]] = []
-        for at, end in self._spans(until):
-            if runs and runs[-1][1] == at:
-                at = runs.pop()[0]
-            runs.append((at, end))
-        return sum(end - at for at, end in runs if end > since)
-
     def held_between(self, since: Seconds, until: Seconds, behavior: str = "") -> Seconds:
         """Seconds between these times in which the behavior was held; empty: in which any was."""
-        return sum(max(0.0, end - max(at, since)) for at, end in self._spans(until, behavior))
-
-    def _spans(self, until: Seconds, behavior: str = "") -> list[tuple[Seconds, Seconds]]:
-        """The times before `until` in which the behavior was held, in order; empty: in which any was."""
         ends = [*(at for at, _ in self._holds[1:]), until]
-        return [
-            (at, min(end, until))
+        return sum(
+            max(0.0, min(end, until) - max(at, since))
             for (at, held), end in zip(self._holds, ends, strict=False)
-            if at < until and (held is None or (behavior in held if behavior else held))
-        ]
+            if held is None or (behavior in held if behavior else held)
+        )

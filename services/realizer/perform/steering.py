@@ -66,6 +66,11 @@ class Steering:
         """Behaviors of the block that are held now; None: all of them."""
         return self._holds.of_block(block)
 
+    @property
+    def is_holding(self) -> bool:
+        """True if anything is held."""
+        return self._holds.earliest() is not None
+
     def forget(self, block: str) -> None:
         """Let go what was held of a block that has ended: its id is free."""
         self._holds.let_go(block, "")
@@ -80,7 +85,7 @@ class Steering:
 
     def _apply(self) -> None:
         for performance in self._performances.values():
-            performance.hold(self._holds.of_block(performance.plan.block.id))
+            performance.hold(self.held(performance.plan.block.id), is_held=self.is_holding)
         since = self._holds.earliest()
         self._timer.set(None if since is None else since + self._longest)
 
