@@ -1,4 +1,4 @@
-"""What comes late since something was held, and not by itself.
+"""Lateness that holds account for, and what comes late by itself.
 
 While something is held, and until all that was under way then has come to its next point, a body may be anywhere
 between two words or on its way to a hold point: what is late by no more than was held is late for that. Then it is
@@ -87,5 +87,5 @@ class HeldUp:
 
 
 def _more(before: Seconds, after: Seconds) -> Seconds:
-    """By how much a lateness has grown."""
+    """Seconds by which a lateness has grown."""
     return max(0.0, after - max(0.0, before))
