@@ -6,11 +6,13 @@ what it is told waits until `update`.
 
 import heapq
 from collections.abc import Callable, Iterable, Mapping
+from itertools import pairwise
 from typing import Any
 
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.realizer.foresee.experience import Experience
 from engage_hri.services.realizer.foresee.forecast import Forecast, full_forecast, is_predictive
+from engage_hri.services.realizer.foresee.outlook import Outlook
 from engage_hri.services.realizer.net.facts import Facts
 from engage_hri.services.realizer.net.running import Observer, RunningNet
 from engage_hri.services.realizer.plan.known import BLOCK_END, BLOCK_START
@@ -160,7 +162,10 @@ class Foresight(Observer):
             before, natural = chain.points[number - 1], chain.segments[number - 1].natural
             if self.plan.predicted(point) - self.plan.predicted(before) < natural - EPSILON:
                 return  # it was to be cut short
-            changed = self.experience.learn(point.behavior, natural, at - self._facts.reached[before])
+            since = self._facts.reached[before]
+            if self._facts.held_between(since, at, point.behavior):
+                return  # how long it would have taken, nobody knows
+            changed = self.experience.learn(point.behavior, natural, at - since)
             if self.forecast is not None and changed:
                 self._news.append((self.forecast.relearn, changed))
 
@@ -290,6 +295,20 @@ class Foresight(Observer):
         forecast, reached = self.from_scratch(now), self._facts.reached
         times = {point: reached.get(point, forecast.times[at]) for point, at in self.plan.at.items()}
         return {**times, BLOCK_START: self._facts.began, BLOCK_END: forecast.times[len(self.plan.members) - 1]}
+
+    def outlook(self, now: Seconds) -> Outlook:
+        """All that was measured, and that is expected from it."""
+        forecast, reached, at = self.from_scratch(now), self._facts.reached, self.plan.at
+        instants = {point: self._net.passed.get(here, forecast.times[here]) for point, here in at.items()}
+        arrivals = {point: reached.get(point, instants[point]) for point in at}
+        for chain in self.plan.chains.values():
+            for before, point in pairwise(chain.points):
+                is_passive = self._net.part_of[point].kind == "passive"
+                if point not in reached and is_passive and at[before] != at[point]:
+                    behavior, here, since = point.behavior, at[point], arrivals[before]
+                    least, most = forecast.phase(behavior, here), forecast.longest(behavior, here)
+                    arrivals[point] = max(now, since + least, min(since + most, instants[point]))
+        return Outlook({**instants, BLOCK_START: self._facts.began}, arrivals)
 
     def from_scratch(self, now: Seconds | None = None) -> Forecast:
         """A forecast of all instants; for those that the kept forecast has, it says the same.
