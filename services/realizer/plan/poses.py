@@ -76,10 +76,12 @@ def _times(plan: Plan, id: str) -> tuple[PlannedTime, ...]:
     chain = plan.chains[id]
     times = [PlannedTime(sync=chain.points[0].sync, at=plan.predicted(chain.points[0]))]
     taken, (_, cut) = _taken(plan, id), plan.successors.get(id, ("", None))
+    is_lost = False
     for (since, to), segment in zip(pairwise(chain.points), chain.segments, strict=True):
+        is_lost = is_lost or to == cut
         begins, comes = plan.predicted(since), plan.predicted(to)
         surplus = comes - begins - segment.natural
-        if segment.hold and comes >= taken - EPSILON:  # It may not pass: it waits there until it is cut.
+        if segment.hold and is_lost:  # It may not pass: it waits there until it is cut.
             times.append(PlannedTime(sync=to.sync, at=taken + CUT))
             break
         if to == cut and surplus < -NOTICEABLE:
