@@ -54,6 +54,7 @@ class Plan(Struct, frozen=True, kw_only=True):
     kept: for each behavior, the last point that it must pass itself. Who takes its part, in whatever block, may save
     it the rest.
     entering: behaviors in the order in which they take their parts: of two that begin at one instant, too.
+    rounds: for each behavior, how many events of the instant in which it begins are measured one after the other first.
     behaviors: those that will be performed, in document order. dropped: those that will not, with `problems`.
     natural: behaviors that end when something takes their place, or with the block.
     waited_for: behaviors that the end of the block waits for. given_up: speeches that lack a time they should have.
@@ -75,6 +76,7 @@ class Plan(Struct, frozen=True, kw_only=True):
     waited_for: frozenset[str]
     kept: Mapping[str, Point]
     entering: tuple[str, ...]
+    rounds: Mapping[str, int] = {}
     constrained: frozenset[Point] = frozenset()
     successors: Mapping[str, tuple[str, Point]] = {}
     takes: Mapping[str, str] = {}
@@ -88,9 +90,13 @@ class Plan(Struct, frozen=True, kw_only=True):
         return self.schedule[self.at[point]]
 
     def begun_in_order(self, behaviors: Iterable[str]) -> list[str]:
-        """Behaviors that begin at one instant in the order in which they are told: as they take parts, and a torso
-        first, since head and arms aim for where that is going to be."""
-        rank = {id: ("torso" not in self.chains[id].parts, number) for number, id in enumerate(self.entering)}
+        """Behaviors that begin at one instant in the order in which they are told: who waits for no measured event of
+        that instant first, then as they take parts, and a torso first, since head and arms aim for where that is
+        going to be."""
+        rank = {
+            id: (self.rounds.get(id, 0), "torso" not in self.chains[id].parts, number)
+            for number, id in enumerate(self.entering)
+        }
         return sorted(behaviors, key=rank.__getitem__)
 
     def transition(self, point: Point) -> int | None:
@@ -279,6 +285,7 @@ class _Planner:
             waited_for=waited_for,
             kept=kept_points(self.chains, present, arrangement.handovers),
             entering=entering(self.chains, mentioned, times, rounds),
+            rounds={id: rounds[chain.points[0]] for id, chain in self.chains.items()},
             constrained=present.constrained,
             successors=arrangement.successors,
             takes=arrangement.takes,

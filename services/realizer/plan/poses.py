@@ -39,8 +39,8 @@ def poses_before(plan: Plan, known: Known = NOTHING) -> dict[str, BodyPose]:
     }
     users = {name: (each.chain, each.estimate) for name, each in known.holders.items()}
     users |= {id: (each, plan.estimates.get(id)) for id, each in plan.chains.items()}
-    order = {id: (times[each.points[0]], number) for number, (id, (each, _)) in enumerate(users.items())}
-    for id in sorted(users, key=order.__getitem__):
+    ranked = [*known.holders, *plan.begun_in_order(plan.chains)]
+    for id in sorted(ranked, key=lambda id: round(times[users[id][0].points[0]], 6)):
         chain, estimate = users[id]
         is_shift, is_ours = chain.type in SHIFTS, id in plan.chains
         for part in chain.parts:
@@ -111,19 +111,20 @@ def _taken(plan: Plan, id: str) -> Seconds:
     return min((start for start in starts if start >= begun), default=inf)
 
 
-def changed(before: Sequence[Estimate], after: Sequence[Estimate]) -> bool:
-    """True if a plan made with the estimates `before` is not the one that they call for `after`.
+def difference(before: Sequence[Estimate], after: Sequence[Estimate]) -> Seconds:
+    """Seconds by which phases differ at most; inf if something else differs.
 
     Estimates of what was not asked about say nothing: bodies err.
     """
     known = {each.behavior: each for each in before}
-    return any(
-        one.feasible != other.feasible
-        or one.parts != other.parts
-        or len(one.phases) != len(other.phases)
-        or any(abs(a.natural - b.natural) > NOTICEABLE for a, b in zip(one.phases, other.phases, strict=True))
-        for one, other in ((known[each.behavior], each) for each in after if each.behavior in known)
-    )
+    return max((_apart(known[each.behavior], each) for each in after if each.behavior in known), default=0.0)
+
+
+def _apart(one: Estimate, other: Estimate) -> Seconds:
+    phases = [each.to for each in one.phases], [each.to for each in other.phases]
+    if one.feasible != other.feasible or one.parts != other.parts or phases[0] != phases[1]:
+        return inf
+    return max((abs(a.natural - b.natural) for a, b in zip(one.phases, other.phases, strict=True)), default=0.0)
 
 
 def between(before: Sequence[Estimate], after: Sequence[Estimate]) -> tuple[Estimate, ...]:
