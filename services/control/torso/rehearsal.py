@@ -99,6 +99,8 @@ class _Part:
         self._forced = forced
         """Points for which it hurries or dawdles: the phases to them are told as they would be by themselves."""
         self._phases: dict[str, Seconds] = {}
+        self._least: dict[str, Seconds] = {}
+        """Phases that took longer than they were asked to, as fast as the body could."""
 
     def settle(self, torso: Torso, clock: Clock, now: Seconds) -> None:
         """Note the points that it has passed by now. At a hold point where it waits it stays."""
@@ -176,11 +178,23 @@ class _Part:
             for since, to in pairwise([sync for sync in syncs if sync in self.passed]):
                 if to not in self._forced and to not in self._stops:
                     self._phases[to] = self.passed[to] - self.passed[since]
+            self._note_misses()
         phases = tuple([self._updated(phase) for phase in self.estimate.phases])
         return replace(self.estimate, phases=phases)
 
+    def _note_misses(self) -> None:
+        """Note the phases to points that came later than it was asked to be there."""
+        asked = self.run.authority.pace
+        for since, to in pairwise([point.sync for point in self.run.course.points if point.sync in self.passed]):
+            if to in asked and self.passed[to] > asked[to] + HURRIED:
+                seconds = self.passed[to] - self.passed[since]
+                if seconds > asked[to] - asked.get(since, self.passed[since]):
+                    self._least[to] = seconds
+
     def _updated(self, phase: Phase) -> Phase:
         natural = max(0.0, self._phases.get(phase.to, phase.natural))
+        if (least := self._least.get(phase.to, 0.0)) > phase.shortest:
+            return replace(phase, shortest=min(natural, least), natural=natural)
         if abs(natural - phase.natural) < TRANSPARENT:
             return phase
         longest = phase.longest

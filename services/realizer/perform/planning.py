@@ -2,7 +2,6 @@
 
 import asyncio
 from collections.abc import Callable, Collection, Iterable, Mapping
-from operator import itemgetter
 
 from engage_hri.schemas import keys
 from engage_hri.schemas.behaviors import Hand, Speech
@@ -10,25 +9,22 @@ from engage_hri.schemas.blocks import Block
 from engage_hri.schemas.body import BodyPose, Estimate, EstimateBehaviors, EstimateItem, Estimates, PlannedTime
 from engage_hri.schemas.check import validated
 from engage_hri.schemas.faults import EngageError, Fault, NoReply
-from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.interface import Bus
 from engage_hri.services.realizer.config import RealizerConfig
 from engage_hri.services.realizer.perform.knowledge import Asker, Performed, knowledge, may_share, parts_of
 from engage_hri.services.realizer.perform.live import Live
 from engage_hri.services.realizer.perform.live_blocks import LiveBlocks
+from engage_hri.services.realizer.plan.agreement import Rounds
 from engage_hri.services.realizer.plan.handover import hands_refused
 from engage_hri.services.realizer.plan.known import Known, is_foreign, is_named_in
 from engage_hri.services.realizer.plan.planner import Plan, plan_steps
-from engage_hri.services.realizer.plan.poses import NOTICEABLE, between, difference, planned_times, poses_before
+from engage_hri.services.realizer.plan.poses import planned_times, poses_before
 from engage_hri.services.realizer.plan.relations import BlockRefused, extent, relation_steps
 from engage_hri.services.realizer.plan.steps import Steps, T
 from engage_hri.services.realizer.points import Point, performer
 
 SLICE = 512
 """Elements that are worked on in one go (see `steps`): one to five milliseconds. Counted: equal runs stay equal."""
-STRAIGHT, ROUNDS = 2, 12
-"""How often the body is asked about a plan anew: each answer may make another plan. After the first so many times
-estimates go half-way only; at most, in all."""
 
 
 class Planning:
@@ -82,34 +78,25 @@ class Planning:
         """Plan with `first`, and ask the body about the plan and the hands it has chosen, until the answer is what the
         plan was made with; if it never is, the plan that comes nearest. question: the one that `first` answers."""
         barred: set[tuple[str, Hand]] = set()
-        chosen, estimates = block, first
-        answers = [(question, first)]
-        nearest: tuple[Seconds, Plan] | None = None
-        jumped = False
+        chosen, rounds = block, Rounds(question, first)
         while True:
-            known = self._known(block, elsewhere, named, estimates)
-            plan = await unhurried(plan_steps(chosen, estimates, known=known, barred=barred))
+            known = self._known(block, elsewhere, named, rounds.estimates)
+            try:
+                plan = await unhurried(plan_steps(chosen, rounds.estimates, known=known, barred=barred))
+            except BlockRefused:
+                if rounds.settled is None:
+                    raise
+                return rounds.settled
             about_plan = question_about(plan.block, poses_before(plan, known), planned_times(plan))
             if plan.block is chosen:
-                told = next((answer for asked, answer in answers if asked == about_plan), None)
-                told = await self._estimates(chosen, about_plan) if told is None else told
-                if (off := difference(estimates, told)) <= NOTICEABLE:
-                    return plan
-                nearest = min(nearest or (off, plan), (off, plan), key=itemgetter(0))
-                if len(answers) > ROUNDS:
-                    return nearest[1]
-                # The same question again: its answer is tried once as it is.
-                is_settled = answers[-1][0] == about_plan and not jumped
-                jumped = jumped or (is_settled and len(answers) > STRAIGHT)
-                answers.append((about_plan, told))
-                estimates = told if is_settled or len(answers) <= STRAIGHT + 1 else between(estimates, told)
+                told = rounds.answer(about_plan) or await self._estimates(chosen, about_plan)
+                if (agreed := rounds.close(plan, about_plan, told)) is not None:
+                    return agreed
             else:
-                chosen, estimates, nearest = plan.block, await self._estimates(plan.block, about_plan), None
-                answers = [(about_plan, estimates)]
-            if refused := hands_refused(block, chosen, estimates):
+                chosen, rounds = plan.block, Rounds(about_plan, await self._estimates(plan.block, about_plan))
+            if refused := hands_refused(block, chosen, rounds.estimates):
                 barred |= refused
-                chosen, estimates, nearest = block, first, None
-                answers = [(question, first)]
+                chosen, rounds = block, Rounds(question, first)
 
     async def _earlier(self, live: Live, named: Iterable[Point]) -> None:
         """Wait until those of the earlier blocks are planned that this one is to be planned with in mind."""

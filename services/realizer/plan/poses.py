@@ -1,10 +1,8 @@
 """Questions to the body about a plan: the poses in which behaviors start, and when they begin, wait and hurry."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from itertools import pairwise
 from math import inf
-
-from msgspec.structs import replace
 
 from engage_hri.schemas.body import BodyPose, Estimate, PlannedTime
 from engage_hri.schemas.units import Seconds
@@ -109,42 +107,6 @@ def _taken(plan: Plan, id: str) -> Seconds:
     if id in plan.successors and is_foreign(successor := plan.successors[id][0]):
         starts.append(plan.predicted(Point(successor, "start")))
     return min((start for start in starts if start >= begun), default=inf)
-
-
-def difference(before: Sequence[Estimate], after: Sequence[Estimate]) -> Seconds:
-    """Seconds by which phases differ at most; inf if something else differs.
-
-    Estimates of what was not asked about say nothing: bodies err.
-    """
-    known = {each.behavior: each for each in before}
-    return max((_apart(known[each.behavior], each) for each in after if each.behavior in known), default=0.0)
-
-
-def _apart(one: Estimate, other: Estimate) -> Seconds:
-    phases = [each.to for each in one.phases], [each.to for each in other.phases]
-    if one.feasible != other.feasible or one.parts != other.parts or phases[0] != phases[1]:
-        return inf
-    return max((abs(a.natural - b.natural) for a, b in zip(one.phases, other.phases, strict=True)), default=0.0)
-
-
-def between(before: Sequence[Estimate], after: Sequence[Estimate]) -> tuple[Estimate, ...]:
-    """Estimates half-way from `before` to `after`: where each answer of the body makes the plan that calls for the
-    other, the right one lies between."""
-    known = {each.behavior: each for each in before}
-    return tuple([_halfway(known.get(each.behavior, each), each) for each in after])
-
-
-def _halfway(one: Estimate, other: Estimate) -> Estimate:
-    if [each.to for each in one.phases] != [each.to for each in other.phases]:
-        return other
-    phases = []
-    for a, b in zip(one.phases, other.phases, strict=True):
-        natural = (a.natural + b.natural) / 2
-        longest = None if b.longest is None else max(b.longest, natural)
-        phases.append(
-            replace(b, natural=natural, shortest=min(natural, (a.shortest + b.shortest) / 2), longest=longest)
-        )
-    return replace(other, phases=tuple(phases))
 
 
 def _is_overlaid(plan: Plan, shift: str) -> bool:
