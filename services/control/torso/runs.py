@@ -99,12 +99,13 @@ class Run:
         if aim is None:
             self.motion.run_at(self.cruise, now)
         else:
-            at = aim[1]
-            if any(point.sync == aim[0] and point.held_with for point in self.pending) and not self.may_pass(aim[0]):
-                # Who has to wait there until that instant comes at its own pace, if that is in time.
-                at = min(at, now + (marks[aim[0]] - self.motion.s(now)) / self.cruise)
-            # A slow motor is slow at its fastest, too; up to that rate the body makes up for it.
-            self.motion.reach(marks[aim[0]], at, now, self.cruise * self.motion.path.fastest)
+            sync, at = aim
+            self.motion.run_at(self.cruise, now)
+            waits = any(point.sync == point.held_with == sync for point in self.pending) and not self.may_pass(sync)
+            # Who has to wait there until that instant comes at its own pace, if that is in time.
+            if not (waits and self.motion.reaches(marks[sync], at)):
+                # A slow motor is slow at its fastest, too; up to that rate the body makes up for it.
+                self.motion.reach(marks[sync], at, now, self.cruise * self.motion.path.fastest)
         return True
 
     def _aims(self, now: Seconds) -> list[tuple[str, Seconds]]:

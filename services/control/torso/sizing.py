@@ -68,8 +68,9 @@ def lateness(
     trial.extend(inf, now)
     for number, (sync, at) in enumerate(aims):
         s = trial.path.marks[sync]
-        own = now + (s - trial.s(now)) / cruise
-        trial.reach(s, min(at, own) if sync in stops else at, now, cruise * trial.path.fastest)
+        trial.run_at(cruise, now)
+        if sync not in stops or not trial.reaches(s, at):
+            trial.reach(s, at, now, cruise * trial.path.fastest)
         crossing = trial.crossing(s)
         assert crossing is not None, "nothing limits the trial"
         worst, now = max(worst, crossing - at), max(now, crossing)
