@@ -108,7 +108,7 @@ class _Part:
         while run.pending and not run.is_over and not run.holding:
             point = run.pending[0]
             due = run.due(point)
-            if due is None or due > now + EARLY:
+            if due is None or due > now + 10.0**-ROUNDING:
                 return
             if point.held_with and not run.authority.covers(point.held_with):
                 run.holding = True

@@ -268,7 +268,8 @@ class Foresight:
         for index, point in enumerate(points[number:], start=number):
             here = plan.at[point]
             if here != before:
-                if is_moving and index and forecast.phase(behavior, here) == 0.0 < segments[index - 1].natural:
+                is_cut = is_moving or plan.successors.get(behavior, ("", None))[1] == point
+                if is_cut and index and forecast.phase(behavior, here) == 0.0 < segments[index - 1].natural:
                     break  # another takes its part before this point: it need not hurry there
                 natural, latest = at + forecast.phase(behavior, here), at + forecast.longest(behavior, here)
                 if point is points[number] and not self.paces.get(behavior):
