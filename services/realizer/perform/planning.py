@@ -75,15 +75,19 @@ class Planning:
         elsewhere: Mapping[str, Block],
         named: Collection[Point],
     ) -> Plan:
-        """Plan with `first`, and ask the body about the plan and the hands it has chosen, until the answer is what the
-        plan was made with; if it never is, the plan that comes nearest. question: the one that `first` answers."""
+        """Plan with `first`, and ask the body about the plan and the hands it has chosen, until the answer is
+        what the plan was made with; if it never is, the plan that comes nearest. question: the one that `first` answers."""
         barred: set[tuple[str, Hand]] = set()
         chosen, rounds = block, Rounds(question, first)
         while True:
             known = self._known(block, elsewhere, named, rounds.estimates)
             try:
-                plan = await unhurried(plan_steps(chosen, rounds.estimates, known=known, barred=barred))
+                steps = plan_steps(chosen, rounds.estimates, known=known, barred=barred, turns=rounds.turns)
+                plan = await unhurried(steps)
             except BlockRefused:
+                if rounds.turns:
+                    rounds.let_go()
+                    continue
                 if rounds.settled is None:
                     raise
                 return rounds.settled

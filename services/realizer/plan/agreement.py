@@ -8,6 +8,7 @@ from msgspec.structs import replace
 
 from engage_hri.schemas.body import Estimate, EstimateBehaviors, Phase
 from engage_hri.schemas.units import Seconds
+from engage_hri.services.realizer.plan.handover import Turn
 from engage_hri.services.realizer.plan.planner import Plan
 from engage_hri.services.realizer.plan.poses import NOTICEABLE
 
@@ -19,25 +20,36 @@ in all."""
 class Rounds:
     """Plans of one block, and what the body has said about them.
 
-    estimates: those to plan with next. settled: the last plan that is right but for phases that cannot be hurried so.
+    estimates: those to plan with next. turns: those that the next plan is to begin with: where two orders on one part
+    each call for the other, what waited in one plan waits in all. settled: the last plan that is right but for phases
+    that cannot be hurried so.
     """
 
     def __init__(self, question: EstimateBehaviors, first: tuple[Estimate, ...]) -> None:
         self.estimates = first
+        self.turns: frozenset[Turn] = frozenset()
         self.settled: Plan | None = None
         self._answers = [(question, first)]
         self._nearest: tuple[Seconds, Plan] | None = None
         self._has_jumped = False
+        self._is_free = False
 
     def answer(self, question: EstimateBehaviors) -> tuple[Estimate, ...] | None:
         """What the body has said to the same question before."""
         return next((answer for asked, answer in self._answers if asked == question), None)
+
+    def let_go(self) -> None:
+        """Insist on no order of behaviors any more: it leaves no time."""
+        self.turns, self._is_free = frozenset(), True
 
     def close(self, plan: Plan, question: EstimateBehaviors, told: tuple[Estimate, ...]) -> Plan | None:
         """Compare what the body has told with what the plan was made with; returns the plan to perform.
 
         None: plan once more, with `estimates`.
         """
+        if self.turns and self._nearest is not None and len(plan.dropped) > len(self._nearest[1].dropped):
+            self.let_go()
+            return None
         off = difference(self.estimates, told)
         if self.settled is not None and len(plan.dropped) > len(self.settled.dropped):
             return self.settled
@@ -54,6 +66,8 @@ class Rounds:
         is_early = len(self._answers) < STRAIGHT + 1
         self._has_jumped = self._has_jumped or (is_settled and not is_early)
         self._answers.append((question, told))
+        if not self._is_free and not is_early:
+            self.turns |= plan.turns
         self.estimates = between(self.estimates, told, 1.0 if is_settled or is_early else 0.5)
         return None
 
