@@ -95,12 +95,15 @@ class _Part:
         self.estimate = estimate
         self.waits = dict(waits)
         self.passed: dict[str, Seconds] = {}
+        self._holds = {point.sync for point in run.course.points if point.held_with}
         self._stops = {point.sync for point in run.course.points if point.held_with in waits}
         self._forced = forced
         """Points for which it hurries or dawdles: the phases to them are told as they would be by themselves."""
         self._phases: dict[str, Seconds] = {}
         self._least: dict[str, Seconds] = {}
         """Phases that took longer than they were asked to, as fast as the body could."""
+        self._most: dict[str, Seconds] = {}
+        """Phases to hold points that took less, as slow as it could be without a stop."""
 
     def settle(self, torso: Torso, clock: Clock, now: Seconds) -> None:
         """Note the points that it has passed by now. At a hold point where it waits it stays."""
@@ -190,15 +193,19 @@ class _Part:
                 seconds = self.passed[to] - self.passed[since]
                 if seconds > asked[to] - asked.get(since, self.passed[since]):
                     self._least[to] = seconds
+            elif to in self._holds and to in asked and self.passed[to] < asked[to] - HURRIED:
+                self._most[to] = self.passed[to] - self.passed[since]
 
     def _updated(self, phase: Phase) -> Phase:
         natural = max(0.0, self._phases.get(phase.to, phase.natural))
+        if (most := self._most.get(phase.to)) is not None:
+            phase = replace(phase, longest=max(most, natural))
         if (least := self._least.get(phase.to, 0.0)) > phase.shortest:
             return replace(phase, shortest=min(natural, least), natural=natural)
         if abs(natural - phase.natural) < TRANSPARENT:
             return phase
         longest = phase.longest
-        if longest is not None:
+        if longest is not None and phase.to not in self._most:
             longest = max(longest, natural) if phase.natural else None
         share = phase.shortest / phase.natural if phase.natural else 1.0
         return replace(phase, natural=natural, shortest=share * natural, longest=longest)
@@ -213,6 +220,7 @@ def rehearsed(torso: Torso, clock: Clock, items: Sequence[EstimateItem]) -> tupl
     times: list[Mapping[str, Seconds]] = [
         {each.sync: round(began + each.at, ROUNDING) for each in item.times} for item in items
     ]
+    passing = [{each.sync for each in item.times if each.through} for item in items]
     events = [(at[START], BEGIN, number, "") for number, at in enumerate(times)]
     heapify(events)
     parts: dict[int, _Part] = {}
@@ -230,7 +238,7 @@ def rehearsed(torso: Torso, clock: Clock, items: Sequence[EstimateItem]) -> tupl
         if kind == RELEASE:
             _let_go(torso, parts[number], hold, clock.at)
         else:
-            begun = _begin(torso, clock, items[number], times[number], moved)
+            begun = _begin(torso, clock, items[number], times[number], passing[number], moved)
             if isinstance(begun, Estimate):
                 told[number] = begun
             else:
@@ -247,7 +255,12 @@ def rehearsed(torso: Torso, clock: Clock, items: Sequence[EstimateItem]) -> tupl
 
 
 def _begin(
-    torso: Torso, clock: Clock, item: EstimateItem, times: Mapping[str, Seconds], moved: set[str]
+    torso: Torso,
+    clock: Clock,
+    item: EstimateItem,
+    times: Mapping[str, Seconds],
+    passing: Container[str],
+    moved: set[str],
 ) -> _Part | Estimate:
     """Begin a behavior on the copy. Returns its estimate alone if it moves nothing."""
     behavior = item.behavior
@@ -268,7 +281,7 @@ def _begin(
     if not estimate.feasible:
         return estimate
     path = torso.path(course)
-    waits, forced = _told_apart(course, path, times)
+    waits, forced = _told_apart(course, path, times, passing)
     paced = _paced(course, path, times, forced)
     authority = MovementAuthority(behavior, _through(behavior, list(waits)), paced)
     run = Run(behavior, course, authority, Variability(), 0)
@@ -282,7 +295,7 @@ def _begin(
 
 
 def _told_apart(
-    course: Course, path: Path, times: Mapping[str, Seconds]
+    course: Course, path: Path, times: Mapping[str, Seconds], passing: Container[str]
 ) -> tuple[dict[str, Seconds], dict[str, Seconds]]:
     """Times of hold points at which it has to wait, and of points for which it hurries or dawdles.
 
@@ -295,7 +308,7 @@ def _told_apart(
         if point.sync in times:
             natural = path.marks[point.sync] - path.marks[before]
             is_hurried = times[point.sync] - at < natural - HURRIED
-            if point.held_with and not is_hurried:
+            if point.held_with and not is_hurried and point.sync not in passing:
                 waits[point.held_with] = times[point.sync]
             else:
                 forced[point.sync] = times[point.sync]

@@ -116,11 +116,15 @@ class Grants:
         if due > now + EPSILON:
             self._wake(transition, due)
             arrival = None if may_pass is None else self._foresight.arrival(may_pass)
-            if may_pass is not None and arrival is not None and arrival >= due - EPSILON:
+            # Who is alone there, and early by less than a stop costs, is slower on its way.
+            is_foreseen = may_pass is not None and self._foresight.forecast is not None
+            early = self._plan.slack(may_pass.point) if may_pass is not None and is_foreseen else 0.0
+            if may_pass is not None and arrival is not None and arrival >= due - early - EPSILON:
                 # Not told earlier than necessary: if the behavior is faster than expected, it must wait after all.
                 if ripe - self._config.lead > now + EPSILON:
                     self._wake(transition, ripe - self._config.lead)
                 else:
+                    self._foresight.may_be_slower.add(may_pass.behavior)
                     self._grant(transition, may_pass)
             return []
         if may_pass is not None:

@@ -39,6 +39,8 @@ class Foresight:
     def __init__(self, plan: Plan, facts: Facts) -> None:
         self.experience = Experience(plan.estimates)
         self.paces: dict[str, Pace] = {}
+        self.may_be_slower: set[str] = set()
+        """Behaviors that were told to pass a hold point before its instant."""
         self._stops: dict[str, set[str]] = {}
         """Hold points within the pace of each behavior at which it has to wait for leave."""
         self.not_before: dict[str, Seconds] = {}
@@ -255,7 +257,8 @@ class Foresight:
         forecast, plan, facts = self.forecast, self.plan, self._facts
         if forecast is None or behavior not in plan.chains:
             return ()
-        if behavior not in self._minded and not forecast.is_hurried(behavior):
+        is_minded = behavior in self._minded or behavior in self.may_be_slower
+        if not is_minded and not forecast.is_hurried(behavior):
             return ()  # No bound makes it hurry, for itself or for who comes after it, or wait on its way.
         points, segments = plan.chains[behavior].points, plan.chains[behavior].segments
         is_moving = plan.chains[behavior].type not in SHIFTS  # a shift beneath a look takes no time
@@ -278,6 +281,9 @@ class Foresight:
                 if forecast.times[here] > natural + NOTICEABLE and self._net.part_of[point].kind == "passive":
                     at = max(natural, min(forecast.times[here], latest))
                     is_paced = is_paced or at > natural + NOTICEABLE
+                if behavior in self.may_be_slower and self._net.part_of[point].can_wait and may_pass(point):
+                    is_paced = is_paced or forecast.times[here] > at + EPSILON
+                    at = max(at, forecast.times[here])
             before = here
             if not may_pass(point):
                 if is_hurried and index:

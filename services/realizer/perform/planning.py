@@ -76,7 +76,10 @@ class Planning:
         named: Collection[Point],
     ) -> Plan:
         """Plan with `first`, and ask the body about the plan and the hands it has chosen, until the answer is
-        what the plan was made with; if it never is, the plan that comes nearest. question: the one that `first` answers."""
+        what the plan was made with; if it never is, the plan that comes nearest.
+
+        question: the one that `first` answers.
+        """
         barred: set[tuple[str, Hand]] = set()
         chosen, rounds = block, Rounds(question, first)
         while True:

@@ -121,7 +121,8 @@ def _between(one: Estimate, other: Estimate, weight: float) -> Estimate:
     phases = []
     for a, b in zip(one.phases, other.phases, strict=True):
         natural = (1.0 - weight) * a.natural + weight * b.natural
-        longest = None if b.longest is None else max(b.longest, natural)
+        longest = a.longest if b.longest is None and b.hold else b.longest
+        longest = None if longest is None else max(longest, natural)
         phases.append(replace(b, natural=natural, shortest=max(map(_haste, (a, b))) * natural, longest=longest))
     return replace(other, phases=tuple(phases))
 

@@ -87,7 +87,9 @@ def _times(plan: Plan, id: str) -> tuple[PlannedTime, ...]:
         is_just_in_time = chain.type in SHIFTS and comes >= taken - EPSILON
         is_due = _is_met_there(plan, to) if segment.hold else is_just_in_time
         if abs(surplus) > NOTICEABLE or is_due:
-            times.append(PlannedTime(sync=to.sync, at=comes + (APART if id in plan.natural else 0.0)))
+            is_slower = EPSILON < surplus <= plan.slack(to)
+            at = comes + (APART if id in plan.natural else 0.0)
+            times.append(PlannedTime(sync=to.sync, at=at, through=is_slower))
     return tuple(times)
 
 
