@@ -45,7 +45,6 @@ from engage_hri.services.realizer.plan.speaking_order import Misordered, Speakin
 from engage_hri.services.realizer.plan.steps import PORTION, Steps, finished, portions
 from engage_hri.services.realizer.points import Member, Point
 
-
 BRIEF: Seconds = 0.05
 """Most seconds by which a behavior is slower on its way, so as not to stop at a hold point."""
 UNNOTICED: Seconds = 0.008
