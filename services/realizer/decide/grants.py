@@ -15,6 +15,7 @@ from engage_hri.services.realizer.net.facts import Facts
 from engage_hri.services.realizer.net.running import RunningNet
 from engage_hri.services.realizer.plan.planner import Plan
 from engage_hri.services.realizer.plan.schedule import EPSILON
+from engage_hri.services.realizer.plan.slack import slack
 from engage_hri.services.realizer.points import Member, Point
 
 
@@ -118,7 +119,7 @@ class Grants:
             arrival = None if may_pass is None else self._foresight.arrival(may_pass)
             # Who is alone there, and early by less than a stop costs, is slower on its way.
             is_foreseen = may_pass is not None and self._foresight.forecast is not None
-            early = self._plan.slack(may_pass.point) if may_pass is not None and is_foreseen else 0.0
+            early = slack(self._plan, may_pass.point) if may_pass is not None and is_foreseen else 0.0
             if may_pass is not None and arrival is not None and arrival >= due - early - EPSILON:
                 # Not told earlier than necessary: if the behavior is faster than expected, it must wait after all.
                 if ripe - self._config.lead > now + EPSILON:

@@ -195,8 +195,10 @@ def _least(chain: Chain, successor: Chain | None) -> int:
 
 
 def is_tied(later: Chain, speech: Chain, classes: Classes) -> bool:
-    """True if the block itself says that `later` begins while the speech is spoken, or after it, not before. The voice
-    decides about that."""
+    """True if the block itself says that `later` begins while the speech is spoken, or after it, not before.
+
+    The voice decides about that.
+    """
     root, begins = classes.find(later.points[0])
     first, spoken = classes.find(speech.points[0])
     if root == first and begins < spoken - EPSILON:

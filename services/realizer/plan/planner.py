@@ -6,7 +6,6 @@ between equals; any other permutation of a block gives the same net.
 """
 
 from collections.abc import Container, Iterable, Mapping
-from math import inf
 
 from msgspec import Struct
 from msgspec.structs import replace
@@ -44,11 +43,6 @@ from engage_hri.services.realizer.plan.sharing import naming_others, share, wait
 from engage_hri.services.realizer.plan.speaking_order import Misordered, SpeakingOrder
 from engage_hri.services.realizer.plan.steps import PORTION, Steps, finished, portions
 from engage_hri.services.realizer.points import Member, Point
-
-BRIEF: Seconds = 0.05
-"""Most seconds by which a behavior is slower on its way, so as not to stop at a hold point."""
-UNNOTICED: Seconds = 0.008
-"""Seconds by which it may pass there too early."""
 
 
 class Plan(Struct, frozen=True, kw_only=True):
@@ -106,20 +100,6 @@ class Plan(Struct, frozen=True, kw_only=True):
             for number, id in enumerate(self.entering)
         }
         return sorted(behaviors, key=rank.__getitem__)
-
-    def slack(self, point: Point) -> Seconds:
-        """Seconds by which a behavior may be early at a hold point that it shares with nobody, and not stop there.
-
-        It is slower on its way instead: a stop would cost more than that.
-        """
-        members = self.members[self.at[point]]
-        if len(members) > 1 or not members[0].can_wait:
-            return 0.0
-        chain = self.chains[point.behavior]
-        number = chain.points.index(point) - 1
-        longest = chain.longest[number]
-        room = inf if longest is None else longest - chain.segments[number].natural
-        return min(BRIEF, max(0.0, room) + UNNOTICED)
 
     def transition(self, point: Point) -> int | None:
         """The transition of a point as other blocks may name it: the end of the block has one, too."""

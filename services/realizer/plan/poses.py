@@ -10,6 +10,7 @@ from engage_hri.services.realizer.plan.known import NOTHING, Known, is_foreign
 from engage_hri.services.realizer.plan.phases import Chain
 from engage_hri.services.realizer.plan.planner import Plan
 from engage_hri.services.realizer.plan.schedule import EPSILON
+from engage_hri.services.realizer.plan.slack import slack
 from engage_hri.services.realizer.points import SHIFTS, Point, family
 
 NOTICEABLE: Seconds = 0.0005
@@ -87,7 +88,7 @@ def _times(plan: Plan, id: str) -> tuple[PlannedTime, ...]:
         is_just_in_time = chain.type in SHIFTS and comes >= taken - EPSILON
         is_due = _is_met_there(plan, to) if segment.hold else is_just_in_time
         if abs(surplus) > NOTICEABLE or is_due:
-            is_slower = EPSILON < surplus <= plan.slack(to)
+            is_slower = EPSILON < surplus <= slack(plan, to)
             at = comes + (APART if id in plan.natural else 0.0)
             times.append(PlannedTime(sync=to.sync, at=at, through=is_slower))
     return tuple(times)
