@@ -15,7 +15,7 @@ from engage_hri.services.realizer.net.facts import Facts
 from engage_hri.services.realizer.net.running import RunningNet
 from engage_hri.services.realizer.plan.planner import Plan
 from engage_hri.services.realizer.plan.schedule import EPSILON
-from engage_hri.services.realizer.plan.slack import slack
+from engage_hri.services.realizer.plan.slack import UNNOTICED, slack
 from engage_hri.services.realizer.points import Member, Point
 
 
@@ -151,7 +151,7 @@ class Grants:
             return
         if arrival - self._config.gap > now + EPSILON:
             self._wake(transition, arrival - self._config.gap)
-        elif due <= arrival + self._config.skew:
+        elif due <= arrival + UNNOTICED:
             self._grant(transition, member)
 
     def _grant(self, transition: int, member: Member) -> None:

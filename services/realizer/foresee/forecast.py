@@ -274,7 +274,7 @@ class Forecast(LongestPaths):
         elastic = [each for each in numbers if room[each] > FINEST and self._arcs[each].behavior]
         boundless = [each for each in elastic if room[each] == inf]
         if boundless:
-            elastic = boundless[:1]
+            elastic = [min(boundless, key=lambda each: self._rank[self._arcs[each].target])]
             room[elastic[0]] = excess
         enough = bool(elastic) and sum(room[each] for each in elastic) >= excess - EPSILON
         # What can be slower gives way before what has to hurry.

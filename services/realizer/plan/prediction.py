@@ -85,7 +85,9 @@ def predict(
 def _shortened(cycle: tuple[Lag, ...], room: list[Seconds], excess: Seconds) -> list[Lag]:
     """The lags of the cycle that give way, by `excess` in all, each in proportion to its `room`."""
     if sum(room) == inf:
-        room = [float(each == inf) for each in room]
+        # What can wait as long as it must does so as early as it can, as it does when it is performed.
+        first = min(lag.target for lag, each in zip(cycle, room, strict=True) if each == inf)
+        room = [float(each == inf and lag.target == first) for lag, each in zip(cycle, room, strict=True)]
     if not (total := sum(room)):
         return []
     shares = [each / total for each in room]
