@@ -35,7 +35,7 @@ class Rounds:
         self._is_free = False
 
     def answer(self, question: EstimateBehaviors) -> tuple[Estimate, ...] | None:
-        """What the body has said to the same question before."""
+        """Answer of the body to the same question before; None if it was not asked that."""
         return next((answer for asked, answer in self._answers if asked == question), None)
 
     def let_go(self) -> None:
