@@ -218,10 +218,12 @@ class Estimate(Struct, frozen=True, kw_only=True, omit_defaults=True):
 
 
 class PlannedTime(Struct, frozen=True, kw_only=True, omit_defaults=True):
-    """Time planned for a sync point. at: seconds from now."""
+    """Time planned for a sync point. at: seconds from now. through: for a hold point, true if the behavior is told in
+    time that it may pass: it is slower on its way, and does not stop there."""
 
     sync: str
     at: Seconds
+    through: bool = False
 
 
 class EstimateItem(Struct, frozen=True, kw_only=True, omit_defaults=True):

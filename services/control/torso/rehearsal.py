@@ -95,6 +95,7 @@ class _Part:
         self.estimate = estimate
         self.waits = dict(waits)
         self.passed: dict[str, Seconds] = {}
+        self._holds = {point.sync for point in run.course.points if point.held_with}
         self._stops = {point.sync for point in run.course.points if point.held_with in waits}
         self._forced = forced
         """Points for which it hurries or dawdles: the phases to them are told as they would be by themselves."""
@@ -102,6 +103,10 @@ class _Part:
         self._known: tuple[object, ...] = ()
         """What its way home depends on, as it was when that was last laid."""
         self._marks: Mapping[str, Seconds] = {}
+        self._least: dict[str, Seconds] = {}
+        """Phases that took longer than they were asked to, as fast as the body could."""
+        self._most: dict[str, Seconds] = {}
+        """Phases to hold points that took less, as slow as it could be without a stop."""
 
     def settle(self, torso: Torso, clock: Clock, now: Seconds) -> None:
         """Note the points that it has passed by now. At a hold point where it waits it stays."""
@@ -109,7 +114,7 @@ class _Part:
         while run.pending and not run.is_over and not run.holding:
             point = run.pending[0]
             due = run.due(point)
-            if due is None or due > now + EARLY:
+            if due is None or due > now + 10.0**-ROUNDING:
                 return
             if point.held_with and not run.authority.covers(point.held_with):
                 run.holding = True
@@ -182,15 +187,31 @@ class _Part:
             for since, to in pairwise([sync for sync in syncs if sync in self.passed]):
                 if to not in self._forced and to not in self._stops:
                     self._phases[to] = self.passed[to] - self.passed[since]
+            self._note_misses()
         phases = tuple([self._updated(phase) for phase in self.estimate.phases])
         return replace(self.estimate, phases=phases)
 
+    def _note_misses(self) -> None:
+        """Note the phases to points that came later than it was asked to be there."""
+        asked = self.run.authority.pace
+        for since, to in pairwise([point.sync for point in self.run.course.points if point.sync in self.passed]):
+            if to in asked and self.passed[to] > asked[to] + HURRIED:
+                seconds = self.passed[to] - self.passed[since]
+                if seconds > asked[to] - asked.get(since, self.passed[since]):
+                    self._least[to] = seconds
+            elif to in self._holds and to in asked and self.passed[to] < asked[to] - HURRIED:
+                self._most[to] = self.passed[to] - self.passed[since]
+
     def _updated(self, phase: Phase) -> Phase:
         natural = max(0.0, self._phases.get(phase.to, phase.natural))
+        if (most := self._most.get(phase.to)) is not None:
+            phase = replace(phase, longest=max(most, natural))
+        if (least := self._least.get(phase.to, 0.0)) > phase.shortest:
+            return replace(phase, shortest=min(natural, least), natural=natural)
         if abs(natural - phase.natural) < TRANSPARENT:
             return phase
         longest = phase.longest
-        if longest is not None:
+        if longest is not None and phase.to not in self._most:
             longest = max(longest, natural) if phase.natural else None
         share = phase.shortest / phase.natural if phase.natural else 1.0
         return replace(phase, natural=natural, shortest=share * natural, longest=longest)
@@ -205,6 +226,7 @@ def rehearsed(torso: Torso, clock: Clock, items: Sequence[EstimateItem]) -> tupl
     times: list[Mapping[str, Seconds]] = [
         {each.sync: round(began + each.at, ROUNDING) for each in item.times} for item in items
     ]
+    passing = [{each.sync for each in item.times if each.through} for item in items]
     events = [(at[START], BEGIN, number, "") for number, at in enumerate(times)]
     heapify(events)
     parts: dict[int, _Part] = {}
@@ -222,7 +244,7 @@ def rehearsed(torso: Torso, clock: Clock, items: Sequence[EstimateItem]) -> tupl
         if kind == RELEASE:
             _let_go(torso, parts[number], hold, clock.at)
         else:
-            begun = _begin(torso, clock, items[number], times[number], moved)
+            begun = _begin(torso, clock, items[number], times[number], passing[number], moved)
             if isinstance(begun, Estimate):
                 told[number] = begun
             else:
@@ -239,7 +261,12 @@ def rehearsed(torso: Torso, clock: Clock, items: Sequence[EstimateItem]) -> tupl
 
 
 def _begin(
-    torso: Torso, clock: Clock, item: EstimateItem, times: Mapping[str, Seconds], moved: set[str]
+    torso: Torso,
+    clock: Clock,
+    item: EstimateItem,
+    times: Mapping[str, Seconds],
+    passing: Container[str],
+    moved: set[str],
 ) -> _Part | Estimate:
     """Begin a behavior on the copy. Returns its estimate alone if it moves nothing."""
     behavior = item.behavior
@@ -260,7 +287,7 @@ def _begin(
     if not estimate.feasible:
         return estimate
     path = torso.path(course)
-    waits, forced = _told_apart(course, path, times)
+    waits, forced = _told_apart(course, path, times, passing)
     paced = _paced(course, path, times, forced)
     authority = MovementAuthority(behavior, _through(behavior, list(waits)), paced)
     run = Run(behavior, course, authority, Variability(), 0)
@@ -274,7 +301,7 @@ def _begin(
 
 
 def _told_apart(
-    course: Course, path: Path, times: Mapping[str, Seconds]
+    course: Course, path: Path, times: Mapping[str, Seconds], passing: Container[str]
 ) -> tuple[dict[str, Seconds], dict[str, Seconds]]:
     """Times of hold points at which it has to wait, and of points for which it hurries or dawdles.
 
@@ -287,7 +314,7 @@ def _told_apart(
         if point.sync in times:
             natural = path.marks[point.sync] - path.marks[before]
             is_hurried = times[point.sync] - at < natural - HURRIED
-            if point.held_with and not is_hurried:
+            if point.held_with and not is_hurried and point.sync not in passing:
                 waits[point.held_with] = times[point.sync]
             else:
                 forced[point.sync] = times[point.sync]

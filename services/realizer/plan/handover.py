@@ -198,9 +198,15 @@ def _least(chain: Chain, successor: Chain | None) -> int:
 
 
 def is_tied(later: Chain, speech: Chain, classes: Classes) -> bool:
-    """True if the block itself says that `later` begins while the speech is spoken. The voice decides about that."""
-    begins = classes.find(later.points[0])[0]
-    return any(classes.find(point)[0] == begins for point in speech.points)
+    """True if the block itself says that `later` begins while the speech is spoken, or after it, not before.
+
+    The voice decides about that.
+    """
+    root, begins = classes.find(later.points[0])
+    first, spoken = classes.find(speech.points[0])
+    if root == first and begins < spoken - EPSILON:
+        return False
+    return any(classes.find(point)[0] == root for point in speech.points)
 
 
 def _users(chains: Mapping[str, Chain], order: Iterable[str]) -> Mapping[str, Sequence[str]]:
