@@ -91,11 +91,12 @@ class Run:
 
     def keep_pace(self, now: Seconds) -> bool:
         """Set the rate such that it reaches its next point at the instant asked for. True if that is a new aim."""
-        aim = next(iter(self._aims(now)), None)
+        marks, limit = self.motion.path.marks, self.limit(self.motion.path)
+        # What is asked for behind a point where it has to wait counts once it may pass there.
+        aim = next((aim for aim in self._aims(now) if marks[aim[0]] <= limit + 1e-9), None)
         if aim == self._aim:
             return False
         self._aim = aim
-        marks = self.motion.path.marks
         if aim is None:
             self.motion.run_at(self.cruise, now)
         else:
