@@ -13,6 +13,7 @@ from engage_hri.schemas.references import type_name
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.realizer.decide.decisions import Decisions
 from engage_hri.services.realizer.perform.live_blocks import LiveBlocks
+from engage_hri.services.realizer.plan.handover import least
 from engage_hri.services.realizer.plan.known import (
     Holder,
     Known,
@@ -22,13 +23,10 @@ from engage_hri.services.realizer.plan.known import (
     is_named_in,
     qualified,
 )
-from engage_hri.services.realizer.plan.phases import chain
+from engage_hri.services.realizer.plan.phases import ARMS, chain
 from engage_hri.services.realizer.plan.planner import Plan
 from engage_hri.services.realizer.plan.relations import Elsewhere
-from engage_hri.services.realizer.plan.sharing import needed_points
 from engage_hri.services.realizer.points import Point, performer
-
-_ARMS = ("left_arm", "right_arm")
 
 
 class Performed(Protocol):
@@ -106,7 +104,7 @@ def _dependents(block: str, plans: Sequence[Plan]) -> set[str]:
             if sources:
                 later = plan.net.later(sources)
                 for id, each in plan.chains.items():
-                    needed = (*each.points[: needed_points(each, is_natural=id in plan.natural)], *plan.constrained)
+                    needed = (*each.points[: least(each) + 1], *plan.constrained)
                     if any(point.behavior == id and plan.at[point] in later for point in needed):
                         found.add(f"{plan.block.id}:{id}")
         if len(found) == before:
@@ -118,7 +116,8 @@ def parts_of(behaviors: Iterable[BlockBehavior], estimates: Iterable[Estimate]) 
     known = {each.behavior: each for each in estimates}
     moving = [each for each in behaviors if performer(each) == "body"]
     parts = {part for each in moving for part in chain(each, known.get(each.id)).parts}
-    return parts | set(_ARMS) if parts.intersection(_ARMS) else parts
+    arms = ARMS["BOTH_HANDS"]
+    return parts.union(arms) if parts.intersection(arms) else parts
 
 
 def may_share(one: Block, other: Block) -> bool:

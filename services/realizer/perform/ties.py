@@ -118,7 +118,7 @@ class Ties:
         asker = Asker(plan.block.id, decisions.began, now, self.foreign, parts, self.blocks)
         found = knowledge(asker, earlier, self._live_blocks)
         points = dict(found.points)
-        performances = {each.decisions.plan.block.id: each for each in self._others()}
+        performances = self._performances
         for taker in self.given.values():
             if (other := performances.get(block_of(taker))) is not None:
                 start = Point(taker.behavior.partition(":")[2], taker.sync)
@@ -135,6 +135,10 @@ class Ties:
             begun=frozenset(decisions.facts.begun),
         )
 
+    @property
+    def _performances(self) -> Mapping[str, Tied]:
+        return {each.decisions.plan.block.id: each for each in self._others()}
+
     def begin(self) -> None:
         """Tell other blocks that this one has begun: those that are tied to it can be planned now."""
         for each in self._others():
@@ -144,8 +148,7 @@ class Ties:
 
     def take_over(self) -> None:
         """Tell other blocks which of their behaviors this one takes a part from by plan."""
-        plan = self._owner.decisions.plan
-        performances = {each.decisions.plan.block.id: each for each in self._others()}
+        plan, performances = self._owner.decisions.plan, self._performances
         for name, taker in plan.takes.items():
             block, _, behavior = name.partition(":")
             if (other := performances.get(block)) is not None:
