@@ -35,7 +35,7 @@ def constraints(case: Case) -> Iterator[Finding]:
                 if gap <= tolerance + _held(case, relation, one.place, other.place):
                     continue
                 group = {(each.block, each.behavior) for each in _touched(instants, one.place, other.place)}
-                if group & warned or _was_late_abroad(group, id, case) or _is_given_up(case, id, one, other):
+                if group & warned or _was_late_abroad(group, id, case):
                     continue
                 where = f"{relation.text}: {_shown(one, case)} against {_shown(other, case)}, off by {gap:.3f} s"
                 yield Finding(_law(relation, one, other, id, case), id, where)
@@ -119,16 +119,6 @@ def _was_late_abroad(group: set[tuple[str, str]], block: str, case: Case) -> boo
         for other in {other for other, _ in group} - {block}
         for each in case.record.warnings(other)
         if _excuses(each, case)
-    )
-
-
-def _is_given_up(case: Case, block: str, *terms: Term) -> bool:
-    """True if it was told that a point of another block comes too late to be waited for."""
-    told = {each.message.partition(" ")[0] for each in case.record.late(block) if not each.behavior}
-    return any(
-        f"{place.block}:{place.behavior or 'bml'}:{_drafted(place, case.blocks[place.block]).sync}" in told
-        for place in (term.place for term in terms)
-        if place.block != block
     )
 
 

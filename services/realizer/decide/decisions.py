@@ -7,16 +7,20 @@ decided comes from the marking of the net (grants.py) and from what is expected 
 from collections.abc import Callable, Collection, Iterable, Sequence
 from math import isfinite
 
+from msgspec.structs import replace
+
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.realizer.config import RealizerConfig
 from engage_hri.services.realizer.decide.effects import Begin, Effect, Extend
 from engage_hri.services.realizer.decide.grants import Grants
-from engage_hri.services.realizer.decide.lateness import Bounds, LatenessWatch
+from engage_hri.services.realizer.decide.lateness import LatenessWatch
 from engage_hri.services.realizer.foresee.foresight import Foresight, differ_noticeably
 from engage_hri.services.realizer.net.facts import Facts
 from engage_hri.services.realizer.net.running import Observer, RunningNet
 from engage_hri.services.realizer.plan.planner import Plan
-from engage_hri.services.realizer.points import Point, performer
+from engage_hri.services.realizer.plan.promises import Broken, promises_of
+from engage_hri.services.realizer.plan.steps import finished
+from engage_hri.services.realizer.points import ORIGIN, Point, performer
 
 
 class Decisions:
@@ -46,7 +50,9 @@ class Decisions:
         """Go on with another plan of the same block, from the same facts: something was dropped."""
         self.plan = plan
         self.net = net = RunningNet(plan.net, plan.members, plan.at, (self.foresight, self.grants))
-        self.bounds = Bounds(plan)
+        self.promises = finished(promises_of(plan.relations))
+        for point in self.facts.reached.keys() | {ORIGIN}:
+            self.promises.come(point, self.facts.reached.get(point, self.began))
         self.foresight.look_ahead(plan, net)
         self.grants.adopt(plan, net)
         self.facts.adopt(net, {id: chain.points for id, chain in plan.chains.items()})
@@ -111,37 +117,42 @@ class Decisions:
         """True if everything has happened that the end of the block waits for."""
         return self.net.is_over
 
-    def lateness(self, point: Point) -> Seconds:
-        """Seconds by which a point was reached later than its constraints allow; 0 if it is not reached."""
-        at = self.facts.reached.get(point)
-        if at is None or point not in self.plan.at:
-            return 0.0
-        passed = self.net.passed
-        if self.facts.held_about(self.began, at):
-            passed = {each: then for each, then in passed.items() if not self._went_on(each)}
-        return self.bounds.lateness(self.plan.at[point], at, passed, self.facts.held_about)
+    def broken(self, point: Point) -> list[Broken]:
+        """Constraints that are broken, now that a point was reached: one of this block, or of another.
 
-    def _went_on(self, transition: int) -> bool:
-        """True if a behavior was held just before, and came since it cannot wait there: nobody has planned that."""
-        for member in self.plan.members[transition]:
-            if member.kind == "passive" and (chain := self.plan.chains.get(member.behavior)) is not None:
-                number = chain.points.index(member.point)
-                before, here = (self.facts.reached.get(each) for each in chain.points[number - 1 : number + 1])
-                if before is not None and here is not None and self.facts.held_between(before, here, member.behavior):
-                    return True
-        return False
-
-    def earliness(self, point: Point) -> Seconds:
-        """Seconds by which a point was reached before the time that the block fixes for it; 0 if it fixes none.
-
-        What was held on its way, and cannot wait there, ends by itself: it is not early.
+        To be asked once for each point. What was held does not count.
         """
         at = self.facts.reached.get(point)
-        if at is None or point not in self.plan.at:
-            return 0.0
-        if self.facts.held_between(self.facts.begun.get(point.behavior, at), at, point.behavior):
-            return 0.0
-        return max(0.0, self.began + self.bounds.fixed(self.plan.at[point]) - at)
+        if at is None:
+            return []
+        found = (self._unheld(each) for each in self.promises.come(point, at))
+        return [each for each in found if each.seconds > 0.0]
+
+    def _unheld(self, broken: Broken) -> Broken:
+        """The same without the seconds that behaviors were held for.
+
+        What was held on its way to where it cannot wait ends by itself: nobody has planned that.
+        """
+        facts = self.facts
+        times = [self.began if each == ORIGIN else facts.reached[each] for each in (broken.early, broken.late)]
+        since, until = min(*times, max(times) - broken.seconds), max(times)
+        if not facts.held_about(self.began, until):
+            return broken
+        was_held = facts.held_between(
+            facts.begun.get(broken.early.behavior, times[0]), times[0], broken.early.behavior
+        )
+        if was_held or any(self._went_on(each) for each in (broken.early, broken.late)):
+            return replace(broken, seconds=0.0)
+        return replace(broken, seconds=broken.seconds - facts.held_about(since, until))
+
+    def _went_on(self, point: Point) -> bool:
+        """True if a behavior was held just before a point, and came since it cannot wait there."""
+        chain, part = self.plan.chains.get(point.behavior), self.net.part_of.get(point)
+        if chain is None or part is None or part.kind != "passive":
+            return False
+        number = chain.points.index(part.point)
+        before, here = (self.facts.reached.get(each) for each in chain.points[number - 1 : number + 1])
+        return before is not None and here is not None and bool(self.facts.held_between(before, here, point.behavior))
 
     # -- decisions -----------------------------------------------------------------------------------------------
 

@@ -105,6 +105,7 @@ class BlockPerformance:
         self.report.started(self.plan, began)
         for problem in self.plan.problems:
             self.report.warn(problem.kind, problem.message, problem.behavior)
+        self.report.unkept(self.plan)
         for behavior in self.plan.dropped:
             self._shared.live_blocks.lose(block, behavior)
         self._shared.live_blocks.reach(block, Point(BLOCK_ITSELF, "start"), began)
@@ -338,11 +339,14 @@ class BlockPerformance:
         except InputRefused as error:
             self._live.stop(Ending("failed", error.fault))
             return
+        kept = frozenset(plan.chains).difference(self.decisions.plan.given_up)
         self.decisions.replan(plan)
         self.ties.renew()
         for id in self._dropped:  # Told only now that the block goes on: its followers would end with it.
             self._shared.live_blocks.lose(self.plan.block.id, id)
         for problem in plan.problems:
+            if problem.behavior in kept.intersection(plan.given_up):
+                self.report.warn(problem.kind, problem.message, problem.behavior)
             # Without the dropped ones, others may be too late now.
             if problem.behavior in plan.dropped and problem.behavior not in gone:
                 if self._runs[problem.behavior].pending is not None:

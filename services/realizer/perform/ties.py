@@ -72,7 +72,7 @@ class Ties:
         if point not in decisions.facts.reached:
             decisions.facts.hear(point, at)
             if point in decisions.facts.reached:  # else it was named by an earlier plan only
-                self._owner.report.heard(decisions, point)
+                self._owner.report.compare(decisions, point)
 
     def foresee(self, point: Point, at: Seconds) -> None:
         """Note that a point of another block is expected at `at` now."""

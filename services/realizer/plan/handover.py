@@ -272,7 +272,7 @@ def free_hand(
 
 
 def window(chain: Chain, times: Mapping[Point, Seconds]) -> tuple[Seconds, Seconds]:
-    """When a behavior starts, and when it ends."""
+    """Start and end of a behavior."""
     return times[chain.points[0]], times[chain.points[-1]]
 
 

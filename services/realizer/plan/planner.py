@@ -20,13 +20,14 @@ from engage_hri.services.realizer.net.petri_net import PetriNet
 from engage_hri.services.realizer.plan import unsupported
 from engage_hri.services.realizer.plan.assembly import Assembler, Assembly, assembling
 from engage_hri.services.realizer.plan.deadlocks import Losses, clashes, judge
-from engage_hri.services.realizer.plan.foresight import foreseen, losses_to_others, too_late, unkept, without_date
+from engage_hri.services.realizer.plan.foresight import foreseen, losses_to_others, too_late, without_date
 from engage_hri.services.realizer.plan.given_up import times_of
 from engage_hri.services.realizer.plan.handover import Arrangement, Conflict, Turn, arrange, entering, kept_points
 from engage_hri.services.realizer.plan.instants import Classes
 from engage_hri.services.realizer.plan.known import BLOCK_END, NOTHING, Known, is_foreign
 from engage_hri.services.realizer.plan.phases import Chain, chain, natural_ends
 from engage_hri.services.realizer.plan.prediction import Impossible, predict
+from engage_hri.services.realizer.plan.promises import Broken, broken_by
 from engage_hri.services.realizer.plan.relations import (
     DROPPED,
     BlockRefused,
@@ -57,6 +58,8 @@ class Plan(Struct, frozen=True, kw_only=True):
     behaviors: those that will be performed, in document order. dropped: those that will not, with `problems`.
     natural: behaviors that end when something takes their place, or with the block.
     waited_for: behaviors that the end of the block waits for. given_up: speeches that lack a time they should have.
+    relations: what the block says of the behaviors that will be performed. broken: what of that the plan cannot keep,
+    for the sake of times that are fixed, or because another block has passed a point already.
     constrained: points that something waits for, or that are timed.
     successors: behaviors that hand their parts over, each with the one that takes them (`block:behavior` of another
     block), and the first of its points that comes by that. takes: behaviors of other blocks whose parts are taken.
@@ -75,6 +78,8 @@ class Plan(Struct, frozen=True, kw_only=True):
     waited_for: frozenset[str]
     kept: Mapping[str, Point]
     entering: tuple[str, ...]
+    relations: Relations
+    broken: tuple[Broken, ...] = ()
     constrained: frozenset[Point] = frozenset()
     successors: Mapping[str, tuple[str, Point]] = {}
     takes: Mapping[str, str] = {}
@@ -146,6 +151,8 @@ class _Planner:
         self.known = known
         self.doubted: set[Point] = set()
         """Points of other blocks that are not planned for when they are expected: something else leaves no time."""
+        self.untied: set[Point] = set()
+        """Points of other blocks to which nothing is tied any more: they are expected too late for fixed times."""
         self.lines = {behavior.id: behavior.line for behavior in block.behaviors}
         self.estimates = estimates
         self.barred = barred
@@ -202,9 +209,13 @@ class _Planner:
     def plan(self) -> Steps[Plan]:
         """The plan; behaviors that cannot be on time are dropped until the rest can be."""
         while True:
-            present, classes = yield from remaining(self.relations, self.chains, self.dropped, self.block.id)
+            said = self.relations
+            present, classes = yield from self._remaining(untied(said, self.untied) if self.untied else said)
             try:
-                return (yield from self._plan(present, classes))
+                plan = yield from self._plan(present, classes)
+                if self.untied:
+                    present, _ = yield from self._remaining(said)
+                return (yield from self._compared(plan, present))
             except Misordered:
                 self.turns = frozenset()
             except Losses as found:
@@ -222,6 +233,18 @@ class _Planner:
                         self._drop(loss.behavior, "IMPOSSIBLE_TO_SCHEDULE", loss.reason)
                 self.relations = times.left
                 self.order.begin_anew(self.chains)
+
+    def _remaining(self, relations: Relations) -> Steps[tuple[Relations, Classes]]:
+        return (yield from remaining(relations, self.chains, self.dropped, self.block.id))
+
+    def _compared(self, plan: Plan, said: Relations) -> Steps[Plan]:
+        """The plan with what it cannot keep of what the block says."""
+        if not self.known.points:
+            return plan
+        times = {point: plan.schedule[at] for point, at in plan.at.items()} | dict(self.known.points)
+        yield len(times) // 4
+        broken = yield from broken_by(said, times)
+        return replace(plan, relations=said, broken=tuple(broken))
 
     def _keep_words(self, id: str, said: str, reason: str) -> None:
         reason = f"{reason}; {said} is given up, so that the words are said"
@@ -279,6 +302,7 @@ class _Planner:
             waited_for=waited_for,
             kept=kept_points(self.chains, present, arrangement.handovers),
             entering=entering(self.chains, mentioned, times, rounds),
+            relations=present,
             constrained=present.constrained,
             successors=arrangement.successors,
             takes=arrangement.takes,
@@ -331,9 +355,8 @@ class _Planner:
                 raise Losses(taken) from None
             if late := too_late(impossible, assembly) - self.doubted:
                 self.doubted |= late
-                self.problems += unkept(late, self.known)
-                if any(is_foreign(point.behavior) for point in late):
-                    self.relations = untied(self.relations, late)
+                if foreign := {point for point in late if is_foreign(point.behavior)}:
+                    self.untied |= foreign
                     raise Misordered from None
                 return (yield from self._solved(assembler, arrangement, classes))
             if waits := assembly.waits(tie for circle in impossible.circles for tie, _ in circle):
