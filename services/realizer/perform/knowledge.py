@@ -60,7 +60,9 @@ def knowledge(asker: Asker, others: Iterable[Performed], live_blocks: LiveBlocks
     points: dict[Point, Seconds] = {}
     holders: dict[str, Holder] = {}
     for block in sorted({block_of(point) for point in asker.named} - there):
-        for point, at in live_blocks.reached(block, asker.blocks.get(block)).items():
+        content = asker.blocks.get(block)
+        waiting = live_blocks.times(block) if live_blocks.blocks.get(block) is content else {}
+        for point, at in {**waiting, **live_blocks.reached(block, content)}.items():
             points[qualified(block, point)] = at - asker.since
     dependent = _dependents(asker.block, [each.decisions.plan for each in concerned])
     for each in concerned:

@@ -32,10 +32,13 @@ class TiedBlock(Protocol):
 
 
 class FollowedBlock(Protocol):
-    """A block that is being performed and that others may be tied to."""
+    """A block that is being performed, or waits for its turn, and that others may be tied to."""
 
     def follow(self, points: Iterable[Point]) -> None:
         """Tell from now on when these points are expected: others are tied to them."""
+
+    def times(self) -> Mapping[Point, Seconds]:
+        """Time of each point, measured or expected, by the loop's clock."""
 
 
 class _Tracked:
@@ -92,6 +95,11 @@ class LiveBlocks:
         tracked = self._find(block, content)
         return tracked.reached if tracked is not None else {}
 
+    def times(self, block: str) -> Mapping[Point, Seconds]:
+        """Times of the points of a live block, measured or expected; none if it is yet to be planned."""
+        tracked = self._tracked.get(block)
+        return tracked.performance.times() if tracked is not None and tracked.performance is not None else {}
+
     def _find(self, id: str, block: Block | None) -> _Tracked | None:
         """A live block, or one that has ended while others lived; another one that has taken its id is not meant."""
         known = (tracked.get(id) for tracked in (self._tracked, *(each.others for each in self._tracked.values())))
@@ -105,7 +113,7 @@ class LiveBlocks:
             follower.hear(qualified(block, point), at)
 
     def perform(self, block: str, performance: FollowedBlock) -> None:
-        """Note that the block is performed now, by `performance`, which is asked for its expected times."""
+        """Note that `performance` performs the block now, or lets it wait: it is asked for its expected times."""
         tracked = self._tracked[block]
         tracked.performance = performance
         performance.follow(tracked.named)

@@ -191,6 +191,10 @@ class BlockPerformance:
         if points:
             self.take_in(partial(self.decisions.follow, points))
 
+    def times(self) -> Mapping[Point, Seconds]:
+        """Time of each point, measured or expected, by the loop's clock."""
+        return self.decisions.foresight.times(self.bus.now())
+
     # -- the end -----------------------------------------------------------------------------------------------------
 
     async def _end_behaviors(self, ending: Ending) -> None:
