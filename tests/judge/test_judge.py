@@ -18,7 +18,8 @@ from tests.judge.story import Deed, Story
 
 ENFORCED = (
     "hang", "crash", "end", "points", "losses", "required", "words", "wrong length", "out of turn", "parts",
-    "in the air", "spoken order", "needless loss", "unmade end of a stroke", "moves though held", "late for a hold",
+    "in the air", "spoken order", "broken", "broken across blocks", "broken, point was past",
+    "needless loss", "unmade end of a stroke", "moves though held", "late for a hold",
 )  # fmt: skip
 """Laws that no story may break."""
 SEED = 12
