@@ -64,7 +64,7 @@ def knowledge(asker: Asker, others: Iterable[Performed], live_blocks: LiveBlocks
         waiting = live_blocks.times(block) if live_blocks.blocks.get(block) is content else {}
         for point, at in {**waiting, **live_blocks.reached(block, content)}.items():
             points[qualified(block, point)] = at - asker.since
-    dependent = _dependents(asker.block, [each.decisions.plan for each in concerned])
+    dependent = _dependents(asker.block, [plan for plan in live_blocks.plans if plan.block.id != asker.block])
     for each in concerned:
         plan, decisions = each.decisions.plan, each.decisions
         block = plan.block.id
@@ -92,17 +92,17 @@ def concerns(block: str, named: Iterable[Point], parts: Collection[str], other: 
 def _dependents(block: str, plans: Sequence[Plan]) -> set[str]:
     """Behaviors, by `block:behavior`, that wait for points of a block, or for others that do: they are not given.
 
+    So no wait for a part closes a circle, whatever ties and waits there are: what a behavior of the block is to wait
+    for does not wait for the block. Blocks that wait for their turn count, too. Ties name blocks that came earlier.
+
     The end of a look that waits to be taken over by that block does not count.
     """
     found: set[str] = set()
+    tied = [(plan, foreign) for plan in plans if (foreign := plan.foreign)]
     while True:
         before = len(found)
-        for plan in plans:
-            sources = [
-                transition
-                for point, transition in plan.at.items()
-                if is_foreign(point.behavior) and (block_of(point) == block or point.behavior in found)
-            ]
+        for plan, foreign in tied:
+            sources = [plan.at[each] for each in foreign if block_of(each) == block or each.behavior in found]
             if sources:
                 later = plan.net.later(sources)
                 for id, each in plan.chains.items():

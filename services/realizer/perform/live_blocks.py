@@ -10,6 +10,7 @@ from engage_hri.schemas.blocks import Block
 from engage_hri.schemas.syncref import BLOCK_ITSELF
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.realizer.plan.known import block_of, qualified
+from engage_hri.services.realizer.plan.planner import Plan
 from engage_hri.services.realizer.plan.schedule import EPSILON
 from engage_hri.services.realizer.points import Point
 
@@ -39,6 +40,10 @@ class FollowedBlock(Protocol):
 
     def times(self) -> Mapping[Point, Seconds]:
         """Time of each point, measured or expected, by the loop's clock."""
+
+    @property
+    def newest_plan(self) -> Plan:
+        """The plan that it follows now, or would follow if its turn came."""
 
 
 class _Tracked:
@@ -99,6 +104,12 @@ class LiveBlocks:
         """Times of the points of a live block, measured or expected; none if it is yet to be planned."""
         tracked = self._tracked.get(block)
         return tracked.performance.times() if tracked is not None and tracked.performance is not None else {}
+
+    @property
+    def plans(self) -> list[Plan]:
+        """Plans of all live blocks that have been planned."""
+        performances = (tracked.performance for tracked in self._tracked.values())
+        return [each.newest_plan for each in performances if each is not None]
 
     def _find(self, id: str, block: Block | None) -> _Tracked | None:
         """A live block, or one that has ended while others lived; another one that has taken its id is not meant."""

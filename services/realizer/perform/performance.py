@@ -195,6 +195,11 @@ class BlockPerformance:
         """Time of each point, measured or expected, by the loop's clock."""
         return self.decisions.foresight.times(self.bus.now())
 
+    @property
+    def newest_plan(self) -> Plan:
+        """The plan that it follows now."""
+        return self.decisions.plan
+
     # -- the end -----------------------------------------------------------------------------------------------------
 
     async def _end_behaviors(self, ending: Ending) -> None:

@@ -1,6 +1,6 @@
 """Ties between a block that is performed and other live blocks: points of theirs, and parts that change hands."""
 
-from collections.abc import Callable, Collection, Iterable, Mapping
+from collections.abc import Callable, Collection, Container, Iterable, Mapping
 from functools import partial
 from typing import Protocol
 
@@ -126,13 +126,15 @@ class Ties:
         for point in self.foreign:
             if (at := decisions.facts.reached.get(point, decisions.foresight.foreseen.get(point))) is not None:
                 points.setdefault(point, at - decisions.began)
-        points |= {Point(id, "start"): at - decisions.began for id, at in decisions.facts.begun.items()}
+        begun = decisions.facts.begun
+        points |= {Point(id, "start"): begun.get(id, now) - decisions.began for id in plan.chains}
         return Known(
             blocks=self.blocks,
             points=points,
             holders={id: each for id, each in found.holders.items() if id not in self.vanished},
             given={id: point for id, point in self.given.items() if point not in decisions.facts.reached},
-            begun=frozenset(decisions.facts.begun),
+            kept=frozenset(self._live_blocks.named(plan.block.id)),
+            begun=frozenset(begun),
         )
 
     @property
@@ -149,10 +151,21 @@ class Ties:
     def take_over(self) -> None:
         """Tell other blocks which of their behaviors this one takes a part from by plan."""
         plan, performances = self._owner.decisions.plan, self._performances
-        for name, taker in plan.takes.items():
-            block, _, behavior = name.partition(":")
-            if (other := performances.get(block)) is not None:
+        for block, other in performances.items():
+            taken = {
+                id: taker for name, taker in plan.takes.items() for of, _, id in (name.partition(":"),) if of == block
+            }
+            other.ties.keep(plan.block.id, taken)
+            for behavior, taker in taken.items():
                 other.ties.give(behavior, Point(f"{plan.block.id}:{taker}", "start"))
+
+    def keep(self, block: str, taken: Container[str]) -> None:
+        """Keep the parts that another block does not take any more: all but those of these behaviors."""
+        kept = [id for id, taker in self.given.items() if block_of(taker) == block and id not in taken]
+        for id in kept:
+            del self.given[id]
+        if kept:
+            self._owner.take_in(self._owner.replan)
 
     def give(self, behavior: str, taker: Point) -> None:
         """Plan to hand over the part of a behavior at `taker`, a point of another block."""

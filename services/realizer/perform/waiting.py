@@ -44,6 +44,11 @@ class WaitingBlock:
         for behavior in behaviors:
             self._ends.pop(block_of(Point(behavior, "end")), None)
 
+    @property
+    def newest_plan(self) -> Plan:
+        """The plan that it had before it had to wait."""
+        return self._plan
+
     def _tell(self) -> None:
         times = self.times()
         self._live_blocks.foresee(

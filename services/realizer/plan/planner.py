@@ -58,8 +58,8 @@ class Plan(Struct, frozen=True, kw_only=True):
     behaviors: those that will be performed, in document order. dropped: those that will not, with `problems`.
     natural: behaviors that end when something takes their place, or with the block.
     waited_for: behaviors that the end of the block waits for. given_up: speeches that lack a time they should have.
-    relations: what the block says of the behaviors that will be performed. broken: what of that the plan cannot keep,
-    for the sake of times that are fixed, or because another block has passed a point already.
+    relations: what the block says of these behaviors. broken: what of that the plan cannot keep, since times are
+    fixed, or another block has passed a point already.
     constrained: points that something waits for, or that are timed.
     successors: behaviors that hand their parts over, each with the one that takes them (`block:behavior` of another
     block), and the first of its points that comes by that. takes: behaviors of other blocks whose parts are taken.
@@ -241,7 +241,7 @@ class _Planner:
         """The plan with what it cannot keep of what the block says."""
         if not self.known.points:
             return plan
-        times = {point: plan.schedule[at] for point, at in plan.at.items()} | dict(self.known.points)
+        times = self.known.with_own({point: plan.schedule[at] for point, at in plan.at.items()})
         yield len(times) // 4
         broken = yield from broken_by(said, times)
         return replace(plan, relations=said, broken=tuple(broken))
@@ -264,14 +264,15 @@ class _Planner:
             assembler, assembly, solution = yield from self._solved(assembler, arrangement, classes)
             times = {point: solution.times[transition] for point, transition in assembly.at.items()}
             yield len(times) // 4
+            everywhere = self.known.with_own(times)
             rounds = assembly.rounds(solution.times)
             yield len(times) // 4
             arranged, conflicts = yield from arrange(
-                self.chains, present, classes, arrangement, {**times, **self.known.points}, rounds, self.barred, given
+                self.chains, present, classes, arrangement, everywhere, rounds, self.barred, given
             )
             undated = without_date(assembly, self.known) if given else ()
             arranged, others = yield from share(
-                self.chains, present, self.known, arranged, times, self.barred, undated
+                self.chains, present, self.known, arranged, everywhere, self.barred, undated
             )
             conflicts = [each for each in (*conflicts, *others) if self._is_open(each)]
             turns = [each.turn for each in conflicts if each.turn and not (each.hand or waits_elsewhere(each.turn))]
@@ -319,7 +320,8 @@ class _Planner:
         if conflict.hand:
             return conflict.hand[0] not in self.known.begun
         assert conflict.turn is not None
-        return conflict.turn[0] not in self.known.begun and conflict.turn not in self.overlaps
+        is_settled = conflict.turn in self.overlaps or conflict.turn in self.turns
+        return conflict.turn[0] not in self.known.begun and not is_settled
 
     def _unawaited_events(self, present: Relations) -> frozenset[str]:
         """Events with a decision that nothing in the block waits for."""

@@ -18,6 +18,7 @@ from engage_hri.services.realizer.plan.handover import (
     free_hand,
     is_overlaid,
     last_kept,
+    least,
     window,
 )
 from engage_hri.services.realizer.plan.known import Holder, Known, is_foreign
@@ -39,14 +40,12 @@ def share(
 ) -> Steps[tuple[Arrangement, list[Conflict]]]:
     """The arrangement with the handovers from and to behaviors of other live blocks, and the conflicts with them.
 
-    times: of the points of this block, in the schedule that `arranged` is for. undated: behaviors that wait for
-    points of blocks that have not begun: nobody knows when they come; they are planned again once it is known.
+    times: of the points of this block, in the schedule that `arranged` is for, and of others. undated: behaviors that
+    wait for points of which nobody knows yet when they come; they are planned again once it is known.
     """
     if not known.holders and not known.given:
         return arranged, []
-    # Others come when they come, also where this block would need them later.
-    everywhere = {**known.points, **{point: at for point, at in times.items() if not is_foreign(point.behavior)}}
-    shared = _Sharing(chains, relations, known, arranged, everywhere, barred)
+    shared = _Sharing(chains, relations, known, arranged, times, barred)
     for id in chains:
         yield 2 + len(known.holders) // 8
         shared.give(id)
@@ -82,7 +81,8 @@ class _Sharing:
         self.held = relations.constrained
         self.mentioned = {point.behavior for point in relations.constrained}
         """Behaviors of which something is said. One that nobody asks for now waits until the earlier has ended."""
-        self.awaited = relations.awaited
+        self.named = frozenset(point for point in relations.constrained if is_foreign(point.behavior))
+        """Points of other blocks that this one is tied to. They keep their parts up to these."""
         self.users: dict[str, list[str]] = {}
         for name, holder in known.holders.items():
             for part in holder.chain.parts:
@@ -124,11 +124,16 @@ class _Sharing:
                 self.takes[name] = id
 
     def give(self, id: str) -> None:
-        """Hand the part over to the behavior of another block that takes it by that block's plan."""
+        """Hand the part over to the behavior of another block that takes it by that block's plan.
+
+        That waits for what this one keeps, whenever it is expected.
+        """
         if (taker := self.known.given.get(id)) is not None and taker in self.times:
-            first = self._first_after(self.chains[id], self.times[taker])
-            if first is not None:
-                self._hand_over(id, taker.behavior, first)
+            chain, kept = self.chains[id], self.held | self.known.kept
+            first = self._first_after(chain, self.times[taker])
+            least_kept = max([least(chain), *(number for number, point in enumerate(chain.points) if point in kept)])
+            if first is not None and least_kept + 1 < len(chain.points):
+                self._hand_over(id, taker.behavior, max(first, least_kept + 1))
 
     def _first_after(self, chain: Chain, at: Seconds) -> int | None:
         """Number of the first point of a behavior that comes after `at`; None: it has ended by then."""
@@ -148,7 +153,7 @@ class _Sharing:
 
     def _needed(self, id: str, holder: Holder, first: int) -> Point | None:
         """The last point of the holder, from `first` on, that a behavior of this block must wait for."""
-        kept = holder.kept.union(self.awaited.get(id, ()))
+        kept = holder.kept | self.named
         is_asked = id in self.mentioned
         last = last_kept(holder.chain, self.chains[id], first, kept, is_natural=holder.is_natural, is_asked=is_asked)
         return None if last is None else holder.chain.points[last]
