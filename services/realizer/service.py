@@ -215,6 +215,7 @@ class _Realizer:
                 # Among them are parts sent home by a block that was itself replaced before it began.
                 _, lost = await asyncio.wait(self.homing, timeout=self.config.abort)
                 self.homing -= lost
+        await self.planning.planned(live.request.block, self.live.values())
         try:
             live.unsettle()
             # Asked again: the body is elsewhere by now.
