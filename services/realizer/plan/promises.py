@@ -1,4 +1,4 @@
-"""What a block says of its points, held against the times at which they come: the one measure of what was kept."""
+"""Promises of a block: what it says of its points, held against when they come. The one measure of what was kept."""
 
 from collections.abc import Iterator, Mapping
 
@@ -109,7 +109,7 @@ def promises_of(relations: Relations) -> Steps[Promises]:
 
 
 def broken_by(relations: Relations, times: Mapping[Point, Seconds]) -> Steps[list[Broken]]:
-    """What is broken of what a block says if its points come at these times."""
+    """Constraints that are broken if their points come at these times."""
     promises = yield from promises_of(relations)
     found: list[Broken] = []
     coming = [point for point in promises.points if point in times]
