@@ -85,6 +85,7 @@ async def test_what_is_past_as_a_block_begins_is_told_at_once(ref: str) -> None:
     seen, _ = await told((0.0, block((WORDS,), id="one")), (1.5, tied))
     warning = seen.warnings()[0]
 
+    assert warning.at is not None
     assert (warning.behavior, warning.kind, warning.at.seconds) == ("t", "LATE", 1.5)
     assert f"later than it should: t:start = {ref}" in warning.message
     assert len(seen.warnings()) == 1
