@@ -44,7 +44,8 @@ from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.control.config import ControlConfig, Displaced, Slow, Stall, Variability
 from engage_hri.services.control.service import embody
 from engage_hri.services.realizer.config import RealizerConfig
-from engage_hri.services.realizer.plan.planner import Plan, plan_block
+from engage_hri.services.realizer.plan.plan import Plan
+from engage_hri.services.realizer.plan.planner import plan_block
 from engage_hri.services.realizer.plan.poses import poses_before
 from engage_hri.services.realizer.points import Point
 from engage_hri.services.realizer.service import realize

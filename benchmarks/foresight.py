@@ -42,7 +42,7 @@ from engage_hri.schemas.body import PerformBehavior, SyncPointArrived, SyncPoint
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.interface import Bus
 from engage_hri.services.control.config import Stall, Variability
-from engage_hri.services.realizer.plan.planner import Plan
+from engage_hri.services.realizer.plan.plan import Plan
 from engage_hri.services.realizer.points import Point
 from engage_hri.services.requests.ends import Pending, Requester
 from engage_hri.services.runtime.virtual_time import run_virtual

@@ -29,7 +29,8 @@ with warnings.catch_warnings():
 from engage_hri.schemas.behaviors import After, BlockBehavior, Constraint, Pointing, Speech, Synchronize
 from engage_hri.schemas.blocks import Block
 from engage_hri.services.realizer.net.petri_net import PetriNet, Place, Transition, enabled, fire, fire_once_each
-from engage_hri.services.realizer.plan.planner import Plan, plan_block
+from engage_hri.services.realizer.plan.plan import Plan
+from engage_hri.services.realizer.plan.planner import plan_block
 
 SIZES = (100, 1000, 10000)
 PER_PAIR = 8

@@ -17,7 +17,7 @@ from engage_hri.services.commandline.outputs import Terminal
 from engage_hri.services.commandline.process import DONE
 from engage_hri.services.commandline.prose import strict_refusal
 from engage_hri.services.commandline.sources import read_source, read_world
-from engage_hri.services.realizer.plan.planner import Plan
+from engage_hri.services.realizer.plan.plan import Plan
 from engage_hri.services.runtime.virtual_time import run_virtual
 
 HIGHEST = 40

@@ -9,7 +9,8 @@ from engage_hri.schemas.units import Stamp
 from engage_hri.services.realizer.net import pnml
 from engage_hri.services.realizer.net.petri_net import Bound, Place, is_live, is_safe
 from engage_hri.services.realizer.perform.net_message import described
-from engage_hri.services.realizer.plan.planner import Plan, plan_block
+from engage_hri.services.realizer.plan.plan import Plan
+from engage_hri.services.realizer.plan.planner import plan_block
 
 __all__ = ["as_dot", "as_json", "as_message", "as_pnml", "as_text", "plan_block"]
 

@@ -34,7 +34,9 @@ from engage_hri.services.realizer.perform.performance import BlockPerformance
 from engage_hri.services.realizer.perform.planning import Planning
 from engage_hri.services.realizer.perform.shared_context import Moving, Presence, SharedContext
 from engage_hri.services.realizer.perform.steering import Steering
-from engage_hri.services.realizer.plan.planner import Plan
+from engage_hri.services.realizer.perform.waiting import WaitingBlock
+from engage_hri.services.realizer.plan.known import BLOCK_END, qualified
+from engage_hri.services.realizer.plan.plan import Plan
 from engage_hri.services.realizer.plan.relations import BlockRefused
 from engage_hri.services.requests.ends import Patience, RequestDesk, Requester
 from engage_hri.services.runtime.service import Ready
@@ -199,15 +201,21 @@ class _Realizer:
         if replaces:
             for other in earlier:
                 other.stop(Ending("interrupted", replaced_by=block))
-        live.settle()
-        if earlier:
-            await asyncio.wait([other.ended for other in earlier])
+        waiting = WaitingBlock(plan, self.live_blocks, self.bus.now)
+        self.live_blocks.perform(block, waiting)
+        blocks = {other.request.block.id: other.request.block for other in reversed(earlier)}
+        ends = [qualified(id, BLOCK_END) for id in blocks] if not replaces else []
+        with self.live_blocks.followed(waiting, ends, blocks):
+            live.settle()
+            if earlier:
+                await asyncio.wait([other.ended for other in earlier])
         if replaces:
             self._send_home(live, replaced)
             if self.homing:
                 # Among them are parts sent home by a block that was itself replaced before it began.
                 _, lost = await asyncio.wait(self.homing, timeout=self.config.abort)
                 self.homing -= lost
+        await self.planning.planned(live.request.block, self.live.values())
         try:
             live.unsettle()
             # Asked again: the body is elsewhere by now.

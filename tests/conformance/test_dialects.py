@@ -17,7 +17,8 @@ from engage_hri.schemas.documents.xml_decode import encode_xml
 from engage_hri.schemas.faults import InputRefused
 from engage_hri.schemas.references import type_name
 from engage_hri.schemas.syncref import SYNC_POINTS, SyncRef
-from engage_hri.services.realizer.plan.planner import Plan, plan_block
+from engage_hri.services.realizer.plan.plan import Plan
+from engage_hri.services.realizer.plan.planner import plan_block
 from tests.conformance.case import Case, cases
 from tests.schemas.grammar import violations
 from tests.schemas.strategies import without_lines

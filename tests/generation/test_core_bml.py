@@ -25,7 +25,8 @@ from engage_hri.services.commandline.generating import generated
 from engage_hri.services.commandline.plan import estimated
 from engage_hri.services.commandline.roster import service
 from engage_hri.services.commandline.sources import still
-from engage_hri.services.realizer.plan.planner import Plan, plan_block
+from engage_hri.services.realizer.plan.plan import Plan
+from engage_hri.services.realizer.plan.planner import plan_block
 from engage_hri.services.realizer.points import EPSILON, Point
 from engage_hri.services.requests.ends import Requester
 from engage_hri.services.runtime.service import Service, running

@@ -18,6 +18,7 @@ LAWS: Mapping[str, str] = {
     "broken": "a constraint within a block was broken in silence",
     "broken across blocks": "a constraint with a point of another block was broken in silence",
     "broken, point was past": "the same, where that point asks for a time before the block began",
+    "inexact": "a constraint was off by more than 10 ms, though not noticeably, and the body is exact",
     "wrong length": "a wait did not take its time",
     "left too early": "a look, a face or a posture did not last",
     "out of turn": "a behavior of which nothing is said began before the one before it had ended",

@@ -200,6 +200,7 @@ def test_untouched_they_break_no_law(xml: str, asks: bool) -> None:
 TAMPERED = [
     ("a point is told 0.3 s later", shifted("g:end", 0.3), "broken"),
     ("a mark is told 0.3 s earlier", shifted("s:m", -0.3), "broken"),
+    ("a point is told 0.05 s later", shifted("g:end", 0.05), "inexact"),
     ("an order is not kept", shifted("w:start", -0.3), "broken"),
     ("a point that nobody has timed is 0.03 s off", shifted("q:end", 0.03), "off its prediction"),
     ("what is tied to another block comes too early", shifted("o:start", -0.3), "broken across blocks"),
@@ -273,6 +274,18 @@ def test_a_point_that_was_past_is_asked_for_in_vain() -> None:
     record = told(without_warnings)(playing.play(story))
 
     assert {each.law for each in judge(story, record)} == {"broken, point was past"}
+
+
+@pytest.mark.parametrize(("seconds", "laws"), [(0.09, {"inexact"}), (0.11, {"broken"})])
+def test_what_people_may_notice_is_told(seconds: float, laws: set[str]) -> None:
+    assert found(EVERYTHING, shifted("g:end", seconds)) - {"off its prediction"} == laws
+
+
+def test_what_was_past_by_less_than_people_notice_needs_no_word() -> None:
+    near = f'<bml id="c" xmlns="{reading.BML_1_0}"><wait id="v" duration="1" start="b:w:start"/></bml>'
+    story = Story((Deed(0.0, "perform", "b", NECESSARY), Deed(0.09, "perform", "c", near)))
+
+    assert judge(story, playing.play(story)) == []
 
 
 def test_something_is_late_for_a_hold() -> None:

@@ -31,7 +31,8 @@ from engage_hri.schemas.behaviors import (
 from engage_hri.schemas.blocks import Block
 from engage_hri.schemas.body import Estimate, Phase
 from engage_hri.schemas.syncref import SyncRef
-from engage_hri.services.realizer.plan.planner import Plan, plan_block
+from engage_hri.services.realizer.plan.plan import Plan
+from engage_hri.services.realizer.plan.planner import plan_block
 from engage_hri.services.realizer.plan.relations import BlockRefused
 
 SEVEN = ("start", "ready", "stroke_start", "stroke", "stroke_end", "relax", "end")

@@ -7,7 +7,8 @@ from msgspec.structs import replace
 from engage_hri.schemas.behaviors import BlockBehavior, Gaze, Pointing, Speech, Timing, Wait
 from engage_hri.schemas.blocks import Block
 from engage_hri.schemas.body import Estimate, Phase
-from engage_hri.services.realizer.plan.planner import Plan, plan_block
+from engage_hri.services.realizer.plan.plan import Plan
+from engage_hri.services.realizer.plan.planner import plan_block
 from engage_hri.services.realizer.points import Point
 from tests.realizer.fake_body import FakeBody, Script
 

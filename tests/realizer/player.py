@@ -6,7 +6,7 @@ from collections.abc import Callable
 from engage_hri.services.realizer.config import RealizerConfig
 from engage_hri.services.realizer.decide.decisions import Decisions
 from engage_hri.services.realizer.decide.effects import Begin, Extend
-from engage_hri.services.realizer.plan.planner import Plan
+from engage_hri.services.realizer.plan.plan import Plan
 
 
 class Player:

@@ -10,7 +10,8 @@ from engage_hri.schemas.behaviors import Gaze, GazeShift, Mark, Pointing, Speech
 from engage_hri.schemas.blocks import BlockOutcome
 from engage_hri.services.realizer.config import RealizerConfig
 from engage_hri.services.realizer.perform import performance as executor
-from engage_hri.services.realizer.plan.planner import Plan, plan_block
+from engage_hri.services.realizer.plan.plan import Plan
+from engage_hri.services.realizer.plan.planner import plan_block
 from engage_hri.services.requests.ends import RequestRefused
 from tests.realizer.fake_body import FakeBody, Script
 from tests.realizer.stage import block, stage, together

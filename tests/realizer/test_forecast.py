@@ -11,7 +11,8 @@ from engage_hri.schemas.behaviors import After, Constraint, Mark, Pointing, Spee
 from engage_hri.schemas.blocks import Block
 from engage_hri.services.realizer.decide.decisions import Decisions
 from engage_hri.services.realizer.foresee.experience import Experience
-from engage_hri.services.realizer.plan.planner import Plan, plan_block
+from engage_hri.services.realizer.plan.plan import Plan
+from engage_hri.services.realizer.plan.planner import plan_block
 from engage_hri.services.realizer.plan.relations import BlockRefused
 from tests.realizer.fake_body import FakeBody
 from tests.realizer.player import Player

@@ -24,7 +24,8 @@ from engage_hri.services.realizer.net.petri_net import (
     is_safe,
 )
 from engage_hri.services.realizer.net.pnml import read_pnml
-from engage_hri.services.realizer.plan.planner import Plan, plan_block
+from engage_hri.services.realizer.plan.plan import Plan
+from engage_hri.services.realizer.plan.planner import plan_block
 from tests.realizer.fake_body import FakeBody
 from tests.realizer.oracle import estimated, random_blocks
 from tests.realizer.stage import after, before, block, together

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from engage_hri.schemas.behaviors import Pointing, Speech, Synchronize, Timing
 from engage_hri.schemas.blocks import Block
-from engage_hri.services.realizer.plan.planner import Plan
+from engage_hri.services.realizer.plan.plan import Plan
 from tests.realizer.oracle import (
     consult,
     estimated,

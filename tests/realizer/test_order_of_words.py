@@ -13,7 +13,8 @@ from msgspec.structs import replace
 from engage_hri.schemas.behaviors import After, BlockBehavior, Constraint, Gesture, Head, Speech, Timing
 from engage_hri.schemas.blocks import Block
 from engage_hri.schemas.documents.xml_decode import decode_xml
-from engage_hri.services.realizer.plan.planner import Plan, plan_block
+from engage_hri.services.realizer.plan.plan import Plan
+from engage_hri.services.realizer.plan.planner import plan_block
 from engage_hri.services.realizer.plan.relations import BlockRefused
 from engage_hri.services.realizer.points import Point
 from tests.realizer.oracle import consult, estimate, relaxed

@@ -29,7 +29,8 @@ from engage_hri.schemas.blocks import Block, BlockOutcome
 from engage_hri.schemas.syncref import SyncRef
 from engage_hri.services.realizer.config import RealizerConfig
 from engage_hri.services.realizer.net.petri_net import enabled, fire, is_live
-from engage_hri.services.realizer.plan.planner import Plan, plan_block
+from engage_hri.services.realizer.plan.plan import Plan
+from engage_hri.services.realizer.plan.planner import plan_block
 from engage_hri.services.realizer.plan.relations import BlockRefused
 from engage_hri.services.realizer.points import Point
 from engage_hri.services.requests.ends import RequestRefused

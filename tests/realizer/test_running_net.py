@@ -12,7 +12,8 @@ from engage_hri.schemas.behaviors import Gaze, Gesture, Mark, Pointing, Speech, 
 from engage_hri.schemas.blocks import Block
 from engage_hri.services.realizer.config import RealizerConfig
 from engage_hri.services.realizer.decide.decisions import Decisions
-from engage_hri.services.realizer.plan.planner import Plan, plan_block
+from engage_hri.services.realizer.plan.plan import Plan
+from engage_hri.services.realizer.plan.planner import plan_block
 from engage_hri.services.realizer.points import Point
 from tests.realizer.fake_body import FakeBody
 from tests.realizer.player import Player

@@ -18,7 +18,8 @@ from engage_hri.schemas.feedback import BlockProgress
 from engage_hri.services.realizer.config import RealizerConfig
 from engage_hri.services.realizer.perform.planning import SLICE, unhurried
 from engage_hri.services.realizer.plan.known import Known
-from engage_hri.services.realizer.plan.planner import Plan, plan_block, plan_steps
+from engage_hri.services.realizer.plan.plan import Plan
+from engage_hri.services.realizer.plan.planner import plan_block, plan_steps
 from engage_hri.services.realizer.plan.relations import BlockRefused
 from engage_hri.services.realizer.plan.steps import Steps, finished, portions
 from tests.realizer.fake_body import FakeBody, Script

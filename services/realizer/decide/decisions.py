@@ -7,18 +7,21 @@ decided comes from the marking of the net (grants.py) and from what is expected 
 from collections.abc import Callable, Collection, Iterable, Sequence
 from math import isfinite
 
+from msgspec.structs import replace
+
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.realizer.config import RealizerConfig
 from engage_hri.services.realizer.decide.effects import Begin, Effect, Extend
 from engage_hri.services.realizer.decide.grants import Grants
 from engage_hri.services.realizer.decide.held_up import HeldUp
-from engage_hri.services.realizer.decide.lateness import Bounds, LatenessWatch
+from engage_hri.services.realizer.decide.lateness import LatenessWatch
 from engage_hri.services.realizer.foresee.foresight import Foresight, differ_noticeably
 from engage_hri.services.realizer.net.facts import Facts
 from engage_hri.services.realizer.net.running import Observer, RunningNet
-from engage_hri.services.realizer.plan.known import BLOCK_END, BLOCK_START
-from engage_hri.services.realizer.plan.planner import Plan
-from engage_hri.services.realizer.points import Point, performer
+from engage_hri.services.realizer.plan.plan import Plan
+from engage_hri.services.realizer.plan.promises import Broken, promises_of
+from engage_hri.services.realizer.plan.steps import finished
+from engage_hri.services.realizer.points import ORIGIN, Point, performer
 
 
 class Decisions:
@@ -49,7 +52,9 @@ class Decisions:
         """Go on with another plan of the same block, from the same facts: something was dropped."""
         self.plan = plan
         self.net = net = RunningNet(plan.net, plan.members, plan.at, (self.foresight, self.grants))
-        self.bounds = Bounds(plan)
+        self.promises = finished(promises_of(plan.relations))
+        for point in self.facts.reached.keys() | {ORIGIN}:
+            self.promises.come(point, self.facts.reached.get(point, self.began))
         self.foresight.look_ahead(plan, net)
         self.grants.adopt(plan, net)
         self.facts.adopt(net, {id: chain.points for id, chain in plan.chains.items()})
@@ -133,49 +138,23 @@ class Decisions:
         """True if everything has happened that the end of the block waits for."""
         return self.net.is_over
 
-    def lateness(self, point: Point) -> Seconds:
-        """Seconds by which a point was reached later than its constraints allow; 0 if it is not reached.
+    def broken(self, point: Point) -> list[Broken]:
+        """Constraints that are broken, now that a point was reached: one of this block, or of another.
 
-        Without those for which holds account.
+        To be asked once for each point. What holds account for does not count.
         """
         at = self.facts.reached.get(point)
-        if at is None or point not in self.plan.at:
-            return 0.0
+        if at is None:
+            return []
+        found = (self._unheld(each) for each in self.promises.come(point, at))
+        return [each for each in found if each.seconds > 0.0]
 
-        def held_up(one: int, other: int, allowed: Seconds) -> Seconds:
-            return self.held_up.between(self._name(one), self._name(other), allowed, at)
-
-        return self.bounds.lateness(self.plan.at[point], at, self.net.passed, held_up)
-
-    def skew(self, point: Point) -> Seconds:
-        """Seconds by which a behavior passed a point later than the first of its instant; 0 if it has not passed it.
-
-        Without those for which holds account.
-        """
-        at = self.facts.reached.get(point)
-        if at is None or point not in self.plan.at:
-            return 0.0
-        together = [member.point for member in self.plan.members[self.plan.at[point]]]
-        first = min(self.facts.reached.get(each, at) for each in (point, *together))
-        return max(0.0, at - first - self.held_up.within(self.net.part_of[point].point, together, at))
-
-    def _name(self, transition: int) -> Point:
-        """A point that keeps its name when the block is planned again."""
-        if not transition:
-            return BLOCK_START
-        return next((member.point for member in self.plan.members[transition]), BLOCK_END)
-
-    def earliness(self, point: Point) -> Seconds:
-        """Seconds by which a point was reached before the time that the block fixes for it; 0 if it fixes none.
-
-        What was held on its way, and cannot wait there, ends by itself: it is not early.
-        """
-        at = self.facts.reached.get(point)
-        if at is None or point not in self.plan.at:
-            return 0.0
-        if self.facts.held_between(self.facts.begun.get(point.behavior, at), at, point.behavior):
-            return 0.0
-        return max(0.0, self.began + self.bounds.fixed(self.plan.at[point]) - at)
+    def _unheld(self, broken: Broken) -> Broken:
+        """The same without the seconds for which holds account."""
+        times = self.facts.reached | {ORIGIN: self.began}
+        early, late = times[broken.early], times[broken.late]
+        held = self.held_up.between(broken.late, broken.early, late - early - broken.seconds, max(early, late))
+        return replace(broken, seconds=broken.seconds - held)
 
     # -- decisions -----------------------------------------------------------------------------------------------
 

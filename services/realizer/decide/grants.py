@@ -13,7 +13,7 @@ from engage_hri.services.realizer.config import RealizerConfig
 from engage_hri.services.realizer.foresee.foresight import Foresight
 from engage_hri.services.realizer.net.facts import Facts
 from engage_hri.services.realizer.net.running import Observer, RunningNet
-from engage_hri.services.realizer.plan.planner import Plan
+from engage_hri.services.realizer.plan.plan import Plan
 from engage_hri.services.realizer.plan.slack import UNNOTICED, slack
 from engage_hri.services.realizer.points import EPSILON, Member, Point
 

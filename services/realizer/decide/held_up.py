@@ -6,7 +6,7 @@ known what the hold has cost: the times that are expected now are compared with 
 what is expected to be late by so much more is late for the hold.
 """
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.realizer.foresee.outlook import Outlook
@@ -66,18 +66,12 @@ class HeldUp:
     # -- what it accounts for ------------------------------------------------------------------------------------
 
     def between(self, point: Point, other: Point, allowed: Seconds, at: Seconds) -> Seconds:
-        """Seconds by which the instant of `point` is later than `allowed` after that of `other`, for holds.
+        """Seconds by which `point` is later than `allowed` after another point, for holds.
 
-        at: when the point came.
+        at: when the later of them came.
         """
         late = [(one.apart(point, other), after.apart(point, other)) for one, after in self._costs]
         return self._open(at) + sum(_more(one - allowed, after - allowed) for one, after in late)
-
-    def within(self, point: Point, others: Iterable[Point], at: Seconds) -> Seconds:
-        """Seconds by which a behavior came later to `point`, at `at`, than the first of the others, for holds."""
-        together = tuple(others)
-        late = [(one.behind(point, together), after.behind(point, together)) for one, after in self._costs]
-        return self._open(at) + sum(_more(one, after) for one, after in late)
 
     def _open(self, at: Seconds) -> Seconds:
         """Seconds by which what came at that time may be late for the hold whose effect is not known yet."""

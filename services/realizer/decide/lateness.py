@@ -1,6 +1,6 @@
 """Time limits while a block runs: for the next report of a behavior under way, and for the decision of an event."""
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Mapping
 
 from msgspec import Struct
 
@@ -11,7 +11,6 @@ from engage_hri.schemas.references import type_name
 from engage_hri.schemas.syncref import SyncRef
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.realizer.config import RealizerConfig
-from engage_hri.services.realizer.plan.planner import Plan
 from engage_hri.services.realizer.points import EPSILON, Point
 from engage_hri.services.requests.deadlines import Deadlines
 
@@ -84,67 +83,6 @@ class LatenessWatch:
                 self._warned.add(behavior)
                 found.append(Late(behavior, awaited.sync, now - awaited.expected))
         return found
-
-
-class Bounds:
-    """Bounds that say how late an instant may be after others."""
-
-    def __init__(self, plan: Plan) -> None:
-        self._not_after: list[list[tuple[int, Seconds]]] = [[] for _ in plan.net.transitions]
-        """For each transition, those that it may be later than by no more than so many seconds."""
-        self._fixed: dict[int, Seconds] = {}
-        """For each transition with a fixed time, the seconds from the block's start."""
-        for place in plan.net.places:
-            if not place.source and place.kind in ("order", "delay", "series"):
-                self._fixed[place.target] = max(place.lag, self._fixed.get(place.target, 0.0))
-            if place.kind in ("order", "delay"):
-                # Points that are predicted, or of another block, may come before those that they wait for.
-                self._not_after[place.source].append((place.target, -place.lag))
-        for bound in plan.net.bounds:
-            if bound.kind != "phase":
-                self._not_after[bound.source].append((bound.target, -bound.lag))
-
-    def fixed(self, transition: int) -> Seconds:
-        """Seconds from the block's start before which the block does not want the transition."""
-        return self._fixed.get(transition, 0.0)
-
-    def lateness(
-        self,
-        transition: int,
-        at: Seconds,
-        passed: Mapping[int, Seconds],
-        held_up: Callable[[int, int, Seconds], Seconds],
-    ) -> Seconds:
-        """Seconds by which a transition at `at` is later than it may be.
-
-        passed: the times of the transitions that all their behaviors have passed. held_up: the seconds for which
-        holds account where the first of two transitions is later than so many seconds after the other.
-        """
-        known = [(each, seconds) for each, seconds in self._not_after[transition] if each in passed]
-        late = [(each, seconds) for each, seconds in known if at - passed[each] > seconds]
-        left = (at - passed[each] - seconds - held_up(transition, each, seconds) for each, seconds in late)
-        return max((0.0, *left))
-
-
-def too_early(plan: Plan, reached: Mapping[Point, Seconds], foreign: Point) -> Iterator[tuple[Point, Seconds]]:
-    """Points that came before a point of another block allowed it, now that this is reached, and by how much.
-
-    They were met by prediction, which was wrong, or were fixed by other times.
-    """
-    at = reached[foreign]
-    if (here := plan.at.get(foreign)) is None:
-        return
-    ties = [(here, 0.0)]
-    ties += [
-        (place.target, place.lag)
-        for place in plan.net.places
-        if place.source == here and place.kind in ("delay", "order") and place.target < len(plan.members)
-    ]
-    for transition, lag in ties:
-        for member in plan.members[transition]:
-            came = reached.get(member.point)
-            if came is not None and member.behavior in plan.chains:
-                yield member.point, at + lag - came
 
 
 def event_deadline(

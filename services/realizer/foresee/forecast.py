@@ -10,7 +10,7 @@ from math import inf
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.realizer.foresee.longest_paths import FINEST, Arc, Circle, LongestPaths
 from engage_hri.services.realizer.net.petri_net import order
-from engage_hri.services.realizer.plan.planner import Plan
+from engage_hri.services.realizer.plan.plan import Plan
 from engage_hri.services.realizer.points import EPSILON, Point
 
 REPAIRS = 200

@@ -16,8 +16,8 @@ from engage_hri.services.realizer.foresee.outlook import Outlook
 from engage_hri.services.realizer.net.facts import Facts
 from engage_hri.services.realizer.net.running import Observer, RunningNet
 from engage_hri.services.realizer.plan.known import BLOCK_END, BLOCK_START
-from engage_hri.services.realizer.plan.planner import Plan
-from engage_hri.services.realizer.points import EPSILON, SHIFTS, Member, Point, performer
+from engage_hri.services.realizer.plan.plan import Plan
+from engage_hri.services.realizer.points import EPSILON, ORIGIN, SHIFTS, Member, Point, performer
 
 SURPRISE: Seconds = 0.1
 """Difference from the expected time, in seconds, from which predictions are computed again."""
@@ -328,7 +328,7 @@ class Foresight(Observer):
                     behavior, here, since = point.behavior, at[point], arrivals[before]
                     least, most = forecast.phase(behavior, here), forecast.longest(behavior, here)
                     arrivals[point] = max(now, since + least, min(since + most, instants[point]))
-        return Outlook({**instants, BLOCK_START: self._facts.began}, arrivals)
+        return Outlook({**arrivals, ORIGIN: self._facts.began})
 
     def from_scratch(self, now: Seconds | None = None) -> Forecast:
         """A forecast of all instants; for those that the kept forecast has, it says the same.

@@ -17,7 +17,7 @@ from engage_hri.services.realizer.perform.futures import SyncPointFutures
 from engage_hri.services.realizer.perform.handed_over import has_lost_nothing, loss
 from engage_hri.services.realizer.perform.recognition_link import RecognitionLink
 from engage_hri.services.realizer.perform.spoken import Spoken
-from engage_hri.services.realizer.plan.planner import Plan
+from engage_hri.services.realizer.plan.plan import Plan
 from engage_hri.services.realizer.points import EPSILON, Point, performer
 from engage_hri.services.requests.ends import NeverEnded, Pending, RequestRefused
 

@@ -18,8 +18,8 @@ from engage_hri.schemas.feedback import (
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.interface import Bus
 from engage_hri.services.realizer.decide.decisions import Decisions
-from engage_hri.services.realizer.decide.lateness import too_early
-from engage_hri.services.realizer.plan.planner import Plan
+from engage_hri.services.realizer.plan.plan import Plan
+from engage_hri.services.realizer.plan.promises import Broken
 from engage_hri.services.realizer.points import Point
 
 NOTICEABLE: Seconds = 0.1
@@ -113,20 +113,25 @@ class Reporter:
                     character_id=self._character,
                 )
             )
-        if (late := max(decisions.skew(point), decisions.lateness(point))) > self._tolerance:
-            self.late(decisions.net.part_of[point].point, f"{point.sync} came {late:.2f} s later than it should")
-        elif (early := decisions.earliness(point)) > self._tolerance:
-            instant = decisions.net.part_of[point].point
-            self.late(instant, f"{point.sync} came {early:.2f} s earlier than its fixed time")
+        self.compare(decisions, point)
 
-    def heard(self, decisions: Decisions, foreign: Point) -> None:
-        """Warn if a point of another block, reached now, is one that points of this block should have waited for."""
-        reached = decisions.facts.reached
-        for point, early in too_early(decisions.plan, reached, foreign):
-            at, allowed = reached[foreign], reached[foreign] - reached[point] - early
-            if early - decisions.held_up.between(foreign, point, allowed, at) > self._tolerance:
-                instant = decisions.net.part_of[point].point
-                self.late(instant, f"{point.sync} came {early:.2f} s earlier than {foreign} allows")
+    def compare(self, decisions: Decisions, point: Point) -> None:
+        """Warn if a point, reached now, and those before it have not come as the block says; also one of another."""
+        for broken in decisions.broken(point):
+            self._broken(decisions.net.part_of[broken.point].point, broken, "came")
+
+    def unkept(self, plan: Plan) -> None:
+        """Warn of what the plan itself cannot keep: ties to points of other blocks that leave no time for it."""
+        for broken in plan.broken:
+            part = next(
+                each for each in plan.members[plan.at[broken.point]] if each.behavior == broken.point.behavior
+            )
+            self._broken(part.point, broken, "is planned")
+
+    def _broken(self, instant: Point, broken: Broken, verb: str) -> None:
+        if broken.seconds > self._tolerance:
+            way, sync = broken.direction, broken.point.sync
+            self.late(instant, f"{sync} {verb} {broken.seconds:.2f} s {way} than it should: {broken.said}")
 
     def late(self, instant: Point, message: str) -> None:
         """Warn that a behavior is late for an instant: once for each."""

@@ -4,7 +4,7 @@ from collections.abc import Container
 
 from engage_hri.schemas.body import BehaviorOutcome
 from engage_hri.schemas.faults import Fault
-from engage_hri.services.realizer.plan.planner import Plan
+from engage_hri.services.realizer.plan.plan import Plan
 from engage_hri.services.realizer.points import Point
 
 

@@ -13,6 +13,7 @@ from engage_hri.schemas.references import type_name
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.realizer.decide.decisions import Decisions
 from engage_hri.services.realizer.perform.live_blocks import LiveBlocks
+from engage_hri.services.realizer.plan.handover import least
 from engage_hri.services.realizer.plan.known import (
     Holder,
     Known,
@@ -22,13 +23,10 @@ from engage_hri.services.realizer.plan.known import (
     is_named_in,
     qualified,
 )
-from engage_hri.services.realizer.plan.phases import chain
-from engage_hri.services.realizer.plan.planner import Plan
+from engage_hri.services.realizer.plan.phases import ARMS, chain
+from engage_hri.services.realizer.plan.plan import Plan
 from engage_hri.services.realizer.plan.relations import Elsewhere
-from engage_hri.services.realizer.plan.sharing import needed_points
 from engage_hri.services.realizer.points import Point, performer
-
-_ARMS = ("left_arm", "right_arm")
 
 
 class Performed(Protocol):
@@ -62,9 +60,11 @@ def knowledge(asker: Asker, others: Iterable[Performed], live_blocks: LiveBlocks
     points: dict[Point, Seconds] = {}
     holders: dict[str, Holder] = {}
     for block in sorted({block_of(point) for point in asker.named} - there):
-        for point, at in live_blocks.reached(block, asker.blocks.get(block)).items():
+        content = asker.blocks.get(block)
+        waiting = live_blocks.times(block) if live_blocks.blocks.get(block) is content else {}
+        for point, at in {**waiting, **live_blocks.reached(block, content)}.items():
             points[qualified(block, point)] = at - asker.since
-    dependent = _dependents(asker.block, [each.decisions.plan for each in concerned])
+    dependent = _dependents(asker.block, [plan for plan in live_blocks.plans if plan.block.id != asker.block])
     for each in concerned:
         plan, decisions = each.decisions.plan, each.decisions
         block = plan.block.id
@@ -92,21 +92,21 @@ def concerns(block: str, named: Iterable[Point], parts: Collection[str], other: 
 def _dependents(block: str, plans: Sequence[Plan]) -> set[str]:
     """Behaviors, by `block:behavior`, that wait for points of a block, or for others that do: they are not given.
 
+    So no wait for a part closes a circle, whatever ties and waits there are: what a behavior of the block is to wait
+    for does not wait for the block. Blocks that wait for their turn count, too. Ties name blocks that came earlier.
+
     The end of a look that waits to be taken over by that block does not count.
     """
     found: set[str] = set()
+    tied = [(plan, foreign) for plan in plans if (foreign := plan.foreign)]
     while True:
         before = len(found)
-        for plan in plans:
-            sources = [
-                transition
-                for point, transition in plan.at.items()
-                if is_foreign(point.behavior) and (block_of(point) == block or point.behavior in found)
-            ]
+        for plan, foreign in tied:
+            sources = [plan.at[each] for each in foreign if block_of(each) == block or each.behavior in found]
             if sources:
                 later = plan.net.later(sources)
                 for id, each in plan.chains.items():
-                    needed = (*each.points[: needed_points(each, is_natural=id in plan.natural)], *plan.constrained)
+                    needed = (*each.points[: least(each) + 1], *plan.constrained)
                     if any(point.behavior == id and plan.at[point] in later for point in needed):
                         found.add(f"{plan.block.id}:{id}")
         if len(found) == before:
@@ -118,7 +118,8 @@ def parts_of(behaviors: Iterable[BlockBehavior], estimates: Iterable[Estimate]) 
     known = {each.behavior: each for each in estimates}
     moving = [each for each in behaviors if performer(each) == "body"]
     parts = {part for each in moving for part in chain(each, known.get(each.id)).parts}
-    return parts | set(_ARMS) if parts.intersection(_ARMS) else parts
+    arms = ARMS["BOTH_HANDS"]
+    return parts.union(arms) if parts.intersection(arms) else parts
 
 
 def may_share(one: Block, other: Block) -> bool:

@@ -35,6 +35,8 @@ class Live:
         self.ending: asyncio.Future[Ending] = loop.create_future()
         self.settled: asyncio.Future[None] = loop.create_future()
         """Resolved while it is being performed, has ended, or waits for its turn: others can be planned now."""
+        self.is_planning = False
+        """True while it is planned, with those in mind that are being performed: no other is to begin meanwhile."""
         there = {each.request.block.id: each for each in reversed(earlier)}  # a second one with an id is refused
         self.leaders = tuple([there[id] for id in request.follows if id in there])
         """Blocks that it continues (`follows`): it ends with any of them that ends otherwise than done."""
@@ -48,6 +50,7 @@ class Live:
 
     def settle(self) -> None:
         """Let blocks that came later be planned."""
+        self.is_planning = False
         if not self.settled.done():
             self.settled.set_result(None)
 

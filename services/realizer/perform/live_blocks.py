@@ -10,6 +10,7 @@ from engage_hri.schemas.blocks import Block
 from engage_hri.schemas.syncref import BLOCK_ITSELF
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.realizer.plan.known import block_of, qualified
+from engage_hri.services.realizer.plan.plan import Plan
 from engage_hri.services.realizer.points import EPSILON, Point
 
 MOST_TELLINGS = 20
@@ -31,10 +32,17 @@ class TiedBlock(Protocol):
 
 
 class FollowedBlock(Protocol):
-    """A block that is being performed and that others may be tied to."""
+    """A block that is being performed, or waits for its turn, and that others may be tied to."""
 
     def follow(self, points: Iterable[Point]) -> None:
         """Tell from now on when these points are expected: others are tied to them."""
+
+    def times(self) -> Mapping[Point, Seconds]:
+        """Time of each point, measured or expected, by the loop's clock."""
+
+    @property
+    def newest_plan(self) -> Plan:
+        """The plan that it follows now, or would follow if its turn came."""
 
 
 class _Tracked:
@@ -91,6 +99,17 @@ class LiveBlocks:
         tracked = self._find(block, content)
         return tracked.reached if tracked is not None else {}
 
+    def times(self, block: str) -> Mapping[Point, Seconds]:
+        """Times of the points of a live block, measured or expected; none if it is yet to be planned."""
+        tracked = self._tracked.get(block)
+        return tracked.performance.times() if tracked is not None and tracked.performance is not None else {}
+
+    @property
+    def plans(self) -> list[Plan]:
+        """Plans of all live blocks that have been planned."""
+        performances = (tracked.performance for tracked in self._tracked.values())
+        return [each.newest_plan for each in performances if each is not None]
+
     def _find(self, id: str, block: Block | None) -> _Tracked | None:
         """A live block, or one that has ended while others lived; another one that has taken its id is not meant."""
         known = (tracked.get(id) for tracked in (self._tracked, *(each.others for each in self._tracked.values())))
@@ -104,7 +123,7 @@ class LiveBlocks:
             follower.hear(qualified(block, point), at)
 
     def perform(self, block: str, performance: FollowedBlock) -> None:
-        """Note that the block is performed now, by `performance`, which is asked for its expected times."""
+        """Note that `performance` performs the block now, or lets it wait: it is asked for its expected times."""
         tracked = self._tracked[block]
         tracked.performance = performance
         performance.follow(tracked.named)

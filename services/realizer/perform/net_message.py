@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from engage_hri.schemas.nets import Fired, NetPlace, NetPlanned, NetPoint, NetTransition
 from engage_hri.schemas.units import Seconds, Stamp
 from engage_hri.services.realizer.net.petri_net import Marking
-from engage_hri.services.realizer.plan.planner import Plan
+from engage_hri.services.realizer.plan.plan import Plan
 from engage_hri.services.realizer.points import FINISH
 
 

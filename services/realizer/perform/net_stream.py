@@ -11,7 +11,7 @@ from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.interface import Bus
 from engage_hri.services.realizer.net.running import Observer, RunningNet
 from engage_hri.services.realizer.perform.net_message import described, firings, tokens
-from engage_hri.services.realizer.plan.planner import Plan
+from engage_hri.services.realizer.plan.plan import Plan
 from engage_hri.services.runtime.alarm import Timer
 
 EVERY: Seconds = 0.05

@@ -31,7 +31,8 @@ from engage_hri.services.realizer.perform.recognition_link import RecognitionLin
 from engage_hri.services.realizer.perform.shared_context import SharedContext
 from engage_hri.services.realizer.perform.spoken import Spoken
 from engage_hri.services.realizer.perform.ties import Ties
-from engage_hri.services.realizer.plan.planner import Plan, plan_block
+from engage_hri.services.realizer.plan.plan import Plan
+from engage_hri.services.realizer.plan.planner import plan_block
 from engage_hri.services.realizer.plan.relations import DROPPED
 from engage_hri.services.realizer.points import FINISH, Point
 from engage_hri.services.runtime.alarm import Afterwards, Timer
@@ -109,6 +110,7 @@ class BlockPerformance:
         self.report.started(self.plan, began)
         for problem in self.plan.problems:
             self.report.warn(problem.kind, problem.message, problem.behavior)
+        self.report.unkept(self.plan)
         for behavior in self.plan.dropped:
             self._shared.live_blocks.lose(block, behavior)
         self._shared.live_blocks.reach(block, Point(BLOCK_ITSELF, "start"), began)
@@ -197,6 +199,15 @@ class BlockPerformance:
         """Tell from now on when these points are expected: other blocks are tied to them."""
         if points:
             self.take_in(partial(self.decisions.follow, points))
+
+    def times(self) -> Mapping[Point, Seconds]:
+        """Time of each point, measured or expected, by the loop's clock."""
+        return self.decisions.foresight.times(self.bus.now())
+
+    @property
+    def newest_plan(self) -> Plan:
+        """The plan that it follows now."""
+        return self.decisions.plan
 
     # -- the end -----------------------------------------------------------------------------------------------------
 
@@ -346,11 +357,14 @@ class BlockPerformance:
         except InputRefused as error:
             self._live.stop(Ending("failed", error.fault))
             return
+        kept = frozenset(plan.chains).difference(self.decisions.plan.given_up)
         self.decisions.replan(plan)
         self.ties.renew()
         for id in self._dropped:  # Told only now that the block goes on: its followers would end with it.
             self._shared.live_blocks.lose(self.plan.block.id, id)
         for problem in plan.problems:
+            if problem.behavior in kept.intersection(plan.given_up):
+                self.report.warn(problem.kind, problem.message, problem.behavior)
             # Without the dropped ones, others may be too late now.
             if problem.behavior in plan.dropped and problem.behavior not in gone:
                 if self._runs[problem.behavior].pending is not None:

@@ -17,7 +17,8 @@ from engage_hri.services.realizer.perform.live_blocks import LiveBlocks
 from engage_hri.services.realizer.plan.agreement import Rounds
 from engage_hri.services.realizer.plan.handover import hands_refused
 from engage_hri.services.realizer.plan.known import Known, is_foreign, is_named_in
-from engage_hri.services.realizer.plan.planner import Plan, plan_steps
+from engage_hri.services.realizer.plan.plan import Plan
+from engage_hri.services.realizer.plan.planner import plan_steps
 from engage_hri.services.realizer.plan.poses import planned_times, poses_before
 from engage_hri.services.realizer.plan.relations import BlockRefused, extent, relation_steps
 from engage_hri.services.realizer.plan.steps import Steps, T
@@ -58,6 +59,7 @@ class Planning:
         question = question_about(block)
         estimates = await self._estimates(block, question)
         await self._earlier(live, named)
+        live.is_planning = True
         return await self._agreed(block, question, estimates, elsewhere, named)
 
     async def again(self, plan: Plan, elsewhere: Mapping[str, Block]) -> Plan:
@@ -108,10 +110,18 @@ class Planning:
     async def _earlier(self, live: Live, named: Iterable[Point]) -> None:
         """Wait until those of the earlier blocks are planned that this one is to be planned with in mind."""
         block = live.request.block
-        for other in reversed(live.earlier):  # The last one waits for the others itself: one wait for all, mostly.
-            id = other.request.block.id
-            if not other.settled.done() and (is_named_in(id, named) or may_share(block, other.request.block)):
-                await asyncio.wait([other.settled])
+        while awaited := [
+            other
+            for other in reversed(live.earlier)  # The last one waits for the others itself: one wait for all, mostly.
+            if not other.settled.done()
+            and (is_named_in(other.request.block.id, named) or may_share(block, other.request.block))
+        ]:
+            await asyncio.wait([awaited[0].settled])
+
+    async def planned(self, block: Block, others: Iterable[Live]) -> None:
+        """Wait until those are planned that are being planned now, and that a block may share parts with."""
+        while awaited := [each for each in others if each.is_planning and may_share(block, each.request.block)]:
+            await asyncio.wait([awaited[0].settled])
 
     def _known(
         self, block: Block, elsewhere: Mapping[str, Block], named: Collection[Point], estimates: Iterable[Estimate]

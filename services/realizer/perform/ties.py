@@ -1,6 +1,6 @@
 """Ties between a block that is performed and other live blocks: points of theirs, and parts that change hands."""
 
-from collections.abc import Callable, Collection, Iterable, Mapping
+from collections.abc import Callable, Collection, Container, Iterable, Mapping
 from functools import partial
 from typing import Protocol
 
@@ -12,7 +12,7 @@ from engage_hri.services.realizer.perform.feedback import Reporter
 from engage_hri.services.realizer.perform.knowledge import Asker, Performed, knowledge, parts_of
 from engage_hri.services.realizer.perform.live_blocks import LiveBlocks
 from engage_hri.services.realizer.plan.known import Known, block_of, is_named_in
-from engage_hri.services.realizer.plan.planner import Plan
+from engage_hri.services.realizer.plan.plan import Plan
 from engage_hri.services.realizer.plan.relations import needing
 from engage_hri.services.realizer.points import Point
 
@@ -72,7 +72,7 @@ class Ties:
         if point not in decisions.facts.reached:
             decisions.facts.hear(point, at)
             if point in decisions.facts.reached:  # else it was named by an earlier plan only
-                self._owner.report.heard(decisions, point)
+                self._owner.report.compare(decisions, point)
 
     def foresee(self, point: Point, at: Seconds) -> None:
         """Note that a point of another block is expected at `at` now."""
@@ -118,7 +118,7 @@ class Ties:
         asker = Asker(plan.block.id, decisions.began, now, self.foreign, parts, self.blocks)
         found = knowledge(asker, earlier, self._live_blocks)
         points = dict(found.points)
-        performances = {each.decisions.plan.block.id: each for each in self._others()}
+        performances = self._performances
         for taker in self.given.values():
             if (other := performances.get(block_of(taker))) is not None:
                 start = Point(taker.behavior.partition(":")[2], taker.sync)
@@ -126,14 +126,20 @@ class Ties:
         for point in self.foreign:
             if (at := decisions.facts.reached.get(point, decisions.foresight.foreseen.get(point))) is not None:
                 points.setdefault(point, at - decisions.began)
-        points |= {Point(id, "start"): at - decisions.began for id, at in decisions.facts.begun.items()}
+        begun = decisions.facts.begun
+        points |= {Point(id, "start"): begun.get(id, now) - decisions.began for id in plan.chains}
         return Known(
             blocks=self.blocks,
             points=points,
             holders={id: each for id, each in found.holders.items() if id not in self.vanished},
             given={id: point for id, point in self.given.items() if point not in decisions.facts.reached},
-            begun=frozenset(decisions.facts.begun),
+            kept=frozenset(self._live_blocks.named(plan.block.id)),
+            begun=frozenset(begun),
         )
+
+    @property
+    def _performances(self) -> Mapping[str, Tied]:
+        return {each.decisions.plan.block.id: each for each in self._others()}
 
     def begin(self) -> None:
         """Tell other blocks that this one has begun: those that are tied to it can be planned now."""
@@ -144,12 +150,22 @@ class Ties:
 
     def take_over(self) -> None:
         """Tell other blocks which of their behaviors this one takes a part from by plan."""
-        plan = self._owner.decisions.plan
-        performances = {each.decisions.plan.block.id: each for each in self._others()}
-        for name, taker in plan.takes.items():
-            block, _, behavior = name.partition(":")
-            if (other := performances.get(block)) is not None:
+        plan, performances = self._owner.decisions.plan, self._performances
+        for block, other in performances.items():
+            taken = {
+                id: taker for name, taker in plan.takes.items() for of, _, id in (name.partition(":"),) if of == block
+            }
+            other.ties.keep(plan.block.id, taken)
+            for behavior, taker in taken.items():
                 other.ties.give(behavior, Point(f"{plan.block.id}:{taker}", "start"))
+
+    def keep(self, block: str, taken: Container[str]) -> None:
+        """Keep the parts that another block does not take any more: all but those of these behaviors."""
+        kept = [id for id, taker in self.given.items() if block_of(taker) == block and id not in taken]
+        for id in kept:
+            del self.given[id]
+        if kept:
+            self._owner.take_in(self._owner.replan)
 
     def give(self, behavior: str, taker: Point) -> None:
         """Plan to hand over the part of a behavior at `taker`, a point of another block."""

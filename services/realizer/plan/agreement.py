@@ -9,7 +9,7 @@ from msgspec.structs import replace
 from engage_hri.schemas.body import Estimate, EstimateBehaviors, Phase
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.realizer.plan.handover import Turn
-from engage_hri.services.realizer.plan.planner import Plan
+from engage_hri.services.realizer.plan.plan import Plan
 from engage_hri.services.realizer.plan.poses import NOTICEABLE
 
 STRAIGHT, MOST = 2, 12

@@ -1,6 +1,6 @@
 """Points of other blocks in the schedule of a block: when they come, and what they leave no time for."""
 
-from collections.abc import Collection, Container, Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from math import inf
 
 from engage_hri.schemas.units import Seconds
@@ -10,7 +10,6 @@ from engage_hri.services.realizer.plan.handover import Turn
 from engage_hri.services.realizer.plan.known import Known, is_foreign
 from engage_hri.services.realizer.plan.phases import Chain
 from engage_hri.services.realizer.plan.prediction import Circle, Foresight, Impossible
-from engage_hri.services.realizer.plan.relations import Problem
 from engage_hri.services.realizer.points import Point
 
 
@@ -62,15 +61,6 @@ def too_late(impossible: Impossible, assembly: Assembly) -> set[Point]:
     """Points that are expected too late for times that are fixed."""
     late = {tie.target for circle in impossible.circles for tie, _ in circle if isinstance(tie, Foresight)}
     return {point for number in late for point in assembly.net.transitions[number].points}
-
-
-def unkept(late: Container[Point], known: Known) -> list[Problem]:
-    """Warnings about ties to points of other blocks that leave no time for what is fixed in this block."""
-    return [
-        Problem("LATE", f"{point} is not waited for: expected{_when(point, known)[1:]}, after times that are fixed")
-        for point in sorted(known.points)
-        if point in late and is_foreign(point.behavior)
-    ]
 
 
 def without_date(assembly: Assembly, known: Known) -> set[str]:

@@ -14,16 +14,20 @@ from engage_hri.schemas.body import Estimate
 from engage_hri.schemas.syncref import SYNC_POINTS
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.realizer.plan.instants import Classes
-from engage_hri.services.realizer.plan.phases import Chain
+from engage_hri.services.realizer.plan.phases import ARMS, Chain
 from engage_hri.services.realizer.plan.relations import Relations
 from engage_hri.services.realizer.plan.steps import Steps
 from engage_hri.services.realizer.points import EPSILON, ON_TARGET, SHIFTS, WITH_STROKE, Point
 
-_OTHER: dict[str, tuple[str, Hand]] = {
-    "left_arm": ("right_arm", "RIGHT_HAND"),
-    "right_arm": ("left_arm", "LEFT_HAND"),
+_OTHER: Mapping[str, tuple[str, Hand]] = {
+    arm: (parts[0], hand)
+    for hand, parts in ARMS.items()
+    if len(parts) == 1
+    for arm in ARMS["BOTH_HANDS"]
+    if arm not in parts
 }
-_STROKE, _RELAX = SYNC_POINTS.index("stroke"), SYNC_POINTS.index("relax")
+"""For each arm, the other, and the hand that means it."""
+_STROKE, RELAX = SYNC_POINTS.index("stroke"), SYNC_POINTS.index("relax")
 """Numbers of these points in a behavior that lasts."""
 Turn = tuple[str, Point]
 """A behavior, and the point of another that it waits for before it takes its part."""
@@ -86,11 +90,8 @@ def arrange(
     rounds: order of points that come at one time. barred: hands with which a behavior cannot be done. given:
     behaviors of other blocks that have parts, with their `times`.
     """
-    held = relations.held
-    awaited: dict[str, set[Point]] = {}
+    held, awaited = relations.held, relations.awaited
     yield len(relations.orders) // 8
-    for order in relations.orders:
-        awaited.setdefault(order.later.point.behavior, set()).add(order.earlier.point)
     mentioned = {point.behavior for point in relations.constrained}
     successors, cuts = dict(before.successors), dict(before.cuts)
     handovers: dict[str, Handover] = {}
@@ -114,12 +115,10 @@ def arrange(
         first = next((number for number, point in enumerate(chain.points) if times[point] > taken + EPSILON), 0)
         is_natural = id in before.natural
         # Points that the successor itself is to come after are kept: cut short, they would come at once.
-        own = awaited.get(successor, set())
-        kept = [number for number, point in enumerate(chain.points) if point in held or point in own]
-        least = _least(chain, chains[successor])
+        own = held.union(awaited.get(successor, ()))
         if first:
-            is_asked = successor in mentioned or _is_overlaid(chain, chains[successor])
-            last = _not_given_up(chain, first, [*kept, least], is_natural, is_asked=is_asked)
+            is_asked = successor in mentioned
+            last = last_kept(chain, chains[successor], first, own, is_natural=is_natural, is_asked=is_asked)
             turn = (successor, chain.points[last]) if last is not None else None
             if turn is not None and chain.type != "speech" and id not in mentioned and successor in mentioned:
                 # Nobody has said when the earlier one comes: it is what waits.
@@ -129,13 +128,13 @@ def arrange(
                 # A behavior that has made its stroke hands over; for one that has not, a free other arm is better.
                 conflicts.append(Conflict(turn, free_hand((successor, id), {**chains, **given}, times, barred)))
                 yield 1 + len(chains) // 32  # `free_hand` has looked at all others
-        kept = [number for number in kept if not first or number < first]
         if chain.type != "speech":
-            handovers[id] = Handover(successor, chain.points[max([least, *kept])])
+            kept = [number for number, point in enumerate(chain.points[: first or None]) if point in own]
+            handovers[id] = Handover(successor, chain.points[max([least(chain, chains[successor]), *kept])])
         if id in successors:
             continue
         if is_natural:
-            first = min(first or _RELAX, _RELAX)
+            first = min(first or RELAX, RELAX)
         if first:
             successors[id] = (successor, chain.points[first])
             cuts[id] = first - 1
@@ -157,7 +156,7 @@ def kept_points(
     for id, chain in chains.items():
         if id not in kept:
             numbers = [number for number, point in enumerate(chain.points) if point in held]
-            kept[id] = chain.points[max([_least(chain, None), *numbers])]
+            kept[id] = chain.points[max([least(chain), *numbers])]
     return kept
 
 
@@ -175,17 +174,21 @@ def entering(
     return tuple(sorted(chains, key=rank.__getitem__))
 
 
-def _not_given_up(chain: Chain, first: int, kept: Iterable[int], is_natural: bool, *, is_asked: bool) -> int | None:
+def last_kept(
+    chain: Chain, successor: Chain, first: int, kept: Container[Point], *, is_natural: bool, is_asked: bool
+) -> int | None:
     """Number of the last point, from `first` on, that a successor must wait for; None if there is none.
 
-    Points `kept` count; all do if nothing asks for the successor now.
+    Points `kept` count; all do if nothing asks for the successor now. What a look lies over loses nothing by it.
     """
-    broken = [*kept, *([] if is_asked else [_STROKE if is_natural else len(chain.points) - 1])]
-    last = max(broken)
+    numbers = [number for number, point in enumerate(chain.points) if point in kept]
+    if not is_overlaid(chain, successor):
+        numbers.append(least(chain) if is_asked or is_natural else len(chain.points) - 1)
+    last = max(numbers, default=-1)
     return last if last >= first else None
 
 
-def _least(chain: Chain, successor: Chain | None) -> int:
+def least(chain: Chain, successor: Chain | None = None) -> int:
     """Number of the last point that a behavior must have passed before the successor takes its part.
 
     A handover may cost it its way home, never its stroke. A shift that a look lies over has set what it is to set.
@@ -194,7 +197,7 @@ def _least(chain: Chain, successor: Chain | None) -> int:
         return next(number for number, point in enumerate(chain.points) if point.sync == "stroke_end")
     if chain.type in ON_TARGET:
         return _STROKE
-    return 0 if successor is not None and _is_overlaid(chain, successor) else len(chain.points) - 1
+    return 0 if successor is not None and is_overlaid(chain, successor) else len(chain.points) - 1
 
 
 def is_tied(later: Chain, speech: Chain, classes: Classes) -> bool:
@@ -238,7 +241,8 @@ def _pairs(users: Sequence[str], chains: Mapping[str, Chain]) -> Iterator[tuple[
     yield from pairwise([id for id in users if chains[id].type in SHIFTS])
 
 
-def _is_overlaid(earlier: Chain, later: Chain) -> bool:
+def is_overlaid(earlier: Chain, later: Chain) -> bool:
+    """True for a shift beneath a look: that takes nothing from it, nor it from that."""
     return earlier.type in SHIFTS and later.type not in SHIFTS
 
 
@@ -249,7 +253,7 @@ def _overlaid(
     for ids in users.values():
         until = -inf
         for id in ids:
-            since, to = _window(chains[id], times)
+            since, to = window(chains[id], times)
             if chains[id].type not in SHIFTS:
                 until = max(until, to)
             elif since < until - EPSILON:
@@ -271,20 +275,21 @@ def free_hand(
         arm, hand = other
         if (id, hand) in barred:
             continue
-        if _is_free(arm, _window(chain, times), (each for each in chains.values() if each is not chain), times):
+        if _is_free(arm, window(chain, times), (each for each in chains.values() if each is not chain), times):
             return id, hand
     return None
 
 
-def _window(chain: Chain, times: Mapping[Point, Seconds]) -> tuple[Seconds, Seconds]:
+def window(chain: Chain, times: Mapping[Point, Seconds]) -> tuple[Seconds, Seconds]:
+    """Start and end of a behavior."""
     return times[chain.points[0]], times[chain.points[-1]]
 
 
 def _is_free(
-    arm: str, window: tuple[Seconds, Seconds], others: Iterable[Chain], times: Mapping[Point, Seconds]
+    arm: str, wanted: tuple[Seconds, Seconds], others: Iterable[Chain], times: Mapping[Point, Seconds]
 ) -> bool:
-    since, to = window
-    windows: Sequence[tuple[Seconds, Seconds]] = [_window(each, times) for each in others if arm in each.parts]
+    since, to = wanted
+    windows: Sequence[tuple[Seconds, Seconds]] = [window(each, times) for each in others if arm in each.parts]
     return all(end <= since + EPSILON or start >= to - EPSILON for start, end in windows)
 
 

@@ -1,6 +1,6 @@
 """Other live blocks, as known when a block is planned: when their points come, and who has which part when."""
 
-from collections.abc import Callable, Container, Iterable, Iterator, Mapping
+from collections.abc import Callable, Container, Iterable, Iterator, Mapping, Set
 
 from msgspec import Struct
 from msgspec.structs import replace
@@ -32,17 +32,29 @@ class Known(Struct, frozen=True, kw_only=True):
     """Other live blocks, as far as the planning of one block has to know them. Times are seconds from its own start.
 
     blocks: their contents, by id. points: when points of others were reached (negative: before this block) or are
-    expected; and when behaviors of this block began. holders: behaviors of others that have parts of the body or will
-    have them, by `block:behavior`; they are given, and come in the order in which they have their parts.
+    expected; and when behaviors of this block began, or may begin at the earliest. holders: behaviors of others that
+    have parts of the body or will have them, by `block:behavior`; they are given, and come in the order in which they
+    have their parts.
     given: behaviors of this block that hand their parts over to another block by plan, and the start of the one there
-    that takes them. begun: behaviors of this block that have begun; they wait for nobody any more.
+    that takes them. kept: points of this block that other blocks wait for. begun: behaviors of this block that have
+    begun; they wait for nobody any more.
     """
 
     blocks: Elsewhere = {}
     points: Mapping[Point, Seconds] = {}
     holders: Mapping[str, Holder] = {}
     given: Mapping[str, Point] = {}
+    kept: Set[Point] = frozenset()
     begun: frozenset[str] = frozenset()
+
+    def with_own(self, times: Mapping[Point, Seconds]) -> Mapping[Point, Seconds]:
+        """Times of a schedule for the block's own points, with those of others as they are known here.
+
+        Others come when they come, also where the block would need them later.
+        """
+        if not self.points:
+            return times
+        return {**self.points, **{point: at for point, at in times.items() if not is_foreign(point.behavior)}}
 
 
 NOTHING = Known()

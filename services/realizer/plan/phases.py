@@ -5,14 +5,17 @@ from collections.abc import Mapping
 from msgspec import Struct
 
 from engage_hri.schemas.behavior_types import TYPES
-from engage_hri.schemas.behaviors import BlockBehavior, Gesture, Head, Pointing
+from engage_hri.schemas.behaviors import BlockBehavior, Gesture, Hand, Head, Pointing
 from engage_hri.schemas.body import Estimate
 from engage_hri.schemas.references import type_name
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.realizer.plan.relations import Relations
 from engage_hri.services.realizer.points import ON_TARGET, Point, Segment, family, segments
 
-_ARMS = {"LEFT_HAND": ("left_arm",), "RIGHT_HAND": ("right_arm",), "BOTH_HANDS": ("left_arm", "right_arm")}
+ARMS: Mapping[Hand, tuple[str, ...]] = {
+    "LEFT_HAND": ("left_arm",), "RIGHT_HAND": ("right_arm",), "BOTH_HANDS": ("left_arm", "right_arm"),
+}  # fmt: skip
+"""Parts of the body that are meant by each hand."""
 
 
 class Chain(Struct, frozen=True):
@@ -64,7 +67,7 @@ def _parts(behavior: BlockBehavior, estimate: Estimate | None) -> tuple[str, ...
     if not TYPES[type].takes_over:
         return ()
     if isinstance(behavior, Pointing | Gesture) and behavior.mode is not None:
-        return _ARMS[behavior.mode]
+        return ARMS[behavior.mode]
     parts = estimate.parts if estimate and estimate.parts else (family(type),)
     # A nod is on top of whatever else the head does.
     return tuple([f"nod of {part}" for part in parts]) if type == "head" else parts

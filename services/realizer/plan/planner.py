@@ -7,7 +7,6 @@ between equals; any other permutation of a block gives the same net.
 
 from collections.abc import Container, Iterable, Mapping
 
-from msgspec import Struct
 from msgspec.structs import replace
 
 from engage_hri.schemas.behaviors import BlockBehavior, Event, Hand, Unknown
@@ -15,18 +14,18 @@ from engage_hri.schemas.blocks import Block
 from engage_hri.schemas.body import Estimate
 from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.feedback import WarningKind
-from engage_hri.schemas.units import Seconds
-from engage_hri.services.realizer.net.petri_net import PetriNet
 from engage_hri.services.realizer.plan import unsupported
 from engage_hri.services.realizer.plan.assembly import Assembler, Assembly, assembling
 from engage_hri.services.realizer.plan.deadlocks import Losses, clashes, judge
-from engage_hri.services.realizer.plan.foresight import foreseen, losses_to_others, too_late, unkept, without_date
+from engage_hri.services.realizer.plan.foresight import foreseen, losses_to_others, too_late, without_date
 from engage_hri.services.realizer.plan.given_up import times_of
 from engage_hri.services.realizer.plan.handover import Arrangement, Conflict, Turn, arrange, entering, kept_points
 from engage_hri.services.realizer.plan.instants import Classes
-from engage_hri.services.realizer.plan.known import BLOCK_END, NOTHING, Known, is_foreign
+from engage_hri.services.realizer.plan.known import NOTHING, Known, is_foreign
 from engage_hri.services.realizer.plan.phases import Chain, chain, natural_ends
+from engage_hri.services.realizer.plan.plan import Plan
 from engage_hri.services.realizer.plan.prediction import Impossible, predict
+from engage_hri.services.realizer.plan.promises import broken_by
 from engage_hri.services.realizer.plan.relations import (
     DROPPED,
     BlockRefused,
@@ -42,73 +41,7 @@ from engage_hri.services.realizer.plan.schedule import Solution, critical_path
 from engage_hri.services.realizer.plan.sharing import naming_others, share, waits_elsewhere
 from engage_hri.services.realizer.plan.speaking_order import Misordered, SpeakingOrder
 from engage_hri.services.realizer.plan.steps import PORTION, Steps, finished, portions
-from engage_hri.services.realizer.points import Member, Point
-
-
-class Plan(Struct, frozen=True, kw_only=True):
-    """A planned block.
-
-    schedule: of each transition of the net, seconds from the block's start, if all goes as estimated.
-    block: with a hand for each gesture that must use a certain one. critical: the transitions that make the block as
-    long as it is, from first to last.
-    kept: for each behavior, the last point that it must pass itself. Who takes its part, in whatever block, may save
-    it the rest.
-    entering: behaviors in the order in which they take their parts: of two that begin at one instant, too.
-    rounds: for each behavior, how many events of the instant in which it begins are measured before it, in a row.
-    turns: behaviors that wait for a point of another before they take its part.
-    behaviors: those that will be performed, in document order. dropped: those that will not, with `problems`.
-    natural: behaviors that end when something takes their place, or with the block.
-    waited_for: behaviors that the end of the block waits for. given_up: speeches that lack a time they should have.
-    constrained: points that something waits for, or that are timed.
-    successors: behaviors that hand their parts over, each with the one that takes them (`block:behavior` of another
-    block), and the first of its points that comes by that. takes: behaviors of other blocks whose parts are taken.
-    """
-
-    block: Block
-    behaviors: tuple[BlockBehavior, ...]
-    net: PetriNet
-    at: Mapping[Point, int]
-    members: tuple[tuple[Member, ...], ...]
-    schedule: tuple[Seconds, ...]
-    chains: Mapping[str, Chain]
-    estimates: Mapping[str, Estimate]
-    natural: frozenset[str]
-    required: frozenset[str]
-    waited_for: frozenset[str]
-    kept: Mapping[str, Point]
-    entering: tuple[str, ...]
-    rounds: Mapping[str, int] = {}
-    turns: frozenset[Turn] = frozenset()
-    constrained: frozenset[Point] = frozenset()
-    successors: Mapping[str, tuple[str, Point]] = {}
-    takes: Mapping[str, str] = {}
-    critical: tuple[int, ...] = ()
-    dropped: tuple[str, ...] = ()
-    given_up: tuple[str, ...] = ()
-    problems: tuple[Problem, ...] = ()
-
-    def predicted(self, point: Point) -> Seconds:
-        """Seconds from the block's start to the point, if all goes as estimated."""
-        return self.schedule[self.at[point]]
-
-    def begun_in_order(self, behaviors: Iterable[str]) -> list[str]:
-        """Behaviors that begin at one instant in the order in which they are told: who waits for no measured event of
-        that instant first, then as they take parts, and a torso first, since head and arms aim for where that is
-        going to be."""
-        rank = {
-            id: (self.rounds.get(id, 0), "torso" not in self.chains[id].parts, number)
-            for number, id in enumerate(self.entering)
-        }
-        return sorted(behaviors, key=rank.__getitem__)
-
-    def transition(self, point: Point) -> int | None:
-        """The transition of a point as other blocks may name it: the end of the block has one, too."""
-        return len(self.net.transitions) - 1 if point == BLOCK_END else self.at.get(point)
-
-    @property
-    def foreign(self) -> tuple[Point, ...]:
-        """Points of other blocks that this one is tied to, or waits for."""
-        return tuple([point for point in self.at if is_foreign(point.behavior)])
+from engage_hri.services.realizer.points import Point
 
 
 def plan_block(
@@ -156,6 +89,8 @@ class _Planner:
         self.known = known
         self.doubted: set[Point] = set()
         """Points of other blocks that are not planned for when they are expected: something else leaves no time."""
+        self.untied: set[Point] = set()
+        """Points of other blocks to which nothing is tied any more: they are expected too late for fixed times."""
         self.lines = {behavior.id: behavior.line for behavior in block.behaviors}
         self.estimates = estimates
         self.barred = barred
@@ -214,9 +149,13 @@ class _Planner:
     def plan(self) -> Steps[Plan]:
         """The plan; behaviors that cannot be on time are dropped until the rest can be."""
         while True:
-            present, classes = yield from remaining(self.relations, self.chains, self.dropped, self.block.id)
+            said = self.relations
+            present, classes = yield from self._remaining(untied(said, self.untied) if self.untied else said)
             try:
-                return (yield from self._plan(present, classes))
+                plan = yield from self._plan(present, classes)
+                if self.untied:
+                    present, _ = yield from self._remaining(said)
+                return (yield from self._compared(plan, present))
             except Misordered:
                 self.turns = self.given
             except Losses as found:
@@ -234,6 +173,18 @@ class _Planner:
                         self._drop(loss.behavior, "IMPOSSIBLE_TO_SCHEDULE", loss.reason)
                 self.relations = times.left
                 self.order.begin_anew(self.chains)
+
+    def _remaining(self, relations: Relations) -> Steps[tuple[Relations, Classes]]:
+        return (yield from remaining(relations, self.chains, self.dropped, self.block.id))
+
+    def _compared(self, plan: Plan, said: Relations) -> Steps[Plan]:
+        """The plan with what it cannot keep of what the block says."""
+        if not self.known.points:
+            return plan
+        times = self.known.with_own({point: plan.schedule[at] for point, at in plan.at.items()})
+        yield len(times) // 4
+        broken = yield from broken_by(said, times)
+        return replace(plan, relations=said, broken=tuple(broken))
 
     def _keep_words(self, id: str, said: str, reason: str) -> None:
         reason = f"{reason}; {said} is given up, so that the words are said"
@@ -254,14 +205,15 @@ class _Planner:
             assembler, assembly, solution = yield from self._solved(assembler, arrangement, classes)
             times = {point: solution.times[transition] for point, transition in assembly.at.items()}
             yield len(times) // 4
+            everywhere = self.known.with_own(times)
             rounds = assembly.rounds(solution.times)
             yield len(times) // 4
             arranged, conflicts = yield from arrange(
-                self.chains, present, classes, arrangement, {**times, **self.known.points}, rounds, self.barred, given
+                self.chains, present, classes, arrangement, everywhere, rounds, self.barred, given
             )
             undated = without_date(assembly, self.known) if given else ()
             arranged, others = yield from share(
-                self.chains, present, self.known, arranged, times, self.barred, undated
+                self.chains, present, self.known, arranged, everywhere, self.barred, undated
             )
             conflicts = [each for each in (*conflicts, *others) if self._is_open(each)]
             turns = [each.turn for each in conflicts if each.turn and not (each.hand or waits_elsewhere(each.turn))]
@@ -294,6 +246,7 @@ class _Planner:
             entering=entering(self.chains, mentioned, times, rounds),
             turns=self.turns,
             rounds={id: rounds[chain.points[0]] for id, chain in self.chains.items()},
+            relations=present,
             constrained=present.constrained,
             successors=arrangement.successors,
             takes=arrangement.takes,
@@ -310,7 +263,8 @@ class _Planner:
         if conflict.hand:
             return conflict.hand[0] not in self.known.begun
         assert conflict.turn is not None
-        return conflict.turn[0] not in self.known.begun and conflict.turn not in self.overlaps
+        is_settled = conflict.turn in self.overlaps or conflict.turn in self.turns
+        return conflict.turn[0] not in self.known.begun and not is_settled
 
     def _unawaited_events(self, present: Relations) -> frozenset[str]:
         """Events with a decision that nothing in the block waits for."""
@@ -346,9 +300,8 @@ class _Planner:
                 raise Losses(taken) from None
             if late := too_late(impossible, assembly) - self.doubted:
                 self.doubted |= late
-                self.problems += unkept(late, self.known)
-                if any(is_foreign(point.behavior) for point in late):
-                    self.relations = untied(self.relations, late)
+                if foreign := {point for point in late if is_foreign(point.behavior)}:
+                    self.untied |= foreign
                     raise Misordered from None
                 return (yield from self._solved(assembler, arrangement, classes))
             if waits := assembly.waits(tie for circle in impossible.circles for tie, _ in circle):

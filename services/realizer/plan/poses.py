@@ -8,7 +8,7 @@ from engage_hri.schemas.body import BodyPose, Estimate, PlannedTime
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.realizer.plan.known import NOTHING, Known, is_foreign
 from engage_hri.services.realizer.plan.phases import Chain
-from engage_hri.services.realizer.plan.planner import Plan
+from engage_hri.services.realizer.plan.plan import Plan
 from engage_hri.services.realizer.plan.slack import slack
 from engage_hri.services.realizer.points import EPSILON, SHIFTS, Point, family
 

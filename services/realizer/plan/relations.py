@@ -114,6 +114,14 @@ class Relations(Struct, frozen=True, dict=True):
         return frozenset(placed)
 
     @cached_property
+    def awaited(self) -> Mapping[str, frozenset[Point]]:
+        """For each behavior, the points that it is to come after."""
+        found: dict[str, set[Point]] = {}
+        for order in self.orders:
+            found.setdefault(order.later.point.behavior, set()).add(order.earlier.point)
+        return {behavior: frozenset(points) for behavior, points in found.items()}
+
+    @cached_property
     def constrained(self) -> frozenset[Point]:
         """Every point that is tied to another."""
         return self.held | {order.earlier.point for order in self.orders}

@@ -9,16 +9,23 @@ from collections.abc import Container, Iterator, Mapping
 from msgspec.structs import replace
 
 from engage_hri.schemas.behaviors import Hand
-from engage_hri.schemas.syncref import SYNC_POINTS
 from engage_hri.schemas.units import Seconds
-from engage_hri.services.realizer.plan.handover import Arrangement, Conflict, Turn, free_hand
+from engage_hri.services.realizer.plan.handover import (
+    RELAX,
+    Arrangement,
+    Conflict,
+    Turn,
+    free_hand,
+    is_overlaid,
+    last_kept,
+    least,
+    window,
+)
 from engage_hri.services.realizer.plan.known import Holder, Known, is_foreign
 from engage_hri.services.realizer.plan.phases import Chain
 from engage_hri.services.realizer.plan.relations import Equal, Relations, Term
 from engage_hri.services.realizer.plan.steps import Steps
-from engage_hri.services.realizer.points import EPSILON, SHIFTS, WITH_STROKE, Point
-
-_STROKE, _STROKE_END, _RELAX = (SYNC_POINTS.index(each) for each in ("stroke", "stroke_end", "relax"))
+from engage_hri.services.realizer.points import EPSILON, Point
 
 
 def share(
@@ -32,14 +39,12 @@ def share(
 ) -> Steps[tuple[Arrangement, list[Conflict]]]:
     """The arrangement with the handovers from and to behaviors of other live blocks, and the conflicts with them.
 
-    times: of the points of this block, in the schedule that `arranged` is for. undated: behaviors that wait for
-    points of blocks that have not begun: nobody knows when they come; they are planned again once it is known.
+    times: of the points of this block, in the schedule that `arranged` is for, and of others. undated: behaviors that
+    wait for points of which nobody knows yet when they come; they are planned again once it is known.
     """
     if not known.holders and not known.given:
         return arranged, []
-    # Others come when they come, also where this block would need them later.
-    everywhere = {**known.points, **{point: at for point, at in times.items() if not is_foreign(point.behavior)}}
-    shared = _Sharing(chains, relations, known, arranged, everywhere, barred)
+    shared = _Sharing(chains, relations, known, arranged, times, barred)
     for id in chains:
         yield 2 + len(known.holders) // 8
         shared.give(id)
@@ -75,10 +80,8 @@ class _Sharing:
         self.held = relations.constrained
         self.mentioned = {point.behavior for point in relations.constrained}
         """Behaviors of which something is said. One that nobody asks for now waits until the earlier has ended."""
-        self.awaited: dict[str, set[Point]] = {}
-        """For each behavior, the points that it is to come after."""
-        for order in relations.orders:
-            self.awaited.setdefault(order.later.point.behavior, set()).add(order.earlier.point)
+        self.named = frozenset(point for point in relations.constrained if is_foreign(point.behavior))
+        """Points of other blocks that this one is tied to. They keep their parts up to these."""
         self.users: dict[str, list[str]] = {}
         for name, holder in known.holders.items():
             for part in holder.chain.parts:
@@ -86,15 +89,15 @@ class _Sharing:
 
     def rivals(self, id: str) -> Iterator[str]:
         """Behaviors of other blocks that have a part of this one while it does, in the order of their starts."""
-        names = {name for part in self.chains[id].parts for name in self.users.get(part, ())}
-        since, to = self._window(self.chains[id])
-        for name in sorted(names, key=lambda name: (self._window(self.known.holders[name].chain), name)):
-            begins, ends = self._window(self.known.holders[name].chain)
+        since, to = window(self.chains[id], self.times)
+        for begins, ends, name in self._users_of(id):
             if since < ends - EPSILON and (begins < to - EPSILON or begins <= since + EPSILON):
                 yield name
 
-    def _window(self, chain: Chain) -> tuple[Seconds, Seconds]:
-        return self.times[chain.points[0]], self.times[chain.points[-1]]
+    def _users_of(self, id: str) -> list[tuple[Seconds, Seconds, str]]:
+        """Behaviors of other blocks that have a part of this one at any time: from when until when, in this order."""
+        names = {name for part in self.chains[id].parts for name in self.users.get(part, ())}
+        return sorted((*window(self.known.holders[name].chain, self.times), name) for name in names)
 
     def settle(self, id: str, name: str) -> None:
         """Settle between a behavior of this block and one of another that has the same part."""
@@ -102,15 +105,14 @@ class _Sharing:
         start, begins = self.times[chain.points[0]], self.times[holder.chain.points[0]]
         if begins > start + EPSILON:
             first = self._first_after(chain, begins)
-            if first is None or _is_overlaid(holder.chain, chain):
+            if first is None or is_overlaid(holder.chain, chain):
                 return
-            is_overlaid = _is_overlaid(chain, holder.chain)
-            last = _not_given_up(chain, first, self.held, is_natural=id in self.natural, is_free=is_overlaid)
+            last = last_kept(chain, holder.chain, first, self.held, is_natural=id in self.natural, is_asked=True)
             if last is None:
                 self._hand_over(id, name, first)
             elif id not in self.known.begun:
                 self._wait(id, self._release(id, holder, 1))
-        elif _is_overlaid(chain, holder.chain):
+        elif is_overlaid(chain, holder.chain):
             self.cuts[id] = 0  # A shift takes nothing from a gaze.
         elif (first := self._first_after(holder.chain, start)) is not None and id not in self.known.begun:
             if (point := self._needed(id, holder, first)) is not None:
@@ -121,11 +123,16 @@ class _Sharing:
                 self.takes[name] = id
 
     def give(self, id: str) -> None:
-        """Hand the part over to the behavior of another block that takes it by that block's plan."""
+        """Hand the part over to the behavior of another block that takes it by that block's plan.
+
+        That waits for what this one keeps, whenever it is expected.
+        """
         if (taker := self.known.given.get(id)) is not None and taker in self.times:
-            first = self._first_after(self.chains[id], self.times[taker])
-            if first is not None:
-                self._hand_over(id, taker.behavior, first)
+            chain, kept = self.chains[id], self.held | self.known.kept
+            first = self._first_after(chain, self.times[taker])
+            least_kept = max([least(chain), *(number for number, point in enumerate(chain.points) if point in kept)])
+            if first is not None and least_kept + 1 < len(chain.points):
+                self._hand_over(id, taker.behavior, max(first, least_kept + 1))
 
     def _first_after(self, chain: Chain, at: Seconds) -> int | None:
         """Number of the first point of a behavior that comes after `at`; None: it has ended by then."""
@@ -138,28 +145,23 @@ class _Sharing:
             if self.times[before] <= self.times[Point(successor, "start")] + EPSILON:
                 return
         if id in self.natural:
-            first = min(first, _RELAX)
+            first = min(first, RELAX)
         if first:
             self.successors[id] = (successor, self.chains[id].points[first])
             self.cuts[id] = first - 1
 
     def _needed(self, id: str, holder: Holder, first: int) -> Point | None:
         """The last point of the holder, from `first` on, that a behavior of this block must wait for."""
-        kept = holder.kept | self.awaited.get(id, set())
-        is_overlaid = _is_overlaid(holder.chain, self.chains[id])
-        last = _not_given_up(holder.chain, first, kept, is_natural=holder.is_natural, is_free=is_overlaid)
-        if id not in self.mentioned and not holder.is_natural and not is_overlaid:
-            last = len(holder.chain.points) - 1
+        kept = holder.kept | self.named
+        is_asked = id in self.mentioned
+        last = last_kept(holder.chain, self.chains[id], first, kept, is_natural=holder.is_natural, is_asked=is_asked)
         return None if last is None else holder.chain.points[last]
 
     def _behind_all(self, id: str, point: Point) -> Point:
         """The point that a behavior waits for if it waits for `point`, and for whoever is in its way from then on."""
-        since, to = self._window(self.chains[id])
-        names = dict.fromkeys(name for part in self.chains[id].parts for name in self.users.get(part, ()))
-        behind = sorted(names, key=lambda name: (self._window(self.known.holders[name].chain), name))
-        for name in behind:
+        since, to = window(self.chains[id], self.times)
+        for begins, ends, name in self._users_of(id):
             holder, at = self.known.holders[name], self.times[point]
-            begins, ends = self._window(holder.chain)
             if at < ends - EPSILON and at - EPSILON <= begins < at + to - since - EPSILON:
                 point = self._release(id, holder, 1)
         return point
@@ -174,30 +176,6 @@ class _Sharing:
             return
         others = {**self.chains, **{name: holder.chain for name, holder in self.known.holders.items()}}
         self.conflicts.append(Conflict(turn, free_hand((id,), others, self.times, self.barred)))
-
-
-def _not_given_up(chain: Chain, first: int, kept: Container[Point], *, is_natural: bool, is_free: bool) -> int | None:
-    """Number of the last point, from `first` on, that is not taken from a behavior; None if there is none.
-
-    These are its stroke, the arrival of a look, words, and what others wait for. is_free: it loses nothing by it.
-    """
-    needed = [number for number in range(first, len(chain.points)) if chain.points[number] in kept]
-    if not is_free:
-        needed.append(needed_points(chain, is_natural=is_natural) - 1)
-    furthest = max(needed, default=-1)
-    return furthest if furthest >= first else None
-
-
-def needed_points(chain: Chain, *, is_natural: bool) -> int:
-    """Number of points that a behavior must have passed before its part can be taken over, whatever waits for it."""
-    if chain.type in WITH_STROKE:
-        return _STROKE_END + 1
-    return _STROKE + 1 if is_natural or len(chain.points) > _RELAX else len(chain.points)
-
-
-def _is_overlaid(shift: Chain, other: Chain) -> bool:
-    """True for a shift beneath a look: that takes nothing from it, nor it from that."""
-    return shift.type in SHIFTS and other.type not in SHIFTS
 
 
 def naming_others(present: Relations, arrangement: Arrangement) -> Relations:

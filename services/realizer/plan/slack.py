@@ -3,7 +3,7 @@
 from math import inf
 
 from engage_hri.schemas.units import Seconds
-from engage_hri.services.realizer.plan.planner import Plan
+from engage_hri.services.realizer.plan.plan import Plan
 from engage_hri.services.realizer.points import Point
 
 BRIEF: Seconds = 0.05

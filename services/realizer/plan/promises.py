@@ -1,0 +1,120 @@
+"""Promises of a block: what it says of its points, held against when they come. The one measure of what was kept."""
+
+from collections.abc import Iterator, Mapping
+
+from msgspec import Struct
+
+from engage_hri.schemas.units import Seconds
+from engage_hri.services.realizer.plan.known import is_foreign
+from engage_hri.services.realizer.plan.relations import Equal, Order, Relations, Term
+from engage_hri.services.realizer.plan.steps import Steps, portions
+from engage_hri.services.realizer.points import EPSILON, ORIGIN, Point
+
+
+class Broken(Struct, frozen=True):
+    """Two points that do not come as a block says.
+
+    early, late: the one that comes too early, and the one that comes too late for it. seconds: by which they are off.
+    said: what the block says of them. last: the one of the two that came last.
+    """
+
+    early: Point
+    late: Point
+    seconds: Seconds
+    said: str
+    last: Point
+
+    @property
+    def point(self) -> Point:
+        """The one of the two that is told of: the last, but no point of another block, and not the block itself."""
+        others = (self.last, self.late, self.early)
+        return next(point for point in others if not is_foreign(point.behavior) and point != ORIGIN)
+
+    @property
+    def direction(self) -> str:
+        """The way in which `point` is wrong."""
+        return "later" if self.point == self.late else "earlier"
+
+
+class _Same:
+    """Terms that are one instant, and of those that have come the earliest and the latest."""
+
+    def __init__(self, equal: Equal) -> None:
+        self.said = " = ".join([term.text for term in equal.terms])
+        self.ends: tuple[tuple[Seconds, Point], tuple[Seconds, Point]] | None = None
+
+    def come(self, term: Term, at: Seconds) -> Iterator[Broken]:
+        here = (at + term.offset, term.point)
+        earliest, latest = self.ends or (here, here)
+        self.ends = min(here, earliest), max(here, latest)
+        for early, late in ((here, latest), (earliest, here)):
+            if late[0] > early[0]:
+                yield Broken(early[1], late[1], late[0] - early[0], self.said, term.point)
+
+
+class _Ordered:
+    """Two terms, of which the one is no earlier than the other."""
+
+    def __init__(self, order: Order) -> None:
+        self.terms = (order.earlier, order.later)
+        self.said = f"{order.earlier.text} <= {order.later.text}"
+        self._came: dict[Term, Seconds] = {}
+
+    def come(self, term: Term, at: Seconds) -> Iterator[Broken]:
+        self._came[term] = at + term.offset
+        if len(self._came) == 2:
+            before, after = self.terms
+            if (seconds := self._came[before] - self._came[after]) > 0.0:
+                yield Broken(after.point, before.point, seconds, self.said, term.point)
+
+
+class Promises:
+    """Everything that a block says of its points, to be held against when they come, whoever comes wrong."""
+
+    def __init__(self) -> None:
+        self._of: dict[Point, list[tuple[_Same | _Ordered, Term]]] = {}
+
+    def read(self, relations: Relations) -> Steps[None]:
+        """Take in what these relations say."""
+        for equals in portions(relations.equals):
+            for equal in equals:
+                self._take(_Same(equal), equal.terms)
+            yield 2 * len(equals)
+        for orders in portions(relations.orders):
+            for order in orders:
+                self._take(_Ordered(order), (order.earlier, order.later))
+            yield 2 * len(orders)
+
+    def _take(self, said: "_Same | _Ordered", terms: tuple[Term, ...]) -> None:
+        if any(not is_foreign(term.point.behavior) and term.point != ORIGIN for term in terms):
+            for term in terms:
+                self._of.setdefault(term.point, []).append((said, term))
+
+    @property
+    def points(self) -> tuple[Point, ...]:
+        """The points of which something is said."""
+        return tuple(self._of)
+
+    def come(self, point: Point, at: Seconds) -> list[Broken]:
+        """Note that a point comes `at` a time; returns what is broken with those that have come before."""
+        found = [broken for said, term in self._of.get(point, ()) for broken in said.come(term, at)]
+        return [each for each in found if each.early != each.late]
+
+
+def promises_of(relations: Relations) -> Steps[Promises]:
+    promises = Promises()
+    yield from promises.read(relations)
+    return promises
+
+
+def broken_by(relations: Relations, times: Mapping[Point, Seconds]) -> Steps[list[Broken]]:
+    """Constraints that are broken if their points come at these times."""
+    promises = yield from promises_of(relations)
+    found: list[Broken] = []
+    coming = [point for point in promises.points if point in times]
+    yield len(coming) // 4
+    for points in portions(sorted(coming, key=times.__getitem__)):
+        for point in points:
+            found += [each for each in promises.come(point, times[point]) if each.seconds > EPSILON]
+        yield 2 * len(points)
+    return found

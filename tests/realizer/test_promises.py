@@ -1,0 +1,106 @@
+"""What a block says of its points, held against when they come: whoever comes wrong, and in both directions."""
+
+import pytest
+
+from engage_hri.schemas.behaviors import FaceLexeme, Wait
+from engage_hri.services.realizer.plan.promises import broken_by
+from engage_hri.services.realizer.plan.relations import Relations, relation_steps
+from engage_hri.services.realizer.plan.steps import finished
+from engage_hri.services.realizer.points import ORIGIN, Point
+from tests.realizer.fake_body import FakeBody, Script
+from tests.realizer.planning import timed
+from tests.realizer.stage import after, before, block, together
+from tests.realizer.test_sharing import MORE, OTHER, RIGHT, WORDS, instants, told, warned
+
+A, B, C = Wait(id="a", duration=1.0), Wait(id="b", duration=1.0), Wait(id="c", duration=1.0)
+
+
+def relations(*constraints: object, elsewhere: str = "") -> Relations:
+    made = block((A, B, C), *constraints)  # type: ignore[arg-type]
+    return finished(relation_steps(made, {"z": None} if elsewhere else {}))
+
+
+def found(said: Relations, **times: float) -> list[tuple[str, str, float]]:
+    """What is broken: who is told of, the direction, and the seconds. times: `a_end` is when `a:end` comes."""
+    points = {Point(*name.replace("z_", "z:").rsplit("_", 1)): at for name, at in times.items()} | {ORIGIN: 0.0}
+    return [(str(each.point), each.direction, round(each.seconds, 6)) for each in finished(broken_by(said, points))]
+
+
+@pytest.mark.parametrize(
+    ("times", "expected"),
+    [
+        ({"a_end": 1.0, "b_end": 1.5}, []),
+        ({"a_end": 1.0, "b_end": 1.75}, [("b:end", "later", 0.25)]),
+        ({"a_end": 1.0, "b_end": 1.25}, [("b:end", "earlier", 0.25)]),
+        ({"a_end": 1.0}, []),
+    ],
+)
+def test_what_is_one_instant_is_missed_in_both_directions(times: dict[str, float], expected: list[object]) -> None:
+    assert found(relations(together("a:end+0.5", "b:end")), **times) == expected
+
+
+@pytest.mark.parametrize(("b", "expected"), [(2.0, []), (1.5, []), (1.25, [("b:end", "earlier", 0.25)])])
+def test_an_order_is_missed_in_one_direction_only(b: float, expected: list[object]) -> None:
+    assert found(relations(after("a:end+0.5", "b:end")), a_end=1.0, b_end=b) == expected
+
+
+def test_before_is_after_the_other_way_round() -> None:
+    assert found(relations(before("a:end", "b:end")), a_end=1.0, b_end=1.5) == [("b:end", "later", 0.5)]
+
+
+def test_of_many_points_the_extremes_are_compared() -> None:
+    said = relations(together("a:end", "b:end", "c:end"))
+
+    assert found(said, a_end=1.0, b_end=3.0, c_end=2.0) == [("c:end", "later", 1.0), ("b:end", "later", 2.0)]
+
+
+@pytest.mark.parametrize(("z", "way"), [(5.0, "earlier"), (0.0, "later")])
+def test_of_a_point_of_another_block_the_own_one_is_told(z: float, way: str) -> None:
+    said = relations(together("z:a:end", "a:end"), elsewhere="z")
+
+    assert found(said, a_end=1.0, z_a_end=z)[0][:2] == ("a:end", way)
+
+
+def test_a_fixed_time_counts_from_the_start_of_the_block() -> None:
+    assert found(relations(together("a:end", "3")), a_end=2.0) == [("a:end", "earlier", 1.0)]
+
+
+# -- told by feedback ------------------------------------------------------------------------------------------------
+
+
+async def test_what_should_have_come_before_a_point_of_another_block_that_is_faster_is_told() -> None:
+    """The stroke sets out for the words as they are expected; they are over at once."""
+    tied = block((timed(RIGHT, stroke="one:s:end-0.5"),), id="two")
+    body = FakeBody({"s": Script(durations=(1.0, 1.0, 1.0, 0.1))})
+    seen, _ = await told((0.0, block((WORDS,), id="one")), (0.0, tied), body=body)
+
+    assert instants(seen)["two:q:stroke"] > instants(seen)["one:s:end"] - 0.5 + 0.1
+    assert warned(seen) == [("two", "q", "LATE")]
+    assert "later than it should: q:stroke = one:s:end-0.5" in seen.warnings()[0].message
+
+
+@pytest.mark.parametrize("ref", ["one:s:m1", "one:bml:start"])
+async def test_what_is_past_as_a_block_begins_is_told_at_once(ref: str) -> None:
+    tied = block((timed(OTHER, start="2"), timed(MORE, start=ref)), id="two")
+    seen, _ = await told((0.0, block((WORDS,), id="one")), (1.5, tied))
+    warning = seen.warnings()[0]
+
+    assert warning.at is not None
+    assert (warning.behavior, warning.kind, warning.at.seconds) == ("t", "LATE", 1.5)
+    assert f"later than it should: t:start = {ref}" in warning.message
+    assert len(seen.warnings()) == 1
+
+
+async def test_an_order_with_a_point_of_another_block_that_is_past_is_told() -> None:
+    tied = block((timed(OTHER, start="1"),), before("one:s:m1", "h:start"), id="two")
+    seen, _ = await told((0.0, block((WORDS,), id="one")), (1.5, tied))
+
+    assert [(each.behavior, each.kind) for each in seen.warnings()] == [("h", "LATE")]
+    assert "1.50 s later than it should: h:start <= one:s:m1" in seen.warnings()[0].message
+
+
+async def test_what_was_past_by_less_than_people_notice_is_not_told() -> None:
+    tied = block((timed(FaceLexeme(id="f", lexeme="SMILE"), start="one:bml:start"),), id="two")
+    seen, _ = await told((0.0, block((WORDS,), id="one")), (0.05, tied))
+
+    assert seen.warnings() == []

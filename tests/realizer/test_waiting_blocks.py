@@ -1,0 +1,125 @@
+"""Blocks that wait for their turn: when their points are expected, and nobody waits for them in a circle."""
+
+from itertools import pairwise
+
+from msgspec.structs import replace
+
+from engage_hri.schemas.behaviors import BlockBehavior, FaceLexeme, Gaze, Gesture, Pointing, Posture, Speech
+from engage_hri.schemas.blocks import Block
+from tests.realizer.fake_body import FakeBody, Script
+from tests.realizer.planning import timed
+from tests.realizer.stage import block
+from tests.realizer.test_sharing import MORE, RIGHT, WORDS, instants, mispredicted, told
+
+SMILE = FaceLexeme(id="f", lexeme="SMILE")
+"""2 s; on target after 0.5."""
+STANDING = Posture(id="u", stance="STANDING")
+
+
+def appended(*behaviors: BlockBehavior, id: str) -> Block:
+    return block(behaviors, id=id, composition="APPEND")
+
+
+async def test_who_is_tied_to_a_block_that_waits_sets_out_in_time_for_it() -> None:
+    """The first block takes four seconds; in the second the stroke comes a second after the start."""
+    tied = block((timed(SMILE, stroke="two:q:stroke-0.25"),), id="three")
+    waiting = appended(timed(RIGHT, stroke="1.25"), id="two")
+    seen, _ = await told((0.0, block((WORDS,), id="one")), (0.5, waiting), (1.0, tied))
+
+    assert instants(seen)["two:q:stroke"] == 5.25
+    assert instants(seen)["three:f:stroke"] == 5.0
+    assert (seen.warnings(), mispredicted(seen)) == ([], [])
+
+
+async def test_dates_pass_through_several_blocks_that_wait() -> None:
+    one, two = block((WORDS,), id="one"), appended(MORE, id="two")
+    three = appended(timed(RIGHT, stroke="1.25"), id="three")
+    tied = block((timed(SMILE, stroke="three:q:stroke-0.25"),), id="four")
+    seen, _ = await told((0.0, one), (0.0, two), (0.0, three), (0.0, tied))
+
+    assert instants(seen)["three:q:stroke"] == 4.0 + 1.0 + 1.25
+    assert instants(seen)["four:f:stroke"] == 6.0
+    assert (seen.warnings(), mispredicted(seen)) == ([], [])
+
+
+async def test_a_date_moves_with_the_block_that_is_waited_for() -> None:
+    tied = block((timed(SMILE, stroke="two:q:stroke-0.25"),), id="three")
+    waiting = appended(timed(RIGHT, stroke="1.25"), id="two")
+    slow = FakeBody({"s": Script(slow=1.5)})
+    seen, _ = await told((0.0, block((WORDS,), id="one")), (0.5, waiting), (1.0, tied), body=slow)
+
+    assert instants(seen)["two:q:stroke"] == 6.0 + 1.25
+    assert instants(seen)["three:f:stroke"] == 7.0
+    assert seen.warnings() == []
+
+
+async def test_the_end_of_a_block_that_waits_has_a_date_too() -> None:
+    tied = block((timed(SMILE, stroke="two:bml:end-0.25"),), id="three")
+    seen, _ = await told((0.0, block((WORDS,), id="one")), (0.5, appended(MORE, id="two")), (1.0, tied))
+
+    assert instants(seen)["three:f:stroke"] == 4.75
+    assert seen.warnings() == []
+
+
+# -- circles of ties and parts ---------------------------------------------------------------------------------------
+
+
+async def test_who_waits_for_a_block_is_not_in_its_way() -> None:
+    """The third is tied to the second, has the part that the second needs, and came before its turn."""
+    waiting = appended(timed(STANDING, start="0.5"), timed(RIGHT, start="1"), id="two")
+    tied = block((timed(replace(STANDING, id="v"), start="two:q:end"), timed(RIGHT, start="0")), id="three")
+    seen, outcomes = await told((0.0, block((WORDS,), id="one")), (0.5, waiting), (1.0, tied))
+
+    assert [each.status for each in outcomes] == ["done"] * 3
+    times = instants(seen)
+    assert times["three:v:start"] == times["two:q:end"]
+    assert times["two:u:start"] < times["three:v:start"]
+
+
+async def test_a_look_that_is_to_be_handed_over_is_kept_up_to_what_the_other_waits_for() -> None:
+    """The third waits for the end of the posture, and is to take its part: it takes nothing before that."""
+    one = appended(Gesture(id="o", lexeme="WAVE"), timed(STANDING, start="1"), id="one")
+    two = block((timed(STANDING, start="one:u:stroke+2"), timed(MORE, start="one:o:end")), id="two")
+    late = block((timed(SMILE, stroke="two:u:end"), timed(STANDING, stroke="two:u:start")), id="three")
+    seen, outcomes = await told((0.0, one), (1.0, two), (3.5, late))
+
+    assert [each.status for each in outcomes] == ["done"] * 3
+    assert instants(seen)["three:f:stroke"] == instants(seen)["two:u:end"]
+
+
+async def test_speeches_of_three_blocks_and_a_tie_to_the_one_that_waited_are_said_one_by_one() -> None:
+    """The last is planned again as the second begins, at a time at which the third has the voice."""
+    words = Speech(id="s", text="one two")
+    last = block((words, timed(MORE, start="two:s:end")), id="four")
+    sent = (block((words,), id="one"), appended(words, id="two"), block((words, MORE), id="three"), last)
+    seen, outcomes = await told(*((0.0, each) for each in sent))
+
+    assert [each.status for each in outcomes] == ["done"] * 4
+    times = instants(seen)
+    spoken = sorted(
+        (at, times[name.removesuffix("start") + "end"])
+        for name, at in times.items()
+        if name.endswith((":s:start", ":t:start"))
+    )
+    assert len(spoken) == 6
+    assert all(end <= start for (_, end), (start, _) in pairwise(spoken))
+
+
+async def test_a_turn_that_comes_while_another_block_is_planned_waits_for_that() -> None:
+    """The first fails as it begins; the second and the third would both find the voice free."""
+    first = block((timed(Pointing(id="p", target="x"), stroke="0"),), id="one")
+    words = Speech(id="s", text="one two")
+    seen, _ = await told((0.0, first), (0.0, appended(words, id="two")), (0.0, block((words,), id="three")))
+
+    times = instants(seen)
+    assert times["two:s:end"] <= times["three:s:start"] or times["three:s:end"] <= times["two:s:start"]
+
+
+async def test_a_look_to_the_end_of_a_turn_that_waits_does_not_last_for_ever() -> None:
+    """A gaze that lasts with its block, in a block that is tied to one that wants the head."""
+    waiting = appended(Gaze(id="g", target="y"), MORE, id="two")
+    tied = block((Gaze(id="h", target="x"), timed(RIGHT, start="two:t:end")), id="three")
+    seen, outcomes = await told((0.0, block((WORDS,), id="one")), (0.0, waiting), (0.0, tied))
+
+    assert [each.status for each in outcomes] == ["done"] * 3
+    assert instants(seen)["three:q:start"] == instants(seen)["two:t:end"]
