@@ -74,9 +74,10 @@ def knowledge(asker: Asker, others: Iterable[Performed], live_blocks: LiveBlocks
         if not each.is_ending:
             over = {id for id in plan.chains if decisions.facts.has_ended(id) or f"{block}:{id}" in dependent}
             kept = plan.constrained | live_blocks.named(block)
-            holders |= holders_of(
-                block, plan.chains, plan.estimates, plan.natural, kept, over, decisions.facts.next_number
-            )
+            reached = decisions.facts.next_number
+            named = {id: taker.partition(":") for id, (taker, _) in plan.successors.items()}
+            takers = {id: taker for id, (of, _, taker) in named.items() if taker and of == asker.block}
+            holders |= holders_of(block, plan.chains, plan.estimates, plan.natural, kept, over, reached, takers)
     return Known(blocks=asker.blocks, points=points, holders=holders)
 
 

@@ -18,7 +18,8 @@ class Holder(Struct, frozen=True):
 
     chain: its points are named as other blocks name them. is_natural: it ends when something takes its place, or with
     its block. kept: points that it cannot be deprived of, since something waits for them. estimate: of the body.
-    reached: number of its points that have been.
+    reached: number of its points that have been. taker: the behavior of the block that is planned to which it hands
+    its parts over by plan already; empty: none.
     """
 
     chain: Chain
@@ -26,6 +27,7 @@ class Holder(Struct, frozen=True):
     kept: frozenset[Point]
     estimate: Estimate | None = None
     reached: int = 0
+    taker: str = ""
 
 
 class Known(Struct, frozen=True, kw_only=True):
@@ -88,17 +90,20 @@ def holders_of(
     kept: frozenset[Point],
     over: Container[str],
     reached: Callable[[str], int],
+    takers: Mapping[str, str],
 ) -> Iterator[tuple[str, Holder]]:
     """Behaviors of a live block that have parts of the body or will have them, by `block:behavior`.
 
     kept: points that something waits for. over: behaviors that have ended or do not count. reached: number of points
-    of a behavior that have been.
+    of a behavior that have been. takers: behaviors that hand their parts over to the block that is planned, each with
+    the one there that takes them.
     """
     for id, chain in chains.items():
         if chain.parts and id not in over:
             renamed = replace(chain, points=tuple([qualified(block, point) for point in chain.points]))
             held = frozenset(qualified(block, point) for point in kept.intersection(chain.points))
-            yield f"{block}:{id}", Holder(renamed, id in natural, held, estimates.get(id), reached(id))
+            taker = takers.get(id, "")
+            yield f"{block}:{id}", Holder(renamed, id in natural, held, estimates.get(id), reached(id), taker)
 
 
 BLOCK_END = Point(BLOCK_ITSELF, "end")

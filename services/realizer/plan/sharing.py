@@ -50,6 +50,7 @@ def share(
         shared.give(id)
         for name in shared.rivals(id) if id not in undated else ():
             shared.settle(id, name)
+        shared.keep_taking(id)
     lasting = tuple(sorted(arranged.natural - shared.successors.keys()))
     return (
         replace(arranged, lasting=lasting, successors=shared.successors, cuts=shared.cuts, takes=shared.takes),
@@ -121,6 +122,13 @@ class _Sharing:
                 self.conflicts.append(Conflict((id, point), None))  # by plan it comes first; it may turn out slow
             elif name not in self.takes or start < self.times[self.chains[self.takes[name]].points[0]] - EPSILON:
                 self.takes[name] = id
+
+    def keep_taking(self, id: str) -> None:
+        """Go on taking what is handed over to a behavior by plan: only for that does it end as this one begins."""
+        start = self.times[self.chains[id].points[0]]
+        for begins, _, name in self._users_of(id):
+            if self.known.holders[name].taker == id and begins <= start + EPSILON:
+                self.takes.setdefault(name, id)
 
     def give(self, id: str) -> None:
         """Hand the part over to the behavior of another block that takes it by that block's plan.
