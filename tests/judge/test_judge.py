@@ -35,7 +35,7 @@ MANY: dict[tuple[Kind, bool], int] = {
     ("alone", True): 15, ("streams", True): 10,
 }  # fmt: skip
 """Number of stories of each kind, without and with a body that has faults."""
-PREDICTED = 150
+PREDICTED = 400
 """Number of single blocks of which the predictions are judged."""
 HELD: dict[tuple[Kind, bool], int] = {("alone", False): 20, ("streams", False): 12, ("streams", True): 6}
 """Number of stories of which parts are held for a while, without and with a body that has faults."""

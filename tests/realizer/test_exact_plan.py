@@ -25,7 +25,7 @@ from engage_hri.services.control.torso.body import SimulatedBody
 from tests.realizer.exact_blocks import OFF, WORLD, Performed, perform, performed
 from tests.realizer.planning import timed
 
-BLOCKS = 120
+BLOCKS = 300
 MOST = {False: 0.02, True: 0.02}
 """Share of blocks that may be off, without shifts and with: 0.29 and 0.45 without a rehearsal. docs/realizer.md
 says what is left."""
