@@ -54,7 +54,9 @@ def check_cycles(cycles: Sequence[Sequence[Lag]], known: Sequence[Lag]) -> None:
 
 @settings(max_examples=300, deadline=None)
 @given(lags(), st.dictionaries(st.integers(1, 7), st.integers(-8, 0).map(lambda each: each / 4), max_size=2))
-def test_a_schedule_is_the_earliest_or_a_cycle_forbids_it(asked: tuple[int, list[Lag]], past: dict[int, float]) -> None:
+def test_a_schedule_is_the_earliest_or_a_cycle_forbids_it(
+    asked: tuple[int, list[Lag]], past: dict[int, float]
+) -> None:
     size, given_lags = asked
     past = {each: at for each, at in past.items() if each < size}
     expected = earliest(size, [lag[:3] for lag in given_lags], past)
@@ -263,7 +265,9 @@ def test_components_are_who_reach_each_other(size: int, pairs: list[tuple[int, i
             for each in reach.values():
                 if source in each:
                     each.update(targets)
-    expected = {frozenset(to for to in range(size) if to in reach[each] and each in reach[to]) for each in range(size)}
+    expected = {
+        frozenset(to for to in range(size) if to in reach[each] and each in reach[to]) for each in range(size)
+    }
 
     found = finished(components(size, out))
     assert all(group == sorted(group) for group in found)
