@@ -1,7 +1,7 @@
-"""Points that are one instant: random ties against distances in a graph, and what a contradiction tells of its reasons."""
+"""Points that are one instant: random ties against distances in a graph, and what a contradiction tells."""
 
 import re
-from collections.abc import Mapping
+from itertools import pairwise
 
 import pytest
 from hypothesis import given, settings
@@ -113,12 +113,9 @@ def check_contradiction(
     assert named == sorted(set(named))
     assert (line in named, fault.line) == (True, line)
     through = re.search(r"\(through (.*)\)", fault.reason)
-    way = [
-        since,
-        *(each for each in (Point(*part.split(":")) for part in (through[1] if through else "").split(", "))),
-    ]
-    way = [ORIGIN if each == Point("bml", "start") else each for each in way]
-    said = [graph[one][other][1] for one, other in zip(way, way[1:], strict=False)]
+    assert through is not None
+    way = [since, *(each for name in through[1].split(", ") for each in (*POINTS, ORIGIN) if str(each) == name)]
+    said = [graph[one][other][1] for one, other in pairwise(way)]
     assert way[-1] == to
     assert named == sorted({*said, line})
 
@@ -148,9 +145,7 @@ def test_instants_are_points_at_no_distance_and_the_lines_between_lead_there(sai
             check_way(graph, one, other, classes.lines(one, other))
 
 
-def check_way(
-    graph: Mapping[Point, Mapping[Point, tuple[float, int]]], one: Point, other: Point, told: set[int]
-) -> None:
+def check_way(graph: Graph, one: Point, other: Point, told: set[int]) -> None:
     """The lines that are told tie the two, and are as few as can be."""
     reached, steps, layer = {one}, 0, {one}
     while other not in reached and layer:

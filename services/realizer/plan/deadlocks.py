@@ -141,7 +141,10 @@ def _loss(
 
 def _shortage(net: PetriNet, circle: Circle, lost: str) -> str:
     """Explain what takes more time than there is, if phases of the lost behavior do; else nothing."""
-    took = [(tie, seconds) for tie, seconds in circle if tie.kind == "phase" and tie.behavior == lost and seconds > 0]
+    own = [isinstance(tie, Place) and tie.kind == "phase" and tie.behavior == lost for tie, _ in circle]
+    first = next((number for number, is_own in enumerate(own) if is_own and not own[number - 1]), 0)
+    phases = [circle[number] for number in (*range(first, len(circle)), *range(first)) if own[number]]
+    took = [(tie, seconds) for tie, seconds in phases if seconds > 0]
     if not took:
         return ""
     needed, excess = sum(seconds for _, seconds in took), sum(seconds for _, seconds in circle)

@@ -1,0 +1,223 @@
+"""What is said of behaviors that cannot be on time: which is lost, what takes how long, and which words are kept."""
+
+import re
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from msgspec.structs import replace
+
+from engage_hri.schemas.behaviors import BlockBehavior, Gaze, Head, Pointing, Posture, Speech, Timing, Wait
+from engage_hri.schemas.blocks import Block
+from engage_hri.schemas.documents.xml_decode import decode_xml
+from engage_hri.services.realizer.plan.given_up import times_of
+from engage_hri.services.realizer.plan.planner import Plan, plan_block
+from engage_hri.services.realizer.plan.relations import BlockRefused, Equal, Order, Relations, Term
+from engage_hri.services.realizer.plan.steps import finished
+from engage_hri.services.realizer.points import ORIGIN, Point
+from tests.realizer.oracle import estimate, phases_of, points_of
+
+BEHAVIORS = (
+    Head(id="x", lexeme="NOD"),
+    Pointing(id="x", target="a"),
+    Gaze(id="x", target="a"),
+    Posture(id="x", lexeme="LEAN"),
+    Speech(id="x", text="one two"),
+)
+
+
+def planned(block: Block) -> Plan:
+    """Everything has a part of its own, but all speeches one voice."""
+    known = [estimate(each) for each in block.behaviors]
+    known = [
+        replace(each, parts=("voice",)) if isinstance(it, Speech) else each
+        for each, it in zip(known, block.behaviors, strict=True)
+    ]
+    return plan_block(block, known)
+
+
+# -- too little time ---------------------------------------------------------------------------------------------
+
+
+@settings(max_examples=120, deadline=None)
+@given(st.data())
+def test_what_takes_too_long_is_told_with_both_times_and_the_way_round(data: st.DataObject) -> None:
+    """Two points of one behavior are so close together that its phases, as short as can be, take longer."""
+    behavior = data.draw(st.sampled_from(BEHAVIORS))
+    points, shortest = points_of(behavior), [each.shortest for each in phases_of(behavior)]
+    ends = st.integers(0, len(points) - 1)
+    first, last = data.draw(st.tuples(ends, ends).filter(lambda each: sum(shortest[each[0] : each[1]]) > 0.25))
+    steps = [(points[number], shortest[number]) for number in range(first, last) if shortest[number]]
+    needed, time = sum(shortest[first:last]), data.draw(st.sampled_from((0.0, 0.125, 0.25)))
+    anchor, seconds = data.draw(st.sampled_from((("", 2.0), ("", 1.5), ("w:start", 2.0), ("w:end", 2.0))))
+    refs = (f"{anchor}+{seconds}", f"{anchor}+{seconds + time}") if anchor else (f"{seconds}", f"{seconds + time}")
+    timing = tuple(Timing(points[each], ref) for each, ref in zip((first, last), refs, strict=True))
+    line = data.draw(st.sampled_from((0, 12)))
+    rest = (Wait(id="w", duration=1.0),)
+    made = planned(Block(id="b", behaviors=(*rest, replace(behavior, timing=timing, line=line))))
+
+    (problem,) = made.problems
+    assert (problem.kind, problem.behavior) == ("IMPOSSIBLE_TO_SCHEDULE", "x")
+    told = re.fullmatch(
+        r"(line 12: )?cannot be on time: from (.+) to (.+) it takes (\S+) s at least, and there are (\S+) s: "
+        r"(.*); (.*)",
+        problem.message,
+    )
+    assert told is not None, problem.message
+    assert bool(told[1]) == bool(line)
+    assert f"x:{steps[0][0]}" in told[2].split(" = ")
+    assert f"x:{points[_last(shortest, last)]}" in told[3].split(" = ")
+    assert (told[4], told[5]) == (f"{needed:.2f}", f"{time:.2f}")
+    way = [re.fullmatch(r"(.*) \((\S+) s\)", each) for each in told[6].split(" -> ")[:-1]]
+    assert told[6].split(" -> ")[-1] == (way[0][1] if way[0] else "")
+    assert sum(float(each[2]) for each in way if each) == pytest.approx(needed - time, abs=2e-3 * len(way))
+    if isinstance(behavior, Speech):
+        assert (made.dropped, made.given_up) == ((), ("x",))
+        assert told[7] == f"x:{points[last]} = {refs[1]} is given up, so that the words are said"
+    else:
+        assert (made.dropped, made.given_up) == (("x",), ())
+        assert told[7] == "the behavior is dropped"
+
+
+def _last(shortest: list[float], last: int) -> int:
+    """The end of the last phase that takes time."""
+    return next(number for number in range(last, 0, -1) if shortest[number - 1])
+
+
+LOST = {
+    "of two that are timed, the later in the document": (
+        '<head id="n" lexeme="NOD" start="1"/><head id="m" lexeme="NOD" start="1" end="n:start+0.3"/>',
+        ("m",),
+    ),
+    "whose phase is too long, not who waits for it": (
+        '<wait id="w" duration="3" start="0"/><head id="n" lexeme="NOD" start="1"/>'
+        '<constraint><before ref="n:start"><sync ref="w:end"/></before></constraint>',
+        ("w",),
+    ),
+    "the one that may be lost": (
+        '<head id="n" lexeme="NOD" start="0" end="c:start"/><head id="c" lexeme="NOD" required="true" start="0.2"/>',
+        ("n",),
+    ),
+    "of two phases in a row, that of the later": (
+        '<wait id="v" duration="2" start="0"/><wait id="w" duration="2" start="v:end" end="3"/>',
+        ("w",),
+    ),
+    "a nod, not the words": (
+        '<head id="n" lexeme="NOD" start="s:start" end="s:end"/>'
+        '<speech id="s" start="1" end="1.5"><text>a</text></speech>',
+        ("n",),
+    ),
+    "each of two circles, one behavior": (
+        '<head id="n" lexeme="NOD" start="1" end="1.2"/><head id="m" lexeme="NOD" start="3" end="3.2"/>',
+        ("n", "m"),
+    ),
+    "one of two circles that share a behavior": (
+        '<wait id="w" duration="5" start="0" end="1"/><wait id="v" duration="3" start="w:end" end="w:end"/>',
+        ("v", "w"),
+    ),
+}
+
+
+@pytest.mark.parametrize("rule", LOST)
+def test_who_is_lost(rule: str) -> None:
+    document, lost = LOST[rule]
+    block = decode_xml(f'<bml id="b">{document}</bml>')
+    assert isinstance(block, Block)
+
+    assert planned(block).dropped == lost
+
+
+# -- words that are kept -----------------------------------------------------------------------------------------
+
+NAMES = ("s", "t", "n", "")
+
+
+def term(draw: st.DrawFn, number: int) -> Term:
+    behavior = draw(st.sampled_from(NAMES))
+    point = Point(behavior, draw(st.sampled_from(("start", "end")))) if behavior else ORIGIN
+    return Term(point, 0.0, f"{point}@{number}")
+
+
+@st.composite
+def relations(draw: st.DrawFn) -> Relations:
+    equals = []
+    for number in range(draw(st.integers(0, 4))):
+        terms = tuple(term(draw, number) for _ in range(draw(st.integers(1, 3))))
+        equals.append(Equal(terms, draw(st.sampled_from(("", terms[0].point.behavior)))))
+    orders = [Order(term(draw, 9), term(draw, 8)) for _ in range(draw(st.integers(0, 3)))]
+    return Relations(tuple(equals), tuple(orders), frozenset(draw(st.sets(st.sampled_from(("s", "n"))))))
+
+
+def points_in(relation: Equal | Order) -> list[Point]:
+    terms = relation.terms if isinstance(relation, Equal) else (relation.earlier, relation.later)
+    return [each.point for each in terms]
+
+
+def may_go(known: Relations, relation: Equal | Order, point: Point) -> bool:
+    """Does it name the point, and is it not said by another behavior that is required?"""
+    if point not in points_in(relation):
+        return False
+    by = relation.behavior if isinstance(relation, Equal) else ""
+    return by == point.behavior or by not in known.required
+
+
+@settings(max_examples=150, deadline=None)
+@given(
+    relations(),
+    st.lists(st.sampled_from([Point(id, sync) for id in "st" for sync in ("start", "end")]), max_size=3, unique=True),
+    st.frozensets(st.sampled_from([ORIGIN, *(Point(id, sync) for id in "stn" for sync in ("start", "end"))])),
+    st.sampled_from(((), ("n",), ("t",))),
+)
+def test_a_time_of_a_speech_is_given_up_the_nearest_of_the_last_point_first(
+    known: Relations, points: list[Point], among: frozenset[Point], dropped: tuple[str, ...]
+) -> None:
+    """Again and again, until there is none left: what goes each time is chosen from a plain list, by the rules."""
+    times = finished(times_of({"s", "t"}, known))
+    equals: list[Equal | None] = list(known.equals)
+    orders: list[Order | None] = list(known.orders)
+    while True:
+        candidates = []
+        for is_far in (False, True):
+            for last in range(len(points) - 1, -1, -1):
+                point = points[last]
+                for is_order, group in ((False, equals), (True, orders)):
+                    for number, each in enumerate(group):
+                        if each is None or not may_go(known, each, point):
+                            continue
+                        others = {one for one in points_in(each) if one != point and one.behavior not in dropped}
+                        if others & among if not is_far else others:
+                            is_own = isinstance(each, Equal) and each.behavior == point.behavior
+                            candidates.append((is_far, -last, is_order, not is_own, number, point))
+        found = times.give_up(points, among, dropped)
+        if not candidates:
+            assert found is None
+            break
+        _, _, is_order, _, number, point = min(candidates, key=lambda each: each[:5])
+        if is_order:
+            order, orders[number] = orders[number], None
+            assert order is not None
+            assert found == (point.behavior, f"{order.earlier.text} <= {order.later.text}")
+        else:
+            equal = equals[number]
+            assert equal is not None
+            assert found == (point.behavior, " = ".join(each.text for each in equal.terms))
+            others = tuple(each for each in equal.terms if each.point != point)
+            equals[number] = Equal(others) if len(others) > 1 and not equal.behavior else None
+    left = times.left
+    assert left.equals == tuple(each for each in equals if each is not None)
+    assert left.orders == tuple(each for each in orders if each is not None)
+    assert left.required == known.required
+
+
+def test_what_a_required_behavior_says_is_not_given_up_but_the_block() -> None:
+    document = (
+        '<head id="n" lexeme="NOD" required="true" start="1" end="s:start+0.1"/>'
+        '<speech id="s" start="1"><text>a</text></speech>'
+    )
+    block = decode_xml(f'<bml id="b">{document}</bml>')
+    assert isinstance(block, Block)
+
+    assert planned(block).given_up == ("s",)
+    fixed: tuple[BlockBehavior, ...] = tuple(replace(each, required=True) for each in block.behaviors)
+    with pytest.raises(BlockRefused, match="circle"):
+        planned(replace(block, behaviors=fixed))
