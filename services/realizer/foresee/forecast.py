@@ -142,6 +142,8 @@ class Forecast(LongestPaths):
         self._out[node] = [number]
         if not as_expected:
             self._loosen(number)
+        if not as_expected or self._given_way or self._broken:
+            # What made way for this phase, or was given up for it, may be kept now.
             self._touch(node)
         for other in self._of_behavior[behavior]:
             # A phase that has begun can no longer keep its own beginning back.
@@ -209,6 +211,8 @@ class Forecast(LongestPaths):
                 arc.asked, arc.least = asked * factor, least * factor
                 if arc.is_on and number not in self._given_way:
                     self._set_seconds(number, arc.asked)
+                elif arc.is_on:
+                    self._touch(arc.source)  # `update` is to see how far it has to give way now.
 
     # -- questions -----------------------------------------------------------------------------------------------
 
