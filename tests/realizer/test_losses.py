@@ -1,21 +1,25 @@
 """What is said of behaviors that cannot be on time: which is lost, what takes how long, and which words are kept."""
 
 import re
+from itertools import pairwise, permutations
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from msgspec.structs import replace
 
 from engage_hri.schemas.behaviors import BlockBehavior, Gaze, Head, Pointing, Posture, Speech, Timing, Wait
 from engage_hri.schemas.blocks import Block
 from engage_hri.schemas.documents.xml_decode import decode_xml
+from engage_hri.services.realizer.plan.deadlocks import Loss, Losses, clashes
 from engage_hri.services.realizer.plan.given_up import times_of
+from engage_hri.services.realizer.plan.instants import Classes
+from engage_hri.services.realizer.plan.phases import Chain, chain
 from engage_hri.services.realizer.plan.planner import Plan, plan_block
 from engage_hri.services.realizer.plan.relations import BlockRefused, Equal, Order, Relations, Term
 from engage_hri.services.realizer.plan.steps import finished
 from engage_hri.services.realizer.points import ORIGIN, Point
-from tests.realizer.oracle import estimate, phases_of, points_of
+from tests.realizer.oracle import estimate, phases_of, points_of, relaxed
 
 BEHAVIORS = (
     Head(id="x", lexeme="NOD"),
@@ -125,6 +129,82 @@ def test_who_is_lost(rule: str) -> None:
     assert isinstance(block, Block)
 
     assert planned(block).dropped == lost
+
+
+# -- waits that cannot be ------------------------------------------------------------------------------------------
+
+
+def is_too_late(earlier: Chain, sync: str, later: Chain, ties: list[tuple[str, str, float]]) -> bool:
+    """Is there no time for `later` to begin when `earlier` is at `sync` (or ever), with phases as short as can be?"""
+    names = {str(point): 0.0 for each in (earlier, later) for point in each.points} | {"0": -1e9}
+    names |= {name: 0.0 for one, other, _ in ties for name in (one, other)}
+    lags = [(f"{earlier.behavior.id}:{sync}", f"{later.behavior.id}:start", 0.0)] if sync else []
+    for each in (earlier, later):
+        pairs = zip(pairwise(each.points), each.segments, strict=True)
+        lags += [(str(since), str(to), segment.shortest) for (since, to), segment in pairs]
+    for one, other, seconds in ties:
+        lags += [(one, other, seconds), (other, one, -seconds)]
+    return relaxed(names, lags) is None
+
+
+@settings(max_examples=150, deadline=None)
+@given(st.data())
+def test_who_cannot_wait_for_a_part_is_lost_or_who_has_it_and_then_the_other_keeps_it(data: st.DataObject) -> None:
+    draw = data.draw
+    kinds = (Head(id="x", lexeme="NOD"), Pointing(id="x", target="a"), Speech(id="x", text="one"))
+    chosen = [replace(draw(st.sampled_from(kinds)), id=id) for id in "abc"]
+    chains = {each.id: chain(each, estimate(each)) for each in chosen}
+    classes, ties = Classes(), list[tuple[str, str, float]]()
+    for each in chains.values():
+        for point in each.points:
+            classes.add(point)
+    for one, other in draw(st.lists(st.sampled_from(("ab", "bc", "ac", "ba")), max_size=3)):
+        ends = [draw(st.sampled_from(chains[id].points)) for id in (one, other)]
+        seconds = draw(st.sampled_from((-1.0, 0.0, 0.25, 1.0, 2.0)))
+        equal = Equal((Term(ends[0], seconds, ""), Term(ends[1], 0.0, "")))
+        if classes.tie_if_possible(equal):
+            ties.append((str(ends[0]), str(ends[1]), seconds))
+    turns = {
+        (later, draw(st.sampled_from(chains[earlier].points[1:])))
+        for earlier, later in draw(st.sets(st.sampled_from(("ab", "bc", "ac", "ba", "ca"))))
+    }
+    required = draw(st.sets(st.sampled_from("abc")))
+    assume(not any(is_too_late(one, "", other, ties) for one, other in permutations(chains.values(), 2)))
+
+    lost: dict[str, tuple[str, str]] = {}
+    keeps: dict[str, str] = {}
+    for later, point in sorted(turns, key=lambda each: (each[0], each[1].behavior)):
+        earlier = keeps.get(point.behavior, point.behavior)
+        syncs = [each.sync for each in chains[earlier].points]
+        sync = point.sync if earlier == point.behavior or point.sync in syncs else "end"
+        free = {earlier, later} - required
+        if free and later not in lost and is_too_late(chains[earlier], sync, chains[later], ties):
+            lost[max(free)] = (later, f"{earlier}:{sync}")
+            keeps[max(free)] = earlier if max(free) == later else later
+    found = finished(clashes(turns, chains, required, classes))
+    assert [each.behavior for each in found] == list(lost)
+    for each in found:
+        later, awaited = lost[each.behavior]
+        earlier = awaited.partition(":")[0]
+        assert each.reason == f"cannot be on time: {later} would have to wait for {awaited}"
+        assert each.points == chains[each.behavior].points
+        assert each.among == {*chains[earlier].points, *chains[later].points}
+        assert each.turn == (later, Point(*awaited.split(":", 1)))
+
+
+def test_losses_are_told_with_their_reasons() -> None:
+    assert str(Losses([Loss("a", "is late"), Loss("b", "is early")])) == "a is late; b is early"
+
+
+def test_of_a_phase_that_cannot_last_so_long_the_way_round_is_told() -> None:
+    """The nod can be readied in 0.3125 s at most, not in a second: nothing takes too long there."""
+    block = decode_xml('<bml id="b"><head id="n" lexeme="NOD" start="1" ready="2"/></bml>')
+    assert isinstance(block, Block)
+
+    assert [each.message for each in planned(block).problems] == [
+        "line 1: cannot be on time: bml:start (+2 s) -> n:ready (-0.312 s) -> n:start (-1 s) -> bml:start; "
+        "the behavior is dropped"
+    ]
 
 
 # -- words that are kept -----------------------------------------------------------------------------------------
