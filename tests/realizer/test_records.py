@@ -308,12 +308,15 @@ async def test_futures_outlive_the_net_and_are_resolved_once() -> None:
     for point, at in ((start, 1.0), (end, 2.0)):
         net.reach(point, at)
     assert waiting.result() == 2.0
-    other = RunningNet(made.net, made.members, made.at, (futures,))
-    finish = futures.adopt(net).fired(over)
-    futures.adopt(other)
+    other = RunningNet(made.net, made.members, made.at)
+    finish, early = futures.fired(over), futures.fired(Point("w", "start"))
+    assert not early.done()
     other.start(5.0)
     for point, at in ((start, 5.0), (end, 6.0), (Point("w", "start"), 6.0)):
         other.reach(point, at)
+    other.observers = (futures,)
+    futures.adopt(other)
+    assert early.result() == 6.0
     assert waiting.result() == 2.0
     assert not finish.done()
     other.reach(Point("w", "end"), 7.0)

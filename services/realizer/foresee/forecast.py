@@ -116,9 +116,10 @@ class Forecast(LongestPaths):
                 self.require(self._arcs[number].source)
         if was_kept and abs(at - expected) <= FINEST:
             self._uncause(transition)
+            self._see_reasons_again(transition)
             return
         self._set(transition, at, -1)
-        if was_kept and at < expected:
+        if at < expected:
             for effect in list(self._effects[transition]):
                 self._invalidate(effect)
             for number in self._in[transition]:
@@ -142,13 +143,17 @@ class Forecast(LongestPaths):
         self._out[node] = [number]
         if not as_expected:
             self._loosen(number)
-        if not as_expected or self._given_way or self._broken:
-            # What made way for this phase, or was given up for it, may be kept now.
             self._touch(node)
+        self._see_reasons_again(node)
         for other in self._of_behavior[behavior]:
             # A phase that has begun can no longer keep its own beginning back.
-            if self._arcs[other].is_bound and self._arcs[other].target == transition:
+            if self._arcs[other].target == transition:
                 self._switch_off(other)
+
+    def _see_reasons_again(self, node: int) -> None:
+        """Let `update` see what has to give way now, if anything does: this fact moves nothing, but frees something."""
+        if self._given_way or self._broken:
+            self._touch(node)
 
     def _whereabouts(self, behavior: str) -> int:
         """The node for the time at which the behavior passed its latest point; it belongs to no instant."""
@@ -167,6 +172,7 @@ class Forecast(LongestPaths):
         if self._cause[transition] == number and abs(at - self.times[transition]) <= FINEST:
             self._uncause(transition)
         self._switch_off(number)
+        self._see_reasons_again(transition)
         if self._is_fact[transition]:
             return
         if self._cause[transition] < 0 and self.times[transition] > self._base[transition] + FINEST:
@@ -211,8 +217,7 @@ class Forecast(LongestPaths):
                 arc.asked, arc.least = asked * factor, least * factor
                 if arc.is_on and number not in self._given_way:
                     self._set_seconds(number, arc.asked)
-                elif arc.is_on:
-                    self._touch(arc.source)  # `update` is to see how far it has to give way now.
+                self._see_reasons_again(arc.source)
 
     # -- questions -----------------------------------------------------------------------------------------------
 
@@ -227,8 +232,6 @@ class Forecast(LongestPaths):
 
     def is_hurried(self, behavior: str) -> bool:
         """True if a phase of the behavior is to be faster than is natural."""
-        if not self._given_way:  # the usual case
-            return False
         hurried = (number for number in self._given_way if not self._arcs[number].is_bound)
         return any(self._arcs[number].behavior == behavior for number in hurried)
 
