@@ -144,14 +144,13 @@ class Forecast(LongestPaths):
         if not as_expected:
             self._loosen(number)
             self._touch(node)
-        self._see_reasons_again(node)
         for other in self._of_behavior[behavior]:
             # A phase that has begun can no longer keep its own beginning back.
             if self._arcs[other].target == transition:
                 self._switch_off(other)
 
     def _see_reasons_again(self, node: int) -> None:
-        """Let `update` see what has to give way now, if anything does: this fact moves nothing, but frees something."""
+        """Let `update` see anew what has to give way, if anything does: a fact that moves nothing may free it."""
         if self._given_way or self._broken:
             self._touch(node)
 
@@ -164,6 +163,7 @@ class Forecast(LongestPaths):
     def come(self, behavior: str, transition: int, at: Seconds) -> None:
         """Note that the behavior is at its point there, or past it."""
         self._there[transition] = max(self._there[transition], at)
+        self._see_reasons_again(transition)
         number = self._phase_to.get((behavior, transition))
         if number is None or not self._arcs[number].is_on:
             self._raise_base(transition, at)
@@ -172,7 +172,6 @@ class Forecast(LongestPaths):
         if self._cause[transition] == number and abs(at - self.times[transition]) <= FINEST:
             self._uncause(transition)
         self._switch_off(number)
-        self._see_reasons_again(transition)
         if self._is_fact[transition]:
             return
         if self._cause[transition] < 0 and self.times[transition] > self._base[transition] + FINEST:
