@@ -1,0 +1,232 @@
+"""Questions to the body about a plan: from where each behavior starts, and when it begins, waits and hurries."""
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from msgspec.structs import replace
+
+from engage_hri.schemas.behaviors import BlockBehavior, Gaze, GazeShift, Pointing, Posture, Speech, Wait
+from engage_hri.schemas.blocks import Block
+from engage_hri.schemas.body import BodyPose, Estimate, JointAngle, Phase
+from engage_hri.services.realizer.plan.known import Holder, Known, qualified
+from engage_hri.services.realizer.plan.phases import chain
+from engage_hri.services.realizer.plan.planner import Plan, plan_block
+from engage_hri.services.realizer.plan.poses import between, changed, planned_times, poses_before
+from engage_hri.services.realizer.points import Point
+from tests.realizer.fake_body import FakeBody
+from tests.realizer.planning import timed
+from tests.realizer.stage import after, block, together
+
+BODY = FakeBody()
+
+
+def pose(angle: float) -> BodyPose:
+    return BodyPose(joints=(JointAngle("pan", angle),))
+
+
+def estimated(behavior: BlockBehavior, angle: float | None = None) -> Estimate:
+    return replace(BODY.estimate(behavior), pose_after=None if angle is None else pose(angle))
+
+
+def planned(example: Block, known: Known | None = None) -> Plan:
+    """Each behavior ends in a pose of its own: the first in pose 1."""
+    found = [
+        estimated(each, number) for number, each in enumerate(example.behaviors, 1) if not isinstance(each, Wait)
+    ]
+    return plan_block(example, found, known=known or Known())
+
+
+def told(plan: Plan) -> dict[str, dict[str, float]]:
+    return {id: {each.sync: round(each.at, 4) for each in times} for id, times in planned_times(plan).items()}
+
+
+def angles(plan: Plan, known: Known | None = None) -> dict[str, float]:
+    return {id: each.joints[0].angle for id, each in poses_before(plan, known or Known()).items()}
+
+
+# -- estimates that differ ---------------------------------------------------------------------------------------
+
+PHASES = st.lists(
+    st.tuples(st.sampled_from((0.5, 0.5003, 0.5004, 0.5006, 1.0)), st.booleans()), min_size=1, max_size=3
+)
+
+
+@st.composite
+def estimates(draw: st.DrawFn, ids: str) -> list[Estimate]:
+    found = []
+    for id in draw(st.sets(st.sampled_from(ids))):
+        names = ["start", "a", "b", "end"]
+        phases = tuple(
+            Phase(
+                since=names[n],
+                to=names[n + 1],
+                shortest=natural / 2,
+                natural=natural,
+                longest=2.0 if bounded else None,
+            )
+            for n, (natural, bounded) in enumerate(draw(PHASES))
+        )
+        part = draw(st.sampled_from(("arm", "arm", "head")))
+        is_feasible = draw(st.sampled_from((True, True, False)))
+        found.append(Estimate(behavior=id, feasible=is_feasible, parts=(part,), phases=phases))
+    return sorted(found, key=lambda each: each.behavior)
+
+
+@settings(max_examples=150, deadline=None)
+@given(estimates("xyz"), estimates("xyz"))
+def test_another_estimate_makes_another_plan_only_where_it_was_asked_for_and_differs(
+    before: list[Estimate], later: list[Estimate]
+) -> None:
+    expected = False
+    for one in before:
+        for other in later:
+            if one.behavior == other.behavior:
+                a, b = ([each.natural for each in it.phases] for it in (one, other))
+                is_same_shape = (one.feasible, one.parts, len(a)) == (other.feasible, other.parts, len(b))
+                expected |= not is_same_shape or max(abs(x - y) for x, y in zip(a, b, strict=True)) > 0.0005
+    assert changed(before, later) == expected
+
+
+@settings(max_examples=150, deadline=None)
+@given(estimates("xyz"), estimates("xyz"))
+def test_between_two_answers_each_phase_is_the_mean_and_may_be_as_short_and_long(
+    before: list[Estimate], later: list[Estimate]
+) -> None:
+    found = between(before, later)
+    assert [each.behavior for each in found] == [each.behavior for each in later]
+    for mean, other in zip(found, later, strict=True):
+        one = next((each for each in before if each.behavior == mean.behavior), other)
+        assert replace(mean, phases=other.phases) == other
+        if len(one.phases) != len(other.phases):
+            assert mean == other
+            continue
+        for a, b, it in zip(one.phases, other.phases, mean.phases, strict=True):
+            assert it.natural == pytest.approx((a.natural + b.natural) / 2)
+            assert it.shortest == pytest.approx((a.shortest + b.shortest) / 2)
+            assert it.longest == b.longest
+            assert (it.since, it.to, it.hold) == (b.since, b.to, b.hold)
+
+
+def test_a_mean_stays_between_its_own_least_and_most() -> None:
+    def one(shortest: float, natural: float, longest: float) -> Estimate:
+        phase = Phase(since="start", to="end", shortest=shortest, natural=natural, longest=longest)
+        return Estimate(behavior="x", feasible=True, phases=(phase,))
+
+    (mean,) = between([one(0.5, 3.0, 4.0)], [one(0.5, 1.0, 1.5)])
+    assert (mean.phases[0].natural, mean.phases[0].longest) == (2.0, 2.0)
+    renamed = replace(one(0.5, 3.0, 4.0), phases=(replace(one(0.5, 3.0, 4.0).phases[0], to="stop"),))
+    assert between([renamed], [one(0.5, 1.0, 1.5)]) == (one(0.5, 1.0, 1.5),)
+
+
+# -- from where --------------------------------------------------------------------------------------------------
+
+
+def test_who_comes_after_a_look_that_went_home_starts_from_home_as_the_last_shift_left_it() -> None:
+    """The first look is over at 3.5 s; who comes before that starts on its target."""
+    first = timed(Gaze(id="first", target="a"), start="0", relax="3")
+    shift = timed(GazeShift(id="shift", target="c"), start="0.5", end="1.5")
+    for start, expected in (("3", 1.0), ("3.5", None), ("9", None)):
+        later = timed(Gaze(id="later", target="b"), start=start)
+        assert angles(planned(block((first, later)))).get("later") == expected
+    moved = block((timed(GazeShift(id="shift", target="c"), start="0", end="1"),
+                   timed(Gaze(id="look", target="a"), start="2", relax="4"),
+                   timed(Gaze(id="later", target="b"), start="9")))  # fmt: skip
+    assert angles(planned(moved)) == {"look": 1.0, "later": 1.0}
+    assert shift.id not in angles(planned(block((first, shift))))
+
+
+def test_who_comes_after_a_posture_that_went_home_starts_from_where_the_body_is() -> None:
+    """Only looks go home to what a shift has turned to."""
+    shift = timed(GazeShift(id="shift", target="c"), start="0", end="1")
+    postures = [timed(Posture(id=f"p{n}", lexeme="LEAN"), start=f"{5 * n}", end=f"{5 * n + 3}") for n in (0, 1)]
+
+    assert "p1" not in angles(planned(block((shift, *postures))))
+
+
+def test_who_follows_a_behavior_of_another_block_starts_from_its_pose() -> None:
+    theirs = Gaze(id="x", target="a")
+    parts = chain(theirs, estimated(theirs))
+    renamed = replace(parts, points=tuple(qualified("other", point) for point in parts.points))
+    times = {qualified("other", point): at for point, at in zip(parts.points, (-2.0,) * 5 + (9.0, 9.5), strict=True)}
+    holder = Holder(renamed, is_natural=True, kept=frozenset(), estimate=estimated(theirs, 7.0), reached=5)
+    known = Known(blocks={"other": None}, points=times, holders={"other:x": holder})
+
+    assert angles(planned(block((Gaze(id="g", target="b"),)), known), known) == {"g": 7.0}
+    blind = replace(known, holders={"other:x": replace(holder, estimate=None)})
+    assert angles(planned(block((Gaze(id="g", target="b"),)), blind), blind) == {}
+
+
+def test_only_who_shares_a_part_with_the_one_before_starts_from_there() -> None:
+    left = timed(Pointing(id="left", target="a", mode="LEFT_HAND"), start="0")
+    right = timed(Pointing(id="right", target="a", mode="RIGHT_HAND"), start="1")
+    again = timed(Pointing(id="again", target="b", mode="LEFT_HAND"), start="1.75")
+
+    assert angles(planned(block((left, right, again)))) == {"again": 1.0}
+
+
+# -- when --------------------------------------------------------------------------------------------------------
+
+GAZE = Gaze(id="g", target="a")
+LEFT = Pointing(id="p", target="a", mode="LEFT_HAND")
+
+
+def test_what_makes_no_difference_to_anything_is_not_asked_about() -> None:
+    assert planned_times(planned(block((LEFT, Speech(id="s", text="so"))))) == {}
+    assert planned_times(planned(block((Wait(id="w", duration=1.0), LEFT)))) == {}
+
+
+def test_who_waits_is_told_where_and_how_long() -> None:
+    made = planned(block((timed(LEFT, start="1", stroke="5"),)))
+    assert told(made) == {"p": {"start": 1.0, "stroke_start": 4.5}}
+    held = planned(block((timed(LEFT, start="1", end="10"),)))
+    assert told(held) == {"p": {"start": 1.0, "stroke_end": 9.25}}
+
+
+def test_two_on_one_arm_are_told_in_the_order_in_which_they_begin() -> None:
+    """The later takes the arm at 2 s: by then the earlier has passed its stroke end, and goes home from there."""
+    second = replace(LEFT, id="q")
+    made = planned(block((timed(second, start="2"), timed(LEFT, start="0"))))
+
+    assert list(planned_times(made)) == ["p", "q"]
+    assert told(made)["q"] == {"start": 2.0}
+    assert told(made)["p"]["start"] == 0.0
+
+
+def test_who_is_cut_at_a_hold_point_is_never_let_go_there() -> None:
+    """A look that lasts until the next comes holds until then, and a second more."""
+    made = planned(block((timed(GAZE, start="0"), timed(Gaze(id="h", target="b"), start="4"))))
+
+    assert told(made)["g"] == {"start": 0.0, "stroke_end": 4.0, "relax": 5.0}
+
+
+def test_a_look_that_lasts_leaves_a_moment_after_all_else_has_ended() -> None:
+    made = planned(block((GAZE, LEFT, replace(LEFT, id="q"))))
+    ends = made.predicted(made.chains["q"].points[-1])
+
+    start, leaves = planned_times(made)["g"]
+    assert (start.sync, start.at, leaves.sync) == ("start", 0.0, "stroke_end")
+    assert leaves.at == pytest.approx(ends + 2e-6, abs=1e-9)
+
+
+def test_who_holds_until_one_comes_who_cannot_wait_is_told_when_that_is() -> None:
+    """The arm is at its stroke start when the words begin, by chance at once: it waits until that is measured."""
+    words = Speech(id="s", text="one")
+    alone = planned(block((timed(LEFT, start="0"), replace(LEFT, id="q"))))
+    met = planned(block((timed(LEFT, start="0"), replace(LEFT, id="q"), words), together("p:stroke_start", "s:end")))
+
+    assert "stroke_start" not in told(alone)["p"]
+    assert told(met)["p"]["stroke_start"] == met.predicted(Point("s", "end"))
+
+
+@pytest.mark.parametrize(
+    ("stroke", "syncs"),
+    [("1.25", ()), ("1.2503", ()), ("1.251", ("stroke_start",)), ("1.249", ()), ("1.248", ("ready", "stroke"))],
+)
+def test_who_is_hurried_or_waits_by_more_than_half_a_millisecond_is_told(stroke: str, syncs: tuple[str, ...]) -> None:
+    """Three phases to the stroke give way by shares of 2 : 1 : 2; who is to be later waits at the stroke start."""
+    body, other = FakeBody(elastic=(0.5, 3.0)), replace(LEFT, id="q")
+    behavior = timed(LEFT, start="0", stroke=stroke)
+    estimates = [body.estimate(behavior), body.estimate(other)]
+    made = plan_block(block((behavior, other), after("p:end", "q:start")), estimates)
+
+    assert tuple(each.sync for each in planned_times(made)["p"]) == ("start", *syncs)
