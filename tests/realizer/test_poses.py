@@ -132,7 +132,14 @@ def test_who_comes_after_a_look_that_went_home_starts_from_home_as_the_last_shif
                    timed(Gaze(id="look", target="a"), start="2", relax="4"),
                    timed(Gaze(id="later", target="b"), start="9")))  # fmt: skip
     assert angles(planned(moved)) == {"look": 1.0, "later": 1.0}
-    assert shift.id not in angles(planned(block((first, shift))))
+    assert angles(planned(block((first, shift)))) == {"shift": 1.0}
+    for start, expected in (
+        ("3", 1.0),
+        ("9", 2.0),
+    ):  # beneath a look a shift moves nothing, but the look goes home there
+        later = timed(Gaze(id="later", target="b"), start=start)
+        made = planned(block((first, replace(shift, timing=shift.timing[:1]), later)))
+        assert angles(made) == {"shift": 1.0, "later": expected}
 
 
 def test_who_comes_after_a_posture_that_went_home_starts_from_where_the_body_is() -> None:

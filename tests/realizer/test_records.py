@@ -272,6 +272,16 @@ async def test_who_follows_what_is_done_goes_on_and_who_was_replaced_says_by_who
     assert not after_done.ending.done()
 
 
+async def test_who_has_ended_by_itself_does_not_end_again_with_what_it_followed() -> None:
+    leader = live("leader")
+    follower = live("follower", leader, follows=("leader",))
+    follower.stop(Ending("done"))
+    leader.fail(Fault(reason="no arm"))
+
+    assert follower.outcome.status == "done"
+    assert follower.ended_by is None
+
+
 async def test_of_two_blocks_of_one_id_the_first_is_followed() -> None:
     one, other = live("same"), live("same")
 

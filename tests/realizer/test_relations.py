@@ -251,6 +251,13 @@ def test_a_reference_to_nothing_refuses_the_block_with_place_and_line(ref: str, 
         assert refusal.value.kind == "PARSING_FAILURE"
 
 
+def test_a_reference_in_a_block_without_behaviors_says_so() -> None:
+    empty = Block(id="b", behaviors=(), constraints=(Constraint(operators=(Synchronize(syncs=("x:end",)),)),))
+
+    with pytest.raises(BlockRefused, match="the block has no behaviors"):
+        finished(relation_steps(empty))
+
+
 def test_a_required_constraint_may_not_name_what_is_not_there() -> None:
     wrong = Constraint(operators=(After(ref="g:nowhere", syncs=("h:start",)),), id="c", required=True, line=8)
 
