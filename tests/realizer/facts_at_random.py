@@ -44,6 +44,10 @@ class Model(Struct):
     def size(self) -> int:
         return len(self.net.transitions)
 
+    @property
+    def ties(self) -> list[Place | Bound]:
+        return [each for each in self.net.places if each.kind != "idle"] + [*self.net.bounds]
+
     def arrive(self, behavior: str, transition: int, at: float) -> None:
         """It is there now: that it was overdue matters no more."""
         self.there[transition] = max(at, self.there.get(transition, BEGAN))
@@ -60,9 +64,7 @@ class Model(Struct):
     def arcs(self) -> list[Arc]:
         """All that holds now; a phase that has begun counts from then, and one that has ended not at all."""
         found = []
-        for each in (*self.net.places, *self.net.bounds):
-            if each.kind == "idle":
-                continue
+        for each in self.ties:
             is_bound, phase = isinstance(each, Bound), each.kind == "phase"
             factor = self.factor.get(each.behavior, 1.0) if phase else 1.0
             least = each.lag
@@ -92,8 +94,8 @@ class Model(Struct):
         """Ends of phases that nothing but the phase makes late: who is there early does not hold its beginning up."""
         arcs = [
             (each.source, each.target, each.behavior if each.kind == "phase" else "", isinstance(each, Bound))
-            for each in (*self.net.places, *self.net.bounds)
-            if each.kind != "idle" and (isinstance(each, Bound) or each.source or each.lag)
+            for each in self.ties
+            if isinstance(each, Bound) or each.source or each.lag
         ] + [(-1, each, "", False) for each in self.foreseen]
         idle: set[tuple[str, int]] = set()
         while True:

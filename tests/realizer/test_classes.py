@@ -72,10 +72,10 @@ def test_what_is_tied_is_so_far_apart_and_a_contradiction_tells_how_far_and_why(
     classes, graph = Classes(), dict[Point, dict[Point, tuple[float, int]]]()
     for each in POINTS:
         classes.add(each)
-    for line, (one, other, here, there) in enumerate(said, 1):
-        since, to, apart = point(one), point(other), here - there
+    for line, (first, second, here, there) in enumerate(said, 1):
+        since, to, apart = point(first), point(second), here - there
         known = between(graph, since, to)
-        equal = Equal((term(one, here, line), term(other, there, line)))
+        equal = Equal((term(first, here, line), term(second, there, line)))
         if known is None or known == apart:
             assert not is_tried or classes.tie_if_possible(equal)
             if not is_tried:
@@ -124,18 +124,18 @@ def check_contradiction(
 @given(TIES)
 def test_instants_are_points_at_no_distance_and_the_lines_between_lead_there(said: list[Said]) -> None:
     classes, graph = Classes(), dict[Point, dict[Point, tuple[float, int]]]()
-    for line, (one, other, here, there) in enumerate(said, 1):
-        if classes.tie_if_possible(Equal((term(one, here, line), term(other, there, line)))):
-            graph.setdefault(point(one), {}).setdefault(point(other), (here - there, line))
-            graph.setdefault(point(other), {}).setdefault(point(one), (there - here, line))
+    for line, (first, second, here, there) in enumerate(said, 1):
+        if classes.tie_if_possible(Equal((term(first, here, line), term(second, there, line)))):
+            graph.setdefault(point(first), {}).setdefault(point(second), (here - there, line))
+            graph.setdefault(point(second), {}).setdefault(point(first), (there - here, line))
 
     found = finished(instants(classes, POINTS))
     assert sorted(each for instant in found for each in instant.points) == POINTS
     for instant in found:
-        first = instant.points[0]
-        tied = {each: at for each, (at, _) in ways(graph, first).items() if each != ORIGIN}
+        earliest = instant.points[0]
+        tied = {each: at for each, (at, _) in ways(graph, earliest).items() if each != ORIGIN}
         assert instant.points == tuple(each for each in POINTS if tied.get(each) == 0.0)
-        assert instant.at == clock(graph, first)
+        assert instant.at == clock(graph, earliest)
         assert instant.offset == -min(tied.values())
         mates = {each.points[0] for each in found if each.class_id == instant.class_id}
         assert mates == {each.points[0] for each in found if each.points[0] in tied}

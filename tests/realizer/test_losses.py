@@ -21,7 +21,7 @@ from engage_hri.services.realizer.plan.steps import finished
 from engage_hri.services.realizer.points import ORIGIN, Point
 from tests.realizer.oracle import estimate, phases_of, points_of, relaxed
 
-BEHAVIORS = (
+BEHAVIORS: tuple[BlockBehavior, ...] = (
     Head(id="x", lexeme="NOD"),
     Pointing(id="x", target="a"),
     Gaze(id="x", target="a"),
@@ -57,8 +57,8 @@ def test_what_takes_too_long_is_told_with_both_times_and_the_way_round(data: st.
     refs = (f"{anchor}+{seconds}", f"{anchor}+{seconds + time}") if anchor else (f"{seconds}", f"{seconds + time}")
     timing = tuple(Timing(points[each], ref) for each, ref in zip((first, last), refs, strict=True))
     line = data.draw(st.sampled_from((0, 12)))
-    rest = (Wait(id="w", duration=1.0),)
-    made = planned(Block(id="b", behaviors=(*rest, replace(behavior, timing=timing, line=line))))
+    timed: tuple[BlockBehavior, ...] = (Wait(id="w", duration=1.0), replace(behavior, timing=timing, line=line))
+    made = planned(Block(id="b", behaviors=timed))
 
     (problem,) = made.problems
     assert (problem.kind, problem.behavior) == ("IMPOSSIBLE_TO_SCHEDULE", "x")
@@ -134,6 +134,9 @@ def test_who_is_lost(rule: str) -> None:
 # -- waits that cannot be ------------------------------------------------------------------------------------------
 
 
+PAIRS = (("a", "b"), ("b", "c"), ("a", "c"), ("b", "a"), ("c", "a"))
+
+
 def is_too_late(earlier: Chain, sync: str, later: Chain, ties: list[tuple[str, str, float]]) -> bool:
     """Is there no time for `later` to begin when `earlier` is at `sync` (or ever), with phases as short as can be?"""
     names = {str(point): 0.0 for each in (earlier, later) for point in each.points} | {"0": -1e9}
@@ -151,14 +154,14 @@ def is_too_late(earlier: Chain, sync: str, later: Chain, ties: list[tuple[str, s
 @given(st.data())
 def test_who_cannot_wait_for_a_part_is_lost_or_who_has_it_and_then_the_other_keeps_it(data: st.DataObject) -> None:
     draw = data.draw
-    kinds = (Head(id="x", lexeme="NOD"), Pointing(id="x", target="a"), Speech(id="x", text="one"))
+    kinds: tuple[BlockBehavior, ...] = (BEHAVIORS[0], BEHAVIORS[1], BEHAVIORS[4])
     chosen = [replace(draw(st.sampled_from(kinds)), id=id) for id in "abc"]
     chains = {each.id: chain(each, estimate(each)) for each in chosen}
     classes, ties = Classes(), list[tuple[str, str, float]]()
     for each in chains.values():
         for point in each.points:
             classes.add(point)
-    for one, other in draw(st.lists(st.sampled_from(("ab", "bc", "ac", "ba")), max_size=3)):
+    for one, other in draw(st.lists(st.sampled_from(PAIRS[:4]), max_size=3)):
         ends = [draw(st.sampled_from(chains[id].points)) for id in (one, other)]
         seconds = draw(st.sampled_from((-1.0, 0.0, 0.25, 1.0, 2.0)))
         equal = Equal((Term(ends[0], seconds, ""), Term(ends[1], 0.0, "")))
@@ -166,7 +169,7 @@ def test_who_cannot_wait_for_a_part_is_lost_or_who_has_it_and_then_the_other_kee
             ties.append((str(ends[0]), str(ends[1]), seconds))
     turns = {
         (later, draw(st.sampled_from(chains[earlier].points[1:])))
-        for earlier, later in draw(st.sets(st.sampled_from(("ab", "bc", "ac", "ba", "ca"))))
+        for earlier, later in draw(st.sets(st.sampled_from(PAIRS)))
     }
     required = draw(st.sets(st.sampled_from("abc")))
     assume(not any(is_too_late(one, "", other, ties) for one, other in permutations(chains.values(), 2)))
@@ -183,13 +186,13 @@ def test_who_cannot_wait_for_a_part_is_lost_or_who_has_it_and_then_the_other_kee
             keeps[max(free)] = earlier if max(free) == later else later
     found = finished(clashes(turns, chains, required, classes))
     assert [each.behavior for each in found] == list(lost)
-    for each in found:
-        later, awaited = lost[each.behavior]
+    for it in found:
+        later, awaited = lost[it.behavior]
         earlier = awaited.partition(":")[0]
-        assert each.reason == f"cannot be on time: {later} would have to wait for {awaited}"
-        assert each.points == chains[each.behavior].points
-        assert each.among == {*chains[earlier].points, *chains[later].points}
-        assert each.turn == (later, Point(*awaited.split(":", 1)))
+        assert it.reason == f"cannot be on time: {later} would have to wait for {awaited}"
+        assert it.points == chains[it.behavior].points
+        assert it.among == {*chains[earlier].points, *chains[later].points}
+        assert it.turn == (later, Point(*awaited.split(":", 1)))
 
 
 def test_losses_are_told_with_their_reasons() -> None:
@@ -281,8 +284,8 @@ def test_a_time_of_a_speech_is_given_up_the_nearest_of_the_last_point_first(
             equal = equals[number]
             assert equal is not None
             assert found == (point.behavior, " = ".join(each.text for each in equal.terms))
-            others = tuple(each for each in equal.terms if each.point != point)
-            equals[number] = Equal(others) if len(others) > 1 and not equal.behavior else None
+            rest = tuple(each for each in equal.terms if each.point != point)
+            equals[number] = Equal(rest) if len(rest) > 1 and not equal.behavior else None
     left = times.left
     assert left.equals == tuple(each for each in equals if each is not None)
     assert left.orders == tuple(each for each in orders if each is not None)

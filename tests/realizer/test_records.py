@@ -179,7 +179,7 @@ def test_a_block_has_failed_if_it_had_behaviors_and_each_was_dropped(
     dropped = [id for id in lost if id not in interrupted]
     for status in ("done", "interrupted", "failed"):
         fault = None if status != "failed" else Fault(reason="broken")
-        raw = BlockOutcome(id="r", block="b", status=status, fault=fault)  # type: ignore[arg-type]
+        raw = BlockOutcome(id="r", block="b", status=status, fault=fault)
         found = completed(raw, example, said, lost, interrupted)
         assert (found.spoken, found.dropped) == (said, tuple(dropped))
         assert found.reasons == tuple(lost[id] for id in dropped)

@@ -112,7 +112,7 @@ def said(draw: st.DrawFn) -> Said:
             known = REFS if is_required else (*REFS, *WRONG)
             refs = draw(st.lists(st.sampled_from(known), min_size=2, max_size=4, unique=True))
             own = draw(st.sampled_from((0, 40 + place)))
-            kind = draw(st.sampled_from((Synchronize, After, Before)))
+            kind: type[Synchronize | After | Before] = draw(st.sampled_from((Synchronize, After, Before)))
             terms = {
                 each.text: Term(each.point, each.offset, each.text, own or line, each.stroke)
                 for each in refs
@@ -145,10 +145,10 @@ def said(draw: st.DrawFn) -> Said:
         timing = []
         own_equals: list[Equal] = []
         lost = False
-        syncs = {"g": "strokeStart", "h": "relax", "s": "m", "w": "end", "u": "x"}
+        own_syncs = {"g": "strokeStart", "h": "relax", "s": "m", "w": "end", "u": "x"}
         for _ in range(draw(st.integers(0, 2))):
             other = draw(st.sampled_from((*REFS, *WRONG)))
-            sync = draw(st.sampled_from((syncs[behavior.id], "start", "middle")))
+            sync = draw(st.sampled_from((own_syncs[behavior.id], "start", "middle")))
             timing.append(Timing(sync, other.text))
             kind_name = str(behavior.__struct_config__.tag)
             wrong = ""
@@ -167,9 +167,9 @@ def said(draw: st.DrawFn) -> Said:
                 unusable.add(behavior.id)
             else:
                 point = Point(behavior.id, "stroke_start" if sync == "strokeStart" else sync)
-                own = Term(point, 0.0, f"{behavior.id}:{sync}", behavior.line)
+                here = Term(point, 0.0, f"{behavior.id}:{sync}", behavior.line)
                 there = Term(other.point, other.offset, other.text, behavior.line, other.stroke)
-                own_equals.append(Equal((own, there), behavior.id))
+                own_equals.append(Equal((here, there), behavior.id))
         behaviors[number] = replace(behavior, timing=tuple(timing))
         equals += [] if lost else own_equals
     if draw(st.booleans()):

@@ -147,7 +147,8 @@ def least(tie: Place | Bound) -> float:
 
 
 def arcs(net: PetriNet, *, extreme: bool) -> list[tuple[int, int, float]]:
-    ties = [each for each in (*net.places, *net.bounds) if each.kind != "idle"]
+    ties: list[Place | Bound] = [each for each in net.places if each.kind != "idle"]
+    ties += net.bounds
     return [(each.source, each.target, least(each) if extreme else each.lag) for each in ties]
 
 
