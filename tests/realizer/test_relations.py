@@ -90,6 +90,8 @@ OTHERS = {
     "dark": None,
 }
 
+KINDS: tuple[type[Synchronize] | type[After] | type[Before], ...] = (Synchronize, After, Before)
+
 
 class Said(NamedTuple):
     block: Block
@@ -112,7 +114,7 @@ def said(draw: st.DrawFn) -> Said:
             known = REFS if is_required else (*REFS, *WRONG)
             refs = draw(st.lists(st.sampled_from(known), min_size=2, max_size=4, unique=True))
             own = draw(st.sampled_from((0, 40 + place)))
-            kind: type[Synchronize | After | Before] = draw(st.sampled_from((Synchronize, After, Before)))
+            kind = draw(st.sampled_from(KINDS))
             terms = {
                 each.text: Term(each.point, each.offset, each.text, own or line, each.stroke)
                 for each in refs
