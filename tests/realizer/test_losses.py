@@ -14,12 +14,13 @@ from engage_hri.schemas.documents.xml_decode import decode_xml
 from engage_hri.services.realizer.plan.deadlocks import Loss, Losses, clashes
 from engage_hri.services.realizer.plan.given_up import times_of
 from engage_hri.services.realizer.plan.instants import Classes
+from engage_hri.services.realizer.plan.known import Holder, Known, qualified
 from engage_hri.services.realizer.plan.phases import Chain, chain
 from engage_hri.services.realizer.plan.planner import Plan, plan_block
 from engage_hri.services.realizer.plan.relations import BlockRefused, Equal, Order, Relations, Term
 from engage_hri.services.realizer.plan.steps import finished
 from engage_hri.services.realizer.points import ORIGIN, Point
-from tests.realizer.oracle import estimate, phases_of, points_of, relaxed
+from tests.realizer.oracle import SEVEN, estimate, phases_of, points_of, relaxed
 
 BEHAVIORS: tuple[BlockBehavior, ...] = (
     Head(id="x", lexeme="NOD"),
@@ -89,6 +90,20 @@ def _last(shortest: list[float], last: int) -> int:
 
 
 LOST = {
+    "whose phase cannot last so long, if none is too long": (
+        '<wait id="w" duration="1"/><head id="n" lexeme="NOD" start="w:start" ready="w:start+1"/>'
+        '<wait id="v" duration="1" start="w:start"/>',
+        ("n",),
+    ),
+    "whose phase is too long, not whose cannot last so long": (
+        '<wait id="w" duration="3" start="n:start" end="n:ready"/><head id="n" lexeme="NOD"/>',
+        ("w",),
+    ),
+    "nobody more where one who is lost anyway has to do with it": (
+        '<head id="a" lexeme="NOD" start="1"/><head id="b" lexeme="NOD" start="1" stroke="a:start+0.1" end="5.1"/>'
+        '<head id="c" lexeme="NOD" start="5" end="b:end"/>',
+        ("b",),
+    ),
     "of two that are timed, the later in the document": (
         '<head id="n" lexeme="NOD" start="1"/><head id="m" lexeme="NOD" start="1" end="n:start+0.3"/>',
         ("m",),
@@ -208,6 +223,58 @@ def test_of_a_phase_that_cannot_last_so_long_the_way_round_is_told() -> None:
         "line 1: cannot be on time: bml:start (+2 s) -> n:ready (-0.312 s) -> n:start (-1 s) -> bml:start; "
         "the behavior is dropped"
     ]
+
+
+# -- parts that other blocks have -----------------------------------------------------------------------------------
+
+
+def others(*behaviors: BlockBehavior, times: dict[str, float]) -> Known:
+    """A block that has the parts of these behaviors, with the times of some of its points."""
+    holders = {}
+    for each in behaviors:
+        parts = chain(each, estimate(each))
+        points = tuple(qualified("other", point) for point in parts.points)
+        renamed = replace(parts, points=points)
+        holders[f"other:{each.id}"] = Holder(renamed, is_natural=False, kept=frozenset(points))
+    points_known = {Point(*name.rsplit(":", 1)): at for name, at in times.items()}
+    content = {"other": Block(id="other", behaviors=behaviors)}
+    return Known(blocks=content, points=points_known, holders=holders)
+
+
+THEIRS = Pointing(id="x", target="a", mode="BOTH_HANDS")
+TIMES = {f"other:x:{sync}": at for sync, at in zip(SEVEN, (-1.0, 0.0, 1.0, 2.0, 3.0, 4.0, 5.0), strict=True)}
+
+
+@pytest.mark.parametrize(("mode", "name"), [("LEFT_HAND", "left arm"), ("BOTH_HANDS", "left arm and right arm")])
+def test_who_has_no_time_to_wait_for_another_block_is_told_what_that_has_and_until_when(mode: str, name: str) -> None:
+    ours = Pointing(id="p", target="a", mode=mode, timing=(Timing("start", "1"),), line=4)  # type: ignore[arg-type]
+    known = others(THEIRS, times=TIMES)
+    made = plan_block(Block(id="b", behaviors=(ours,)), [estimate(ours)], known=known)
+
+    assert [(each.kind, each.behavior, each.message) for each in made.problems] == [
+        (
+            "IMPOSSIBLE_TO_SCHEDULE",
+            "p",
+            f"line 4: cannot be on time: other:x has the {name} until other:x:end, 5.00 s after the start of the "
+            "block; the behavior is dropped",
+        )
+    ]
+
+
+def test_a_point_of_another_block_that_comes_after_a_fixed_time_is_told_with_its_own() -> None:
+    ours = Head(
+        id="n", lexeme="NOD", timing=(Timing("start", "1"), Timing("end", "other:s:end"), Timing("relax", "2"))
+    )
+    speech = Speech(id="s", text="so")
+    known = Known(
+        blocks={"other": Block(id="other", behaviors=(speech,))},
+        points={Point("other:s", "end"): 7.0, Point("other:s", "start"): 1.0},
+    )
+    made = plan_block(Block(id="b", behaviors=(ours,)), [estimate(ours)], known=known)
+
+    words = "other:s:end is not waited for: expected 7.00 s after the start of the block, after times that are fixed"
+    assert [(each.kind, each.message) for each in made.problems] == [("LATE", words)]
+    assert made.predicted(Point("n", "start")) == 1.0
 
 
 # -- words that are kept -----------------------------------------------------------------------------------------

@@ -199,11 +199,40 @@ def test_two_on_one_arm_are_told_in_the_order_in_which_they_begin() -> None:
     assert told(made)["p"]["start"] == 0.0
 
 
+def test_if_one_waits_all_are_told_that_move_and_speak_with_more_than_the_voice() -> None:
+    right = timed(Pointing(id="r", target="a", mode="RIGHT_HAND"), start="0")
+    made = planned(block((timed(LEFT, start="1", stroke="5"), right, Speech(id="s", text="so"))))
+
+    assert told(made) == {"r": {"start": 0.0}, "p": {"start": 1.0, "stroke_start": 4.5}}
+
+
+def test_a_torso_is_always_told_and_first_of_those_that_begin_with_it() -> None:
+    for start, order in (("0", ["d", "p"]), ("2", ["p", "d"])):
+        made = planned(block((timed(LEFT, start="0"), timed(Posture(id="d", lexeme="LEAN"), start=start))))
+        assert list(planned_times(made)) == order
+
+
+def test_two_who_can_both_wait_for_each_other_are_told_no_time() -> None:
+    right = timed(Pointing(id="r", target="a", mode="RIGHT_HAND"), start="0")
+    made = planned(block((LEFT, right, replace(LEFT, id="q")), together("p:stroke_start", "r:stroke_start")))
+
+    assert told(made)["p"] == {"start": 0.0}
+
+
+def test_a_shift_is_told_its_end_only_if_a_look_begins_then() -> None:
+    shift = timed(GazeShift(id="shift", target="c"), start="0")
+    for start, syncs in (("5", {"start"}), ("shift:end", {"start", "end"})):
+        made = planned(block((shift, timed(GAZE, start=start))))
+        assert set(told(made)["shift"]) == syncs
+
+
 def test_who_is_cut_at_a_hold_point_is_never_let_go_there() -> None:
     """A look that lasts until the next comes holds until then, and a second more."""
-    made = planned(block((timed(GAZE, start="0"), timed(Gaze(id="h", target="b"), start="4"))))
+    others = [timed(Gaze(id=id, target="b"), start=start) for id, start in (("h", "4"), ("k", "8"))]
+    made = planned(block((timed(GAZE, start="0"), *others)))
 
     assert told(made)["g"] == {"start": 0.0, "stroke_end": 4.0, "relax": 5.0}
+    assert told(made)["h"] == {"start": 4.0, "stroke_end": 8.0, "relax": 9.0}
 
 
 def test_a_look_that_lasts_leaves_a_moment_after_all_else_has_ended() -> None:
