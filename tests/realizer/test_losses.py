@@ -126,6 +126,10 @@ LOST = {
         '<speech id="s" start="1" end="1.5"><text>a</text></speech>',
         ("n",),
     ),
+    "a nod, not the words that follow it": (
+        '<head id="n" lexeme="NOD" start="0"/><speech id="s" start="n:end" end="0.7"><text>a</text></speech>',
+        ("n",),
+    ),
     "each of two circles, one behavior": (
         '<head id="n" lexeme="NOD" start="1" end="1.2"/><head id="m" lexeme="NOD" start="3" end="3.2"/>',
         ("n", "m"),
@@ -212,6 +216,17 @@ def test_who_cannot_wait_for_a_part_is_lost_or_who_has_it_and_then_the_other_kee
 
 def test_losses_are_told_with_their_reasons() -> None:
     assert str(Losses([Loss("a", "is late"), Loss("b", "is early")])) == "a is late; b is early"
+
+
+def test_of_two_speeches_that_begin_at_once_the_later_gives_its_time_up() -> None:
+    speeches = "".join(f'<speech id="{id}" start="1"><text>one</text></speech>' for id in "st")
+    block = decode_xml(f'<bml id="b">{speeches}</bml>')
+    assert isinstance(block, Block)
+    made = planned(block)
+
+    assert (made.dropped, made.given_up) == ((), ("t",))
+    assert made.problems[0].message.endswith("; t:start = 1 is given up, so that the words are said")
+    assert "from t:start to t:end it takes 0.50 s at least, and there are 0.00 s" in made.problems[0].message
 
 
 def test_of_a_phase_that_cannot_last_so_long_the_way_round_is_told() -> None:
