@@ -102,7 +102,9 @@ ROWS = (
     BehaviorType(is_standard=True, kind=of.Locomotion, takes_over=False),
     BehaviorType(is_standard=True, kind=of.Speech),
     BehaviorType(is_standard=True, kind=of.Wait, holds=("end",), performer="clock", takes_over=False),
-    BehaviorType(is_standard=True, kind=of.Emit, performer="clock", takes_over=False, nominal=(0.0,)),
+    BehaviorType(
+        is_standard=True, kind=of.Emit, holds=("end",), performer="clock", takes_over=False, nominal=(0.0,),
+    ),
     replace(_OURS, kind=of.Event, performer="recognition", lasts=True),
     replace(_OURS, kind=of.TurnSignal, performer="recognition", lasts=True, nominal=(0.0,)),
     replace(_OURS, kind=of.Reference),

@@ -42,8 +42,8 @@ class PerformBehavior(Request, frozen=True, kw_only=True, tag="perform_behavior"
     moving faster, slower or less far. The newest request replaces all earlier instants; empty: natural pace."""
     held: bool = False
     """True to wait at the next place where the body can, whatever `through` says: a movement at its next hold point
-    (`SyncPointArrived`), a voice at the next word gap, mark or no mark. `pace` is void meanwhile. Sent again without
-    it, the behavior goes on as far as `through` says. One that can wait nowhere any more ends by itself."""
+    (`SyncPointArrived`), a voice at the next word gap, mark or no mark. It goes there at its `pace`. Sent again
+    without it, the behavior goes on as far as `through` says. One that can wait nowhere any more ends by itself."""
 
     @property
     def authority(self) -> str:
@@ -218,10 +218,12 @@ class Estimate(Struct, frozen=True, kw_only=True, omit_defaults=True):
 
 
 class PlannedTime(Struct, frozen=True, kw_only=True, omit_defaults=True):
-    """Time planned for a sync point. at: seconds from now."""
+    """Time planned for a sync point. at: seconds from now. through: for a hold point, true if the behavior is told in
+    time that it may pass: it is slower on its way, and does not stop there."""
 
     sync: str
     at: Seconds
+    through: bool = False
 
 
 class EstimateItem(Struct, frozen=True, kw_only=True, omit_defaults=True):

@@ -107,12 +107,12 @@ class MovementAuthority:
 
     @property
     def pace(self) -> Mapping[str, Seconds]:
-        """Loop times in seconds at which the behavior is asked to reach its points; none while it is held.
+        """Loop times in seconds at which the behavior is asked to reach its points, also while it is held.
 
         They are asked where its natural pace would miss them. A body with one pace only ignores them; the estimates
         of other bodies say how far they can follow.
         """
-        return {} if self.held else self._pace
+        return self._pace
 
     def covers(self, sync: str) -> bool:
         """True if `sync` may be passed now.

@@ -182,7 +182,7 @@ class _Realizer:
                 return
             there = {**self.live_blocks.blocks, **elsewhere}
             performance = self.performances[live.request.id] = BlockPerformance(
-                live, plan, self.shared, there, self.steering.held(block.id)
+                live, plan, self.shared, there, self.steering.held(block.id), is_held=self.steering.is_holding
             )
             live.settle()
             await self._end(live, await performance.run())
@@ -284,5 +284,6 @@ async def realize(bus: Bus, ready: Ready, config: RealizerConfig) -> None:
                     with bus.containing(received):
                         realizer.take(received, tasks)
     finally:
+        realizer.steering.close()
         realizer.desk.close()
         realizer.requests.close()

@@ -76,12 +76,13 @@ class HoldingContract(Suite):
             stage.authority.extend("end")
             await stage.over()
 
-    async def test_a_pace_is_void_while_a_behavior_is_held(self, body: Body):
+    async def test_a_pace_stays_while_a_behavior_is_held_and_counts_no_further_than_where_it_waits(self, body: Body):
         for behavior in self.moving(body):
             stage, last = Stage(body, behavior, "end"), sync_points(behavior)[-1]
-            stage.authority.set_pace({last: asyncio.get_running_loop().time() + 60.0})
+            pace = {last: asyncio.get_running_loop().time() + 60.0}
+            stage.authority.set_pace(pace)
             stage.authority.hold()
-            assert stage.authority.pace == {}
+            assert stage.authority.pace == pace
             await asyncio.sleep(ENOUGH)
             assert stage.waits_at == [HOLDS[type_name(behavior)][0]], behavior.id
             stage.authority.set_pace({})

@@ -7,7 +7,7 @@ from msgspec.structs import replace
 
 from tests.judge.case import Case, Done, Finding, within
 from tests.judge.laws_time import EXACT
-from tests.judge.reading import LASTING, SHIFTS, WITH_STROKE, Asked, Reading
+from tests.judge.reading import LASTING, SHIFTS, WITH_STROKE, Asked, Place, Reading, Relation, Term
 
 LEAVING = ("stroke_end", "relax", "end")
 """Points that say when a look, a face or a posture ends."""
@@ -39,17 +39,31 @@ def customs(case: Case) -> Iterator[Finding]:
 
 
 def _without_the_lost(case: Case, block: Reading) -> Reading:
-    """The block without what was lost before it was there, as if that had never been written."""
+    """The block without what was lost before it was there, as if that had never been written.
+
+    What was one instant with a point that is lost stays tied to what else was, by docs/realizer.md.
+    """
     relations = []
+    tied: dict[Place, list[Term]] = {}
     for each in block.relations:
-        left = tuple(
-            term
-            for term in each.terms
-            if (term.place.block, term.place.behavior) not in case.lost or term.place in case.times
-        )
+        gone = [term for term in each.terms if _is_gone(case, term)]
+        left = tuple(term for term in each.terms if term not in gone)
         if len(left) > 1:
             relations.append(replace(each, terms=left))
+        for term in gone if each.kind == "same" else ():
+            # In the seconds of the lost point, whatever its offset was here.
+            meant = [other._replace(offset=other.offset - term.offset) for other in left]
+            tied.setdefault(term.place, []).extend(meant)
+    relations += [
+        Relation("same", tuple(terms), f"through {place.behavior}:{place.sync}")
+        for place, terms in tied.items()
+        if len(terms) > 1
+    ]
     return replace(block, relations=tuple(relations))
+
+
+def _is_gone(case: Case, term: Term) -> bool:
+    return (term.place.block, term.place.behavior) in case.lost and term.place not in case.times
 
 
 def _length(case: Case, done: Done) -> Iterator[Finding]:

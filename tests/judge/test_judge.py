@@ -10,8 +10,10 @@ from pathlib import Path
 import pytest
 
 from tests.judge import generate, playing
+from tests.judge.case import Case
 from tests.judge.generate import Kind
 from tests.judge.laws import LAWS, judge
+from tests.judge.laws_time import EXACT, misses
 from tests.judge.reading import Place, Term, read, term
 from tests.judge.shrinking import shrink
 from tests.judge.story import Deed, Story
@@ -19,16 +21,23 @@ from tests.judge.story import Deed, Story
 ENFORCED = (
     "hang", "crash", "end", "points", "losses", "required", "words", "wrong length", "out of turn", "parts",
     "in the air", "spoken order", "needless loss", "unmade end of a stroke", "moves though held", "late for a hold",
+    "pointless",
 )  # fmt: skip
 """Laws that no story may break."""
+ALONE = ("broken", "left too early")
+"""Laws that no story of a single block and a body without faults may break."""
+OFF = 0.02
+"""Share of such blocks that may be off their predictions; docs/realizer.md says what is left."""
 SEED = 12
 MANY: dict[tuple[Kind, bool], int] = {
     ("alone", False): 30, ("streams", False): 25, ("sentences", False): 20,
     ("alone", True): 15, ("streams", True): 10,
 }  # fmt: skip
 """Number of stories of each kind, without and with a body that has faults."""
-HELD = 20
-"""Number of stories of which parts are held for a while."""
+PREDICTED = 150
+"""Number of single blocks of which the predictions are judged."""
+HELD: dict[tuple[Kind, bool], int] = {("alone", False): 20, ("streams", False): 12, ("streams", True): 6}
+"""Number of stories of which parts are held for a while, without and with a body that has faults."""
 WHOLE: dict[Kind, tuple[int, ...]] = {
     "alone": (0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 15), "streams": (0, 1, 2, 3, 4, 6, 8, 10, 11, 16),
     "sentences": (0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11),
@@ -44,15 +53,28 @@ def test_no_story_breaks_a_law_that_is_enforced(kind: Kind, faults: bool) -> Non
         story = generate.story(SEED, number, kind, faults=faults)
         record = playing.play(story, asks=kind == "sentences")
         assert record.told, story.seed
-        found += [f"{story.seed}: {each}" for each in judge(story, record) if each.law in ENFORCED]
+        enforced = (*ENFORCED, *ALONE) if kind == "alone" and not faults else ENFORCED
+        found += [f"{story.seed}: {each}" for each in judge(story, record) if each.law in enforced]
 
     assert found == []
 
 
-def test_what_is_held_makes_nothing_late_and_goes_on_where_it_stopped() -> None:
+def test_points_of_a_single_block_come_when_predicted() -> None:
+    worst = []
+    for number in range(PREDICTED):
+        story = generate.story(SEED, number, "alone")
+        worst += misses(Case(story, playing.play(story)))
+
+    assert len(worst) > PREDICTED / 2
+    assert sum(seconds > EXACT for seconds in worst) <= OFF * len(worst), worst
+
+
+@pytest.mark.contained
+@pytest.mark.parametrize(("kind", "faults"), HELD)
+def test_what_is_held_makes_nothing_late_and_goes_on_where_it_stopped(kind: Kind, faults: bool) -> None:
     found = []
-    for number in range(HELD):
-        story = generate.story(SEED, number, "alone", holds=True)
+    for number in range(HELD[kind, faults]):
+        story = generate.story(SEED, number, kind, faults=faults, holds=True)
         record = playing.play(story)
         assert record.steered, story.seed
         found += [f"{story.seed}: {each}" for each in judge(story, record) if each.law in ENFORCED]
@@ -71,7 +93,7 @@ def test_these_stories_break_no_law(kind: Kind) -> None:
 
 
 def test_the_list_of_laws_that_are_enforced_names_laws() -> None:
-    assert set(ENFORCED) <= LAWS.keys()
+    assert {*ENFORCED, *ALONE} <= LAWS.keys()
 
 
 def test_the_judge_takes_nothing_from_what_it_judges() -> None:

@@ -13,6 +13,8 @@ from engage_hri.schemas import keys
 from engage_hri.schemas.behaviors import Event, Gaze, Gesture, Head, Mark, Speech, Wait
 from engage_hri.schemas.blocks import Block, BlockOutcome, InterruptBehavior, PerformanceSteered, SteerPerformance
 from engage_hri.services.realizer.config import RealizerConfig
+from engage_hri.services.realizer.perform import steering
+from engage_hri.services.realizer.perform.holding import Holds
 from engage_hri.services.requests.ends import RequestRefused
 from engage_hri.services.runtime.virtual_time import run_virtual
 from tests.realizer.fake_body import FakeBody
@@ -147,6 +149,23 @@ async def test_what_is_held_for_too_long_is_stopped() -> None:
     assert outcome.status == "interrupted"
     assert "realizer.longest_hold" in str(outcome.fault)
     assert after_that.status == "done"
+
+
+async def test_a_realizer_that_has_ended_counts_no_longer_for_how_long_it_was_held() -> None:
+    asked: list[float] = []
+
+    class Noting(Holds):
+        def since(self, at: float) -> list[tuple[str, str]]:
+            asked.append(at)
+            return super().since(at)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(steering, "Holds", Noting)
+        async with stage(config=RealizerConfig(longest_hold=7.0)) as seen:
+            await steered(seen, "hold")
+        await asyncio.sleep(20.0)
+
+    assert asked == []
 
 
 async def test_an_event_is_given_its_time_without_that_for_which_it_was_held() -> None:

@@ -180,6 +180,20 @@ def test_words_whose_end_cannot_be_lose_that_with_one_warning_and_are_said(end: 
     assert (at(made, "s:start"), at(made, "s:end"), at(made, "g:stroke")) == (1.0, 2.0, 2.0)
 
 
+@pytest.mark.parametrize("dropped", [(), ("w",)])
+def test_words_are_not_lost_for_a_time_through_what_is_gone(dropped: tuple[str, ...]) -> None:
+    """The wait ties the ends of the words to each other, half a second apart; also when it is dropped itself."""
+    made_of = block(
+        (Wait(id="w", duration=1.0), Speech(id="s", text="a")),
+        together("w:end-0.5", "s:start"),
+        together("w:end", "s:end"),
+    )
+    made = plan_block(made_of, [elastic("s", ("start", "end"), 0.9, 1.0, 1.1)], dropped=dropped)
+
+    assert warnings(made) == [("IMPOSSIBLE_TO_SCHEDULE", "s")]
+    assert (made.dropped, made.given_up) == (dropped, ("s",))
+
+
 @pytest.mark.parametrize(
     "timing",
     [{"start": "3", "end": "1"}, {"start": "-1"}, {"stroke": "0.25"}, {"end": "p:start"}, {"start": "p:start+1"}],

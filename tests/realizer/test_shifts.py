@@ -7,6 +7,7 @@ import pytest
 from engage_hri.schemas.behaviors import BlockBehavior, Gaze, GazeShift, HeadDirectionShift, Mark, Speech
 from engage_hri.schemas.body import Estimate, Phase
 from engage_hri.services.control.config import Variability
+from engage_hri.services.realizer.points import Point
 from tests.realizer.planning import at, plan, timed, warnings
 from tests.realizer.stage import after, block, together
 from tests.realizer.test_simulated_body import robot
@@ -63,6 +64,13 @@ def test_a_shift_beneath_a_look_takes_nothing_from_it() -> None:
     assert made.problems == ()
     assert at(made, "z:relax") == 3.0
     assert at(made, "g:start") == at(made, "g:end") == at(made, "s:start") == 1.0
+
+
+@pytest.mark.parametrize("shift", [SHIFT, OTHER])
+def test_who_takes_over_a_shift_is_no_look_so_the_shift_is_not_at_its_end(shift: BlockBehavior) -> None:
+    made = plan(block((shift, timed(LOOK, start="3"), WORDS)))
+
+    assert made.kept[shift.id] == Point(shift.id, "end")
 
 
 TIMED = [

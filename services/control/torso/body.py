@@ -9,7 +9,7 @@ from collections.abc import AsyncGenerator, Sequence
 from contextlib import aclosing
 from math import inf, radians
 
-from engage_hri.schemas.behaviors import BlockBehavior, Gaze, GazeShift, HeadDirectionShift, Speech, Wait
+from engage_hri.schemas.behaviors import BlockBehavior, GazeShift, HeadDirectionShift, Speech, Wait
 from engage_hri.schemas.body import BodyPose, Capabilities, Estimate, EstimateItem, NoPointZone
 from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.references import type_name
@@ -31,7 +31,7 @@ from engage_hri.services.control.torso import choreography, kinematics, tracks
 from engage_hri.services.control.torso.beneath import pass_end
 from engage_hri.services.control.torso.course import CoursePoint, Impossible
 from engage_hri.services.control.torso.estimates import infeasible, speech_estimate, wait_estimate
-from engage_hri.services.control.torso.moving import Torso
+from engage_hri.services.control.torso.moving import Torso, is_last_on_target
 from engage_hri.services.control.torso.rehearsal import Clock, beside, rehearsed
 from engage_hri.services.control.torso.repertoire import BUILT_IN, Repertoire
 from engage_hri.services.control.torso.runs import OVERHEAT, STALL, Run
@@ -170,6 +170,8 @@ class SimulatedBody(Body):
                 await run.bell.wait(inf if due is None else due)
             elif point.sync in (STALL, OVERHEAT):
                 await self._fail_or_stall(run, point)
+            elif not run.holding and self._torso.is_off_target(run, point.sync):
+                raise _out_of_reach(run)
             elif point.held_with and (run.holding or not run.may_pass(point.held_with)):
                 arrived = max(due, since)
                 if not run.may_pass(point.held_with):
@@ -177,6 +179,8 @@ class SimulatedBody(Body):
                     yield Arrived(point.held_with, arrived)
                 while not run.may_pass(point.held_with) and not run.is_over:
                     await run.bell.wait(inf)
+                if not run.is_over and self._torso.is_off_target(run, point.sync):
+                    raise _out_of_reach(run)
                 # What is taken over just as it may go on has passed the point, and goes no further.
                 if not run.is_over or (run.is_taken_over and run.may_pass(point.held_with)):
                     since = self._loop.time()
@@ -184,8 +188,8 @@ class SimulatedBody(Body):
                         yield Reached(sync, since, arrived)
             else:
                 run.pending.pop(0)
-                if point.sync == "relax" and isinstance(run.behavior, Gaze):
-                    self._torso.turn_home(run)
+                if is_last_on_target(run.behavior, point.sync):
+                    self._torso.leave_target(run)
                 self._torso.attention.follow_run(run, self._loop.time())
                 yield Reached(point.sync, due, due)
         if run.is_beneath or run.is_taken_over:
@@ -244,3 +248,7 @@ class SimulatedBody(Body):
 
 def _fault(behavior: BlockBehavior, reason: str) -> Fault:
     return Fault(reason=reason, where=behavior.id, service="control")
+
+
+def _out_of_reach(run: Run) -> BodyFailed:
+    return BodyFailed(_fault(run.behavior, "its target is out of reach where the torso is now"))

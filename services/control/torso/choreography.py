@@ -34,6 +34,7 @@ from engage_hri.schemas.units import Degrees, Seconds
 from engage_hri.schemas.vocabulary import normal
 from engage_hri.schemas.world import Entity, World
 from engage_hri.services.control.torso import expressions, kinematics
+from engage_hri.services.control.torso.aiming import TRUNK, Aim
 from engage_hri.services.control.torso.course import (
     Course,
     CoursePoint,
@@ -64,16 +65,19 @@ TYPES: tuple[type[BlockBehavior], ...] = (
 )  # fmt: skip
 """Types of behaviors that this body performs."""
 
+Looked = tuple[Aim, tuple[float, ...]]
+"""The place of a look, and the angles of the neck on it."""
+
 
 def plan(behavior: BlockBehavior, situation: Situation) -> Course:
     """Plan the course of `behavior` in `situation`. Speech and wait move nothing and have none. Raises Impossible."""
     match behavior:
         case Gaze():
-            return _noted(_glance(_gaze_angles(behavior, situation), situation), behavior)
+            return _noted(_glance(_gaze_aim(behavior, situation), situation), behavior)
         case GazeShift():
-            return _noted(_shift(_gaze_angles(behavior, situation), situation), behavior)
+            return _noted(_shift(_gaze_aim(behavior, situation), situation), behavior)
         case HeadDirectionShift(target=target):
-            return _shift(_neck_angles(target, 0.0, "", situation), situation)
+            return _shift(_neck_aim(target, 0.0, "", situation), situation)
         case Pointing(target=target, mode=mode):
             return _point(_entity(target, situation.world), mode, situation)
         case Gesture(lexeme=lexeme, mode=mode):
@@ -99,36 +103,31 @@ def plan(behavior: BlockBehavior, situation: Situation) -> Course:
             raise Impossible("BEHAVIOR_TYPE_NOT_SUPPORTED", f"this body has no {type(behavior).__name__.lower()}")
 
 
-def look(target: str, situation: Situation) -> tuple[float, float]:
-    """Neck angles that look at an entity, as near as the joints come. Raises Impossible if there is none."""
-    return _neck_angles(target, 0.0, "", situation)
-
-
 def _entity(target: str, world: World) -> Entity:
     if (entity := world.entity(target)) is None:
         raise Impossible("NO_SUCH_TARGET", f"the world has no {target!r}")
     return entity
 
 
-def _neck_angles(target: str, offset: Degrees, direction: str, situation: Situation) -> tuple[float, float]:
+def _neck_aim(target: str, offset: Degrees, direction: str, situation: Situation) -> Looked:
     entity = _entity(target, situation.world)
     try:
-        yaw, pitch = kinematics.look_at(entity.position, situation.pose, kinematics.NOD_RESERVE)
+        free = kinematics.look_at(entity.position, situation.pose, kinematics.NOD_RESERVE)
     except Unreachable as error:
         raise Impossible("CANNOT_CREATE_BEHAVIOR", f"cannot look at {target!r}: {error}") from error
     right, up = OFFSETS.get(normal(direction), (0, 0))
-    return (
-        _clamped("neck_yaw", yaw - right * radians(offset), kinematics.NOD_RESERVE),
-        _clamped("neck_pitch", pitch + up * radians(offset), kinematics.NOD_RESERVE),
-    )
+    beside, trunk = (-right * radians(offset), up * radians(offset)), angles(TRUNK, situation.pose)
+    aim = Aim(target=entity.position, trunk=trunk, beside=beside, reserve=kinematics.NOD_RESERVE)
+    return aim, aim.nearest(free)
 
 
-def _glance(goal: tuple[float, float], situation: Situation) -> Course:
-    joints = ("neck_yaw", "neck_pitch")
-    here, base = angles(joints, situation.pose), angles(joints, situation.rest)
+def _glance(looked: Looked, situation: Situation) -> Course:
+    aim, goal = looked
+    joints, here = aim.joints, situation.start(aim)
+    base = angles(joints, situation.rest)
     out, back = turning_time(here, goal), turning_time(goal, base)
     if out == 0.0:
-        goal = (here[0], here[1])
+        goal = here
     if back == 0.0:
         base = goal
     drift = (0.0, 0.0)
@@ -143,21 +142,21 @@ def _glance(goal: tuple[float, float], situation: Situation) -> Course:
         Leg(goal=base, seconds=back, marks=marks(1.0, "end")),
     )
     ray = kinematics.gaze({**situation.pose, **dict(zip(joints, goal, strict=True))})
-    return course(("head",), joints, legs, held_on_target("stroke"), goal, ray)
+    return course(("head",), joints, legs, held_on_target("stroke"), goal, ray, aim=aim)
 
 
-def _shift(goal: tuple[float, float], situation: Situation) -> Course:
-    joints = ("neck_yaw", "neck_pitch")
-    here = angles(joints, situation.pose)
+def _shift(looked: Looked, situation: Situation) -> Course:
+    aim, goal = looked
+    joints, here = aim.joints, situation.start(aim)
     seconds = turning_time(here, goal)
-    goal = goal if seconds else (here[0], here[1])
+    goal = goal if seconds else here
     legs = (Leg(goal=goal, seconds=seconds, marks=(("start", 0.0), ("end", 1.0))),)
     ray = kinematics.gaze({**situation.pose, **dict(zip(joints, goal, strict=True))})
-    return course(("head",), joints, legs, (CoursePoint("start"), CoursePoint("end")), goal, ray)
+    return course(("head",), joints, legs, (CoursePoint("start"), CoursePoint("end")), goal, ray, aim=aim)
 
 
-def _gaze_angles(behavior: Gaze | GazeShift, situation: Situation) -> tuple[float, float]:
-    return _neck_angles(behavior.target, behavior.offset_angle, behavior.offset_direction, situation)
+def _gaze_aim(behavior: Gaze | GazeShift, situation: Situation) -> Looked:
+    return _neck_aim(behavior.target, behavior.offset_angle, behavior.offset_direction, situation)
 
 
 def _noted(made: Course, behavior: Gaze | GazeShift) -> Course:
@@ -185,23 +184,24 @@ def _point(entity: Entity, mode: str | None, situation: Situation) -> Course:
             continue
         hand = f"{side.upper()}_HAND"
         note = f"this body does not point with {mode!r}; it points with its {hand!r}, the nearest"
-        return replace(_point_with(side, aim, situation), note=note if mode == "BOTH_HANDS" else "")
+        return replace(_point_with(entity, side, aim, situation), note=note if mode == "BOTH_HANDS" else "")
     raise Impossible("CANNOT_CREATE_BEHAVIOR", f"cannot point at {entity.id!r}: {'; '.join(reasons)}")
 
 
-def _point_with(side: Side, aim: kinematics.ArmAim, situation: Situation) -> Course:
-    joints = kinematics.joints_of(f"{side}_arm")
-    here, home = angles(joints, situation.pose), angles(joints, situation.rest)
-    yaw, pitch, elbow = aim.stroke
+def _point_with(entity: Entity, side: Side, aim: kinematics.ArmAim, situation: Situation) -> Course:
+    trunk, pitch = angles(TRUNK, situation.pose), (aim.stroke[1] + aim.held[1]) / 2
+    on = Aim(target=entity.position, trunk=trunk, side=side, pitch=pitch)
+    joints, here = on.joints, situation.start(on)
+    home = angles(joints, situation.rest)
+    yaw, lift, elbow = aim.stroke
     ready = (
         here[0] + 0.7 * (yaw - here[0]),
-        pitch + radians(12),
+        lift + radians(12),
         max(elbow + 0.4 * (here[2] - elbow), elbow + radians(18)),
     )
     slide = tuple((b - a) / SLIDE for a, b in zip(aim.stroke, aim.held, strict=True))
     raising = arm_time(here, ready, 0.25, 150.0)
     stroke = arm_time(ready, aim.stroke, 0.4, 120.0)
-    back = max(0.4, return_time(aim.held, home))
     through = tuple(
         0.35 * ((b - a) / raising + (c - b) / stroke) for a, b, c in zip(here, ready, aim.stroke, strict=True)
     )
@@ -209,12 +209,13 @@ def _point_with(side: Side, aim: kinematics.ArmAim, situation: Situation) -> Cou
         Leg(goal=ready, velocity=through, seconds=raising, marks=(("start", 0.0), ("ready", 1.0))),
         Leg(goal=aim.stroke, velocity=slide, seconds=stroke, marks=(("stroke_start", 0.1 / stroke), ("stroke", 1.0))),
         Leg(goal=aim.held, velocity=slide, seconds=SLIDE, marks=marks(1.0, "stroke_end")),
-        Leg(goal=home, seconds=back, marks=(("relax", 0.1 / back), ("end", 1.0))),
+        lowering(aim.held, home),
     )
     ray = kinematics.arm({**situation.pose, **dict(zip(joints, aim.held, strict=True))}, side)
-    return course((f"{side}_arm",), joints, legs, held_around_stroke(), aim.held, ray)
+    return course((f"{side}_arm",), joints, legs, held_around_stroke(), aim.held, ray, aim=on)
 
 
-def _clamped(joint: str, angle: float, reserve: float) -> float:
-    limit = kinematics.LIMIT[joint]
-    return min(max(angle, limit.low + reserve), limit.high - reserve)
+def lowering(here: tuple[float, ...], home: tuple[float, ...]) -> Leg:
+    """Leg of an arm from a target back to where it belongs."""
+    seconds = max(0.4, return_time(here, home))
+    return Leg(goal=home, seconds=seconds, marks=(("relax", 0.1 / seconds), ("end", 1.0)))

@@ -2,12 +2,14 @@
 
 from collections.abc import Mapping, Sequence
 
+import numpy as np
 from msgspec import Struct
 
 from engage_hri.schemas.body import NoPointZone, Ray
 from engage_hri.schemas.feedback import WarningKind
 from engage_hri.schemas.syncref import SYNC_POINTS
 from engage_hri.schemas.world import World
+from engage_hri.services.control.torso.aiming import Aim, Trunk
 from engage_hri.services.control.torso.path import Leg
 from engage_hri.services.control.torso.repertoire import BUILT_IN, Repertoire
 
@@ -44,12 +46,17 @@ class Course(Struct, frozen=True, kw_only=True):
     ray: Ray | None = None
     is_resizable: bool = False
     """True if it may be made smaller for want of time; false for a motion with a target."""
+    aim: Aim | None = None
+    """The place that it is on from its beginning until it leaves its target: the trunk may move meanwhile."""
     note: str = ""
     """Warning, if this is only the nearest to what was asked: names both."""
 
 
 class Situation(Struct, frozen=True):
-    """Circumstances of a course. pose: joint angles at its start. rest: joint angles that it returns to."""
+    """Circumstances of a course. pose: joint angles at its start, with the trunk where it is going to be.
+
+    rest: joint angles that it returns to. trunk: where the trunk is at its start; None: where it is going to be.
+    """
 
     pose: Mapping[str, float]
     rest: Mapping[str, float]
@@ -58,16 +65,26 @@ class Situation(Struct, frozen=True):
     busy: tuple[str, ...] = ()
     """Names of parts in use: a pointing without a mode takes the other arm."""
     repertoire: Repertoire = BUILT_IN
+    trunk: Trunk | None = None
+
+    def start(self, aim: Aim) -> tuple[float, ...]:
+        """Angles from which the path of a part begins that is going to be on a place."""
+        here = angles(aim.joints, self.pose)
+        return (
+            here
+            if self.trunk is None or aim.is_laid_for(self.trunk)
+            else tuple(np.subtract(here, aim.offset(self.trunk)).tolist())
+        )
 
 
 def course(
     parts: tuple[str, ...], joints: tuple[str, ...], legs: tuple[Leg, ...], points: tuple[CoursePoint, ...],
-    goal: tuple[float, ...], ray: Ray | None = None, note: str = "",
+    goal: tuple[float, ...], ray: Ray | None = None, note: str = "", aim: Aim | None = None,
 ) -> Course:  # fmt: skip
     """Make the course of a motion to `goal`."""
     return Course(
         parts=parts, joints=joints, legs=legs, points=points, on_target=dict(zip(joints, goal, strict=True)), ray=ray,
-        note=note,
+        note=note, aim=aim,
     )  # fmt: skip
 
 

@@ -1,9 +1,11 @@
 """Estimates of the simulated body, from the paths that it then moves along: without deviations they are exact."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from itertools import pairwise
 from math import inf
+
+import numpy as np
 
 from engage_hri.schemas.behavior_types import sync_points
 from engage_hri.schemas.behaviors import BlockBehavior, Speech, Wait
@@ -12,9 +14,12 @@ from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.control.torso.course import Course, CoursePoint, Impossible
 from engage_hri.services.control.torso.motion import SLOWEST
-from engage_hri.services.control.torso.path import Path
+from engage_hri.services.control.torso.path import Array, Path
 from engage_hri.services.control.torso.sizing import quickest
 from engage_hri.services.control.voice.timeline import Utterance
+
+Added = Callable[[Seconds], Array]
+"""What the trunk adds to the joints of a path so many seconds after it began."""
 
 
 def infeasible(behavior: BlockBehavior, impossible: Impossible) -> Estimate:
@@ -39,11 +44,22 @@ def wait_estimate(behavior: Wait, duration: Seconds, pose: BodyPose) -> Estimate
 
 
 def motion_estimate(
-    behavior: BlockBehavior, course: Course, path: Path, pose: BodyPose, pose_end: BodyPose
+    behavior: BlockBehavior,
+    course: Course,
+    path: Path,
+    pose: BodyPose,
+    pose_end: BodyPose,
+    added: Added | None = None,
 ) -> Estimate:
-    """Estimate a behavior that moves along `path`. pose, pose_end: joint angles on target, and at the end."""
+    """Estimate a behavior that moves along `path`. pose, pose_end: joint angles on target, and at the end.
+
+    added: what the trunk adds to the path, if it moves.
+    """
     is_gaze, is_arm = course.parts == ("head",), course.parts[0].endswith("_arm")
-    degrees = math.degrees(path.travel(path.marks.get("stroke", path.length))) if is_gaze or is_arm else 0.0
+    degrees = 0.0
+    if is_gaze or is_arm:
+        until = path.marks.get("stroke", path.length)
+        degrees = math.degrees(path.travel(until) if added is None else _travel(path, until, added))
     return Estimate(
         behavior=behavior.id,
         feasible=True,
@@ -56,6 +72,12 @@ def motion_estimate(
         pose_after=pose,
         pose_end=pose_end,
     )
+
+
+def _travel(path: Path, until: Seconds, added: Added) -> float:
+    """Way of all joints along `path` to which the trunk adds its share."""
+    seen = [path.at(s).q + added(s) for s in np.linspace(0.0, until, 9).tolist()]
+    return sum(float(np.sum(np.abs(after - before))) for before, after in pairwise(seen))
 
 
 def _phases(

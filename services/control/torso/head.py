@@ -1,6 +1,6 @@
 """Gaze of the simulated torso: the base gaze, the entity the eyes rest on, and following entities that move. Pure."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from math import inf, radians
 
@@ -9,6 +9,7 @@ from msgspec.structs import replace
 from engage_hri.schemas.behaviors import BlockBehavior, Gaze, GazeShift, HeadDirectionShift
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.control.torso import choreography, tracks
+from engage_hri.services.control.torso.aiming import NECK, Aim
 from engage_hri.services.control.torso.course import Course, Impossible, Situation
 from engage_hri.services.control.torso.motion import Motion
 from engage_hri.services.control.torso.pace import turning_time
@@ -42,6 +43,8 @@ class Fixation:
     def __init__(self) -> None:
         self.base: BlockBehavior | None = None
         self.angles = tracks.HOME["head"]
+        self.aim: Aim | None = None
+        """The place that the base gaze is on."""
         self._entity = ""
         self._since: Seconds = 0.0
 
@@ -51,17 +54,21 @@ class Fixation:
         return eye_target(self.base)
 
     def shift(self, behavior: BlockBehavior, course: Course) -> None:
-        self.base, self.angles = behavior, course.legs[-1].goal
+        self.base, self.angles, self.aim = behavior, course.legs[-1].goal, course.aim
 
     def stay(self, angles: tuple[float, ...]) -> None:
         """Make a direction the base gaze, without an entity."""
-        self.base, self.angles = None, angles
+        self.base, self.angles, self.aim = None, angles, None
 
     def update(self, situation: Situation) -> None:
         """Turn the base after its entity; the last direction stays when it is gone or out of view."""
         if self.base is not None:
             with suppress(Impossible):
-                self.angles = choreography.plan(self.base, situation).legs[-1].goal
+                self.shift(self.base, choreography.plan(self.base, situation))
+
+    def angles_at(self, trunk: Sequence[float]) -> tuple[float, ...]:
+        """Angles of the base gaze with the trunk elsewhere."""
+        return self.angles if self.aim is None else tuple((self.aim.offset(trunk) + self.angles).tolist())
 
     def fixated(self, now: Seconds) -> str:
         """Id of the entity that the eyes rest on; empty: none."""
@@ -85,10 +92,18 @@ class Fixation:
             self.expect(eye_target(run.behavior), motion.crossing(marks["end"]), now)
 
 
-def turn(track: Track, goal: tuple[float, ...], now: Seconds) -> None:
-    """Turn the head to `goal` if it is noticeably elsewhere than where the head goes now."""
-    if differ(goal, tuple(track.motion.at(inf).q)):
-        track.return_to(goal, now)
+def turn(track: Track, goal: tuple[float, ...], now: Seconds, aim: Aim | None) -> None:
+    """Turn the head to `goal`, on the place of `aim`, if it is noticeably elsewhere than where it goes."""
+    if differ(goal, going(track, aim)):
+        track.return_to(goal, now, aim)
+
+
+def going(track: Track, aim: Aim | None) -> tuple[float, ...]:
+    """Angles at which the head comes to rest, with the trunk where `aim` has it."""
+    rests = track.motion.at(inf).q
+    if aim is not None and track.aim is not None:
+        rests = rests + track.aim.offset(aim.trunk)
+    return tuple(rests.tolist())
 
 
 def way_back(here: tuple[float, ...], base: tuple[float, ...]) -> Leg:
@@ -98,22 +113,35 @@ def way_back(here: tuple[float, ...], base: tuple[float, ...]) -> Leg:
 
 
 def retargeted(run: Run, course: Course, track: Track, now: Seconds) -> Path | None:
-    """Path for the rest of a gaze or shift after its target (or base) has moved; None: not noticeably.
+    """Path for the rest of a gaze or shift on its way whose target has moved; None: not noticeably.
 
     course: to where the target is now.
     """
-    if run.awaits("stroke") or is_shift(run.behavior):
-        legs, goal, old = course.legs, _target(course.on_target), _target(run.course.on_target)
-    elif run.awaits("relax"):
+    if not differ(_target(course.on_target), going_to(run.course, course)):
         return None
-    else:
-        legs, goal, old = course.legs[-1:], course.legs[-1].goal, run.course.legs[-1].goal
-    if not differ(goal, old):
+    legs = (replace(course.legs[0], seconds=_left(run, now)), *course.legs[1:])
+    return Path(track.start_at(now, course.aim), run.with_faults(legs), track.limits(now, course.aim))
+
+
+def homeward(run: Run, base: tuple[float, ...], track: Track, now: Seconds, aim: Aim | None) -> Path | None:
+    """Path for the rest of a look's way home whose base has moved; None: not noticeably."""
+    if not differ(base, going(track, aim)):
         return None
+    leg = replace(run.course.legs[-1], goal=base, seconds=_left(run, now))
+    return Path(track.start_at(now, aim), run.with_faults((leg,)), track.limits(now, aim))
+
+
+def going_to(old: Course, new: Course) -> tuple[float, ...]:
+    """Target of one course of the head, with the trunk where another has it."""
+    assert old.aim is not None
+    assert new.aim is not None
+    return tuple((old.aim.offset(new.aim.trunk) + _target(old.on_target)).tolist())
+
+
+def _left(run: Run, now: Seconds) -> Seconds:
+    """Seconds of the leg on which the run is."""
     left = run.motion.path.after(run.motion.s(now))
-    seconds = max(left[0].seconds if left else 0.0, SHORTEST)
-    legs = (replace(legs[0], seconds=seconds), *legs[1:])
-    return Path(track.at(now), run.with_faults(legs), tracks.LIMITS["head"])
+    return max(left[0].seconds if left else 0.0, SHORTEST)
 
 
 def differ(one: tuple[float, ...], other: tuple[float, ...]) -> bool:
@@ -121,7 +149,7 @@ def differ(one: tuple[float, ...], other: tuple[float, ...]) -> bool:
 
 
 def _target(angles: Mapping[str, float]) -> tuple[float, ...]:
-    return tuple(angles[joint] for joint in tracks.NECK)
+    return tuple(angles[joint] for joint in NECK)
 
 
 def brake(motion: Motion, now: Seconds) -> tuple[float, ...]:

@@ -139,16 +139,28 @@ def look_at(target: Vector, pose: Pose, reserve: Radians = 0.0) -> tuple[float, 
 
     reserve: kept free before the joints' limits, for a nod. Raises Unreachable.
     """
-    x, y, z = _subtract(_to_torso(target, pose), NECK)
-    distance, above = hypot(x, y), z
-    if hypot(distance, above) <= EYES_ABOVE:
+    if math.dist(_to_torso(target, pose), NECK) <= EYES_ABOVE:
         raise Unreachable("it is inside the head")
-    # The axis passes EYES_ABOVE the neck's pivot, so the pitch is a little less than the direction from the pivot.
-    angles = (atan2(y, x), atan2(above, distance) - math.asin(EYES_ABOVE / hypot(distance, above)))
+    angles = neck_angles(target, pose)
     for joint, angle in zip(("neck_yaw", "neck_pitch"), angles, strict=True):
         if not LIMIT[joint].low + reserve <= angle <= LIMIT[joint].high - reserve:
             raise Unreachable(f"{joint} cannot turn to {math.degrees(angle):.0f} degrees")
     return angles
+
+
+def neck_angles(target: Vector, pose: Pose) -> tuple[float, float]:
+    """Neck yaw and pitch whose gaze axis runs through `target`, whether the joints come there or not."""
+    x, y, z = _subtract(_to_torso(target, pose), NECK)
+    distance = hypot(x, y)
+    # The axis passes EYES_ABOVE the neck's pivot, so the pitch is a little less than the direction from the pivot.
+    return atan2(y, x), atan2(z, distance) - math.asin(EYES_ABOVE / max(hypot(distance, z), EYES_ABOVE))
+
+
+def arm_angles(side: Side, target: Vector, pitch: Radians, pose: Pose) -> tuple[float, float, float]:
+    """Angles of the `side` arm with the shoulder at `pitch` whose forearm axis runs through `target`, within the
+    joints' limits or not."""
+    x, y, z = _subtract(_to_torso(target, pose), SHOULDER[side])
+    return _pointing(x, y, z, pitch)
 
 
 def point_at(side: Side, target: Vector, radius: Meters, pose: Pose) -> ArmAim:

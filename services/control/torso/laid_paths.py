@@ -17,10 +17,10 @@ KEPT = 128
 """Paths that are kept, the latest used. A fragment asks for some ten, and its behaviors then move along them."""
 
 
-def laid_path(start: JointMotion, course: Course) -> Path:
-    """The path along `course`. Raises Impossible."""
+def laid_path(start: JointMotion, course: Course, *, is_free: bool = False) -> Path:
+    """The path along `course`. is_free: without the ranges of joints (`tracks.limits_of`). Raises Impossible."""
     state = (np.asarray(each, dtype=np.float64).tobytes() for each in (start.q, start.v, start.a))
-    path, is_blocked = _laid(*state, course.legs, course.parts, course.joints)
+    path, is_blocked = _laid(*state, course.legs, course.parts, course.joints, is_free)
     if is_blocked:
         raise Impossible("CANNOT_CREATE_BEHAVIOR", "the table is in the way of the arm")
     return path
@@ -28,9 +28,15 @@ def laid_path(start: JointMotion, course: Course) -> Path:
 
 @lru_cache(KEPT)
 def _laid(
-    q: bytes, v: bytes, a: bytes, legs: tuple[Leg, ...], parts: tuple[str, ...], joints: tuple[str, ...]
+    q: bytes,
+    v: bytes,
+    a: bytes,
+    legs: tuple[Leg, ...],
+    parts: tuple[str, ...],
+    joints: tuple[str, ...],
+    is_free: bool,
 ) -> tuple[Path, bool]:
     """A path, and whether the table is in its way. q, v, a: the arrays of the state in which it starts."""
     start = JointMotion(*(np.frombuffer(each, dtype=np.float64) for each in (q, v, a)))
-    path = Path(start, legs, tracks.limits_of(parts))
+    path = Path(start, legs, tracks.limits_of(parts, is_free=is_free))
     return path, tracks.meets_table(path, joints)

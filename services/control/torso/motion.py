@@ -73,7 +73,8 @@ class Motion:
             cruise = left / time
         elif left >= rate * time:
             reach = rate + change * time
-            cruise = reach - sqrt(max(0.0, reach * reach - rate * rate - 2 * change * left))
+            room = reach * reach - rate * rate - 2 * change * left
+            cruise = reach - sqrt(room) if room >= 0.0 else fastest
         else:
             reach = change * time - rate
             cruise = sqrt(max(0.0, reach * reach - rate * rate + 2 * change * left)) - reach
@@ -84,6 +85,11 @@ class Motion:
         s, rate = self.s(now), self.rate(now)
         self.limit = min(self.limit, s + rate * rate / (2 * self.path.gentlest_brake) if at is None else at)
         self._replan(now, s, rate)
+
+    def reaches(self, s: Seconds, at: Seconds) -> bool:
+        """True if s is reached by `at`, as it moves now."""
+        crossing = self.crossing(s)
+        return crossing is not None and crossing <= at
 
     def can_stop_at(self, s: Seconds, now: Seconds) -> bool:
         """True if it has not passed s, and can come to rest there."""

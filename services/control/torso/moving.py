@@ -3,25 +3,31 @@
 Time is that of a clock: of the event loop for the body, of its own for a rehearsal.
 """
 
+import math
+from collections.abc import Sequence
 from typing import Protocol
 
 from msgspec.structs import replace
 
-from engage_hri.schemas.behaviors import BlockBehavior, Gaze
-from engage_hri.schemas.body import BodyPose, Estimate, NoPointZone
+from engage_hri.schemas.behaviors import BlockBehavior, Gaze, Pointing
+from engage_hri.schemas.body import BodyPose, Estimate, JointLimit, NoPointZone
 from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.world import World
 from engage_hri.services.control.body import MovementAuthority
 from engage_hri.services.control.torso import choreography, head, kinematics, tracks
+from engage_hri.services.control.torso.aiming import NECK, Aim
 from engage_hri.services.control.torso.course import Course, Impossible, Situation
-from engage_hri.services.control.torso.estimates import infeasible, motion_estimate
+from engage_hri.services.control.torso.estimates import Added, infeasible, motion_estimate
 from engage_hri.services.control.torso.head import Fixation
 from engage_hri.services.control.torso.laid_paths import laid_path
 from engage_hri.services.control.torso.motion import Motion
-from engage_hri.services.control.torso.path import Path, resting
+from engage_hri.services.control.torso.path import JointMotion, Leg, Path, resting
 from engage_hri.services.control.torso.repertoire import Repertoire
 from engage_hri.services.control.torso.runs import Run
 from engage_hri.services.control.torso.tracks import Track
+
+STEP: Seconds = 0.02
+"""Seconds between two looks at where the trunk will be."""
 
 
 class Clock(Protocol):
@@ -44,6 +50,8 @@ class Torso:
         self.repertoire = repertoire
         self.misbelieved = {joint: kinematics.HOME[joint] for joint in displaced}
         self.tracks = {part: Track(part, tracks.home_of(part, displaced)) for part in tracks.LIMITS}
+        for track in self.tracks.values():
+            track.trunk = self.tracks["torso"]
         self.runs: dict[str, Run] = {}
         self.world = World(entities=())
         self.attention = Fixation()
@@ -69,9 +77,17 @@ class Torso:
         # A nod is on top of the gaze, and leaves the neck where that has it.
         moved = () if course.parts == ("nod",) else zip(course.joints, course.legs[-1].goal, strict=True)
         on_target, end = {**situation.pose, **course.on_target}, {**situation.pose, **dict(moved)}
+        added = self._added(course) if moving and not self.misbelieved else None
         return motion_estimate(
-            behavior, course, path, kinematics.pose_message(on_target), kinematics.pose_message(end)
+            behavior, course, path, kinematics.pose_message(on_target), kinematics.pose_message(end), added
         )
+
+    def _added(self, course: Course) -> Added | None:
+        """Tell what the trunk adds to a path that begins now; None: nothing."""
+        now, aim, torso = self.clock.time(), course.aim, self.tracks["torso"]
+        if aim is None or torso.is_still(now, aim):
+            return None
+        return lambda seconds: aim.offset(torso.angles(now + seconds))
 
     def situation(self, world: World, pose: BodyPose | None = None, *, real: bool = False) -> Situation:
         """Describe what a course starts from. real: with the true joint angles, not those that the body believes."""
@@ -81,15 +97,18 @@ class Torso:
         for part, track in self.tracks.items():
             if part != "nod":
                 here.update(zip(track.joints, track.angles(now), strict=True))
-        # Head and arms aim for where the torso is going to be.
+        # Paths of head and arms are laid for where the torso is going to be.
         torso, leaning = self.tracks["torso"], self.runs.get("torso")
+        trunk = torso.angles(now) if pose is None and (real or not self.misbelieved) else None
         here.update(zip(torso.joints, torso.angles(max(now, torso.motion.end)), strict=True))
         if leaning is not None and leaning.is_setting_out and torso.is_moving(now):
             here.update((joint, leaning.course.on_target[joint]) for joint in torso.joints)
         if not real:
             here.update(self.misbelieved)
-        rest = {**tracks.bases(self.tracks), **dict(zip(tracks.NECK, self.attention.angles, strict=True))}
-        return Situation(tracks.updated(here, pose), rest, world, self.zones, tuple(self.runs), self.repertoire)
+        here = tracks.updated(here, pose)
+        base = self.attention.angles_at([here[joint] for joint in torso.joints])
+        rest = {**tracks.bases(self.tracks), **dict(zip(NECK, base, strict=True))}
+        return Situation(here, rest, world, self.zones, tuple(self.runs), self.repertoire, trunk)
 
     def path(self, course: Course, situation: Situation | None = None) -> Path:
         """Lay a path along `course`. Raises Impossible.
@@ -100,8 +119,47 @@ class Torso:
             start = resting([situation.pose[joint] for joint in course.joints])
         else:
             now = self.clock.time()
-            start = tracks.joined([self.tracks[part].at(now) for part in course.parts])
+            start = tracks.joined([self.tracks[part].start_at(now, course.aim) for part in course.parts])
+            if course.aim is not None and not self.tracks["torso"].is_still(now, course.aim):
+                return self._path_on_the_move(start, course)
         return laid_path(start, course)
+
+    def _path_on_the_move(self, start: JointMotion, course: Course) -> Path:
+        """Lay a path to a target while the trunk moves: it arrives when the target is in reach. Raises Impossible."""
+        path = laid_path(start, course, is_free=True)
+        arrival = _arrival(course)
+        if delay := self._delay(course.aim, self.clock.time() + path.marks[arrival]):
+            path = laid_path(start, replace(course, legs=_delayed(course.legs, arrival, delay)), is_free=True)
+        return path
+
+    def _delay(self, aim: Aim | None, at: Seconds) -> Seconds:
+        """Seconds from that instant on until the target comes into reach as the trunk moves; 0: it is, or never."""
+        torso = self.tracks["torso"]
+        for step in range(1 + max(0, math.ceil((torso.motion.end - at) / STEP))):
+            if aim is None or aim.is_in_reach(torso.angles(at + step * STEP)):
+                return step * STEP
+        return 0.0
+
+    def _wait_for_reach(self) -> None:
+        """Delay what is on its way to a target that is not in reach by then, since the trunk moves otherwise."""
+        now = self.clock.time()
+        for run in dict.fromkeys(self.runs.values()):
+            arrival = _arrival(run.course)
+            if run.course.aim is None or run.is_over or not run.awaits(arrival):
+                continue
+            at = run.motion.crossing(run.motion.path.marks[arrival])
+            if at is not None and at > now and (delay := self._delay(run.course.aim, at)):
+                track = self.tracks[run.course.parts[0]]
+                left = run.motion.path.after(run.motion.s(now), [point.sync for point in run.pending])
+                start, legs = track.start_at(now, run.course.aim), _delayed(left, arrival, delay)
+                path = Path(start, run.with_faults(legs), self._limits(run, run.course.aim, now))
+                self._play(run, path, run.course.aim)
+                run.bell.ring()
+
+    def is_off_target(self, run: Run, sync: str) -> bool:
+        """True if `sync` says that a behavior is on its target, which is out of reach, since the trunk has moved."""
+        aim, trunk = run.course.aim, self.tracks["torso"].angles(self.clock.time())
+        return aim is not None and sync == _arrival(run.course) and not aim.is_in_reach(trunk)
 
     # -- motion -------------------------------------------------------------------------------------------------
 
@@ -123,44 +181,74 @@ class Torso:
             self.set_base(run.behavior, run.course, run.authority)
         elif isinstance(run.behavior, choreography.SETTLING):
             tracks.rebase(self.tracks, run.course.parts, run.course.on_target)
-        self._play(run, path)
+        self._play(run, path, run.course.aim)
         if "torso" in run.course.parts:
-            self.follow()
+            self._wait_for_reach()
 
-    def _play(self, run: Run, path: Path) -> None:
+    def _play(self, run: Run, path: Path, aim: Aim | None) -> None:
         now = self.clock.time()
         run.play(Motion(path, now, cruise=run.cruise, limit=run.limit(path)))
         column = 0
         for part in run.course.parts:
-            self.tracks[part].play(run.motion, column)
+            self.tracks[part].play(run.motion, column, aim)
             column += len(self.tracks[part].joints)
         self.attention.follow_run(run, now)
 
-    def turn_home(self, run: Run) -> None:
-        """Lay the way home of a look anew if a shift has set another base since it began."""
-        track, base = self.tracks["head"], self.attention.angles
-        if head.differ(run.course.legs[-1].goal, base):
-            now = self.clock.time()
-            back = head.way_back(track.angles(now), base)
-            run.course = replace(run.course, legs=(*run.course.legs[:-1], back))
-            self._play(run, Path(track.at(now), run.with_faults((back,)), tracks.LIMITS["head"]))
+    def leave_target(self, run: Run) -> None:
+        """Let a part that leaves its target move with the trunk again, or be on the base gaze.
+
+        Its way home is laid anew if the trunk or a shift has made another of it.
+        """
+        now = self.clock.time()
+        track, aim = self.tracks[run.course.parts[0]], self._home(run)[1]
+        if (path := self.way_home(run, run.motion, now)) is not None:
+            self._play(run, path, aim)
+        else:
+            track.aim = None if aim is None else aim.at(track.trunk.angles(now))
+
+    def way_home(self, run: Run, motion: Motion, at: Seconds) -> Path | None:
+        """The way home of a behavior that leaves its target then; None: as it was laid."""
+        assert run.course.aim is not None
+        torso, (goal, aim) = self.tracks["torso"], self._home(run)
+        if torso.is_still(at, run.course.aim):
+            base = goal if aim is None else tuple((aim.offset(torso.angles(at)) + goal).tolist())
+            if not head.differ(run.course.legs[-1].goal, base):
+                return None
+        trunk = torso.at(at)
+        start = run.course.aim.added(motion.at(at), trunk)
+        start = start if aim is None else aim.removed(start, trunk)
+        return Path(start, run.with_faults((_leg_home(run, start, goal),)), self._limits(run, aim, at))
+
+    def _home(self, run: Run) -> tuple[tuple[float, ...], Aim | None]:
+        """Angles to which a behavior goes home, and the place that its part is on there."""
+        if run.course.parts == ("head",):
+            return self.attention.angles, self.attention.aim
+        return run.course.legs[-1].goal, None
 
     def leave_hold(self, run: Run, hold: str) -> list[str]:
         """Let `run` go on from a hold point, on a new path if it stands still. Returns the sync points it passes."""
         now = self.clock.time()
         stood, passed = run.stands, run.leave(hold, now)
         if stood and not run.holding and not run.is_over:
+            goal, aim = self._home(run)
+            is_homeward = any(is_last_on_target(run.behavior, sync) for sync in passed)
+            aim = aim if is_homeward else run.course.aim
+            start = tracks.joined([self.tracks[part].start_at(now, aim) for part in run.course.parts])
             legs = run.motion.path.after(run.motion.s(now), [point.sync for point in run.pending])
-            if run.course.parts == ("head",):
-                legs = (head.way_back(self.tracks["head"].angles(now), self.attention.angles),)
-            start = tracks.joined([self.tracks[part].at(now) for part in run.course.parts])
-            self._play(run, Path(start, run.with_faults(legs), tracks.limits_of(run.course.parts)))
+            if is_homeward:
+                legs = (_leg_home(run, start, goal),)
+            self._play(run, Path(start, run.with_faults(legs), self._limits(run, aim, now)), aim)
         return passed
+
+    def _limits(self, run: Run, aim: Aim | None, at: Seconds) -> tuple[JointLimit, ...]:
+        """Limits of a path with this aim that begins then."""
+        is_free = aim is not None and not self.tracks["torso"].is_still(at, aim)
+        return tracks.limits_of(run.course.parts, is_free=is_free)
 
     def extend(self, run: Run) -> None:
         now = self.clock.time()
         if (path := run.hurry(now)) is not None:
-            self._play(run, path)
+            self._play(run, path, self.tracks[run.course.parts[0]].aim)
         limit = run.limit(run.motion.path)
         is_extended = limit > run.motion.limit
         run.motion.extend(limit, now)
@@ -178,22 +266,35 @@ class Torso:
     def abandon(self, run: Run) -> None:
         """Send the parts of `run` to rest. A shift of the head that is broken off stays where it can stop."""
         if head.is_shift(run.behavior):
-            self.attention.stay(head.brake(run.motion, self.clock.time()))
+            self._stay(run)
             self.attention.expect("", 0.0, self.clock.time())
         else:
             if isinstance(run.behavior, choreography.SETTLING):
                 tracks.rebase(self.tracks, run.course.parts)
             self.relax(run.course.parts)
 
+    def _stay(self, run: Run) -> None:
+        """Stop a shift of the head, and make the direction where it stops the base gaze."""
+        now, track = self.clock.time(), self.tracks["head"]
+        goal = head.brake(run.motion, now)
+        if track.aim is not None and not track.is_still(now, track.aim):
+            goal = tuple((track.aim.offset(track.trunk.angles(run.motion.end)) + goal).tolist())
+            leg = Leg(goal=goal, seconds=max(run.motion.end - now, head.SHORTEST))
+            track.play(Motion(Path(track.at(now), (leg,), tracks.LIMITS["head"]), now))
+        track.aim = None
+        self.attention.stay(goal)
+
     def relax(self, parts: tuple[str, ...]) -> None:
         now = self.clock.time()
         for part in parts:
             track = self.tracks[part]
-            track.return_to(self.attention.angles if part == "head" else track.base, now)
             if part == "head":
+                track.return_to(self.attention.angles, now, self.attention.aim)
                 self.attention.expect(self.attention.entity, track.motion.end, now)
+            else:
+                track.return_to(track.base, now)
         if "torso" in parts:
-            self.follow()
+            self._wait_for_reach()
 
     # -- gaze ---------------------------------------------------------------------------------------------------
 
@@ -212,16 +313,45 @@ class Torso:
         """Turn the head to follow the entity that it looks at, or is about to look at."""
         now, situation, track = self.clock.time(), self.situation(self.world, real=True), self.tracks["head"]
         self.attention.update(situation)
+        aim = self.attention.aim
         if (run := self.runs.get("head")) is None:
-            head.turn(track, self.attention.angles, now)
+            head.turn(track, self.attention.angles, now, aim)
             return
         try:
             course = choreography.plan(run.behavior, situation)
         except Impossible:
             return
+        path: Path | None = None
         if run.stands:
-            head.turn(track, tuple(course.on_target.values()), now)
-        elif (path := head.retargeted(run, course, track, now)) is not None:
-            run.course = course
-            self._play(run, path)
+            head.turn(track, tuple(course.on_target.values()), now, course.aim)
+        elif run.awaits("stroke") or head.is_shift(run.behavior):
+            path, aim = head.retargeted(run, course, track, now), course.aim
+            run.course = course if path is not None else run.course
+        elif not run.awaits("relax"):
+            path = head.homeward(run, self.attention.angles, track, now, aim)
+        if path is not None:
+            self._play(run, path, aim)
             run.bell.ring()
+
+
+def is_last_on_target(behavior: BlockBehavior, sync: str) -> bool:
+    """True if a behavior with a target is on it up to this sync point."""
+    return (isinstance(behavior, Gaze) and sync == "relax") or (
+        isinstance(behavior, Pointing) and sync == "stroke_end"
+    )
+
+
+def _arrival(course: Course) -> str:
+    """The sync point that says that a behavior has come to its target."""
+    return "stroke" if any(point.sync == "stroke" for point in course.points) else "end"
+
+
+def _delayed(legs: Sequence[Leg], arrival: str, by: Seconds) -> tuple[Leg, ...]:
+    """Legs whose arrival comes later."""
+    return tuple(replace(leg, seconds=leg.seconds + by) if arrival in dict(leg.marks) else leg for leg in legs)
+
+
+def _leg_home(run: Run, start: JointMotion, goal: tuple[float, ...]) -> Leg:
+    """Leg from a target to where the part belongs."""
+    here = tuple(start.q.tolist())
+    return head.way_back(here, goal) if run.course.parts == ("head",) else choreography.lowering(here, goal)

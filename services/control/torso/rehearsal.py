@@ -12,7 +12,7 @@ from math import inf
 
 from msgspec.structs import replace
 
-from engage_hri.schemas.behaviors import BlockBehavior, Gaze
+from engage_hri.schemas.behaviors import BlockBehavior
 from engage_hri.schemas.body import BodyPose, Estimate, EstimateItem, Phase
 from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.world import World
@@ -21,7 +21,7 @@ from engage_hri.services.control.config import Variability
 from engage_hri.services.control.torso import choreography, head, tracks
 from engage_hri.services.control.torso.course import Course, Impossible
 from engage_hri.services.control.torso.motion import Motion
-from engage_hri.services.control.torso.moving import Torso
+from engage_hri.services.control.torso.moving import Torso, is_last_on_target
 from engage_hri.services.control.torso.path import Path, resting
 from engage_hri.services.control.torso.runs import Run
 from engage_hri.services.control.waiting import EARLY, Bell
@@ -67,7 +67,7 @@ def beside(torso: Torso, clock: Clock, world: World) -> Torso:
     other.misbelieved = dict(torso.misbelieved)
     other.tracks = {part: copy(track) for part, track in torso.tracks.items()}
     for track in other.tracks.values():
-        track.motion = copied(track.motion)
+        track.motion, track.trunk = copied(track.motion), other.tracks["torso"]
     runs = {id(run): copy(run) for run in torso.runs.values()}
     for run in runs.values():
         run.motion, run.bell, run.pending = copied(run.motion), clock, list(run.pending)
@@ -95,10 +95,18 @@ class _Part:
         self.estimate = estimate
         self.waits = dict(waits)
         self.passed: dict[str, Seconds] = {}
+        self._holds = {point.sync for point in run.course.points if point.held_with}
         self._stops = {point.sync for point in run.course.points if point.held_with in waits}
         self._forced = forced
         """Points for which it hurries or dawdles: the phases to them are told as they would be by themselves."""
         self._phases: dict[str, Seconds] = {}
+        self._known: tuple[object, ...] = ()
+        """What its way home depends on, as it was when that was last laid."""
+        self._marks: Mapping[str, Seconds] = {}
+        self._least: dict[str, Seconds] = {}
+        """Phases that took longer than they were asked to, as fast as the body could."""
+        self._most: dict[str, Seconds] = {}
+        """Phases to hold points that took less, as slow as it could be without a stop."""
 
     def settle(self, torso: Torso, clock: Clock, now: Seconds) -> None:
         """Note the points that it has passed by now. At a hold point where it waits it stays."""
@@ -106,16 +114,16 @@ class _Part:
         while run.pending and not run.is_over and not run.holding:
             point = run.pending[0]
             due = run.due(point)
-            if due is None or due > now + EARLY:
+            if due is None or due > now + 10.0**-ROUNDING:
                 return
             if point.held_with and not run.authority.covers(point.held_with):
                 run.holding = True
                 return
             run.pending.pop(0)
             self.passed[point.sync] = due
-            if point.sync == "relax" and isinstance(run.behavior, Gaze):
+            if is_last_on_target(run.behavior, point.sync):
                 clock.at = due
-                torso.turn_home(run)
+                torso.leave_target(run)
 
     def next_due(self) -> Seconds | None:
         """Instant at which a paced behavior passes its next point: then it is given the next one."""
@@ -146,19 +154,22 @@ class _Part:
             at[point.sync] = crossing
             if self.run.holding and point.held_with == self.run.pending[0].held_with:
                 come.add(point.sync)
-        if isinstance(self.run.behavior, Gaze) and self.run.awaits("relax"):
-            self._foresee_way_home(torso, trial, at)
+        pending = [point.sync for point in self.run.pending]
+        last = next((sync for sync in pending if is_last_on_target(self.run.behavior, sync)), "")
+        if last:
+            at |= {sync: at[last] + s for sync, s in self._way_home(torso, trial, at[last]).items()}
         for since, to in pairwise([point.sync for point in self.run.course.points]):
             if to not in come:
                 self._phases[to] = at[to] - at[since]
 
-    def _foresee_way_home(self, torso: Torso, trial: Motion, at: dict[str, Seconds]) -> None:
-        """Take the way home of a look to where looks go home by now, if a shift has changed that."""
-        base = torso.attention.angles
-        if head.differ(self.run.course.legs[-1].goal, base):
-            start = trial.at(at["relax"])
-            back = head.way_back(tuple(start.q.tolist()), base)
-            at["end"] = at["relax"] + Path(start, (back,), tracks.LIMITS["head"]).length
+    def _way_home(self, torso: Torso, trial: Motion, at: Seconds) -> Mapping[str, Seconds]:
+        """Seconds from its target to each point on its way home, if that has to be laid anew."""
+        leaning, base = torso.tracks["torso"].motion, torso.attention.angles
+        known = (at, trial.path, leaning, leaning.end, base)
+        if known != self._known:
+            self._known, back = known, torso.way_home(self.run, trial, at)
+            self._marks = {} if back is None else back.marks
+        return self._marks
 
     def _foresee_unpaced(self, now: Seconds) -> None:
         """Take the times from the path of a behavior that runs at another pace, if it has just left a hold point."""
@@ -176,15 +187,31 @@ class _Part:
             for since, to in pairwise([sync for sync in syncs if sync in self.passed]):
                 if to not in self._forced and to not in self._stops:
                     self._phases[to] = self.passed[to] - self.passed[since]
+            self._note_misses()
         phases = tuple([self._updated(phase) for phase in self.estimate.phases])
         return replace(self.estimate, phases=phases)
 
+    def _note_misses(self) -> None:
+        """Note the phases to points that came later than it was asked to be there."""
+        asked = self.run.authority.pace
+        for since, to in pairwise([point.sync for point in self.run.course.points if point.sync in self.passed]):
+            if to in asked and self.passed[to] > asked[to] + HURRIED:
+                seconds = self.passed[to] - self.passed[since]
+                if seconds > asked[to] - asked.get(since, self.passed[since]):
+                    self._least[to] = seconds
+            elif to in self._holds and to in asked and self.passed[to] < asked[to] - HURRIED:
+                self._most[to] = self.passed[to] - self.passed[since]
+
     def _updated(self, phase: Phase) -> Phase:
         natural = max(0.0, self._phases.get(phase.to, phase.natural))
+        if (most := self._most.get(phase.to)) is not None:
+            phase = replace(phase, longest=max(most, natural))
+        if (least := self._least.get(phase.to, 0.0)) > phase.shortest:
+            return replace(phase, shortest=min(natural, least), natural=natural)
         if abs(natural - phase.natural) < TRANSPARENT:
             return phase
         longest = phase.longest
-        if longest is not None:
+        if longest is not None and phase.to not in self._most:
             longest = max(longest, natural) if phase.natural else None
         share = phase.shortest / phase.natural if phase.natural else 1.0
         return replace(phase, natural=natural, shortest=share * natural, longest=longest)
@@ -199,6 +226,7 @@ def rehearsed(torso: Torso, clock: Clock, items: Sequence[EstimateItem]) -> tupl
     times: list[Mapping[str, Seconds]] = [
         {each.sync: round(began + each.at, ROUNDING) for each in item.times} for item in items
     ]
+    passing = [{each.sync for each in item.times if each.through} for item in items]
     events = [(at[START], BEGIN, number, "") for number, at in enumerate(times)]
     heapify(events)
     parts: dict[int, _Part] = {}
@@ -216,7 +244,7 @@ def rehearsed(torso: Torso, clock: Clock, items: Sequence[EstimateItem]) -> tupl
         if kind == RELEASE:
             _let_go(torso, parts[number], hold, clock.at)
         else:
-            begun = _begin(torso, clock, items[number], times[number], moved)
+            begun = _begin(torso, clock, items[number], times[number], passing[number], moved)
             if isinstance(begun, Estimate):
                 told[number] = begun
             else:
@@ -233,7 +261,12 @@ def rehearsed(torso: Torso, clock: Clock, items: Sequence[EstimateItem]) -> tupl
 
 
 def _begin(
-    torso: Torso, clock: Clock, item: EstimateItem, times: Mapping[str, Seconds], moved: set[str]
+    torso: Torso,
+    clock: Clock,
+    item: EstimateItem,
+    times: Mapping[str, Seconds],
+    passing: Container[str],
+    moved: set[str],
 ) -> _Part | Estimate:
     """Begin a behavior on the copy. Returns its estimate alone if it moves nothing."""
     behavior = item.behavior
@@ -254,7 +287,7 @@ def _begin(
     if not estimate.feasible:
         return estimate
     path = torso.path(course)
-    waits, forced = _told_apart(course, path, times)
+    waits, forced = _told_apart(course, path, times, passing)
     paced = _paced(course, path, times, forced)
     authority = MovementAuthority(behavior, _through(behavior, list(waits)), paced)
     run = Run(behavior, course, authority, Variability(), 0)
@@ -268,7 +301,7 @@ def _begin(
 
 
 def _told_apart(
-    course: Course, path: Path, times: Mapping[str, Seconds]
+    course: Course, path: Path, times: Mapping[str, Seconds], passing: Container[str]
 ) -> tuple[dict[str, Seconds], dict[str, Seconds]]:
     """Times of hold points at which it has to wait, and of points for which it hurries or dawdles.
 
@@ -281,7 +314,7 @@ def _told_apart(
         if point.sync in times:
             natural = path.marks[point.sync] - path.marks[before]
             is_hurried = times[point.sync] - at < natural - HURRIED
-            if point.held_with and not is_hurried:
+            if point.held_with and not is_hurried and point.sync not in passing:
                 waits[point.held_with] = times[point.sync]
             else:
                 forced[point.sync] = times[point.sync]

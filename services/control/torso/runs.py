@@ -83,7 +83,8 @@ class Run:
         if is_passing or aims == self._tried_aims:
             return None
         self._tried_aims = aims
-        if (reduced := hurried(self.course, self.motion, self.size, aims, now, self.cruise)) is None:
+        stops = [point.sync for point in self.pending if point.held_with and not self.may_pass(point.held_with)]
+        if (reduced := hurried(self.course, self.motion, self.size, aims, now, self.cruise, stops)) is None:
             return None
         self.size = reduced.size
         return reduced.path
@@ -98,8 +99,13 @@ class Run:
         if aim is None:
             self.motion.run_at(self.cruise, now)
         else:
-            # A slow motor is slow at its fastest, too; up to that rate the body makes up for it.
-            self.motion.reach(marks[aim[0]], aim[1], now, self.cruise * self.motion.path.fastest)
+            sync, at = aim
+            self.motion.run_at(self.cruise, now)
+            waits = any(point.sync == point.held_with == sync for point in self.pending) and not self.may_pass(sync)
+            # Who has to wait there until that instant comes at its own pace, if that is in time.
+            if not (waits and self.motion.reaches(marks[sync], at)):
+                # A slow motor is slow at its fastest, too; up to that rate the body makes up for it.
+                self.motion.reach(marks[sync], at, now, self.cruise * self.motion.path.fastest)
         return True
 
     def _aims(self, now: Seconds) -> list[tuple[str, Seconds]]:
@@ -115,7 +121,8 @@ class Run:
         """
         mark = self.motion.path.marks[point.sync]
         crossing = self.motion.crossing(mark)
-        if crossing is None or not self.motion.path.at(mark).at_rest:
+        waits = bool(point.held_with) and not self.may_pass(point.held_with)
+        if crossing is None or waits or not self.motion.path.at(mark).at_rest:
             return crossing
         return max(crossing, self.authority.pace.get(point.sync, crossing))
 

@@ -1,6 +1,6 @@
 """Size of a gesture or a nod that has to be on time: it is made smaller where faster is not enough. Pure."""
 
-from collections.abc import Sequence
+from collections.abc import Container, Sequence
 from copy import copy
 from math import inf
 
@@ -11,7 +11,7 @@ from engage_hri.schemas.units import Seconds
 from engage_hri.services.control.torso import tracks
 from engage_hri.services.control.torso.course import Course
 from engage_hri.services.control.torso.motion import Motion
-from engage_hri.services.control.torso.path import Leg, Path
+from engage_hri.services.control.torso.path import Leg, Path, resting
 
 SIZES = (0.9, 0.8, 0.7, 0.6, 0.5, 0.4)
 """Shares of the full amplitude, largest first. Anything smaller than the last would not be taken for a gesture."""
@@ -35,33 +35,49 @@ def quickest(course: Course, path: Path) -> dict[str, Seconds]:
 
 
 def hurried(
-    course: Course, motion: Motion, size: float, aims: Sequence[tuple[str, Seconds]], now: Seconds, cruise: float
+    course: Course,
+    motion: Motion,
+    size: float,
+    aims: Sequence[tuple[str, Seconds]],
+    now: Seconds,
+    cruise: float,
+    stops: Container[str] = (),
 ) -> Reduced | None:
     """Reduce a course to the largest size that is on time, or else to the least late; None: leave it at `size`.
 
     aims: sync points to come and the instants asked for. cruise: speed of its motors, 1 = as believed.
+    stops: those of them at which it stands until their instants.
     """
-    least = lateness(motion, aims, now, cruise) if course.is_resizable else 0.0
+    least = lateness(course, motion, aims, now, cruise, stops) if course.is_resizable else 0.0
     best: Reduced | None = None
     for each in SIZES:
         if each < size and least > 0.0:
             path = _reduced(course, motion, now, each / size)
-            late = lateness(Motion(path, now, cruise=cruise), aims, now, cruise)
+            late = lateness(course, Motion(path, now, cruise=cruise), aims, now, cruise, stops)
             if late < least and not tracks.meets_table(path, course.joints):
                 least, best = late, Reduced(path, each)
     return best
 
 
-def lateness(motion: Motion, aims: Sequence[tuple[str, Seconds]], now: Seconds, cruise: float) -> Seconds:
-    """Seconds by which `motion` misses the worst of `aims` if nothing stops it; 0: all are met."""
+def lateness(
+    course: Course, motion: Motion, aims: Sequence[tuple[str, Seconds]], now: Seconds, cruise: float,
+    stops: Container[str] = (),
+) -> Seconds:  # fmt: skip
+    """Seconds by which `motion` misses the worst of `aims` if nothing else stops it; 0: all are met."""
     trial, worst = copy(motion), 0.0
     trial.extend(inf, now)
-    for sync, at in aims:
+    for number, (sync, at) in enumerate(aims):
         s = trial.path.marks[sync]
-        trial.reach(s, at, now, cruise * trial.path.fastest)
+        trial.run_at(cruise, now)
+        if sync not in stops or not trial.reaches(s, at):
+            trial.reach(s, at, now, cruise * trial.path.fastest)
         crossing = trial.crossing(s)
         assert crossing is not None, "nothing limits the trial"
         worst, now = max(worst, crossing - at), max(now, crossing)
+        if sync in stops and now < at:
+            left = trial.path.after(s, [later for later, _ in aims[number + 1 :]])
+            now, start = at, resting(trial.path.at(s).q)
+            trial = Motion(Path(start, left, tracks.limits_of(course.parts)), now, cruise=cruise)
     return worst if worst > LATE else 0.0
 
 

@@ -4,6 +4,7 @@ The head has two tracks: gaze, and a nod on top of it. They share the neck's lim
 Only the nod tilts the head.
 """
 
+import math
 from collections.abc import Mapping, Sequence
 
 import msgspec
@@ -12,11 +13,11 @@ import numpy as np
 from engage_hri.schemas.body import BodyPose, JointLimit
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.control.torso import kinematics
+from engage_hri.services.control.torso.aiming import NECK, Aim
 from engage_hri.services.control.torso.motion import Motion
 from engage_hri.services.control.torso.pace import return_time, turning_time
 from engage_hri.services.control.torso.path import JointMotion, Leg, Path, resting
 
-NECK = ("neck_yaw", "neck_pitch")
 GAZE_SHARES = (0.56, 0.42)
 """Shares of the neck's speed and of its acceleration for gaze; the rest is for nods, which are short and quick."""
 
@@ -62,38 +63,63 @@ def home_of(part: str, displaced: Mapping[str, float]) -> tuple[float, ...]:
 class Track:
     """The motion of one part. Two arms that move as one share a motion, each with its columns of it.
 
-    base: angles to which the part goes back; those of the safe pose until a shift changes them.
+    base: angles to which the part goes back; those of the safe pose until a shift changes them. aim: the place that
+    it is on, or on its way to; None: it moves with the trunk. trunk: the track of the torso.
     """
 
     def __init__(self, part: str, angles: Sequence[float]) -> None:
         self.part = part
         self.base = HOME[part]
+        self.aim: Aim | None = None
+        self.trunk = self
         self.joints = tuple(limit.joint for limit in LIMITS[part])
         self.motion = Motion(Path(resting(angles), (), LIMITS[part]), 0.0)
         self._column = 0
 
-    def play(self, motion: Motion, column: int = 0) -> None:
-        self.motion, self._column = motion, column
+    def play(self, motion: Motion, column: int = 0, aim: Aim | None = None) -> None:
+        self.motion, self._column, self.aim = motion, column, aim
 
     def at(self, t: Seconds) -> JointMotion:
         state, columns = self.motion.at(t), slice(self._column, self._column + len(self.joints))
-        return JointMotion(state.q[columns], state.v[columns], state.a[columns])
+        state = JointMotion(state.q[columns], state.v[columns], state.a[columns])
+        if self.aim is None or self.is_still(t, self.aim):
+            return state
+        state = self.aim.added(state, self.trunk.at(t))
+        return JointMotion(self.aim.within(state.q), state.v, state.a)
+
+    def start_at(self, t: Seconds, aim: Aim | None) -> JointMotion:
+        """State in which a path with this aim begins."""
+        state = self.at(t)
+        return state if aim is None or self.is_still(t, aim) else aim.removed(state, self.trunk.at(t))
+
+    def limits(self, t: Seconds, aim: Aim | None) -> tuple[JointLimit, ...]:
+        """Limits of a path with this aim that begins then."""
+        return limits_of((self.part,), is_free=aim is not None and not self.is_still(t, aim))
+
+    def is_still(self, t: Seconds, aim: Aim) -> bool:
+        """True if the trunk rests where the path of an aim supposes it."""
+        return not self.trunk.is_moving(t) and aim.is_laid_for(self.trunk.angles(t))
 
     def angles(self, t: Seconds) -> tuple[float, ...]:
-        columns = self.motion.at(t).q.tolist()
-        return tuple(columns[self._column : self._column + len(self.joints)])
+        columns = self.motion.at(t).q[self._column : self._column + len(self.joints)]
+        if self.aim is not None and not self.is_still(t, self.aim):
+            columns = self.aim.within(columns + self.aim.offset(self.trunk.angles(t)))
+        return tuple(columns.tolist())
 
     def is_moving(self, t: Seconds) -> bool:
         return t < self.motion.end
 
-    def return_to(self, goal: tuple[float, ...], now: Seconds) -> None:
-        """Leave the current motion and go to rest at `goal`, by a path that is clear of the table."""
-        start = self.at(now)
+    def return_to(self, goal: tuple[float, ...], now: Seconds, aim: Aim | None = None) -> None:
+        """Leave the current motion and go to rest at `goal`, by a path that is clear of the table.
+
+        aim: the place that it is on at `goal`.
+        """
+        start = self.start_at(now, aim)
         time = turning_time if self.part in ("head", "nod") else return_time
-        seconds = time(self.angles(now), goal)
-        direct = Path(start, (Leg(goal=goal, seconds=seconds),), LIMITS[self.part])
+        seconds = time(start.q.tolist(), goal)
+        direct = Path(start, (Leg(goal=goal, seconds=seconds),), self.limits(now, aim))
         if not meets_table(direct, self.joints):
-            self.play(Motion(direct, now))
+            self.play(Motion(direct, now), aim=aim)
             return
         # Up first: the elbow bends and the upper arm lifts, which takes elbow and hand away from the table.
         yaw, pitch, elbow = self.angles(now)
@@ -118,8 +144,12 @@ def rebase(tracks: Mapping[str, Track], parts: Sequence[str], angles: Mapping[st
         track.base = tuple(angles.get(joint, angle) for joint, angle in zip(track.joints, track.base, strict=True))
 
 
-def limits_of(parts: Sequence[str]) -> tuple[JointLimit, ...]:
-    return tuple(limit for part in parts for limit in LIMITS[part])
+def limits_of(parts: Sequence[str], *, is_free: bool = False) -> tuple[JointLimit, ...]:
+    """Limits of some parts. is_free: without their ranges, for a path to which a moving trunk adds its share."""
+    limits = tuple(limit for part in parts for limit in LIMITS[part])
+    if not is_free:
+        return limits
+    return tuple(msgspec.structs.replace(limit, low=-math.pi, high=math.pi) for limit in limits)
 
 
 def joined(states: Sequence[JointMotion]) -> JointMotion:

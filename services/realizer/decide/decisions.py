@@ -11,10 +11,12 @@ from engage_hri.schemas.units import Seconds
 from engage_hri.services.realizer.config import RealizerConfig
 from engage_hri.services.realizer.decide.effects import Begin, Effect, Extend
 from engage_hri.services.realizer.decide.grants import Grants
+from engage_hri.services.realizer.decide.held_up import HeldUp
 from engage_hri.services.realizer.decide.lateness import Bounds, LatenessWatch
 from engage_hri.services.realizer.foresee.foresight import Foresight, differ_noticeably
 from engage_hri.services.realizer.net.facts import Facts
 from engage_hri.services.realizer.net.running import Observer, RunningNet
+from engage_hri.services.realizer.plan.known import BLOCK_END, BLOCK_START
 from engage_hri.services.realizer.plan.planner import Plan
 from engage_hri.services.realizer.points import Point, performer
 
@@ -38,6 +40,7 @@ class Decisions:
         self.foresight = Foresight(plan, self.facts)
         self.grants = Grants(self.facts, self.foresight, config)
         self.lateness_watch = LatenessWatch(config)
+        self.held_up = HeldUp()
         self._observers = observers
         self.replan(plan)
         self.foresight.is_surprised = False
@@ -83,6 +86,22 @@ class Decisions:
         self.foresight.expect_next(point.behavior)
         return news
 
+    def hold_up(self, is_held: bool, now: Seconds) -> None:
+        """Note that something is held from now on, of whatever block, or nothing any more.
+
+        To be called before what is held stops (see `hold`).
+        """
+        if is_held:
+            self.held_up.hold(self.foresight.outlook(now), now)
+        else:
+            self.held_up.let_go(now, self._under_way())
+
+    def _under_way(self) -> dict[str, int]:
+        """Behaviors that are on their way to a point, with its number."""
+        facts = self.facts
+        going = {id: facts.next_number(id) for id in facts.begun if not facts.has_ended(id)}
+        return {id: number for id, number in going.items() if not facts.holds(self.plan.chains[id].points[number])}
+
     def hold(self, behaviors: Collection[str] | None, now: Seconds) -> list[Effect]:
         """Hold these behaviors, and no others, from now on: each waits where it next can. None: all of them.
 
@@ -93,15 +112,18 @@ class Decisions:
         facts.hold(behaviors, now)
         self.net.hold(behaviors, now)
         self.foresight.prolong()
-        for behavior in before:
-            if not facts.is_held(behavior) and not facts.has_ended(behavior):
-                self.foresight.go_on(behavior, now)
+        changed = [each for each in sorted(facts.begun) if facts.is_held(each) != (each in before)]
+        changed = [each for each in changed if not facts.has_ended(each)]
+        going_on = [each for each in changed if each in before]
+        for behavior in going_on:
+            self.foresight.go_on(behavior, now)
+        self._conclude(now)
+        for behavior in going_on:
+            self.foresight.paces[behavior] = self.foresight.pace(behavior, now, self.grants.may_pass)
         effects: list[Effect] = []
-        for behavior in sorted(facts.begun):
-            is_held = facts.is_held(behavior)
-            if is_held != (behavior in before) and not facts.has_ended(behavior):
-                effects.append(self._command(behavior, self.grants.through(behavior), now))
-                self._watch(behavior, now)
+        for behavior in changed:
+            effects.append(self._command(behavior, self.grants.through(behavior), now))
+            self._watch(behavior, now)
         for transition in range(len(self.plan.members)):
             self.grants.on_opened(transition)
         return effects
@@ -112,24 +134,36 @@ class Decisions:
         return self.net.is_over
 
     def lateness(self, point: Point) -> Seconds:
-        """Seconds by which a point was reached later than its constraints allow; 0 if it is not reached."""
+        """Seconds by which a point was reached later than its constraints allow; 0 if it is not reached.
+
+        Without those for which holds account.
+        """
         at = self.facts.reached.get(point)
         if at is None or point not in self.plan.at:
             return 0.0
-        passed = self.net.passed
-        if self.facts.held_about(self.began, at):
-            passed = {each: then for each, then in passed.items() if not self._went_on(each)}
-        return self.bounds.lateness(self.plan.at[point], at, passed, self.facts.held_about)
 
-    def _went_on(self, transition: int) -> bool:
-        """True if a behavior was held just before, and came since it cannot wait there: nobody has planned that."""
-        for member in self.plan.members[transition]:
-            if member.kind == "passive" and (chain := self.plan.chains.get(member.behavior)) is not None:
-                number = chain.points.index(member.point)
-                before, here = (self.facts.reached.get(each) for each in chain.points[number - 1 : number + 1])
-                if before is not None and here is not None and self.facts.held_between(before, here, member.behavior):
-                    return True
-        return False
+        def held_up(one: int, other: int, allowed: Seconds) -> Seconds:
+            return self.held_up.between(self._name(one), self._name(other), allowed, at)
+
+        return self.bounds.lateness(self.plan.at[point], at, self.net.passed, held_up)
+
+    def skew(self, point: Point) -> Seconds:
+        """Seconds by which a behavior passed a point later than the first of its instant; 0 if it has not passed it.
+
+        Without those for which holds account.
+        """
+        at = self.facts.reached.get(point)
+        if at is None or point not in self.plan.at:
+            return 0.0
+        together = [member.point for member in self.plan.members[self.plan.at[point]]]
+        first = min(self.facts.reached.get(each, at) for each in (point, *together))
+        return max(0.0, at - first - self.held_up.within(self.net.part_of[point].point, together, at))
+
+    def _name(self, transition: int) -> Point:
+        """A point that keeps its name when the block is planned again."""
+        if not transition:
+            return BLOCK_START
+        return next((member.point for member in self.plan.members[transition]), BLOCK_END)
 
     def earliness(self, point: Point) -> Seconds:
         """Seconds by which a point was reached before the time that the block fixes for it; 0 if it fixes none.
@@ -155,6 +189,8 @@ class Decisions:
         self._conclude(now)
         self.grants.wake(now)
         effects = self._effects(self._decide(now, only_measured=False), now)
+        if self.held_up.has_effect and self.held_up.is_settled(now, self._under_way()):
+            self.held_up.settle(self.foresight.outlook(now))
         return [*effects, *self.lateness_watch.overdue(now)]
 
     def _conclude(self, now: Seconds) -> None:

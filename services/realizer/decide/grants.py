@@ -14,6 +14,7 @@ from engage_hri.services.realizer.foresee.foresight import Foresight
 from engage_hri.services.realizer.net.facts import Facts
 from engage_hri.services.realizer.net.running import Observer, RunningNet
 from engage_hri.services.realizer.plan.planner import Plan
+from engage_hri.services.realizer.plan.slack import UNNOTICED, slack
 from engage_hri.services.realizer.points import EPSILON, Member, Point
 
 
@@ -109,11 +110,15 @@ class Grants(Observer):
         if due > now + EPSILON:
             self._wake(transition, due)
             arrival = None if may_pass is None else self._foresight.arrival(may_pass)
-            if may_pass is not None and arrival is not None and arrival >= due - EPSILON:
+            # Who is alone there, and early by less than a stop costs, is slower on its way.
+            is_foreseen = may_pass is not None and self._foresight.forecast is not None
+            early = slack(self._plan, may_pass.point) if may_pass is not None and is_foreseen else 0.0
+            if may_pass is not None and arrival is not None and arrival >= due - early - EPSILON:
                 # Not told earlier than necessary: if the behavior is faster than expected, it must wait after all.
                 if ripe - self._config.lead > now + EPSILON:
                     self._wake(transition, ripe - self._config.lead)
                 else:
+                    self._foresight.may_be_slower.add(may_pass.behavior)
                     self._grant(transition, may_pass)
             return []
         if may_pass is not None:
@@ -139,7 +144,7 @@ class Grants(Observer):
             return
         if arrival - self._config.gap > now + EPSILON:
             self._wake(transition, arrival - self._config.gap)
-        elif due <= arrival + self._config.skew:
+        elif due <= arrival + UNNOTICED:
             self._grant(transition, member)
 
     def _grant(self, transition: int, member: Member) -> None:

@@ -113,16 +113,17 @@ class Bounds:
         transition: int,
         at: Seconds,
         passed: Mapping[int, Seconds],
-        held_about: Callable[[Seconds, Seconds], Seconds],
+        held_up: Callable[[int, int, Seconds], Seconds],
     ) -> Seconds:
         """Seconds by which a transition at `at` is later than it may be.
 
-        passed: the times of the transitions that all their behaviors have passed. held_about: the seconds for which
-        behaviors were held about two times. They do not count.
+        passed: the times of the transitions that all their behaviors have passed. held_up: the seconds for which
+        holds account where the first of two transitions is later than so many seconds after the other.
         """
-        known = [(passed[each], seconds) for each, seconds in self._not_after[transition] if each in passed]
-        late = (at - since - seconds - held_about(min(since, since + seconds), at) for since, seconds in known)
-        return max((0.0, *late))
+        known = [(each, seconds) for each, seconds in self._not_after[transition] if each in passed]
+        late = [(each, seconds) for each, seconds in known if at - passed[each] > seconds]
+        left = (at - passed[each] - seconds - held_up(transition, each, seconds) for each, seconds in late)
+        return max((0.0, *left))
 
 
 def too_early(plan: Plan, reached: Mapping[Point, Seconds], foreign: Point) -> Iterator[tuple[Point, Seconds]]:

@@ -279,15 +279,18 @@ class Forecast(LongestPaths):
         elastic = [each for each in numbers if room[each] > FINEST and self._arcs[each].behavior]
         boundless = [each for each in elastic if room[each] == inf]
         if boundless:
-            elastic, share = boundless[:1], 1.0
+            elastic = [min(boundless, key=lambda each: self._rank[self._arcs[each].target])]
             room[elastic[0]] = excess
-        else:
-            total = sum(room[each] for each in elastic)
-            share = min(1.0, excess / total) if total > 0.0 else 0.0
         enough = bool(elastic) and sum(room[each] for each in elastic) >= excess - EPSILON
-        for each in elastic:
-            self._given_way.add(each)
-            self._set_seconds(each, self._arcs[each].seconds - share * room[each])
+        # What can be slower gives way before what has to hurry.
+        for is_bound in (True, False):
+            giving = [each for each in elastic if self._arcs[each].is_bound == is_bound]
+            total = sum(room[each] for each in giving)
+            share = min(1.0, excess / total) if total > 0.0 and excess > 0.0 else 0.0
+            excess -= share * total
+            for each in giving if share else ():
+                self._given_way.add(each)
+                self._set_seconds(each, self._arcs[each].seconds - share * room[each])
         if not enough:
             bounds = [each for each in numbers if self._arcs[each].is_bound]
             self._break(next((each for each in bounds if self._arcs[each].behavior), bounds[-1]))

@@ -6,11 +6,13 @@ what it is told waits until `update`.
 
 import heapq
 from collections.abc import Callable, Iterable, Mapping
+from itertools import pairwise
 from typing import Any
 
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.realizer.foresee.experience import Experience
 from engage_hri.services.realizer.foresee.forecast import Forecast, full_forecast, is_predictive
+from engage_hri.services.realizer.foresee.outlook import Outlook
 from engage_hri.services.realizer.net.facts import Facts
 from engage_hri.services.realizer.net.running import Observer, RunningNet
 from engage_hri.services.realizer.plan.known import BLOCK_END, BLOCK_START
@@ -38,6 +40,10 @@ class Foresight(Observer):
     def __init__(self, plan: Plan, facts: Facts) -> None:
         self.experience = Experience(plan.estimates)
         self.paces: dict[str, Pace] = {}
+        self.may_be_slower: set[str] = set()
+        """Behaviors that were told to pass a hold point before its instant."""
+        self._stops: dict[str, set[str]] = {}
+        """Hold points within the pace of each behavior at which it has to wait for leave."""
         self.not_before: dict[str, Seconds] = {}
         self.foreseen = {point: facts.began + plan.predicted(point) for point in plan.foreign}
         self.is_surprised = False
@@ -160,7 +166,10 @@ class Foresight(Observer):
             before, natural = chain.points[number - 1], chain.segments[number - 1].natural
             if self.plan.predicted(point) - self.plan.predicted(before) < natural - EPSILON:
                 return  # it was to be cut short
-            changed = self.experience.learn(point.behavior, natural, at - self._facts.reached[before])
+            since = self._facts.reached[before]
+            if self._facts.held_between(since, at, point.behavior):
+                return  # how long it would have taken, nobody knows
+            changed = self.experience.learn(point.behavior, natural, at - since)
             if self.forecast is not None and changed:
                 self._news.append((self.forecast.relearn, changed))
 
@@ -215,7 +224,9 @@ class Foresight(Observer):
         return self._arrivals[0][0] + SURPRISE if self._followed and self._arrivals else None
 
     def asked(self, point: Point, natural: Seconds) -> Seconds:
-        """Time at which the behavior was told to be at `point`; `natural` if it was told none."""
+        """Time at which the behavior was told to be at `point`; `natural` if it was told none, or waits there."""
+        if point.sync in self._stops.get(point.behavior, ()):
+            return natural
         return dict(self.paces.get(point.behavior, ())).get(point.sync, natural)
 
     def due(self, transition: int, ripe: Seconds) -> Seconds:
@@ -243,23 +254,29 @@ class Foresight(Observer):
         return 0.0 if before == here else self.forecast.phase(behavior, here)
 
     def pace(self, behavior: str, now: Seconds, may_pass: Callable[[Point], bool]) -> Pace:
-        """Instants for the behavior's points up to the next where it must ask; empty if it comes to them anyway."""
+        """Instants for the behavior's points up to the next where it must ask; empty if it comes to them anyway.
+
+        Who is to hurry is told of all points: a gesture that is made smaller in time need not stop for it.
+        """
         forecast, plan, facts = self.forecast, self.plan, self._facts
         if forecast is None or behavior not in plan.chains:
             return ()
-        if behavior not in self._minded and not forecast.is_hurried(behavior):
+        is_minded = behavior in self._minded or behavior in self.may_be_slower
+        if not is_minded and not forecast.is_hurried(behavior):
             return ()  # No bound makes it hurry, for itself or for who comes after it, or wait on its way.
         points, segments = plan.chains[behavior].points, plan.chains[behavior].segments
         is_moving = plan.chains[behavior].type not in SHIFTS  # a shift beneath a look takes no time
         number = facts.next_number(behavior)
         at = facts.reached[points[number - 1]] if number else now
-        is_paced = forecast.is_hurried(behavior)
+        is_paced = is_hurried = forecast.is_hurried(behavior)
+        stops = self._stops[behavior] = set()
         planned: list[tuple[str, Seconds]] = []
         before = plan.at[points[number - 1]] if number else -1
         for index, point in enumerate(points[number:], start=number):
             here = plan.at[point]
             if here != before:
-                if is_moving and index and forecast.phase(behavior, here) == 0.0 < segments[index - 1].natural:
+                is_cut = is_moving or plan.successors.get(behavior, ("", None))[1] == point
+                if is_cut and index and forecast.phase(behavior, here) == 0.0 < segments[index - 1].natural:
                     break  # another takes its part before this point: it need not hurry there
                 natural, latest = at + forecast.phase(behavior, here), at + forecast.longest(behavior, here)
                 if point is points[number] and not self.paces.get(behavior):
@@ -268,10 +285,18 @@ class Foresight(Observer):
                 if forecast.times[here] > natural + NOTICEABLE and self._net.part_of[point].kind == "passive":
                     at = max(natural, min(forecast.times[here], latest))
                     is_paced = is_paced or at > natural + NOTICEABLE
+                if behavior in self.may_be_slower and self._net.part_of[point].can_wait and may_pass(point):
+                    is_paced = is_paced or forecast.times[here] > at + EPSILON
+                    at = max(at, forecast.times[here])
             before = here
-            planned.append((point.sync, at))
             if not may_pass(point):
-                break
+                if is_hurried and index:
+                    at = max(at, forecast.times[here])
+                    stops.add(point.sync)
+                else:
+                    planned.append((point.sync, at))
+                    break
+            planned.append((point.sync, at))
         return tuple(planned) if is_paced else ()
 
     # -- expected times ------------------------------------------------------------------------------------------
@@ -290,6 +315,20 @@ class Foresight(Observer):
         forecast, reached = self.from_scratch(now), self._facts.reached
         times = {point: reached.get(point, forecast.times[at]) for point, at in self.plan.at.items()}
         return {**times, BLOCK_START: self._facts.began, BLOCK_END: forecast.times[len(self.plan.members) - 1]}
+
+    def outlook(self, now: Seconds) -> Outlook:
+        """All that was measured, and that is expected from it."""
+        forecast, reached, at = self.from_scratch(now), self._facts.reached, self.plan.at
+        instants = {point: self._net.passed.get(here, forecast.times[here]) for point, here in at.items()}
+        arrivals = {point: reached.get(point, instants[point]) for point in at}
+        for chain in self.plan.chains.values():
+            for before, point in pairwise(chain.points):
+                is_passive = self._net.part_of[point].kind == "passive"
+                if point not in reached and is_passive and at[before] != at[point]:
+                    behavior, here, since = point.behavior, at[point], arrivals[before]
+                    least, most = forecast.phase(behavior, here), forecast.longest(behavior, here)
+                    arrivals[point] = max(now, since + least, min(since + most, instants[point]))
+        return Outlook({**instants, BLOCK_START: self._facts.began}, arrivals)
 
     def from_scratch(self, now: Seconds | None = None) -> Forecast:
         """A forecast of all instants; for those that the kept forecast has, it says the same.

@@ -128,23 +128,9 @@ class Facts:
         """True if the behavior is to wait where it next can."""
         return self.held is None or behavior in self.held
 
-    def held_about(self, since: Seconds, until: Seconds) -> Seconds:
-        """Seconds of the holds, of whatever behaviors, that were in force between these times; each from its begin.
-
-        What was held before `since` may have its effect only after that.
-        """
-        runs: list[tuple[Seconds, Seconds]] = []
-        was_held = False
-        for (at, held), end in zip(self._holds, [*(at for at, _ in self._holds[1:]), until], strict=False):
-            is_held = held is None or bool(held)
-            if is_held and at < until:
-                runs[-1:] = [(runs[-1][0], min(end, until))] if was_held else [*runs[-1:], (at, min(end, until))]
-            was_held = is_held
-        return sum(end - at for at, end in runs if end > since)
-
     def held_between(self, since: Seconds, until: Seconds, behavior: str = "") -> Seconds:
         """Seconds between these times in which the behavior was held; empty: in which any was."""
-        ends = [at for at, _ in self._holds[1:]] + [until]
+        ends = [*(at for at, _ in self._holds[1:]), until]
         return sum(
             max(0.0, min(end, until) - max(at, since))
             for (at, held), end in zip(self._holds, ends, strict=False)

@@ -72,7 +72,7 @@ class BehaviorRun:
     def command(self, asked: Begin | Extend) -> None:
         """Let it begin, or go on as far as is asked."""
         self._asked = asked
-        if asked.through == "end" and isinstance(self._block.plan.chains[self.id].behavior, Wait):
+        if asked.through == "end" and performer(self._block.plan.chains[self.id].behavior) == "clock":
             self._block.futures.grant(Point(self.id, "end"))
         if isinstance(asked, Begin):
             self._block.futures.grant(Point(self.id, "start"))
@@ -108,7 +108,7 @@ class BehaviorRun:
                 block.recognition.signal(block.body.id(self.id), block.plan.block.id, behavior)
                 self._at_once()
             case _ if performer(behavior) == "clock":
-                self._at_once()
+                await self._wait(0.0)
             case _:
                 await self._by_body(behavior)
 

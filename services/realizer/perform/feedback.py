@@ -113,8 +113,7 @@ class Reporter:
                     character_id=self._character,
                 )
             )
-        moved = skew - facts.held_about(at - skew, at)
-        if (late := max(moved, decisions.lateness(point))) > self._tolerance:
+        if (late := max(decisions.skew(point), decisions.lateness(point))) > self._tolerance:
             self.late(decisions.net.part_of[point].point, f"{point.sync} came {late:.2f} s later than it should")
         elif (early := decisions.earliness(point)) > self._tolerance:
             instant = decisions.net.part_of[point].point
@@ -122,8 +121,10 @@ class Reporter:
 
     def heard(self, decisions: Decisions, foreign: Point) -> None:
         """Warn if a point of another block, reached now, is one that points of this block should have waited for."""
-        for point, early in too_early(decisions.plan, decisions.facts.reached, foreign):
-            if early > self._tolerance:
+        reached = decisions.facts.reached
+        for point, early in too_early(decisions.plan, reached, foreign):
+            at, allowed = reached[foreign], reached[foreign] - reached[point] - early
+            if early - decisions.held_up.between(foreign, point, allowed, at) > self._tolerance:
                 instant = decisions.net.part_of[point].point
                 self.late(instant, f"{point.sync} came {early:.2f} s earlier than {foreign} allows")
 

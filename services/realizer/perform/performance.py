@@ -56,8 +56,10 @@ class BlockPerformance:
         shared: SharedContext,
         elsewhere: Mapping[str, Block],
         held: Collection[str] | None = (),
+        *,
+        is_held: bool = False,
     ) -> None:
-        """elsewhere: other blocks, which the plan may name points of. held: see `hold`."""
+        """elsewhere: other blocks, which the plan may name points of. held, is_held: see `hold`."""
         self._live = live
         self.plan = plan
         self._shared = shared
@@ -68,6 +70,7 @@ class BlockPerformance:
         self.body = ControlLink(shared.bus, shared.requests, live.request.id, plan.block.id)
         self.futures = SyncPointFutures()
         self._held = held
+        self._is_held = is_held
         self._net = NetStream(shared.bus, plan.block.id)
         self.report = Reporter(shared.bus, plan.block.id, shared.config.skew)
         self._runs = {id: BehaviorRun(self, id) for id in plan.chains}
@@ -100,7 +103,8 @@ class BlockPerformance:
         """Perform the block to its end, whatever that is. Ends everything it began."""
         began, block = self.bus.now(), self.plan.block.id
         self.decisions = Decisions(self.plan, began, self._config, self._observers)
-        if self._held != ():
+        if self._is_held:
+            self.decisions.hold_up(True, began)
             self.decisions.hold(self._held, began)
         self.report.started(self.plan, began)
         for problem in self.plan.problems:
@@ -156,14 +160,18 @@ class BlockPerformance:
             self.take_in()
         return behavior not in self._dropped and self.decisions.facts.has_ended(behavior)
 
-    def hold(self, behaviors: Collection[str] | None) -> None:
-        """Hold these behaviors, and no others, from now on: each waits where it next can. None: all of them."""
-        if behaviors != self._held:
-            self._held = behaviors
+    def hold(self, behaviors: Collection[str] | None, *, is_held: bool) -> None:
+        """Hold these behaviors, and no others, from now on: each waits where it next can. None: all of them.
+
+        is_held: something is held, perhaps of another block.
+        """
+        if (behaviors, is_held) != (self._held, self._is_held):
+            self._held, self._is_held = behaviors, is_held
             if self._tasks:  # Otherwise it is held as it begins.
                 self.take_in(self._hold)
 
     def _hold(self) -> None:
+        self.decisions.hold_up(self._is_held, self.bus.now())
         for effect in self.decisions.hold(self._held, self.bus.now()):
             self._apply(effect)
 

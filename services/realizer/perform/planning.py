@@ -14,19 +14,17 @@ from engage_hri.services.realizer.config import RealizerConfig
 from engage_hri.services.realizer.perform.knowledge import Asker, Performed, knowledge, may_share, parts_of
 from engage_hri.services.realizer.perform.live import Live
 from engage_hri.services.realizer.perform.live_blocks import LiveBlocks
+from engage_hri.services.realizer.plan.agreement import Rounds
 from engage_hri.services.realizer.plan.handover import hands_refused
 from engage_hri.services.realizer.plan.known import Known, is_foreign, is_named_in
 from engage_hri.services.realizer.plan.planner import Plan, plan_steps
-from engage_hri.services.realizer.plan.poses import between, changed, planned_times, poses_before
+from engage_hri.services.realizer.plan.poses import planned_times, poses_before
 from engage_hri.services.realizer.plan.relations import BlockRefused, extent, relation_steps
 from engage_hri.services.realizer.plan.steps import Steps, T
 from engage_hri.services.realizer.points import Point, performer
 
 SLICE = 512
 """Elements that are worked on in one go (see `steps`): one to five milliseconds. Counted: equal runs stay equal."""
-STRAIGHT, ROUNDS = 2, 8
-"""How often the body is asked about a plan anew: each answer may make another plan. After the first so many times
-estimates go half-way only; at most, in all."""
 
 
 class Planning:
@@ -77,28 +75,35 @@ class Planning:
         elsewhere: Mapping[str, Block],
         named: Collection[Point],
     ) -> Plan:
-        """Plan with `first`, and ask the body about the plan and the hands it has chosen, until that changes nothing:
-        the answer, or already the question. question: the one that `first` answers."""
+        """Plan with `first`, and ask the body about the plan and the hands it has chosen, until the answer is
+        what the plan was made with; if it never is, the plan that comes nearest.
+
+        question: the one that `first` answers.
+        """
         barred: set[tuple[str, Hand]] = set()
-        chosen, asked, estimates, rounds = block, question, first, 0
+        chosen, rounds = block, Rounds(question, first)
         while True:
-            known = self._known(block, elsewhere, named, estimates)
-            plan = await unhurried(plan_steps(chosen, estimates, known=known, barred=barred))
-            before, times = poses_before(plan, known), planned_times(plan)
-            if plan.block is chosen and (rounds >= ROUNDS or not (before or times)):
-                return plan
-            about_plan = question_about(plan.block, before, times)
-            if plan.block is chosen and about_plan == asked:
-                return plan
-            told = await self._estimates(plan.block, about_plan)
-            if plan.block is chosen and not changed(estimates, told):
-                return plan
-            if plan.block is chosen and rounds >= STRAIGHT:
-                told = between(estimates, told)
-            chosen, asked, estimates, rounds = plan.block, about_plan, told, rounds + 1
-            if refused := hands_refused(block, chosen, estimates):
+            known = self._known(block, elsewhere, named, rounds.estimates)
+            try:
+                steps = plan_steps(chosen, rounds.estimates, known=known, barred=barred, turns=rounds.turns)
+                plan = await unhurried(steps)
+            except BlockRefused:
+                if rounds.turns:
+                    rounds.let_go()
+                    continue
+                if rounds.settled is None:
+                    raise
+                return rounds.settled
+            about_plan = question_about(plan.block, poses_before(plan, known), planned_times(plan))
+            if plan.block is chosen:
+                told = rounds.answer(about_plan) or await self._estimates(chosen, about_plan)
+                if (agreed := rounds.close(plan, about_plan, told)) is not None:
+                    return agreed
+            else:
+                chosen, rounds = plan.block, Rounds(about_plan, await self._estimates(plan.block, about_plan))
+            if refused := hands_refused(block, chosen, rounds.estimates):
                 barred |= refused
-                chosen, asked, estimates, rounds = block, question, first, 0
+                chosen, rounds = block, Rounds(question, first)
 
     async def _earlier(self, live: Live, named: Iterable[Point]) -> None:
         """Wait until those of the earlier blocks are planned that this one is to be planned with in mind."""

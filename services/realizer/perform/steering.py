@@ -1,7 +1,7 @@
 """Holding, continuing and stopping what is performed, on request: the robot, a block, or a behavior."""
 
 import asyncio
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 
 from engage_hri.schemas.blocks import PerformanceSteered, SteerPerformance
 from engage_hri.schemas.faults import Fault
@@ -40,7 +40,7 @@ class Steering:
         """Carry out a request, and answer it."""
         block, behavior = request.block, request.behavior
         with self._desk.serving(request):
-            concerned = [live for live in self._live.values() if block in ("", live.request.block.id)]
+            concerned = self._concerned(block)
             performances = [each for each in self._performances.values() if each.plan.block.id == block]
             is_there = (
                 any(each.is_going_on(behavior) for each in performances) if behavior else concerned or not block
@@ -66,6 +66,11 @@ class Steering:
         """Behaviors of the block that are held now; None: all of them."""
         return self._holds.of_block(block)
 
+    @property
+    def is_holding(self) -> bool:
+        """True if anything is held."""
+        return self._holds.earliest() is not None
+
     def forget(self, block: str) -> None:
         """Let go what was held of a block that has ended: its id is free."""
         self._holds.let_go(block, "")
@@ -74,9 +79,13 @@ class Steering:
         """Ring no more."""
         self._timer.set(None)
 
+    def _concerned(self, block: str) -> list[Live]:
+        """Live blocks that this names; empty: all."""
+        return [live for live in self._live.values() if block in ("", live.request.block.id)]
+
     def _apply(self) -> None:
         for performance in self._performances.values():
-            performance.hold(self._holds.of_block(performance.plan.block.id))
+            performance.hold(self.held(performance.plan.block.id), is_held=self.is_holding)
         since = self._holds.earliest()
         self._timer.set(None if since is None else since + self._longest)
 
@@ -85,8 +94,7 @@ class Steering:
             performed = [self._performances.get(live.request.id) for live in concerned]
             await asyncio.gather(*[each.interrupt(behavior) for each in performed if each is not None])
             return
-        for live in concerned:
-            live.stop(Ending("interrupted", Fault(reason=reason, where=live.request.block.id)))
+        _interrupt(concerned, reason)
         if concerned:
             await asyncio.wait([live.ended for live in concerned])
 
@@ -95,7 +103,10 @@ class Steering:
         for block, behavior in self._holds.since(self._bus.now() - self._longest):
             self._holds.let_go(block, behavior)
             reason = f"held for {self._longest:g} s, the longest time (`realizer.longest_hold`)"
-            for live in self._live.values():
-                if block in ("", live.request.block.id):
-                    live.stop(Ending("interrupted", Fault(reason=reason, where=live.request.block.id)))
+            _interrupt(self._concerned(block), reason)
         self._apply()
+
+
+def _interrupt(concerned: Iterable[Live], reason: str) -> None:
+    for live in concerned:
+        live.stop(Ending("interrupted", Fault(reason=reason, where=live.request.block.id)))

@@ -41,14 +41,17 @@ class Times:
         behavior says is never given up. None: there is none left.
 
         points: of speeches, that cannot all be on time. among: points to which the relation ties it, if there is such
-        a one. dropped: behaviors whose relations count no more.
+        a one. dropped: behaviors that are gone; what is tied to them is tied through them, and given up last.
         """
-        for is_near in (True, False):
+        for is_enough in (
+            lambda others: any(each in among and each.behavior not in dropped for each in others),
+            lambda others: any(each.behavior not in dropped for each in others),
+            bool,
+        ):
             for point in reversed(points):
                 naming = self._naming.get(point, ())
                 for number in sorted(naming, key=lambda each: (each < 0, not self._is_own(each, point))):
-                    others = [each for each in self._others(number, point) if each.behavior not in dropped]
-                    if any(each in among for each in others) if is_near else others:
+                    if is_enough(self._others(number, point)):
                         return point.behavior, self._without(number, point)
         return None
 

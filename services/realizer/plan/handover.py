@@ -144,12 +144,16 @@ def arrange(
     return arranged, conflicts
 
 
+_BENEATH = ("gazeShift", "headDirectionShift")
+"""Types from which a look takes nothing: who takes over such a shift is another, and it did not come to its end."""
+
+
 def kept_points(
     chains: Mapping[str, Chain], relations: Relations, handovers: Mapping[str, Handover]
 ) -> Mapping[str, Point]:
     """For each behavior, the last point that it must pass itself, whoever takes its part."""
     held = relations.held
-    kept = {id: each.kept for id, each in handovers.items()}
+    kept = {id: each.kept for id, each in handovers.items() if chains[id].type not in _BENEATH}
     for id, chain in chains.items():
         if id not in kept:
             numbers = [number for number, point in enumerate(chain.points) if point in held]
@@ -194,9 +198,15 @@ def _least(chain: Chain, successor: Chain | None) -> int:
 
 
 def is_tied(later: Chain, speech: Chain, classes: Classes) -> bool:
-    """True if the block itself says that `later` begins while the speech is spoken. The voice decides about that."""
-    begins = classes.find(later.points[0])[0]
-    return any(classes.find(point)[0] == begins for point in speech.points)
+    """True if the block itself says that `later` begins while the speech is spoken, or after it, not before.
+
+    The voice decides about that.
+    """
+    root, begins = classes.find(later.points[0])
+    first, spoken = classes.find(speech.points[0])
+    if root == first and begins < spoken - EPSILON:
+        return False
+    return any(classes.find(point)[0] == root for point in speech.points)
 
 
 def _users(chains: Mapping[str, Chain], order: Iterable[str]) -> Mapping[str, Sequence[str]]:

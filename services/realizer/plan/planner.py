@@ -54,6 +54,8 @@ class Plan(Struct, frozen=True, kw_only=True):
     kept: for each behavior, the last point that it must pass itself. Who takes its part, in whatever block, may save
     it the rest.
     entering: behaviors in the order in which they take their parts: of two that begin at one instant, too.
+    rounds: for each behavior, how many events of the instant in which it begins are measured before it, in a row.
+    turns: behaviors that wait for a point of another before they take its part.
     behaviors: those that will be performed, in document order. dropped: those that will not, with `problems`.
     natural: behaviors that end when something takes their place, or with the block.
     waited_for: behaviors that the end of the block waits for. given_up: speeches that lack a time they should have.
@@ -75,6 +77,8 @@ class Plan(Struct, frozen=True, kw_only=True):
     waited_for: frozenset[str]
     kept: Mapping[str, Point]
     entering: tuple[str, ...]
+    rounds: Mapping[str, int] = {}
+    turns: frozenset[Turn] = frozenset()
     constrained: frozenset[Point] = frozenset()
     successors: Mapping[str, tuple[str, Point]] = {}
     takes: Mapping[str, str] = {}
@@ -88,9 +92,13 @@ class Plan(Struct, frozen=True, kw_only=True):
         return self.schedule[self.at[point]]
 
     def begun_in_order(self, behaviors: Iterable[str]) -> list[str]:
-        """Behaviors that begin at one instant in the order in which they are told: as they take parts, and a torso
-        first, since head and arms aim for where that is going to be."""
-        rank = {id: ("torso" not in self.chains[id].parts, number) for number, id in enumerate(self.entering)}
+        """Behaviors that begin at one instant in the order in which they are told: who waits for no measured event of
+        that instant first, then as they take parts, and a torso first, since head and arms aim for where that is
+        going to be."""
+        rank = {
+            id: (self.rounds.get(id, 0), "torso" not in self.chains[id].parts, number)
+            for number, id in enumerate(self.entering)
+        }
         return sorted(behaviors, key=rank.__getitem__)
 
     def transition(self, point: Point) -> int | None:
@@ -126,9 +134,11 @@ def plan_steps(
     dropped: Iterable[str] = (),
     known: Known = NOTHING,
     barred: Container[tuple[str, Hand]] = (),
+    turns: frozenset[Turn] = frozenset(),
 ) -> Steps[Plan]:
-    """Plan as `plan_block` does, in steps."""
+    """Plan as `plan_block` does, in steps. turns: those to begin with."""
     planner = _Planner(block, {each.behavior: each for each in estimates}, dropped, barred, known)
+    planner.turns = planner.given = turns
     yield from planner.read()
     return (yield from planner.plan())
 
@@ -153,7 +163,9 @@ class _Planner:
         """Behaviors, in the order in which they were dropped; the values mean nothing."""
         self.given_up: dict[str, list[Problem]] = {}
         """Speeches without some of their times, each with the warnings of that."""
-        self.turns: frozenset[Turn] = frozenset()
+        self.given: frozenset[Turn] = frozenset()
+        """Turns to begin with."""
+        self.turns = self.given
         self.overlaps: set[Turn] = set()
         """Turns that there is no time to wait for."""
         self.hands: dict[str, Hand] = {}
@@ -206,9 +218,9 @@ class _Planner:
             try:
                 return (yield from self._plan(present, classes))
             except Misordered:
-                self.turns = frozenset()
+                self.turns = self.given
             except Losses as found:
-                turns, self.turns = self.turns, frozenset()
+                turns, self.turns = self.turns, self.given
                 times = yield from times_of(self.speeches, self.relations)
                 for number, loss in enumerate(found.losses):
                     if not number % PORTION:
@@ -232,7 +244,8 @@ class _Planner:
         """The plan of the behaviors that are left. Raises Losses: those that cannot be on time."""
         natural = natural_ends(self.chains, present)
         waited_for = frozenset(self.chains) - self._unawaited_events(present)
-        arrangement = Arrangement(natural=natural, spoken=self.order.current)
+        self.turns = frozenset(turn for turn in self.turns if {turn[0], turn[1].behavior} <= self.chains.keys())
+        arrangement = Arrangement(natural=natural, turns=self.turns, spoken=self.order.current)
         assembler = yield from assembling(self.chains, present, classes, waited_for)
         given = {name: holder.chain for name, holder in self.known.holders.items()}
         while True:
@@ -279,6 +292,8 @@ class _Planner:
             waited_for=waited_for,
             kept=kept_points(self.chains, present, arrangement.handovers),
             entering=entering(self.chains, mentioned, times, rounds),
+            turns=self.turns,
+            rounds={id: rounds[chain.points[0]] for id, chain in self.chains.items()},
             constrained=present.constrained,
             successors=arrangement.successors,
             takes=arrangement.takes,

@@ -1,16 +1,15 @@
 """Questions to the body about a plan: the poses in which behaviors start, and when they begin, wait and hurry."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from itertools import pairwise
 from math import inf
-
-from msgspec.structs import replace
 
 from engage_hri.schemas.body import BodyPose, Estimate, PlannedTime
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.realizer.plan.known import NOTHING, Known, is_foreign
 from engage_hri.services.realizer.plan.phases import Chain
 from engage_hri.services.realizer.plan.planner import Plan
+from engage_hri.services.realizer.plan.slack import slack
 from engage_hri.services.realizer.points import EPSILON, SHIFTS, Point, family
 
 NOTICEABLE: Seconds = 0.0005
@@ -38,8 +37,8 @@ def poses_before(plan: Plan, known: Known = NOTHING) -> dict[str, BodyPose]:
     }
     users = {name: (each.chain, each.estimate) for name, each in known.holders.items()}
     users |= {id: (each, plan.estimates.get(id)) for id, each in plan.chains.items()}
-    order = {id: (times[each.points[0]], number) for number, (id, (each, _)) in enumerate(users.items())}
-    for id in sorted(users, key=order.__getitem__):
+    ranked = [*known.holders, *plan.begun_in_order(plan.chains)]
+    for id in sorted(ranked, key=lambda id: round(times[users[id][0].points[0]], 6)):
         chain, estimate = users[id]
         is_shift, is_ours = chain.type in SHIFTS, id in plan.chains
         for part in chain.parts:
@@ -75,10 +74,12 @@ def _times(plan: Plan, id: str) -> tuple[PlannedTime, ...]:
     chain = plan.chains[id]
     times = [PlannedTime(sync=chain.points[0].sync, at=plan.predicted(chain.points[0]))]
     taken, (_, cut) = _taken(plan, id), plan.successors.get(id, ("", None))
+    is_lost = False
     for (since, to), segment in zip(pairwise(chain.points), chain.segments, strict=True):
+        is_lost = is_lost or to == cut
         begins, comes = plan.predicted(since), plan.predicted(to)
         surplus = comes - begins - segment.natural
-        if segment.hold and comes >= taken - EPSILON:  # It may not pass: it waits there until it is cut.
+        if segment.hold and is_lost:  # It may not pass: it waits there until it is cut.
             times.append(PlannedTime(sync=to.sync, at=taken + CUT))
             break
         if to == cut and surplus < -NOTICEABLE:
@@ -86,7 +87,9 @@ def _times(plan: Plan, id: str) -> tuple[PlannedTime, ...]:
         is_just_in_time = chain.type in SHIFTS and comes >= taken - EPSILON
         is_due = _is_met_there(plan, to) if segment.hold else is_just_in_time
         if abs(surplus) > NOTICEABLE or is_due:
-            times.append(PlannedTime(sync=to.sync, at=comes + (APART if id in plan.natural else 0.0)))
+            is_slower = EPSILON < surplus <= slack(plan, to)
+            at = comes + (APART if id in plan.natural else 0.0)
+            times.append(PlannedTime(sync=to.sync, at=at, through=is_slower))
     return tuple(times)
 
 
@@ -106,41 +109,6 @@ def _taken(plan: Plan, id: str) -> Seconds:
     if id in plan.successors and is_foreign(successor := plan.successors[id][0]):
         starts.append(plan.predicted(Point(successor, "start")))
     return min((start for start in starts if start >= begun), default=inf)
-
-
-def changed(before: Sequence[Estimate], after: Sequence[Estimate]) -> bool:
-    """True if a plan made with the estimates `before` is not the one that they call for `after`.
-
-    Estimates of what was not asked about say nothing: bodies err.
-    """
-    known = {each.behavior: each for each in before}
-    return any(
-        one.feasible != other.feasible
-        or one.parts != other.parts
-        or len(one.phases) != len(other.phases)
-        or any(abs(a.natural - b.natural) > NOTICEABLE for a, b in zip(one.phases, other.phases, strict=True))
-        for one, other in ((known[each.behavior], each) for each in after if each.behavior in known)
-    )
-
-
-def between(before: Sequence[Estimate], after: Sequence[Estimate]) -> tuple[Estimate, ...]:
-    """Estimates half-way from `before` to `after`: where each answer of the body makes the plan that calls for the
-    other, the right one lies between."""
-    known = {each.behavior: each for each in before}
-    return tuple([_halfway(known.get(each.behavior, each), each) for each in after])
-
-
-def _halfway(one: Estimate, other: Estimate) -> Estimate:
-    if [each.to for each in one.phases] != [each.to for each in other.phases]:
-        return other
-    phases = []
-    for a, b in zip(one.phases, other.phases, strict=True):
-        natural = (a.natural + b.natural) / 2
-        longest = None if b.longest is None else max(b.longest, natural)
-        phases.append(
-            replace(b, natural=natural, shortest=min(natural, (a.shortest + b.shortest) / 2), longest=longest)
-        )
-    return replace(other, phases=tuple(phases))
 
 
 def _is_overlaid(plan: Plan, shift: str) -> bool:

@@ -37,8 +37,9 @@ def predict(
     """The earliest schedule; `reason` of a cause is the number of the place or, after them, of the bound.
 
     known: when transitions come that depend on more than this net, at the earliest; negative: before the block.
-    A cycle that takes too long is shortened: each phase by a share of its room. Raises Impossible; also for a cycle
-    with ties that are dispensable: no phase is hurried for their sake.
+    A cycle that takes too long is shortened: each phase by a share of its room, those that can be slower before those
+    that have to hurry. Raises Impossible; also for a cycle with ties that are dispensable: no phase is hurried for
+    their sake.
     """
     foreseen = [Foresight("order", 0, each, at, at) for each, at in sorted(known.items()) if each and at > 0.0]
     past = {each: at for each, at in known.items() if each and at <= 0.0}
@@ -69,8 +70,15 @@ def predict(
                 if is_dispensable([tie for tie, _ in circle]):
                     hopeless.append(circle)
                     continue
-                for lag in _shortened(cycle, room, excess):
+                slower = [
+                    seconds if isinstance(tie, Bound) else 0.0 for (tie, _), seconds in zip(circle, room, strict=True)
+                ]
+                for lag in _shortened(cycle, slower, min(excess, sum(slower))):
                     lags[index[lag.reason]] = lag
+                if (rest := excess - sum(slower)) > 0.0:
+                    faster = [seconds - each for seconds, each in zip(room, slower, strict=True)]
+                    for lag in _shortened(cycle, faster, rest):
+                        lags[index[lag.reason]] = lag
             if hopeless:
                 raise Impossible(hopeless) from None
 
@@ -78,8 +86,11 @@ def predict(
 def _shortened(cycle: tuple[Lag, ...], room: list[Seconds], excess: Seconds) -> list[Lag]:
     """The lags of the cycle that give way, by `excess` in all, each in proportion to its `room`."""
     if sum(room) == inf:
-        room = [float(each == inf) for each in room]
-    total = sum(room)
+        # What can wait as long as it must does so as early as it can, as it does when it is performed.
+        first = min(lag.target for lag, each in zip(cycle, room, strict=True) if each == inf)
+        room = [float(each == inf and lag.target == first) for lag, each in zip(cycle, room, strict=True)]
+    if not (total := sum(room)):
+        return []
     shares = [each / total for each in room]
     return [
         lag._replace(seconds=lag.seconds - excess * share) for lag, share in zip(cycle, shares, strict=True) if share

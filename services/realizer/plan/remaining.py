@@ -86,6 +86,7 @@ def _left_over(relations: Relations, chains: Mapping[str, Chain], dropped: Conta
     first: dict[Point, Term] = {}
     found = []
     for point, term in sorted(survivors.items()):
+        through.add(point)  # Nothing is tied to it where that contradicts the rest.
         root, offset = through.find(point)
         here = replace(term, offset=-offset, stroke=0)
         if root in first:

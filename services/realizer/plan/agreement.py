@@ -1,0 +1,132 @@
+"""Agreement of a plan with what the body says about it: each answer may make another plan, with another answer."""
+
+from collections.abc import Sequence
+from math import inf
+from typing import NamedTuple
+
+from msgspec.structs import replace
+
+from engage_hri.schemas.body import Estimate, EstimateBehaviors, Phase
+from engage_hri.schemas.units import Seconds
+from engage_hri.services.realizer.plan.handover import Turn
+from engage_hri.services.realizer.plan.planner import Plan
+from engage_hri.services.realizer.plan.poses import NOTICEABLE
+
+STRAIGHT, MOST = 2, 12
+"""How often the body is asked about a plan anew. After the first so many times estimates go half-way only; at most,
+in all."""
+
+
+class Rounds:
+    """Plans of one block, and what the body has said about them.
+
+    estimates: those to plan with next. turns: those that the next plan is to begin with: where two orders on one part
+    each call for the other, what waited in one plan waits in all. settled: the last plan that is right but for phases
+    that cannot be hurried so.
+    """
+
+    def __init__(self, question: EstimateBehaviors, first: tuple[Estimate, ...]) -> None:
+        self.estimates = first
+        self.turns: frozenset[Turn] = frozenset()
+        self.settled: Plan | None = None
+        self._answers = [(question, first)]
+        self._nearest: tuple[Seconds, Plan] | None = None
+        self._has_jumped = False
+        self._is_free = False
+
+    def answer(self, question: EstimateBehaviors) -> tuple[Estimate, ...] | None:
+        """Answer of the body to the same question before; None if it was not asked that."""
+        return next((answer for asked, answer in self._answers if asked == question), None)
+
+    def let_go(self) -> None:
+        """Insist on no order of behaviors any more: it leaves no time."""
+        self.turns, self._is_free = frozenset(), True
+
+    def close(self, plan: Plan, question: EstimateBehaviors, told: tuple[Estimate, ...]) -> Plan | None:
+        """Compare what the body has told with what the plan was made with; returns the plan to perform.
+
+        None: plan once more, with `estimates`.
+        """
+        if self.turns and self._nearest is not None and len(plan.dropped) > len(self._nearest[1].dropped):
+            self.let_go()
+            return None
+        off = difference(self.estimates, told)
+        if self.settled is not None and len(plan.dropped) > len(self.settled.dropped):
+            return self.settled
+        if max(off) <= NOTICEABLE:
+            return plan
+        if off.natural <= NOTICEABLE and self.settled is None:
+            self.settled = plan
+        if self._nearest is None or max(off) < self._nearest[0]:
+            self._nearest = max(off), plan
+        if len(self._answers) > MOST:
+            return self._nearest[1]
+        # The same question again: its answer is tried once as it is.
+        is_settled = self._answers[-1][0] == question and not self._has_jumped
+        is_early = len(self._answers) < STRAIGHT + 1
+        self._has_jumped = self._has_jumped or (is_settled and not is_early)
+        self._answers.append((question, told))
+        if not self._is_free and not is_early:
+            self.turns |= plan.turns
+        self.estimates = between(self.estimates, told, 1.0 if is_settled or is_early else 0.5)
+        return None
+
+
+class Difference(NamedTuple):
+    """Seconds by which phases are other than expected, at most; inf if something else is. short: by which they take
+    longer, at their shortest."""
+
+    natural: Seconds
+    short: Seconds
+
+
+def difference(before: Sequence[Estimate], after: Sequence[Estimate]) -> Difference:
+    """The greatest difference between the estimates of a plan, `before`, and those that it calls for.
+
+    Estimates of what was not asked about say nothing: bodies err. Nor do those of what the plan leaves out.
+    """
+    known = {each.behavior: each for each in before if each.feasible}
+    found = [_difference(known[each.behavior], each) for each in after if each.behavior in known]
+    return Difference(
+        max((each.natural for each in found), default=0.0), max((each.short for each in found), default=0.0)
+    )
+
+
+def _difference(one: Estimate, other: Estimate) -> Difference:
+    phases = [each.to for each in one.phases], [each.to for each in other.phases]
+    if one.feasible != other.feasible or one.parts != other.parts or phases[0] != phases[1]:
+        return Difference(inf, 0.0)
+    pairs = list(zip(one.phases, other.phases, strict=True))
+    return Difference(
+        max((abs(a.natural - b.natural) for a, b in pairs), default=0.0),
+        max((b.shortest - a.shortest for a, b in pairs), default=0.0),
+    )
+
+
+def between(before: Sequence[Estimate], after: Sequence[Estimate], weight: float = 0.5) -> tuple[Estimate, ...]:
+    """Estimates on the way from `before` to `after`, which is at weight 1.
+
+    Where each answer of the body makes the plan that calls for the other, the right one lies between. What could
+    not be hurried in one plan cannot in the next; a behavior that the body could not do then stays out.
+    """
+    known = {each.behavior: each for each in before}
+    return tuple([_between(known.get(each.behavior, each), each, weight) for each in after])
+
+
+def _between(one: Estimate, other: Estimate, weight: float) -> Estimate:
+    if not one.feasible:
+        return one
+    if [each.to for each in one.phases] != [each.to for each in other.phases]:
+        return other
+    phases = []
+    for a, b in zip(one.phases, other.phases, strict=True):
+        natural = (1.0 - weight) * a.natural + weight * b.natural
+        longest = a.longest if b.longest is None and b.hold else b.longest
+        longest = None if longest is None else max(longest, natural)
+        phases.append(replace(b, natural=natural, shortest=max(map(_haste, (a, b))) * natural, longest=longest))
+    return replace(other, phases=tuple(phases))
+
+
+def _haste(phase: Phase) -> float:
+    """Share of its natural time that a phase takes at least."""
+    return min(1.0, phase.shortest / phase.natural) if phase.natural else 0.0

@@ -1,0 +1,24 @@
+"""Slack at hold points: who is early there by less than a stop costs is slower on its way, and does not stop."""
+
+from math import inf
+
+from engage_hri.schemas.units import Seconds
+from engage_hri.services.realizer.plan.planner import Plan
+from engage_hri.services.realizer.points import Point
+
+BRIEF: Seconds = 0.05
+"""Most seconds by which a behavior is slower on its way, so as not to stop."""
+UNNOTICED: Seconds = 0.008
+"""Seconds by which it may pass there too early."""
+
+
+def slack(plan: Plan, point: Point) -> Seconds:
+    """Seconds by which a behavior may be early at a hold point that it shares with nobody, and not stop there."""
+    members = plan.members[plan.at[point]]
+    if len(members) > 1 or not members[0].can_wait:
+        return 0.0
+    chain = plan.chains[point.behavior]
+    number = chain.points.index(point) - 1
+    longest = chain.longest[number]
+    room = inf if longest is None else longest - chain.segments[number].natural
+    return min(BRIEF, max(0.0, room) + UNNOTICED)

@@ -1,0 +1,105 @@
+"""What a hold costs: the rest keeps its pace and its times as far as it can, and only what is left is late for it."""
+
+import asyncio
+
+import pytest
+
+from engage_hri.schemas import keys
+from engage_hri.schemas.behaviors import Gesture, Speech
+from engage_hri.schemas.blocks import SteerPerformance
+from engage_hri.schemas.feedback import WarningFeedback
+from engage_hri.services.control.config import Stall, Variability
+from engage_hri.services.realizer.decide.held_up import STANDING, HeldUp
+from engage_hri.services.realizer.foresee.outlook import Outlook
+from engage_hri.services.realizer.points import Point
+from tests.realizer.planning import timed
+from tests.realizer.stage import block, together
+from tests.realizer.test_simulated_body import Robot, robot
+
+BEAT = Gesture(id="g", lexeme="BEAT", mode="LEFT_HAND")
+FIRST, SECOND = Speech(id="s", text="Yes, please."), Speech(id="t", text="And now the next piece goes there.")
+A, B, C = Point("a", "stroke"), Point("b", "stroke"), Point("c", "stroke")
+
+
+async def hold(seen: Robot, seconds: float, block: str = "b", behavior: str = "") -> None:
+    for to in ("hold", "continue"):
+        request = SteerPerformance(id=to, requester="test", to=to, block=block, behavior=behavior)
+        await seen.requests.send(keys.BLOCK, request).outcome
+        await asyncio.sleep(seconds if to == "hold" else 0.0)
+
+
+async def test_a_slowed_stroke_that_is_held_shortly_goes_on_slowly_and_comes_later_by_that() -> None:
+    async with robot(Variability()) as seen:
+        performing = seen.ask(block((timed(BEAT, stroke_start="1", stroke="1.7"),)))
+        await asyncio.sleep(1.2)
+        await hold(seen, 0.3)
+        await performing.outcome
+
+    times = seen.times()
+    assert times["g:stroke_start"].time == pytest.approx(1.0, abs=0.01)
+    assert times["g:stroke"].time == pytest.approx(2.0, abs=0.02)
+    assert seen.kinds() == []
+
+
+async def test_words_that_were_held_do_not_make_the_voice_slow() -> None:
+    """The stroke waits for the end of the second utterance, and is there with it."""
+    async with robot(Variability()) as seen:
+        performing = seen.ask(block((FIRST, SECOND, BEAT), together("g:stroke", "t:end")))
+        await asyncio.sleep(0.3)
+        await hold(seen, 0.8)
+        await performing.outcome
+
+    times = seen.times()
+    assert times["g:stroke"].time == pytest.approx(times["t:end"].time, abs=0.02)
+    assert seen.kinds() == []
+
+
+async def test_what_stalls_after_a_hold_is_late_for_itself() -> None:
+    """The hold is over for long, and its 3 s do not hide that the stroke comes 0.4 s after the word."""
+    stall = Stall(part="left_arm", before="stroke", seconds=0.4)
+    made = block((timed(BEAT, start="t:start+0.1"), FIRST, SECOND), together("g:stroke", "t:end"))
+    async with robot(Variability(stall=(stall,))) as seen:
+        performing = seen.ask(made)
+        await asyncio.sleep(0.2)
+        await hold(seen, 3.0)
+        await performing.outcome
+
+    late = [each for each in seen.feedback if isinstance(each, WarningFeedback) and each.kind == "LATE"]
+    assert [each.behavior for each in late] == ["g"]
+
+
+def test_until_it_is_known_what_a_hold_has_cost_it_accounts_for_as_much_as_it_lasted() -> None:
+    held = HeldUp()
+    before = Outlook({A: 5.0, B: 5.0}, {A: 5.0, B: 5.0})
+    held.hold(before, 1.0)
+    assert held.between(A, B, 0.0, 0.5) == 0.0  # it came before
+    assert held.between(A, B, 0.0, 3.0) == pytest.approx(2.0 + STANDING)
+    held.let_go(4.0, {"a": 2})
+    assert held.within(A, (B,), 20.0) == pytest.approx(3.0 + STANDING)
+    assert not held.is_settled(4.2, {"a": 3})
+    assert not held.is_settled(9.0, {"a": 2})
+    assert held.is_settled(9.0, {"a": 3})
+
+
+def test_then_it_accounts_for_what_is_expected_to_be_later_than_it_was() -> None:
+    held = HeldUp()
+    held.hold(Outlook({A: 5.0, B: 5.0, C: 4.0}, {A: 5.2, B: 5.0}), 1.0)
+    held.let_go(4.0, {})
+    held.settle(Outlook({A: 8.0, B: 6.0, C: 7.0}, {A: 8.0, B: 7.0}))
+
+    assert held.between(A, B, 0.0, 9.0) == 2.0
+    assert held.between(A, B, 0.5, 9.0) == 1.5
+    assert held.between(B, A, 0.0, 9.0) == 0.0
+    assert held.between(A, C, 0.0, 9.0) == 0.0  # it was expected to be as late before
+    assert held.within(A, (B,), 9.0) == pytest.approx(0.8)
+    assert held.between(A, Point("nobody", "end"), 0.0, 9.0) == 0.0
+
+
+def test_holds_add_up() -> None:
+    held = HeldUp()
+    for since in (0.0, 10.0):
+        held.hold(Outlook({A: since, B: since / 10.0}, {}), since)
+        held.let_go(since + 1.0, {})
+        held.settle(Outlook({A: since + 1.0, B: since / 10.0}, {}))
+
+    assert held.between(A, B, 0.0, 20.0) == pytest.approx(2.0)
