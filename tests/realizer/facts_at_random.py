@@ -181,6 +181,7 @@ def case(chance: random.Random, *, is_elastic: bool) -> Case:
             bounds.append(Bound("delay", target, source, -(lag if kind == "delay" else lag + 1.5)))
     places += [Place("order", each, size - 1) for each in range(1, size - 1)]
     places.append(Place("idle", size - 1, 0))
+    places += [Place("idle", each[-1], each[0], 1.0, 1.0) for each in stations.values() if chance.random() < 0.3]
     foreign = [each for each in range(1, size - 1) if chance.random() < 0.15]
     return Case(
         PetriNet(tuple(Transition(str(n), ()) for n in range(size)), tuple(places), tuple(bounds)), stations, foreign

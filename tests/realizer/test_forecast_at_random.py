@@ -236,3 +236,14 @@ def test_an_instant_that_comes_as_expected_frees_what_was_given_up_for_it() -> N
     told.fix(2, BEGAN + 2.0)
     assert told.update() == {1}
     assert told.times[1:3] == pytest.approx([BEGAN + 1.5, BEGAN + 2.0])
+
+
+def test_an_upper_bound_that_only_its_own_phase_could_break_holds_nobody_back() -> None:
+    """Unless something else may end the phase late: an order, a bound, or a point of another block."""
+    phase, own = Place("phase", 1, 2, 1.0, 1.0, "a"), Bound("phase", 2, 1, -1.0, 0.0, "a")
+    starts = tuple(Place("order", 0, each) for each in (1, 2, 3))
+    for more, bounded in ((), set()), ((Place("order", 3, 2),), {1, 2}), ((Place("order", 0, 2, 2.0, 2.0),), {1, 2}):
+        net = PetriNet(tuple(Transition(str(n), ()) for n in range(4)), (*starts, phase, *more), (own,))
+        assert Forecast(Case(net, {}, []).plan, BEGAN, lambda id: 1.0, {}).bounded == bounded
+    net = PetriNet(tuple(Transition(str(n), ()) for n in range(4)), (*starts, phase), (own,))
+    assert Forecast(Case(net, {}, [2]).plan, BEGAN, lambda id: 1.0, {}).bounded == {1, 2}

@@ -99,6 +99,11 @@ LOST = {
         '<wait id="w" duration="3" start="n:start" end="n:ready"/><head id="n" lexeme="NOD"/>',
         ("w",),
     ),
+    "who waits for itself": (
+        '<wait id="v" duration="1" start="n:start"/><head id="n" lexeme="NOD"/>'
+        '<constraint><after ref="n:stroke+1"><sync ref="n:stroke"/></after></constraint>',
+        ("n",),
+    ),
     "nobody more where one who is lost anyway has to do with it": (
         '<head id="a" lexeme="NOD" start="1"/><head id="b" lexeme="NOD" start="1" stroke="a:start+0.1" end="5.1"/>'
         '<head id="c" lexeme="NOD" start="5" end="b:end"/>',
