@@ -13,6 +13,7 @@ from msgspec import Struct, field
 
 from engage_hri.schemas.behaviors import After, Before, BlockBehavior, Constraint, Synchronize, Wait
 from engage_hri.schemas.blocks import Block
+from engage_hri.services.realizer.plan.deadlocks import Loss, Losses
 from engage_hri.services.realizer.plan.planner import plan_block
 from engage_hri.services.realizer.plan.relations import BlockRefused
 
@@ -124,3 +125,7 @@ def test_points_of_one_line_are_told_with_that_line_alone_and_without_lines_with
         with pytest.raises(BlockRefused) as refusal:
             plan_block(Block(id="b", behaviors=behaviors, constraints=(constraint,)))
         assert (refusal.value.fault.line, refusal.value.fault.advice) == (told, "")
+
+
+def test_losses_are_told_with_their_reasons() -> None:
+    assert str(Losses([Loss("a", "is late"), Loss("b", "is early")])) == "a is late; b is early"

@@ -11,7 +11,7 @@ from msgspec.structs import replace
 from engage_hri.schemas.behaviors import BlockBehavior, Gaze, Head, Pointing, Posture, Speech, Timing, Wait
 from engage_hri.schemas.blocks import Block
 from engage_hri.schemas.documents.xml_decode import decode_xml
-from engage_hri.services.realizer.plan.deadlocks import Loss, Losses, clashes
+from engage_hri.services.realizer.plan.deadlocks import clashes
 from engage_hri.services.realizer.plan.given_up import times_of
 from engage_hri.services.realizer.plan.instants import Classes
 from engage_hri.services.realizer.plan.known import Holder, Known, qualified
@@ -219,10 +219,6 @@ def test_who_cannot_wait_for_a_part_is_lost_or_who_has_it_and_then_the_other_kee
         assert it.turn == (later, Point(*awaited.split(":", 1)))
 
 
-def test_losses_are_told_with_their_reasons() -> None:
-    assert str(Losses([Loss("a", "is late"), Loss("b", "is early")])) == "a is late; b is early"
-
-
 def test_of_two_speeches_that_begin_at_once_the_later_gives_its_time_up() -> None:
     speeches = "".join(f'<speech id="{id}" start="1"><text>one</text></speech>' for id in "st")
     block = decode_xml(f'<bml id="b">{speeches}</bml>')
@@ -265,10 +261,19 @@ THEIRS = Pointing(id="x", target="a", mode="BOTH_HANDS")
 TIMES = {f"other:x:{sync}": at for sync, at in zip(SEVEN, (-1.0, 0.0, 1.0, 2.0, 3.0, 4.0, 5.0), strict=True)}
 
 
-@pytest.mark.parametrize(("mode", "name"), [("LEFT_HAND", "left arm"), ("BOTH_HANDS", "left arm and right arm")])
-def test_who_has_no_time_to_wait_for_another_block_is_told_what_that_has_and_until_when(mode: str, name: str) -> None:
+@pytest.mark.parametrize(
+    ("theirs", "mode", "name"),
+    [
+        ("BOTH_HANDS", "LEFT_HAND", "left arm"),
+        ("BOTH_HANDS", "BOTH_HANDS", "left arm and right arm"),
+        ("RIGHT_HAND", "BOTH_HANDS", "right arm"),
+    ],
+)
+def test_who_has_no_time_to_wait_for_another_block_is_told_what_that_has_and_until_when(
+    theirs: str, mode: str, name: str
+) -> None:
     ours = Pointing(id="p", target="a", mode=mode, timing=(Timing("start", "1"),), line=4)  # type: ignore[arg-type]
-    known = others(THEIRS, times=TIMES)
+    known = others(replace(THEIRS, mode=theirs), times=TIMES)
     made = plan_block(Block(id="b", behaviors=(ours,)), [estimate(ours)], known=known)
 
     assert [(each.kind, each.behavior, each.message) for each in made.problems] == [
