@@ -242,6 +242,7 @@ async def test_what_fires_in_the_moment_of_a_new_plan_is_told_once() -> None:
 async def test_who_comes_late_knows_all_within_two_seconds() -> None:
     early, late = Watcher(), Watcher()
     async with stage() as seen, watching(seen, early):
+        await asyncio.sleep(3.0)  # times are the block's own, not those of the clock
         pending = seen.ask(FIGURES["4.4"][0])
         await seen.seen("point-1:stroke_start")
         async with watching(seen, late):

@@ -116,9 +116,10 @@ class Forecast(LongestPaths):
                 self.require(self._arcs[number].source)
         if was_kept and abs(at - expected) <= FINEST:
             self._uncause(transition)
+            self._see_reasons_again(transition)
             return
         self._set(transition, at, -1)
-        if was_kept and at < expected:
+        if at < expected:
             for effect in list(self._effects[transition]):
                 self._invalidate(effect)
             for number in self._in[transition]:
@@ -145,8 +146,13 @@ class Forecast(LongestPaths):
             self._touch(node)
         for other in self._of_behavior[behavior]:
             # A phase that has begun can no longer keep its own beginning back.
-            if self._arcs[other].is_bound and self._arcs[other].target == transition:
+            if self._arcs[other].target == transition:
                 self._switch_off(other)
+
+    def _see_reasons_again(self, node: int) -> None:
+        """Let `update` see anew what has to give way, if anything does: a fact that moves nothing may free it."""
+        if self._given_way or self._broken:
+            self._touch(node)
 
     def _whereabouts(self, behavior: str) -> int:
         """The node for the time at which the behavior passed its latest point; it belongs to no instant."""
@@ -157,6 +163,7 @@ class Forecast(LongestPaths):
     def come(self, behavior: str, transition: int, at: Seconds) -> None:
         """Note that the behavior is at its point there, or past it."""
         self._there[transition] = max(self._there[transition], at)
+        self._see_reasons_again(transition)
         number = self._phase_to.get((behavior, transition))
         if number is None or not self._arcs[number].is_on:
             self._raise_base(transition, at)
@@ -209,6 +216,7 @@ class Forecast(LongestPaths):
                 arc.asked, arc.least = asked * factor, least * factor
                 if arc.is_on and number not in self._given_way:
                     self._set_seconds(number, arc.asked)
+                self._see_reasons_again(arc.source)
 
     # -- questions -----------------------------------------------------------------------------------------------
 
@@ -223,8 +231,6 @@ class Forecast(LongestPaths):
 
     def is_hurried(self, behavior: str) -> bool:
         """True if a phase of the behavior is to be faster than is natural."""
-        if not self._given_way:  # the usual case
-            return False
         hurried = (number for number in self._given_way if not self._arcs[number].is_bound)
         return any(self._arcs[number].behavior == behavior for number in hurried)
 

@@ -81,8 +81,6 @@ class PetriNet(Struct, frozen=True, dict=True):
     def later(self, sources: Iterable[int]) -> set[int]:
         """Transitions that come after one of these, and these."""
         found = set(sources)
-        if not found:
-            return found
         out: dict[int, list[int]] = {}
         for place in self.places:
             if place.kind != "idle":
@@ -191,10 +189,10 @@ def is_safe(net: PetriNet) -> bool:
     ends = [((place.source, place.target), count) for place, count in zip(net.places, net.initial, strict=True)]
     tokens = {pair for pair, count in ends if count}
     open_places = {pair for pair, count in ends if not count and pair[::-1] not in tokens}
-    for source, target in sorted(tokens, key=lambda ends: ends[0] - ends[1], reverse=True):
-        if not open_places:
-            break
+    for source, target in tokens:
         after, before = _reachable(net, target, forward=True), _reachable(net, source, forward=False)
+        if source not in after:
+            return False  # No cycle limits the tokens that come to this one.
         open_places = {(since, to) for since, to in open_places if since not in after or to not in before}
     return not open_places and is_live(net)
 

@@ -11,7 +11,7 @@ from engage_hri.services.realizer.plan.handover import Turn
 from engage_hri.services.realizer.plan.instants import Classes
 from engage_hri.services.realizer.plan.phases import Chain
 from engage_hri.services.realizer.plan.prediction import Circle, Impossible
-from engage_hri.services.realizer.plan.relations import BlockRefused
+from engage_hri.services.realizer.plan.relations import BlockRefused, Order, Relations
 from engage_hri.services.realizer.plan.steps import Steps
 from engage_hri.services.realizer.points import EPSILON, Point
 
@@ -78,7 +78,7 @@ def judge(
     impossible: Impossible,
     assembly: Assembly,
     chains: Mapping[str, Chain],
-    required: Collection[str],
+    relations: Relations,
     classes: Classes,
     block: str,
     turns: Collection[Turn],
@@ -90,7 +90,7 @@ def judge(
     Each circle costs a behavior, unless one that is lost already was part of it.
     """
     net = assembly.net
-    rank = {id: number for number, id in enumerate(chains) if id not in required}
+    rank = {id: number for number, id in enumerate(chains) if id not in relations.required}
     ends = {(assembly.at[turn[1]], assembly.at[Point(turn[0], "start")]): turn for turn in sorted(turns)}
     found = []
     for circle in impossible.circles:
@@ -101,7 +101,9 @@ def judge(
         yield len(circle)
         if loss is not None and not _touched(circle, net) & losses.keys():
             losses[loss.behavior] = loss
-    return Losses(tuple(losses.values())) if losses else _deadlock(impossible.circles[0], net, classes, block)
+    if losses:
+        return Losses(tuple(losses.values()))
+    return _deadlock(impossible.circles[0], net, relations.orders, classes, block)
 
 
 def _loss(
@@ -139,7 +141,10 @@ def _loss(
 
 def _shortage(net: PetriNet, circle: Circle, lost: str) -> str:
     """Explain what takes more time than there is, if phases of the lost behavior do; else nothing."""
-    took = [(tie, seconds) for tie, seconds in circle if tie.kind == "phase" and tie.behavior == lost and seconds > 0]
+    own = [isinstance(tie, Place) and tie.kind == "phase" and tie.behavior == lost for tie, _ in circle]
+    first = next((number for number, is_own in enumerate(own) if is_own and not own[number - 1]), 0)
+    phases = [circle[number] for number in (*range(first, len(circle)), *range(first)) if own[number]]
+    took = [(tie, seconds) for tie, seconds in phases if seconds > 0]
     if not took:
         return ""
     needed, excess = sum(seconds for _, seconds in took), sum(seconds for _, seconds in circle)
@@ -152,9 +157,9 @@ def _touched(circle: Circle, net: PetriNet) -> set[str]:
     return {point.behavior for tie, _ in circle for point in net.transitions[tie.source].points}
 
 
-def _deadlock(circle: Circle, net: PetriNet, classes: Classes, block: str) -> BlockRefused:
+def _deadlock(circle: Circle, net: PetriNet, orders: Sequence[Order], classes: Classes, block: str) -> BlockRefused:
     ties = [tie for tie, _ in circle]
-    lines = sorted({line for tie in ties for line in tie.lines} | _lines_of_instants(ties, net, classes))
+    lines = sorted({line for tie in ties for line in tie.lines} | _lines_of_instants(ties, net, orders, classes))
     fault = Fault(
         reason=f"these points wait for each other in a circle: {_route(net, circle)}",
         where=block,
@@ -169,15 +174,21 @@ def _route(net: PetriNet, circle: Circle) -> str:
     return " -> ".join((*steps, net.transitions[circle[0][0].source].name))
 
 
-def _lines_of_instants(ties: list[Place | Bound], net: PetriNet, classes: Classes) -> set[int]:
-    """Lines that say that the points of these instants belong together."""
+def _lines_of_instants(
+    ties: list[Place | Bound], net: PetriNet, orders: Sequence[Order], classes: Classes
+) -> set[int]:
+    """Lines that say that the points of an instant, or of one a fixed time later, belong together."""
     lines: set[int] = set()
-    for before, after in zip([ties[-1], *ties], ties, strict=False):
-        came, goes = before.behavior, after.behavior
-        here = net.transitions[after.source].points
-        ends = [next((point for point in here if point.behavior == id), None) for id in (came, goes)]
-        lines |= classes.lines(*(end for end in ends if end is not None))
-        if after.kind == "delay":
-            there = net.transitions[after.target].points
-            lines |= classes.lines(here[0], there[0])
+    others = [tie for tie in ties if tie.kind != "delay"]
+    for before, after in zip([*others[-1:], *others], others, strict=False):
+        lines |= classes.lines(_ends(before, net, orders)[1], _ends(after, net, orders)[0])
     return lines
+
+
+def _ends(tie: Place | Bound, net: PetriNet, orders: Sequence[Order]) -> tuple[Point, Point]:
+    """The points that a tie is between: of its behavior, or those that are said to come in this order."""
+    since, to = (net.transitions[end].points for end in (tie.source, tie.target))
+    said = ((each.earlier.point, each.later.point) for each in orders)
+    start, end = next((each for each in said if each[0] in since and each[1] in to), (since[0], to[0]))
+    named = {point.behavior: point for point in reversed(since)}, {point.behavior: point for point in reversed(to)}
+    return named[0].get(tie.behavior, start), named[1].get(tie.behavior, end)

@@ -109,9 +109,9 @@ class Classes:
             return False
         return True
 
-    def lines(self, *points: Point) -> set[int]:
-        """Lines that tie the first of `points` to the last; empty if nothing does."""
-        return {term.line for term in self._chain(points[0], points[-1])} - {0} if len(points) > 1 else set()
+    def lines(self, one: Point, other: Point) -> set[int]:
+        """Lines that tie the two points; empty if nothing does."""
+        return {term.line for term in self._chain(one, other)} - {0}
 
     def _contradiction(self, first: Term, second: Term, known: Seconds, block: str) -> BlockRefused:
         chain = self._chain(first.point, second.point)

@@ -307,10 +307,9 @@ class _Planner:
             if waits := assembly.waits(tie for circle in impossible.circles for tie, _ in circle):
                 assembler.waive(waits)
                 return (yield from self._solved(assembler, arrangement, classes))
-            required = self.relations.required
-            turns = self.turns | self.order.turns | set(arrangement.handovers.values())
+            present, turns = assembler.relations, self.turns | self.order.turns | set(arrangement.handovers.values())
             raise (
-                yield from judge(impossible, assembly, self.chains, required, classes, self.block.id, turns)
+                yield from judge(impossible, assembly, self.chains, present, classes, self.block.id, turns)
             ) from None
 
     def _may_speak_at_once(self, id: str, present: Relations) -> bool:
