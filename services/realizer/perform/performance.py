@@ -362,6 +362,7 @@ class BlockPerformance:
         self.ties.renew()
         for id in self._dropped:  # Told only now that the block goes on: its followers would end with it.
             self._shared.live_blocks.lose(self.plan.block.id, id)
+        self.report.unkept(plan)
         for problem in plan.problems:
             if problem.behavior in kept.intersection(plan.given_up):
                 self.report.warn(problem.kind, problem.message, problem.behavior)

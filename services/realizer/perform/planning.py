@@ -3,6 +3,8 @@
 import asyncio
 from collections.abc import Callable, Collection, Iterable, Mapping
 
+from msgspec.structs import replace
+
 from engage_hri.schemas import keys
 from engage_hri.schemas.behaviors import Hand, Speech
 from engage_hri.schemas.blocks import Block
@@ -60,7 +62,8 @@ class Planning:
         estimates = await self._estimates(block, question)
         await self._earlier(live, named)
         live.is_planning = True
-        return await self._agreed(block, question, estimates, elsewhere, named)
+        waits = bool(live.earlier) and block.composition != "MERGE"
+        return await self._agreed(block, question, estimates, elsewhere, named, is_to_wait=waits)
 
     async def again(self, plan: Plan, elsewhere: Mapping[str, Block]) -> Plan:
         """Plan a block that had to wait: by now the body and the other blocks are elsewhere."""
@@ -76,16 +79,20 @@ class Planning:
         first: tuple[Estimate, ...],
         elsewhere: Mapping[str, Block],
         named: Collection[Point],
+        *,
+        is_to_wait: bool = False,
     ) -> Plan:
         """Plan with `first`, and ask the body about the plan and the hands it has chosen, until the answer is
         what the plan was made with; if it never is, the plan that comes nearest.
 
-        question: the one that `first` answers.
+        question: the one that `first` answers. is_to_wait: whoever has parts of the body now has ended by then.
         """
         barred: set[tuple[str, Hand]] = set()
         chosen, rounds = block, Rounds(question, first)
         while True:
             known = self._known(block, elsewhere, named, rounds.estimates)
+            if is_to_wait:
+                known = replace(known, holders={})
             try:
                 steps = plan_steps(chosen, rounds.estimates, known=known, barred=barred, turns=rounds.turns)
                 plan = await unhurried(steps)
