@@ -107,7 +107,7 @@ def test_nothing_is_dropped_that_some_order_can_serve(block: Block) -> None:
 
     if orders:
         assert plan is not None
-        assert (plan.dropped, plan.given_up) == ((), ())
+        assert (plan.dropped, plan.given_up) == ((), {})
         assert tuple(spoken(plan)) in orders
         document = tuple(each.id for each in block.behaviors if isinstance(each, Speech))
         assert document not in orders or tuple(spoken(plan)) == document

@@ -357,15 +357,16 @@ class BlockPerformance:
         except InputRefused as error:
             self._live.stop(Ending("failed", error.fault))
             return
-        kept = frozenset(plan.chains).difference(self.decisions.plan.given_up)
+        before = self.decisions.plan.given_up
         self.decisions.replan(plan)
         self.ties.renew()
         for id in self._dropped:  # Told only now that the block goes on: its followers would end with it.
             self._shared.live_blocks.lose(self.plan.block.id, id)
         self.report.unkept(plan)
+        for id, given_up in plan.given_up.items():
+            for said in sorted(given_up.keys() - before.get(id, {}).keys()):
+                self.report.warn(given_up[said].kind, given_up[said].message, id)
         for problem in plan.problems:
-            if problem.behavior in kept.intersection(plan.given_up):
-                self.report.warn(problem.kind, problem.message, problem.behavior)
             # Without the dropped ones, others may be too late now.
             if problem.behavior in plan.dropped and problem.behavior not in gone:
                 if self._runs[problem.behavior].pending is not None:

@@ -30,12 +30,19 @@ def losses_to_others(
     chains: Mapping[str, Chain],
     known: Known,
 ) -> list[Loss]:
-    """Behaviors that have no time to wait until another block is done with their part, in document order."""
+    """Behaviors that have no time to wait until another block is done with their part, in document order.
+
+    A speech gives up its times before it is lost: it may wait until the other has the voice no more.
+    """
     ends = {(assembly.at[point], assembly.at[Point(id, "start")]): (id, point) for id, point in turns}
     found = {}
     for circle in impossible.circles:
         if (turn := _turn(circle, ends)) is not None and is_foreign(turn[1].behavior):
-            found[turn[0]] = Loss(turn[0], _taken(turn, chains, known), turn=turn)
+            ends_of_ties = {end for tie, _ in circle for end in (tie.source, tie.target)}
+            among = frozenset(point for end in ends_of_ties for point in assembly.net.transitions[end].points)
+            chain = chains[turn[0]]
+            points = tuple(point for point in chain.points if chain.type == "speech" and point in among)
+            found[turn[0]] = Loss(turn[0], _taken(turn, chains, known), points, among, turn)
     return [found[id] for id in chains if id in found]
 
 

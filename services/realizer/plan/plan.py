@@ -30,7 +30,8 @@ class Plan(Struct, frozen=True, kw_only=True):
     turns: behaviors that wait for a point of another before they take its part.
     behaviors: those that will be performed, in document order. dropped: those that will not, with `problems`.
     natural: behaviors that end when something takes their place, or with the block.
-    waited_for: behaviors that the end of the block waits for. given_up: speeches that lack a time they should have.
+    waited_for: behaviors that the end of the block waits for. given_up: for each speech that lacks a time it should
+    have, what the block said, with the warning.
     relations: what the block says of these behaviors. broken: what of that the plan cannot keep, since times are
     fixed, or another block has passed a point already.
     constrained: points that something waits for, or that are timed.
@@ -60,7 +61,7 @@ class Plan(Struct, frozen=True, kw_only=True):
     takes: Mapping[str, str] = {}
     critical: tuple[int, ...] = ()
     dropped: tuple[str, ...] = ()
-    given_up: tuple[str, ...] = ()
+    given_up: Mapping[str, Mapping[str, Problem]] = {}
     problems: tuple[Problem, ...] = ()
 
     def predicted(self, point: Point) -> Seconds:

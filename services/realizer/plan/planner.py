@@ -96,8 +96,8 @@ class _Planner:
         self.barred = barred
         self.dropped = dict.fromkeys(dropped)
         """Behaviors, in the order in which they were dropped; the values mean nothing."""
-        self.given_up: dict[str, list[Problem]] = {}
-        """Speeches without some of their times, each with the warnings of that."""
+        self.given_up: dict[str, dict[str, Problem]] = {}
+        """Speeches without some of their times: what the block said of these, and the warnings."""
         self.given: frozenset[Turn] = frozenset()
         """Turns to begin with."""
         self.turns = self.given
@@ -143,7 +143,7 @@ class _Planner:
         self.chains.pop(id, None)
         self.dropped[id] = None
         if futile := self.given_up.pop(id, None):
-            self.problems = [each for each in self.problems if each not in futile]
+            self.problems = [each for each in self.problems if each not in futile.values()]
         self.problems.append(Problem(kind, at_line(self.lines[id], f"{reason}{DROPPED}"), id))
 
     def plan(self) -> Steps[Plan]:
@@ -189,7 +189,7 @@ class _Planner:
     def _keep_words(self, id: str, said: str, reason: str) -> None:
         reason = f"{reason}; {said} is given up, so that the words are said"
         self.problems.append(Problem("IMPOSSIBLE_TO_SCHEDULE", at_line(self.lines[id], reason), id))
-        self.given_up.setdefault(id, []).append(self.problems[-1])
+        self.given_up.setdefault(id, {})[said] = self.problems[-1]
 
     def _plan(self, present: Relations, classes: Classes) -> Steps[Plan]:
         """The plan of the behaviors that are left. Raises Losses: those that cannot be on time."""
@@ -252,7 +252,7 @@ class _Planner:
             takes=arrangement.takes,
             critical=critical_path(solution),
             dropped=tuple(self.dropped),
-            given_up=tuple(self.given_up),
+            given_up=self.given_up,
             problems=tuple(
                 one for one in self.problems if one.kind != "DEGRADED" or one.behavior not in self.dropped
             ),
