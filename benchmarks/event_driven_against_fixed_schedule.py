@@ -207,11 +207,12 @@ async def planned(block: Block, bus: Bus) -> Plan:
 
 
 def skews(plan: Plan, times: Mapping[Point, Seconds]) -> list[Seconds]:
+    """Seconds from the first to the last point of each shared instant. Who was taken over has no way home."""
     found = []
     for members in plan.members:
-        together = [times[member.point] for member in members if member.behavior]
-        if len({member.behavior for member in members}) > 1:
-            found.append(max(together) - min(together))
+        measured = {member.behavior: times[member.point] for member in members if member.point in times}
+        if len(measured) > 1:
+            found.append(max(measured.values()) - min(measured.values()))
     return found
 
 
