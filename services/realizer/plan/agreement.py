@@ -1,6 +1,6 @@
 """Agreement of a plan with what the body says about it: each answer may make another plan, with another answer."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from math import inf
 from typing import NamedTuple
 
@@ -68,7 +68,8 @@ class Rounds:
         self._answers.append((question, told))
         if not self._is_free and not is_early:
             self.turns |= plan.turns
-        self.estimates = between(self.estimates, told, 1.0 if is_settled or is_early else 0.5)
+        same = self._answers[-2][1] if not is_settled else ()
+        self.estimates = between(self.estimates, told, 1.0 if is_settled or is_early else 0.5, same)
         return None
 
 
@@ -103,24 +104,29 @@ def _difference(one: Estimate, other: Estimate) -> Difference:
     )
 
 
-def between(before: Sequence[Estimate], after: Sequence[Estimate], weight: float = 0.5) -> tuple[Estimate, ...]:
+def between(
+    before: Sequence[Estimate], after: Sequence[Estimate], weight: float = 0.5, earlier: Sequence[Estimate] = ()
+) -> tuple[Estimate, ...]:
     """Estimates on the way from `before` to `after`, which is at weight 1.
 
     Where each answer of the body makes the plan that calls for the other, the right one lies between. What could
     not be hurried in one plan cannot in the next; a behavior that the body could not do then stays out.
     """
     known = {each.behavior: each for each in before}
-    return tuple([_between(known.get(each.behavior, each), each, weight) for each in after])
+    said = {(each.behavior, phase.to): phase.natural for each in earlier for phase in each.phases}
+    return tuple([_between(known.get(each.behavior, each), each, weight, said) for each in after])
 
 
-def _between(one: Estimate, other: Estimate, weight: float) -> Estimate:
+def _between(one: Estimate, other: Estimate, weight: float, said: Mapping[tuple[str, str], Seconds]) -> Estimate:
     if not one.feasible:
         return one
     if [each.to for each in one.phases] != [each.to for each in other.phases]:
         return other
     phases = []
     for a, b in zip(one.phases, other.phases, strict=True):
-        natural = (1.0 - weight) * a.natural + weight * b.natural
+        is_sure = abs(said.get((one.behavior, b.to), inf) - b.natural) <= NOTICEABLE
+        share = 1.0 if is_sure else weight
+        natural = (1.0 - share) * a.natural + share * b.natural
         longest = a.longest if b.longest is None and b.hold else b.longest
         longest = None if longest is None else max(longest, natural)
         phases.append(replace(b, natural=natural, shortest=max(map(_haste, (a, b))) * natural, longest=longest))
