@@ -44,7 +44,7 @@ class Term(NamedTuple):
 class Relation(Struct, frozen=True):
     """`same`: all terms are one instant. `after`, `before`: the second term is, of the first; two terms each.
 
-    text: as written, for messages. own: the behavior that says it of itself, as an attribute; empty: a constraint does.
+    text: as written, for messages. own: the behavior that says it of itself, as an attribute; empty: a constraint.
     """
 
     kind: Kind
