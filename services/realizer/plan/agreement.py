@@ -16,6 +16,9 @@ STRAIGHT, MOST = 2, 12
 """How often the body is asked about a plan anew. After the first so many times estimates go half-way only; at most,
 in all."""
 
+SURE = 3
+"""An answer that the body has given so often in a row is taken as it is."""
+
 
 class Rounds:
     """Plans of one block, and what the body has said about them.
@@ -68,8 +71,8 @@ class Rounds:
         self._answers.append((question, told))
         if not self._is_free and not is_early:
             self.turns |= plan.turns
-        same = self._answers[-2][1] if not is_settled else ()
-        self.estimates = between(self.estimates, told, 1.0 if is_settled or is_early else 0.5, same)
+        earlier = [answer for _, answer in self._answers[-SURE:-1]]
+        self.estimates = between(self.estimates, told, 1.0 if is_settled or is_early else 0.5, earlier)
         return None
 
 
@@ -105,26 +108,36 @@ def _difference(one: Estimate, other: Estimate) -> Difference:
 
 
 def between(
-    before: Sequence[Estimate], after: Sequence[Estimate], weight: float = 0.5, earlier: Sequence[Estimate] = ()
+    before: Sequence[Estimate],
+    after: Sequence[Estimate],
+    weight: float = 0.5,
+    earlier: Sequence[Sequence[Estimate]] = (),
 ) -> tuple[Estimate, ...]:
     """Estimates on the way from `before` to `after`, which is at weight 1.
 
-    Where each answer of the body makes the plan that calls for the other, the right one lies between. What could
-    not be hurried in one plan cannot in the next; a behavior that the body could not do then stays out.
+    Where each answer of the body makes the plan that calls for the other, the right one lies between; not for a phase
+    of which all `earlier` answers say the same. What could not be hurried in one plan cannot in the next; a behavior
+    that the body could not do then stays out.
     """
     known = {each.behavior: each for each in before}
-    said = {(each.behavior, phase.to): phase.natural for each in earlier for phase in each.phases}
+    said = [
+        {(each.behavior, phase.to): phase.natural for each in answer for phase in each.phases} for answer in earlier
+    ]
     return tuple([_between(known.get(each.behavior, each), each, weight, said) for each in after])
 
 
-def _between(one: Estimate, other: Estimate, weight: float, said: Mapping[tuple[str, str], Seconds]) -> Estimate:
+def _between(
+    one: Estimate, other: Estimate, weight: float, said: Sequence[Mapping[tuple[str, str], Seconds]]
+) -> Estimate:
     if not one.feasible:
         return one
     if [each.to for each in one.phases] != [each.to for each in other.phases]:
         return other
     phases = []
     for a, b in zip(one.phases, other.phases, strict=True):
-        is_sure = abs(said.get((one.behavior, b.to), inf) - b.natural) <= NOTICEABLE
+        is_sure = bool(said) and all(
+            abs(answer.get((one.behavior, b.to), inf) - b.natural) <= NOTICEABLE for answer in said
+        )
         share = 1.0 if is_sure else weight
         natural = (1.0 - share) * a.natural + share * b.natural
         longest = a.longest if b.longest is None and b.hold else b.longest
