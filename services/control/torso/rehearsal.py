@@ -280,7 +280,8 @@ def _begin(
             course = choreography.plan(behavior, torso.situation(torso.world))
             torso.set_base(behavior, course, MovementAuthority(behavior, START))
             torso.follow()
-        return estimate
+        # Nothing moves: it ends whenever it is asked to.
+        return replace(estimate, phases=tuple([replace(each, longest=None) for each in estimate.phases]))
     try:
         course = choreography.plan(behavior, torso.situation(torso.world))
         _place(torso, item.pose, [part for part in course.parts if part not in moved])
