@@ -106,9 +106,6 @@ def arrange(
     for id, successor in _successors(chains, ranked, users).items():
         yield 1
         chain = chains[id]
-        look = before.successors.get(id, ("",))[0]
-        if look in chains and is_overlaid(chain, chains[look]):
-            successor = look  # With it the shift has ended: who is next to take the head takes it from the look.
         if before.successors.get(successor, ("",))[0] == id:
             # Either would come first if the other cut it short. So neither is cut: the one meant to be later waits.
             conflicts.append(Conflict((id, chains[successor].points[-1]), None))
