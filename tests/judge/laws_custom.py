@@ -41,12 +41,15 @@ def customs(case: Case) -> Iterator[Finding]:
 def _without_the_lost(case: Case, block: Reading) -> Reading:
     """The block without what was lost before it was there, as if that had never been written.
 
-    What was one instant with a point that is lost stays tied to what else was, by docs/realizer.md.
+    What was one instant with a point that is lost stays tied to what else was, by docs/realizer.md; but what a lost
+    behavior says of itself is lost with it.
     """
     relations = []
     tied: dict[Place, list[Term]] = {}
     for each in block.relations:
         gone = [term for term in each.terms if _is_gone(case, term)]
+        if any(term.place[:2] == (block.id, each.own) for term in gone):
+            continue
         left = tuple(term for term in each.terms if term not in gone)
         if len(left) > 1:
             relations.append(replace(each, terms=left))

@@ -44,13 +44,14 @@ class Term(NamedTuple):
 class Relation(Struct, frozen=True):
     """`same`: all terms are one instant. `after`, `before`: the second term is, of the first; two terms each.
 
-    text: as written, for messages.
+    text: as written, for messages. own: the behavior that says it of itself, as an attribute; empty: a constraint.
     """
 
     kind: Kind
     terms: tuple[Term, ...]
     text: str
     required: bool = False
+    own: str = ""
 
 
 class Asked(Struct, frozen=True):
@@ -207,7 +208,7 @@ def _inline(asked: Asked, element: ET.Element, block: Reading, known: Mapping[st
     for name, text in element.attrib.items():
         if name in asked.points and name not in marks and (to := term(text, block, known)) is not None:
             own = Term(Place(block.id, asked.id, name), 0.0)
-            yield Relation("same", (to, own), f'{asked.id}: {name}="{text}"')
+            yield Relation("same", (to, own), f'{asked.id}: {name}="{text}"', own=asked.id)
 
 
 def _constraint(

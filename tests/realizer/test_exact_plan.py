@@ -13,6 +13,7 @@ from engage_hri.schemas.behaviors import (
     GazeShift,
     Gesture,
     Head,
+    HeadDirectionShift,
     Pointing,
     Posture,
     PostureShift,
@@ -90,6 +91,28 @@ SLOWER_FIRST = (
     Head(id="n", lexeme="NOD"),
     timed(FaceLexeme(id="f", lexeme="SMILE"), start="n:start+1.0", stroke="n:ready-0.5"),
 )
+BEGUN_BENEATH_A_LOOK = (
+    Gaze(id="g", target="human"),
+    timed(GazeShift(id="s", target="ball"), start="0.1"),
+    Gaze(id="h", target="human"),
+)
+TAKEN_JUST_BEFORE_ITS_END = (
+    PostureShift(id="p", lexeme="TURN_LEFT"),
+    timed(PostureShift(id="q", lexeme="TURN_LEFT"), end="0.9"),
+)
+FAST_PAST_A_HOLD = (timed(Head(id="n", lexeme="SHAKE", repetition=2), stroke_end="0.5", end="3.2"),)
+ALL_AT_ONE_INSTANT = (
+    timed(Gaze(id="g", target="box"), start="1.2"),
+    HeadDirectionShift(id="r", target="cup"),
+    Gaze(id="h", target="box"),
+    timed(GazeShift(id="s", target="cup"), start="1.4", end="3.2"),
+    GazeShift(id="t", target="box"),
+)
+BENEATH_AND_THERE = (
+    timed(Gaze(id="g", target="human"), start="0.5"),
+    timed(GazeShift(id="s", target="human"), start="0.7", end="3.2"),
+    timed(Posture(id="p", lexeme="LEAN_FORWARD"), stroke_start="1.1", end="4.0"),
+)
 OVER_A_SMILE = (
     timed(FaceLexeme(id="f", lexeme="SMILE"), start="0"),
     timed(FaceLexeme(id="h", lexeme="RAISE_BROWS"), start="0.1"),
@@ -115,6 +138,11 @@ OVER_A_SMILE = (
         (TAKEN_OVER_IN_A_SHIFT, ()),
         (HANDING_OVER, ()),
         (SLOWER_FIRST, ()),
+        (BEGUN_BENEATH_A_LOOK, ()),
+        (TAKEN_JUST_BEFORE_ITS_END, ()),
+        (FAST_PAST_A_HOLD, ()),
+        (ALL_AT_ONE_INSTANT, ()),
+        (BENEATH_AND_THERE, ()),
     ],
     ids=[
         "cut",
@@ -133,6 +161,11 @@ OVER_A_SMILE = (
         "taken over in a shift",
         "handing over",
         "slower before faster",
+        "begun beneath a look",
+        "taken just before its end",
+        "fast past a hold",
+        "all at one instant",
+        "beneath a look, and there",
     ],
 )
 def test_the_plan_knows_where_a_behavior_begins(

@@ -27,6 +27,11 @@ AT_REST = 1e-9
 SAMPLES = np.linspace(0.0, 1.0, 33)
 _STRETCHES = tuple(1.1**step for step in range(40)) + tuple(0.9**step for step in range(1, 12))
 
+_LEAST: Seconds = 0.02
+"""Least time of a leg on which something moves."""
+_NOTHINGS: tuple[Seconds, ...] = (0.0004, 0.001, 0.002, 0.005, 0.01)
+"""Times to try for a leg that needs none: whoever is all but there, and all but at rest, is there at once."""
+
 
 class JointMotion(Struct, frozen=True):
     """Position, velocity and acceleration of some joints, in the order of their limits."""
@@ -94,7 +99,7 @@ class Path:
         still = state.at_rest and not velocity.any() and bool(np.all(np.abs(state.q - goal) < 1e-7))
         seconds = 0.0
         if not (still and leg.seconds <= 0.0):
-            connection = self._limits.connect(state, end, max(leg.seconds, 0.02))
+            connection = self._limits.connect(state, end, leg.seconds)
             seconds = connection.seconds
             self._segments.append(_Segment(self.length, seconds, connection.coefficients))
             self._peaks.append((connection.speed, connection.acceleration))
@@ -183,8 +188,9 @@ class _Limits:
     def connect(self, start: JointMotion, end: JointMotion, seconds: Seconds) -> "_Connection":
         """The quintic between two states that takes `seconds`, or as near to it as keeps the limits."""
         best: _Connection | None = None
-        for stretch in _STRETCHES:
-            connection = self._with_peaks(_quintic(start, end, seconds * stretch), seconds * stretch)
+        least = _NOTHINGS if seconds <= 0.0 else ()
+        for each in (*least, *(max(seconds, _LEAST) * stretch for stretch in _STRETCHES)):
+            connection = self._with_peaks(_quintic(start, end, each), each)
             if connection.excess <= 0.0:
                 return connection
             if best is None or connection.excess < best.excess:

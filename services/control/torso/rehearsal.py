@@ -106,7 +106,7 @@ class _Part:
         self._least: dict[str, Seconds] = {}
         """Phases that took longer than they were asked to, as fast as the body could."""
         self._most: dict[str, Seconds] = {}
-        """Phases to hold points that took less, as slow as it could be without a stop."""
+        """Phases that took less, as slow as it could be without a stop."""
 
     def settle(self, torso: Torso, clock: Clock, now: Seconds) -> None:
         """Note the points that it has passed by now. At a hold point where it waits it stays."""
@@ -199,12 +199,13 @@ class _Part:
                 seconds = self.passed[to] - self.passed[since]
                 if seconds > asked[to] - asked.get(since, self.passed[since]):
                     self._least[to] = seconds
-            elif to in self._holds and to in asked and self.passed[to] < asked[to] - HURRIED:
+            elif to in asked and self.passed[to] < asked[to] - HURRIED:
                 self._most[to] = self.passed[to] - self.passed[since]
 
     def _updated(self, phase: Phase) -> Phase:
         natural = max(0.0, self._phases.get(phase.to, phase.natural))
         if (most := self._most.get(phase.to)) is not None:
+            natural = natural if phase.to in self._holds else min(natural, most)
             phase = replace(phase, longest=max(most, natural))
         if (least := self._least.get(phase.to, 0.0)) > phase.shortest:
             return replace(phase, shortest=min(natural, least), natural=natural)
@@ -234,12 +235,15 @@ def rehearsed(torso: Torso, clock: Clock, items: Sequence[EstimateItem]) -> tupl
     told: dict[int, Estimate] = {}
     awaited: dict[int, Seconds] = {}
     """When each paced behavior passes its next point, by its number."""
+    begun_at = -inf
     while events:
         at, kind, number, hold = heappop(events)
-        for part in parts.values():
+        # Those who begin at one instant have all begun before any of them passes a point.
+        for part in () if begun_at == at else parts.values():
             part.settle(torso, clock, at)
             if not part.run.pending:
                 torso.release(part.run)
+        begun_at = at if kind == BEGIN else begun_at
         clock.at = max(at + EARLY, clock.at)  # What ends then has ended.
         if kind == RELEASE:
             _let_go(torso, parts[number], hold, clock.at)
@@ -276,7 +280,8 @@ def _begin(
             course = choreography.plan(behavior, torso.situation(torso.world))
             torso.set_base(behavior, course, MovementAuthority(behavior, START))
             torso.follow()
-        return estimate
+        # Nothing moves: it ends whenever it is asked to.
+        return replace(estimate, phases=tuple([replace(each, longest=None) for each in estimate.phases]))
     try:
         course = choreography.plan(behavior, torso.situation(torso.world))
         _place(torso, item.pose, [part for part in course.parts if part not in moved])

@@ -1,6 +1,6 @@
 """Agreement of a plan with what the body says about it: each answer may make another plan, with another answer."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from math import inf
 from typing import NamedTuple
 
@@ -15,6 +15,9 @@ from engage_hri.services.realizer.plan.poses import NOTICEABLE
 STRAIGHT, MOST = 2, 12
 """How often the body is asked about a plan anew. After the first so many times estimates go half-way only; at most,
 in all."""
+
+SURE = 3
+"""An answer that the body has given so often in a row is taken as it is."""
 
 
 class Rounds:
@@ -68,7 +71,8 @@ class Rounds:
         self._answers.append((question, told))
         if not self._is_free and not is_early:
             self.turns |= plan.turns
-        self.estimates = between(self.estimates, told, 1.0 if is_settled or is_early else 0.5)
+        earlier = [answer for _, answer in self._answers[-SURE:-1]]
+        self.estimates = between(self.estimates, told, 1.0 if is_settled or is_early else 0.5, earlier)
         return None
 
 
@@ -103,24 +107,39 @@ def _difference(one: Estimate, other: Estimate) -> Difference:
     )
 
 
-def between(before: Sequence[Estimate], after: Sequence[Estimate], weight: float = 0.5) -> tuple[Estimate, ...]:
+def between(
+    before: Sequence[Estimate],
+    after: Sequence[Estimate],
+    weight: float = 0.5,
+    earlier: Sequence[Sequence[Estimate]] = (),
+) -> tuple[Estimate, ...]:
     """Estimates on the way from `before` to `after`, which is at weight 1.
 
-    Where each answer of the body makes the plan that calls for the other, the right one lies between. What could
-    not be hurried in one plan cannot in the next; a behavior that the body could not do then stays out.
+    Where each answer of the body makes the plan that calls for the other, the right one lies between; not for a phase
+    of which all `earlier` answers say the same. What could not be hurried in one plan cannot in the next; a behavior
+    that the body could not do then stays out.
     """
     known = {each.behavior: each for each in before}
-    return tuple([_between(known.get(each.behavior, each), each, weight) for each in after])
+    said = [
+        {(each.behavior, phase.to): phase.natural for each in answer for phase in each.phases} for answer in earlier
+    ]
+    return tuple([_between(known.get(each.behavior, each), each, weight, said) for each in after])
 
 
-def _between(one: Estimate, other: Estimate, weight: float) -> Estimate:
+def _between(
+    one: Estimate, other: Estimate, weight: float, said: Sequence[Mapping[tuple[str, str], Seconds]]
+) -> Estimate:
     if not one.feasible:
         return one
     if [each.to for each in one.phases] != [each.to for each in other.phases]:
         return other
     phases = []
     for a, b in zip(one.phases, other.phases, strict=True):
-        natural = (1.0 - weight) * a.natural + weight * b.natural
+        is_sure = bool(said) and all(
+            abs(answer.get((one.behavior, b.to), inf) - b.natural) <= NOTICEABLE for answer in said
+        )
+        share = 1.0 if is_sure else weight
+        natural = (1.0 - share) * a.natural + share * b.natural
         longest = a.longest if b.longest is None and b.hold else b.longest
         longest = None if longest is None else max(longest, natural)
         phases.append(replace(b, natural=natural, shortest=max(map(_haste, (a, b))) * natural, longest=longest))

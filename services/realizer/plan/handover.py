@@ -100,7 +100,8 @@ def arrange(
     ranked = entering(chains, mentioned, times, rounds)
     yield len(chains) // 4
     users = _users(chains, ranked)
-    cuts.update(dict.fromkeys(_overlaid(chains, users, times), 0))
+    beneath = frozenset(_overlaid(chains, users, times))
+    cuts.update(dict.fromkeys(beneath, 0))
     yield len(chains) // 4
     for id, successor in _successors(chains, ranked, users).items():
         yield 1
@@ -131,7 +132,7 @@ def arrange(
         if chain.type != "speech":
             kept = [number for number, point in enumerate(chain.points[: first or None]) if point in own]
             handovers[id] = Handover(successor, chain.points[max([least(chain, chains[successor]), *kept])])
-        if id in successors:
+        if id in successors or id in beneath:  # Who begins beneath a look ends by itself, at once.
             continue
         if is_natural:
             first = min(first or RELAX, RELAX)
