@@ -13,6 +13,7 @@ from engage_hri.schemas.blocks import Block
 from engage_hri.services.realizer.foresee.forecast import Forecast
 from engage_hri.services.realizer.net.petri_net import Bound, PetriNet, Place, Transition
 from engage_hri.services.realizer.plan.planner import Plan
+from engage_hri.services.realizer.plan.relations import Relations
 from engage_hri.services.realizer.points import Point
 
 BEGAN = 10.0
@@ -153,7 +154,7 @@ class Case(Struct):
         return Plan(
             block=Block(id="b", behaviors=()), behaviors=(), net=self.net, at=at, members=members, schedule=(),
             chains={}, estimates={}, natural=frozenset(), required=frozenset(), waited_for=frozenset(), kept={},
-            entering=(),
+            entering=(), relations=Relations((), (), frozenset()),
         )  # fmt: skip
 
 

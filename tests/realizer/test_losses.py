@@ -297,8 +297,9 @@ def test_a_point_of_another_block_that_comes_after_a_fixed_time_is_told_with_its
     )
     made = plan_block(Block(id="b", behaviors=(ours,)), [estimate(ours)], known=known)
 
-    words = "other:s:end is not waited for: expected 7.00 s after the start of the block, after times that are fixed"
-    assert [(each.kind, each.message) for each in made.problems] == [("LATE", words)]
+    (broken,) = made.broken
+    assert (broken.point, broken.direction, broken.said) == (Point("n", "end"), "earlier", "n:end = other:s:end")
+    assert broken.seconds == pytest.approx(7.0 - made.predicted(Point("n", "end")))
     assert made.predicted(Point("n", "start")) == 1.0
 
 
@@ -392,7 +393,7 @@ def test_what_a_required_behavior_says_is_not_given_up_but_the_block() -> None:
     block = decode_xml(f'<bml id="b">{document}</bml>')
     assert isinstance(block, Block)
 
-    assert planned(block).given_up == ("s",)
+    assert tuple(planned(block).given_up) == ("s",)
     fixed: tuple[BlockBehavior, ...] = tuple(replace(each, required=True) for each in block.behaviors)
     with pytest.raises(BlockRefused, match="circle"):
         planned(replace(block, behaviors=fixed))
