@@ -61,8 +61,9 @@ class _Realizer:
         self.planning = Planning(bus, config, self.live_blocks, self.performing)
         self.steering = Steering(bus, self.desk, config, self.live, self.performances)
         self.shared = SharedContext(
-            bus, self.requests, config, self.peers, self.routes, self.performing, self.live_blocks
-        )
+            bus, self.requests, config, self.peers, self.routes, self.performing, self.live_blocks,
+            self.steering.forget,
+        )  # fmt: skip
 
     # -- what arrives ---------------------------------------------------------------------------------------------
 

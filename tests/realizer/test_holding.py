@@ -11,7 +11,14 @@ from hypothesis import strategies as st
 
 from engage_hri.schemas import keys
 from engage_hri.schemas.behaviors import Event, Gaze, Gesture, Head, Mark, Speech, Wait
-from engage_hri.schemas.blocks import Block, BlockOutcome, InterruptBehavior, PerformanceSteered, SteerPerformance
+from engage_hri.schemas.blocks import (
+    Block,
+    BlockOutcome,
+    InterruptBehavior,
+    PerformanceSteered,
+    PerformBlock,
+    SteerPerformance,
+)  # fmt: skip
 from engage_hri.services.realizer.config import RealizerConfig
 from engage_hri.services.realizer.perform import steering
 from engage_hri.services.realizer.perform.holding import Holds
@@ -155,9 +162,9 @@ async def test_a_realizer_that_has_ended_counts_no_longer_for_how_long_it_was_he
     asked: list[float] = []
 
     class Noting(Holds):
-        def since(self, at: float) -> list[tuple[str, str]]:
-            asked.append(at)
-            return super().since(at)
+        def expired(self, now: float, longest: float) -> list[tuple[str, str]]:
+            asked.append(now)
+            return super().expired(now, longest)
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(steering, "Holds", Noting)
@@ -271,3 +278,84 @@ async def test_what_is_tied_to_words_that_were_held_comes_with_them() -> None:
     times = seen.times()
     assert times["beat:stroke_start"] == pytest.approx(times["s:m2"] - 0.2)
     assert seen.warnings() == []
+
+
+@pytest.mark.parametrize("since", [0.3, 1.4, 2.7, 33.3])
+async def test_a_hold_expires_whenever_it_began(since: float) -> None:
+    """A time that is rounded must not make the realizer look for what has expired without end."""
+    async with stage() as seen:
+        performing = seen.ask(block((Wait(id="w", duration=100.0),)))
+        await asyncio.sleep(since)
+        await steered(seen, "hold", "b")
+        outcome = await performing.outcome
+        at = asyncio.get_running_loop().time()
+
+    assert isinstance(outcome, BlockOutcome)
+    assert outcome.status == "interrupted"
+    assert at == pytest.approx(since + RealizerConfig().longest_hold, abs=0.6)
+
+
+@pytest.mark.parametrize("ends", ["interrupted", "by itself"])
+async def test_a_hold_of_a_behavior_ends_with_it(ends: str) -> None:
+    async with stage() as seen:
+        performing = seen.ask(block((BEAT, Wait(id="w", duration=100.0))))
+        await asyncio.sleep(0.2 if ends == "interrupted" else 2.0)  # at 2 s on its way home, where it cannot wait
+        await steered(seen, "hold", "b", "beat")
+        await asyncio.sleep(1.0)
+        if ends == "interrupted":
+            request = InterruptBehavior(id="i", requester="test", block="b", behavior="beat")
+            await seen.requests.send(keys.BLOCK, request).outcome
+        outcome = await performing.outcome
+        at = asyncio.get_running_loop().time()
+
+    assert isinstance(outcome, BlockOutcome)
+    assert outcome.status == "done"
+    assert at == pytest.approx(100.0, abs=0.1)
+
+
+async def test_a_behavior_that_is_held_for_too_long_is_stopped_and_its_block_goes_on() -> None:
+    async with stage(config=RealizerConfig(longest_hold=7.0)) as seen:
+        performing = seen.ask(block((BEAT, Wait(id="w", duration=20.0))))
+        await asyncio.sleep(0.2)
+        await steered(seen, "hold", "b", "beat")
+        outcome = await performing.outcome
+
+    assert isinstance(outcome, BlockOutcome)
+    assert (outcome.status, outcome.interrupted) == ("done", ("beat",))
+
+
+async def test_a_refused_block_of_the_same_id_lets_nothing_go() -> None:
+    async with stage() as seen:
+        performing = seen.ask(block((STORY,)))
+        await asyncio.sleep(0.5)
+        await steered(seen, "hold", "b")
+        again = PerformBlock(id="again", requester="test", block=block((Wait(id="w", duration=1.0),)))
+        with pytest.raises(RequestRefused):
+            await seen.requests.send(keys.BLOCK, again).outcome
+        other = seen.ask(block((Wait(id="w", duration=3.0),), id="c"))
+        await asyncio.sleep(0.5)
+        await steered(seen, "hold", "c")
+        await steered(seen, "continue", "c")
+        await other.outcome
+        assert not performing.outcome.done()
+        await steered(seen, "continue", "b")
+        outcome = await performing.outcome
+
+    assert isinstance(outcome, BlockOutcome)
+    assert outcome.status == "done"
+
+
+async def test_once_a_held_block_has_ended_others_are_late_again() -> None:
+    made = block(
+        (Wait(id="w", duration=5.0), BEAT), together("beat:start", "w:end"), together("w:end+1", "beat:stroke")
+    )
+    async with stage(body=FakeBody(estimates={"beat": (0.1, 0.1, 0.1, 0.1, 0.1, 0.1)})) as seen:
+        held, other = seen.ask(block((Wait(id="w", duration=50.0),), id="a")), seen.ask(made)
+        await asyncio.sleep(0.5)
+        await steered(seen, "hold", "a")
+        await asyncio.sleep(0.5)
+        await steered(seen, "stop", "a")
+        await held.outcome
+        await other.outcome
+
+    assert any(each.kind == "LATE" for each in seen.warnings())

@@ -17,7 +17,8 @@ LONGEST_WAY: Seconds = 10.0
 class ControlLink:
     """Sends the body what one block asks of it.
 
-    request: the id of the block's request; that of a behavior is `<request>/<behavior>`, and ids hold no colon.
+    request: the id of the block's request; that of a behavior is `<request>/<behavior>`, with `%2F` for a slash in
+    the behavior's, so that no two are alike. Ids of behaviors hold no colon.
     """
 
     def __init__(self, bus: Bus, requests: Requester, request: str, block: str) -> None:
@@ -28,7 +29,8 @@ class ControlLink:
 
     def id(self, behavior: str) -> str:
         """Id of the request for a behavior, to whatever service performs it."""
-        return f"{self._request}/{behavior}"
+        quoted = behavior.replace("%", "%25").replace("/", "%2F")
+        return f"{self._request}/{quoted}"
 
     def perform(self, behavior: BlockBehavior, asked: Begin | Extend) -> Pending:
         """Ask the body to begin a behavior, or to go on as far as is asked."""

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Mapping
 from math import inf
+from typing import NamedTuple
 
 from engage_hri.schemas import keys
 from engage_hri.schemas.behavior_types import dialect_sync
@@ -35,6 +36,15 @@ def moved_noticeably(old: Mapping[Point, Seconds], new: Mapping[Point, Seconds])
     Points that `new` lacks have been, or were dropped: other feedback says so.
     """
     return any(point not in old or abs(time - old[point]) > NOTICEABLE for point, time in new.items())
+
+
+class News(NamedTuple):
+    """A sync point that is yet to be told: in feedback, and to other blocks."""
+
+    point: Point
+    at: Seconds
+    arrived: Seconds | None
+    by_body: bool
 
 
 class Reporter:

@@ -1,6 +1,7 @@
 """Holds that are in force: on the whole robot, on blocks, on behaviors."""
 
 from engage_hri.schemas.units import Seconds
+from engage_hri.services.realizer.points import EPSILON
 
 Held = tuple[str, str]
 """A block and a behavior of it. An empty behavior: the whole block; an empty block: the robot."""
@@ -31,9 +32,9 @@ class Holds:
         """Time since when something is held, the longest; None: nothing is."""
         return min(self._since.values(), default=None)
 
-    def since(self, at: Seconds) -> list[Held]:
-        """Holds that are in force since `at`, or longer."""
-        return [held for held, since in self._since.items() if since <= at]
+    def expired(self, now: Seconds, longest: Seconds) -> list[Held]:
+        """Holds that have been in force for so long: those whose time, begun plus longest, has come."""
+        return [held for held, since in self._since.items() if since + longest <= now + EPSILON]
 
 
 def _is_part(one: Held, whole: Held) -> bool:

@@ -7,7 +7,6 @@ releases is commanded first; predictions, feedback and news for other blocks com
 import asyncio
 from collections.abc import Callable, Collection, Iterable, Mapping
 from functools import partial
-from typing import NamedTuple
 
 from engage_hri.schemas.blocks import Block, BlockOutcome
 from engage_hri.schemas.body import SyncPointArrived, SyncPointReached
@@ -22,7 +21,7 @@ from engage_hri.services.realizer.decide.lateness import Late, Stalled
 from engage_hri.services.realizer.net.running import Observer, RunningNet
 from engage_hri.services.realizer.perform.behavior_run import BehaviorRun
 from engage_hri.services.realizer.perform.control_link import ControlLink
-from engage_hri.services.realizer.perform.feedback import Reporter
+from engage_hri.services.realizer.perform.feedback import News, Reporter
 from engage_hri.services.realizer.perform.futures import SyncPointFutures
 from engage_hri.services.realizer.perform.live import Ending, Live
 from engage_hri.services.realizer.perform.net_stream import NetStream
@@ -36,15 +35,6 @@ from engage_hri.services.realizer.plan.planner import plan_block
 from engage_hri.services.realizer.plan.relations import DROPPED
 from engage_hri.services.realizer.points import FINISH, Point
 from engage_hri.services.runtime.alarm import Afterwards, Timer
-
-
-class News(NamedTuple):
-    """A sync point that is yet to be told: in feedback, and to other blocks."""
-
-    point: Point
-    at: Seconds
-    arrived: Seconds | None
-    by_body: bool
 
 
 class BlockPerformance:
@@ -131,10 +121,15 @@ class BlockPerformance:
                     task.cancel()
         finally:
             self._close()
-        outcome = completed(self._live.outcome, self.plan.block, self.spoken.texts, self._dropped, self._interrupted)
+        outcome = self._outcome
         self.report.ended(outcome.status, began)
         self._shared.live_blocks.reach(block, Point(BLOCK_ITSELF, "end"), self.bus.now())
         return outcome
+
+    @property
+    def _outcome(self) -> BlockOutcome:
+        ended = self._live.outcome
+        return completed(ended, self.plan.block, self.spoken.texts, self._dropped, self._interrupted)
 
     def _observers(self, plan: Plan, net: RunningNet, began: Seconds) -> tuple[Observer, ...]:
         self._net.planned(plan, net, began)
@@ -146,7 +141,8 @@ class BlockPerformance:
 
     def is_going_on(self, behavior: str) -> bool:
         """True if the behavior is of this block and has neither ended nor been dropped."""
-        return not self._ending.done() and behavior in self._tasks and not self.decisions.facts.has_ended(behavior)
+        is_left = behavior in self._tasks and behavior not in self._dropped
+        return is_left and not self._ending.done() and not self.decisions.facts.has_ended(behavior)
 
     async def interrupt(self, behavior: str) -> bool:
         """End one behavior on request; the others go on. Returns once it has ended: True if it came to its end."""
@@ -229,7 +225,7 @@ class BlockPerformance:
             _, stuck = await asyncio.wait(moving, timeout=self._config.abort)
             for task in stuck:  # Its request is not to be kept alive: it is over, though the body does not say so.
                 self._requests.cancel(self.body.id(moving[task]), "its block has ended")
-        if ending.status == "done":
+        if self._outcome.status == "done":
             self.decisions.net.let_go()
         else:
             self.decisions.net.clear()
@@ -295,6 +291,12 @@ class BlockPerformance:
                 came = self.decisions.facts.arrived.get(point, arrived)
                 self.report.reached(self.decisions, point, arrived=came, by_body=by_body)
                 self._shared.live_blocks.reach(self.plan.block.id, point, at)
+                self._let_go(point.behavior)
+
+    def _let_go(self, behavior: str) -> None:
+        """Hold a behavior no more once it has ended: nothing else is to be late for it."""
+        if self._held and behavior in self._held and not self.is_going_on(behavior):
+            self._shared.over(self.plan.block.id, behavior)
 
     # -- what behaviors report (see `Performing`) --------------------------------------------------------------------
 
@@ -338,6 +340,7 @@ class BlockPerformance:
                 self._go_home(self._parts(id), id)
             if id in self.plan.required:
                 self._live.stop(Ending("failed", Fault(reason=fault.reason, where=f"{self.plan.block.id}: {id}")))
+        self._let_go(id)
         self._needs_replan = True  # later and once, for all that is lost in one go
         asyncio.get_running_loop().call_soon(self.take_in)
 

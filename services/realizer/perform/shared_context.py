@@ -52,7 +52,8 @@ class SharedContext(Struct, frozen=True):
     """Context of every performance.
 
     routes: for the id of each request to the body, the performance that sent it. others: all performances, in the
-    order in which they began. live_blocks: for ties between blocks.
+    order in which they began. live_blocks: for ties between blocks. over: told of each block and behavior of it that
+    is held and has ended.
     """
 
     bus: Bus
@@ -62,3 +63,4 @@ class SharedContext(Struct, frozen=True):
     routes: MutableMapping[str, Moving]
     others: Callable[[], Iterable[Moving]]
     live_blocks: LiveBlocks
+    over: Callable[[str, str], None]

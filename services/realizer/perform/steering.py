@@ -35,6 +35,7 @@ class Steering:
         self._performances = performances
         self._holds = Holds()
         self._timer = Timer(self._expire)
+        self._stopping: set[asyncio.Task[None]] = set()
 
     async def steer(self, request: SteerPerformance) -> None:
         """Carry out a request, and answer it."""
@@ -71,13 +72,17 @@ class Steering:
         """True if anything is held."""
         return self._holds.earliest() is not None
 
-    def forget(self, block: str) -> None:
-        """Let go what was held of a block that has ended: its id is free."""
-        self._holds.let_go(block, "")
+    def forget(self, block: str, behavior: str = "") -> None:
+        """Let go what was held of a block that has ended, or of a behavior of it. Another block may have its id."""
+        if behavior or not self._concerned(block):
+            self._holds.let_go(block, behavior)
+            self._apply()
 
     def close(self) -> None:
         """Ring no more."""
         self._timer.set(None)
+        for task in self._stopping:
+            task.cancel()
 
     def _concerned(self, block: str) -> list[Live]:
         """Live blocks that this names; empty: all."""
@@ -92,7 +97,8 @@ class Steering:
     async def _stop(self, concerned: list[Live], behavior: str, reason: str) -> None:
         if behavior:
             performed = [self._performances.get(live.request.id) for live in concerned]
-            await asyncio.gather(*[each.interrupt(behavior) for each in performed if each is not None])
+            going_on = [each for each in performed if each is not None and each.is_going_on(behavior)]
+            await asyncio.gather(*[each.interrupt(behavior) for each in going_on])
             return
         _interrupt(concerned, reason)
         if concerned:
@@ -100,10 +106,17 @@ class Steering:
 
     def _expire(self) -> None:
         """Stop what has been held for too long."""
-        for block, behavior in self._holds.since(self._bus.now() - self._longest):
+        for block, behavior in self._holds.expired(self._bus.now(), self._longest):
             self._holds.let_go(block, behavior)
             reason = f"held for {self._longest:g} s, the longest time (`realizer.longest_hold`)"
-            _interrupt(self._concerned(block), reason)
+            if behavior:
+                task = asyncio.create_task(
+                    self._stop(self._concerned(block), behavior, reason), name=f"stop {behavior}"
+                )
+                self._stopping.add(task)
+                task.add_done_callback(self._stopping.discard)
+            else:
+                _interrupt(self._concerned(block), reason)
         self._apply()
 
 
