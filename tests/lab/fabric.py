@@ -57,11 +57,9 @@ class Fabric:
     def take(self, since: int, frame: bytes, now: Seconds) -> None:
         """Take a frame that a machine has sent."""
         to, mark = frame[:6], frame[5]
-        if to[0] & 1:  # for all, or for a group
-            targets = self.machines - {since}
-        else:
-            targets = {mark} & self.machines if to[:5] == PREFIX else set()
-        for each in sorted(targets):
+        is_for_many = to[0] & 1
+        meant = self.machines - {since} if is_for_many else self.machines & {mark}
+        for each in sorted(meant) if is_for_many or to[:5] == PREFIX else ():
             self._send((since, each), frame, now)
 
     def _send(self, ends: tuple[int, int], frame: bytes, now: Seconds) -> None:

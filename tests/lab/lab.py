@@ -99,10 +99,11 @@ class Lab:
 
     async def order(self, **words: object) -> dict[str, Any]:
         """Give the switch an order (see `Switch.order`); returns its answer."""
-        assert self._switch.stdin is not None and self._switch.stdout is not None
+        assert self._switch.stdin is not None
+        assert self._switch.stdout is not None
         async with self._turn:
             self._switch.stdin.write(json.dumps(words).encode() + b"\n")
-            answer = json.loads(await asyncio.wait_for(self._switch.stdout.readline(), PATIENCE))
+            answer: dict[str, Any] = json.loads(await asyncio.wait_for(self._switch.stdout.readline(), PATIENCE))
         if "error" in answer:
             raise ValueError(answer["error"])
         return answer

@@ -70,7 +70,7 @@ class Switch:
         self._timer = None if after is None else self._loop.call_at(after, self._deliver)
 
     def order(self, words: dict[str, Any]) -> dict[str, Any]:
-        """Carry out an order: `path` (since, to, and what changes), `unplug` (machine), `plugged` (machine), or `counts`."""
+        """Carry out an order: `path` (since, to, and what changes), `counts`; `unplug`, `plugged` (machine)."""
         match words:
             case {"order": "path", "since": since, "to": to, **changes}:
                 path = self._fabric.path(since, to)
