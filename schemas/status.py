@@ -14,6 +14,8 @@ class BusHealth(Struct, frozen=True, kw_only=True, omit_defaults=True):
 
     peers: tuple[str, ...] = ()
     """Names of all participants on the bus, this one included."""
+    places: dict[str, tuple[str, ...]] = {}
+    """For each participant, the endpoints at which others may connect to its process. Clients have none."""
     passed: int = 0
     """Messages, tokens and replies that have come in."""
     dropped: int = 0
