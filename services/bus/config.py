@@ -1,4 +1,4 @@
-"""Where a process finds the bus: section `[bus]` of the configuration, and the variables of the environment."""
+"""Section `[bus]` of the configuration, and variables of the environment: where a process finds the bus."""
 
 import re
 from collections.abc import Mapping, Sequence

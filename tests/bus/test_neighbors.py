@@ -5,7 +5,7 @@ import logging
 import pytest
 
 from engage_hri.schemas import keys
-from engage_hri.schemas.status import BusHealth, Status
+from engage_hri.schemas.status import BusHealth, Reachable, Status
 from engage_hri.schemas.units import Stamp
 from engage_hri.services.bus.zenoh.hub import open_hub
 from engage_hri.services.bus.zenoh.neighbors import Unseen, robots, tell_who_is_missing, told, unseen
@@ -42,7 +42,9 @@ async def test_nobody_is_named_where_nobody_is_and_nothing_is_said_where_the_rob
 
 
 def status(name: str, *peers: str, **places: str) -> Status:
-    health = BusHealth(peers=(name, *peers), places={each: (place,) for each, place in places.items()})
+    health = BusHealth(
+        peers=(name, *peers), reachable=tuple(Reachable(each, (place,)) for each, place in places.items())
+    )
     return Status(participant=name, run="1", version="1", at=Stamp("c", 0.0), joined=Stamp("c", 0.0), bus=health)
 
 

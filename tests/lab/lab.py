@@ -130,6 +130,15 @@ class Lab:
         for other in self.machines.keys() - {machine}:
             await self.path(machine, other, is_cut=is_cut)
 
+    async def cut_for(self, seconds: float, machine: int, *others: int) -> None:
+        """Cut a machine off from these others, none: from all, and join it to them again after so many seconds."""
+        ends = others or tuple(self.machines.keys() - {machine})
+        for is_cut in (True, False):
+            for other in ends:
+                await self.path(machine, other, is_cut=is_cut)
+            if is_cut:
+                await asyncio.sleep(seconds)
+
     async def until_plugged(self, machine: Machine) -> None:
         """Wait until the switch has the card of a machine that is starting."""
         deadline = asyncio.get_running_loop().time() + PATIENCE

@@ -70,9 +70,9 @@ def test_the_compose_file_keeps_to_the_specification() -> None:
 @pytest.mark.parametrize("unit", ["engage-router.service", "engage@.service"])
 def test_systemd_finds_nothing_wrong_with_the_units(unit: str, tmp_path: Path) -> None:
     text = (FILES / unit).read_text()
-    assert "/opt/engage/bin/engage " in text
+    assert "/usr/local/bin/engage " in text
     there = tmp_path / unit
-    there.write_text(text.replace("/opt/engage/bin/engage", sys.executable))
+    there.write_text(text.replace("/usr/local/bin/engage", sys.executable))
     checked = subprocess.run(["systemd-analyze", "verify", str(there)], capture_output=True, text=True)
     assert (checked.returncode, checked.stderr) == (0, "")
     there.write_text(text)  # with a program that is not there

@@ -103,7 +103,7 @@ class ZenohHub(Hub):
         """Figures of the process, without those of its participants."""
         traffic = self.bridge.traffic
         return BusHealth(
-            peers=tuple(sorted(self.peers.names)), places=self.peers.places_of_names, refused=self.readers.refused,
+            peers=tuple(sorted(self.peers.names)), reachable=self.peers.reachable, refused=self.readers.refused,
             passed=traffic.passed, dropped=traffic.dropped, depth=traffic.depth, lag=traffic.lag,
             waiting=self.bridge.waiting,
         )  # fmt: skip

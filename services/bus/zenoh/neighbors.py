@@ -71,7 +71,17 @@ def unseen(absent: Iterable[str], statuses: Iterable[Status]) -> list[Unseen]:
         Unseen(
             name,
             tuple(sorted(each.participant for each in known if name in each.bus.peers)),
-            tuple(sorted({place for each in known for place in each.bus.places.get(name, ())})),
+            tuple(
+                sorted(
+                    {
+                        place
+                        for each in known
+                        for there in each.bus.reachable
+                        if there.participant == name
+                        for place in there.endpoints
+                    }
+                )
+            ),
         )
         for name in absent
     ]

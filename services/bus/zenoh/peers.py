@@ -10,6 +10,7 @@ import msgspec
 import zenoh
 
 from engage_hri.schemas import keys
+from engage_hri.schemas.status import Reachable
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.zenoh.clocks import Clocks
 from engage_hri.services.bus.zenoh.order import Missing, Past, Pulse, SentLog
@@ -114,12 +115,13 @@ class Peers:
         self._wake_watchers()
 
     @property
-    def places_of_names(self) -> dict[str, tuple[str, ...]]:
-        """For each participant, the endpoints at which others may connect to its process."""
-        found = {
-            name: {each for run in runs for each in self._places.get(run, ())} for name, runs in self.names.items()
-        }
-        return {name: tuple(sorted(places)) for name, places in sorted(found.items()) if places}
+    def reachable(self) -> tuple[Reachable, ...]:
+        """Participants, and the endpoints at which others may connect to their processes."""
+        found = []
+        for name, runs in sorted(self.names.items()):
+            if places := {each for run in runs for each in self._places.get(run, ())}:
+                found.append(Reachable(name, tuple(sorted(places))))
+        return tuple(found)
 
     def note(self, name: str, run: str, there: bool) -> None:
         """Note that a participant has come or gone; the hub does so for those of the own process."""
