@@ -80,6 +80,12 @@ class Machine:
         self.processes.append(process)
         return process
 
+    async def kill(self, process: Process, number: signal.Signals = signal.SIGKILL) -> None:
+        """Send a signal to a process of this machine; if it is to be killed, wait until it is."""
+        os.kill(_child_of(process.pid), number)  # the process itself only stands for it on the host
+        if number == signal.SIGKILL:
+            await process.wait()
+
     async def stop(self) -> None:
         """End everything on the machine, and the machine."""
         if self._first is not None and self._first.returncode is None:

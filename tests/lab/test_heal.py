@@ -26,7 +26,7 @@ async def test_after_a_cut_everything_is_back_unaided(tmp_path: Path, cut: str) 
             case "a machine":
                 await lab.cut_for(6.0, 2)
             case _:
-                router.kill()
+                await lab.machines[1].kill(router)
                 await until(await engage(lab.machines[1], "router", "--listen", address), "realizer is here")
         play = await engage(lab.machines[3], "play", str(block), "--connect", address)
         told, _ = await asyncio.wait_for(play.communicate(), LONG)
