@@ -45,26 +45,28 @@ def card(machine: int) -> int:
 
 
 def main() -> None:
-    """Set the machine up, hand its card to the switch, and wait for ever."""
+    """Set the machine up, hand its card to the switch, and wait as long as that runs."""
     door, machine, boot_id = sys.argv[1], int(sys.argv[2]), sys.argv[3]
     subprocess.run(["mount", "--bind", boot_id, "/proc/sys/kernel/random/boot_id"], check=True)
     socket.sethostname(f"lab{machine}")
     tap = card(machine)
-    with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as switch:
-        switch.connect(door)
-        rights = [(socket.SOL_SOCKET, socket.SCM_RIGHTS, array.array("i", [tap]).tobytes())]
-        switch.sendmsg([bytes([machine])], rights)
-        switch.recv(1)
+    switch = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+    switch.connect(door)
+    rights = [(socket.SOL_SOCKET, socket.SCM_RIGHTS, array.array("i", [tap]).tobytes())]
+    switch.sendmsg([bytes([machine])], rights)
     os.close(tap)
-    signal.signal(signal.SIGCHLD, lambda *_: None)
-    while True:
-        signal.pause()
-        while True:
-            try:
-                if os.waitpid(-1, os.WNOHANG)[0] == 0:
-                    break
-            except ChildProcessError:
-                break
+    signal.signal(signal.SIGCHLD, reap)
+    while switch.recv(1):  # until the switch has ended: then the laboratory has
+        pass
+
+
+def reap(number: int, frame: object) -> None:
+    """Bury children of which nobody else knows."""
+    try:
+        while os.waitpid(-1, os.WNOHANG)[0]:
+            pass
+    except ChildProcessError:
+        pass
 
 
 if __name__ == "__main__":

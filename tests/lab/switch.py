@@ -103,13 +103,14 @@ async def main() -> None:
     listening.listen()
     listening.setblocking(False)
 
+    machines: list[socket.socket] = []
+
     def come() -> None:
         machine, _ = listening.accept()
-        with machine:
-            machine.setblocking(True)
-            number, cards, _, _ = socket.recv_fds(machine, 1, 1)
-            switch.plug(number[0], cards[0])
-            machine.send(b"+")
+        machine.setblocking(True)
+        number, cards, _, _ = socket.recv_fds(machine, 1, 1)
+        switch.plug(number[0], cards[0])
+        machines.append(machine)  # open for as long as the switch runs: machines end with it
 
     loop.add_reader(listening, come)
     orders = asyncio.StreamReader()
