@@ -189,7 +189,10 @@ ANY_FLUSH = f"{PREFIX}/@bus/*/flush"
 
 
 def own(run: str, subject: str) -> str:
-    """Key of the process with id `run`. subject: `process`, `alive/<name>`, `pulse`, `past`, `clock` or `flush`."""
+    """Key of the process with id `run`.
+
+    subject: `process`, `alive/<name>`, `at/<endpoint>`, `pulse`, `past`, `clock` or `flush`.
+    """
     return f"{PREFIX}/@bus/{run}/{subject}"
 
 

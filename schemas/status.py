@@ -9,11 +9,20 @@ class AskStatus(Struct, frozen=True, kw_only=True, tag="ask_status"):
     """rpc: anyone asks any participant. Answered with `Status`; a query without payload means this, too."""
 
 
+class Reachable(Struct, frozen=True, array_like=True):
+    """A participant, and the endpoints at which others may connect to its process."""
+
+    participant: str
+    endpoints: tuple[str, ...]
+
+
 class BusHealth(Struct, frozen=True, kw_only=True, omit_defaults=True):
     """Counts since the process opened the bus. The last four are of the participant, the others of its process."""
 
     peers: tuple[str, ...] = ()
     """Names of all participants on the bus, this one included."""
+    reachable: tuple[Reachable, ...] = ()
+    """Where others may connect to the processes of participants. Clients are not among them."""
     passed: int = 0
     """Messages, tokens and replies that have come in."""
     dropped: int = 0

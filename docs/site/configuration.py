@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGE = ROOT / "docs" / "configuration.md"
-SECTIONS = ("generation", "realizer", "recognition", "control", "simulation", "collaboration")
+SECTIONS = ("bus", "generation", "realizer", "recognition", "control", "simulation", "collaboration")
 HEAD = """\
 # Configuration
 
@@ -22,9 +22,16 @@ a wrong type or a value out of range is refused at start, with the file and the 
 on the command line, stronger than the file: `--set recognition.gaze_resolution=table`. What drives a robot loads
 nothing of the simulation: `engage run` of its services passes over `[simulation]` and `[collaboration]`.
 
+The environment has its say, too: `ENGAGE_CONFIG` names the file where no option does, and `ENGAGE_BUS_ROBOT`,
+`ENGAGE_BUS_MODE` and `ENGAGE_BUS_CONNECT` (endpoints, with commas between them) are stronger than the file and weaker
+than options. `connect()` of the client reads the same variables and the same section `[bus]`.
+
 ```toml
-robot = "melvin"                 # the namespace on the bus, and the robot's actor id
 covered_for = 10.0               # s: so long an object that the world leaves out is taken to be covered, where it was
+
+[bus]
+robot = "melvin"
+connect = ["tcp/192.0.2.1:7447"]
 
 [recognition]
 gaze_resolution = "table"

@@ -34,6 +34,7 @@ from engage_hri.schemas.recognition import Statistics
 from engage_hri.schemas.requests import Outcome, Request
 from engage_hri.schemas.units import Seconds, Stamp
 from engage_hri.schemas.world import Entity, World
+from engage_hri.services.bus.config import Mode
 from engage_hri.services.bus.interface import Bus, Hub, Keep
 from engage_hri.services.client.event_stream import EventStream
 from engage_hri.services.client.feeds import EventFeed, Feed
@@ -41,6 +42,7 @@ from engage_hri.services.client.inputs import FragmentSource, checked, fragment_
 from engage_hri.services.client.results import in_time, successful
 from engage_hri.services.client.steering import Steering
 from engage_hri.services.requests.ends import Pending, Requester, RequestRefused
+from engage_hri.services.runtime.configuration import bus_config
 
 ANSWER_PATIENCE = 20.0
 """Seconds after a fragment's end for which `await_answer` waits: longer than recognition waits for an answer."""
@@ -328,25 +330,29 @@ class Robot(Steering):
 
 @asynccontextmanager
 async def connect(
-    robot: str = "robot",
+    robot: str | None = None,
     *,
     connect: Sequence[str] = (),
+    mode: Mode | None = None,
     listen: Sequence[str] = (),
     hub: Hub | None = None,
     name: str = "",
 ) -> AsyncIterator[Robot]:
     """Join a robot's bus as a collaboration manager. The robot may come later: what is asked of it waits.
 
-    If there is no such robot after 3 s, a warning in the log `engage` names those that are there.
+    If its services are not all in sight after 3 s, a warning in the log `engage` says which, and why. What is not
+    given is taken from the variables `ENGAGE_BUS_ROBOT`, `ENGAGE_BUS_CONNECT` and `ENGAGE_BUS_MODE`, else from the
+    section `[bus]` of the file that `ENGAGE_CONFIG` names.
 
-    robot: the robot's namespace on the bus.
-    connect: Zenoh endpoints to connect to, such as `tcp/192.0.2.1:7447`; empty: this machine's.
+    robot: the robot's namespace on the bus; `robot` where nothing says otherwise.
+    connect: Zenoh endpoints to connect to, such as `tcp/192.0.2.1:7447`; none: this machine's.
+    mode: client of a router, or peer; auto: client if an endpoint is on another machine.
     listen: Zenoh endpoints to listen on.
     hub: use this one instead; it stays open.
     name: the participant's, unique on the robot's bus; made up when empty.
 
     Raises:
-        InputRefused: an endpoint is misspelled.
+        InputRefused: an endpoint is misspelled, or the file or a variable is wrong.
         RunFailed: an endpoint that is to be listened on is taken.
         ValueError: a name that cannot be in a key, or that the hub has already.
     """
@@ -356,15 +362,15 @@ async def connect(
         return
     # Only here: a client on an existing hub needs no Zenoh.
     from engage_hri.services.bus.zenoh.hub import open_hub
-    from engage_hri.services.bus.zenoh.neighbors import tell_if_alone
+    from engage_hri.services.bus.zenoh.neighbors import hinting
 
-    async with await open_hub(robot, connect=connect, listen=listen) as opened, _joined(opened, name) as client:
-        hint = asyncio.create_task(tell_if_alone(client._bus, connect), name="hint")
-        try:
-            yield client
-        finally:
-            hint.cancel()
-            await asyncio.gather(hint, return_exceptions=True)
+    bus = bus_config(robot=robot, connect=tuple(connect), mode=mode)
+    async with (
+        await open_hub(bus.robot, connect=bus.connect, listen=listen, mode=bus.mode) as opened,
+        _joined(opened, name) as client,
+        hinting(client._bus, bus.connect),
+    ):
+        yield client
 
 
 @asynccontextmanager

@@ -32,6 +32,7 @@ COMMANDS = {
     "Exit 2 if it is not being performed.",
     "hostile": "Attack the whole robot, in memory and virtual time only. "
     "Exit 1 if anything came of it that should not have.",
+    "router": "Pass on what the processes of several machines send one another, until Ctrl-C.",
     "session": "",
 }
 """Commands with their help. One without help is for our own child processes."""

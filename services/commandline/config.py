@@ -7,7 +7,8 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from engage_hri.services.collaboration.config import CollaborationConfig
-from engage_hri.services.commandline.settings import RobotConfig, read
+from engage_hri.services.commandline.settings import RobotConfig
+from engage_hri.services.runtime.configuration import read
 from engage_hri.services.simulation.config import SimulationConfig
 
 
@@ -19,5 +20,5 @@ class Config(RobotConfig, frozen=True, kw_only=True, forbid_unknown_fields=True)
 
 
 def load(path: Path | None = None, *, settings: Iterable[str] = (), defaults: Iterable[str] = ()) -> Config:
-    """Read the whole configuration, as `settings.read` does."""
+    """Read the whole configuration from a file, and nothing of the environment (see `read`)."""
     return read(Config, path, settings=settings, defaults=defaults)

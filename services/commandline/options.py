@@ -3,6 +3,7 @@
 A command's file has a class `Options` that inherits from these groups and adds the command's own options.
 """
 
+import os
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,8 +16,10 @@ from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.utf8 import is_utf8
 
 if TYPE_CHECKING:
+    from engage_hri.services.bus.config import BusConfig
     from engage_hri.services.bus.interface import Hub
     from engage_hri.services.commandline.config import Config
+    from engage_hri.services.runtime.configuration import Kind
 
 Resolution = Annotated[
     Literal["table", "object"] | None, typer.Option(help="How finely perception tells what people look at.")
@@ -70,14 +73,29 @@ class Configured:
 
     def load(self, *, defaults: Iterable[str] = ()) -> "Config":
         """Read the configuration: the file, and the stronger settings of the options. Raises InputRefused."""
-        from engage_hri.services.commandline.config import load
+        from engage_hri.services.commandline.config import Config
 
-        return load(self.config, settings=self.overrides, defaults=defaults)
+        return self.read(Config, defaults=defaults)
+
+    def read(self, kind: "type[Kind]", *, defaults: Iterable[str] = (), elsewhere: Iterable[str] = ()) -> "Kind":
+        """Read a configuration of this kind, without the sections that are `elsewhere`. Raises InputRefused."""
+        from engage_hri.services.runtime.configuration import read
+
+        return read(
+            kind, self.config, settings=self.overrides, defaults=defaults, elsewhere=frozenset(elsewhere),
+            variables=os.environ,
+        )  # fmt: skip
 
 
 @dataclass(frozen=True, kw_only=True)
 class Connected(Configured):
     """Options for the robot and the bus. Without endpoints the bus is that of this machine."""
+
+    mode: Annotated[
+        Literal["auto", "peer", "client"] | None,
+        typer.Option(help="client of a router, or peer; auto: client if an endpoint is on another machine.",
+                     show_default="auto"),
+    ] = None  # fmt: skip
 
     robot: Annotated[
         str | None, typer.Option(metavar="NAME", help="The robot's namespace on the bus.", show_default="robot")
@@ -88,18 +106,19 @@ class Connected(Configured):
 
     @property
     def overrides(self) -> tuple[str, ...]:
-        """Settings of the options; `--robot` is stronger than `--set`."""
-        if self.robot is None:
-            return super().overrides
-        if not is_utf8(self.robot):
-            raise InputRefused(Fault(reason=f"robot {self.robot!r} is not UTF-8"))
-        return (*super().overrides, f"robot={json.encode(self.robot).decode()}")
+        """Settings of the options, which are stronger than `--set`."""
+        given = {"robot": self.robot, "mode": self.mode, "connect": self.connect}
+        for option, value in given.items():
+            if value and not all(map(is_utf8, [value] if isinstance(value, str) else value)):
+                raise InputRefused(Fault(reason=f"{option} {value!r} is not UTF-8"))
+        own = [f"bus.{key}={json.encode(value).decode()}" for key, value in given.items() if value is not None]
+        return (*super().overrides, *own)
 
-    async def open(self, robot: str, listen: Sequence[str] = ()) -> "Hub":
+    async def open(self, bus: "BusConfig", listen: Sequence[str] = ()) -> "Hub":
         """Open the Zenoh hub. Raises EngageError if an endpoint is bad or taken."""
         from engage_hri.services.bus.zenoh.hub import open_hub
 
-        return await open_hub(robot, connect=self.connect or (), listen=listen)
+        return await open_hub(bus.robot, connect=bus.connect, listen=listen, mode=bus.mode)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -165,8 +165,8 @@ async def _embedded(job: Job, config: Config, world: World) -> int:
 
 
 async def _remote(job: Job, config: Config) -> int:
-    async with await job.options.open(config.robot) as hub:
-        await _somebody_there(hub, job.servers)
+    async with await job.options.open(config.bus) as hub:
+        await _somebody_there(hub, job.servers, config)
         if job.has_fragments:
             async with connect(hub=hub) as robot:
                 # Without perception generation itself waits or refuses.
@@ -175,16 +175,20 @@ async def _remote(job: Job, config: Config) -> int:
         return await _perform_all(job, hub, PATIENCE)
 
 
-async def _somebody_there(hub: Hub, servers: frozenset[str]) -> None:
+async def _somebody_there(hub: Hub, servers: frozenset[str], config: Config) -> None:
     """Wait for the servers, at most `PATIENCE` for all of them. Raises RunFailed for the first that is missing."""
+    from engage_hri.services.bus.zenoh.neighbors import hinting
+
     bus = hub.join(unique_name("play-asks"))
     deadline = bus.now() + PATIENCE
-    for server in sorted(servers):
-        try:
-            await bus.query(keys.status(server), AskStatus(), max(0.0, deadline - bus.now()))
-        except NoReply as error:
-            advice = f"is {server} running? `engage up` starts everything"
-            raise RunFailed(Fault(reason=f"no answer within {PATIENCE:g} s", where=server, advice=advice)) from error
+    async with hinting(bus, config.bus.connect):
+        for server in sorted(servers):
+            try:
+                await bus.query(keys.status(server), AskStatus(), max(0.0, deadline - bus.now()))
+            except NoReply as error:
+                reason = f"no answer within {PATIENCE:g} s"
+                advice = f"is {server} running? `engage up` starts everything"
+                raise RunFailed(Fault(reason=reason, where=server, advice=advice)) from error
 
 
 async def _perform_all(job: Job, hub: Hub, patience: Seconds | None) -> int:

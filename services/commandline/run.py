@@ -2,6 +2,7 @@
 
 import asyncio
 import sys
+from contextlib import AsyncExitStack
 from dataclasses import dataclass
 from typing import Annotated
 
@@ -9,8 +10,9 @@ import typer
 
 from engage_hri.services.commandline import roster
 from engage_hri.services.commandline.options import Listening
-from engage_hri.services.commandline.process import DONE, run_until_signal
-from engage_hri.services.commandline.settings import RobotConfig, read
+from engage_hri.services.commandline.process import DONE, run_until_signal, unique_name
+from engage_hri.services.commandline.roster import ROBOT
+from engage_hri.services.commandline.settings import ELSEWHERE, RobotConfig
 from engage_hri.services.runtime.service import serve
 
 
@@ -29,20 +31,27 @@ def ready_line(name: str) -> str:
 
 def main(options: Options) -> int:
     """Serve until a signal."""
-    on_robot = options.service in roster.ROBOT
-    config = read(RobotConfig, options.config, settings=options.overrides) if on_robot else options.load()
+    on_robot = options.service in ROBOT
+    config = options.read(RobotConfig, elsewhere=ELSEWHERE) if on_robot else options.load()
     run_until_signal(_serve(options, config))
     return DONE
 
 
 async def _serve(options: Options, config: RobotConfig) -> None:
+    from engage_hri.services.bus.zenoh.neighbors import hinting
+
     name = options.service
     service = roster.service(name, config)
 
     def announce() -> None:
         print(ready_line(name), file=sys.stderr, flush=True)
 
-    async with await options.open(config.robot, options.listen or ()) as hub:
+    async with AsyncExitStack() as stack:
+        hub = await stack.enter_async_context(await options.open(config.bus, options.listen or ()))
+        if not options.attended:  # `engage up` sees for itself who is there
+            await stack.enter_async_context(
+                hinting(hub.join(unique_name("run")), config.bus.connect, {*ROBOT} - {name})
+            )
         serving = asyncio.create_task(serve(hub, name, service, announce), name=f"service {name}")
         waiting = {serving}
         if options.attended:

@@ -10,6 +10,7 @@ import typer
 from rich.console import Console
 from rich.text import Text
 
+from engage_hri.services.bus.config import mode_of
 from engage_hri.services.commandline.claim import claiming
 from engage_hri.services.commandline.config import Config
 from engage_hri.services.commandline.demo import DEFAULTS, Tallying, scene_view
@@ -43,7 +44,7 @@ def main(options: Options) -> int:
 
 async def _up(options: Options, config: Config, outputs: Outputs, console: Console) -> None:
     # Our own session comes first and stays, for children find one another through it, and may crash.
-    async with await options.open(config.robot, options.listen or ()) as hub, claiming(hub) as claim:
+    async with await options.open(config.bus, options.listen or ()) as hub, claiming(hub) as claim:
         await claim.granted()
         await hub.wait_until_free(*_names(options))
         bus = claim.bus
@@ -88,8 +89,9 @@ def command(name: str, options: Options, config: Config) -> list[str]:
         *options.overrides,
         f"recognition.gaze_resolution={config.recognition.gaze_resolution}",
         f"simulation.human={config.simulation.human}",
+        f"bus.mode={mode_of(config.bus.mode, config.bus.connect, options.listen or ())}",
     )
-    endpoints = (*(options.listen or ()), *(options.connect or ()))
+    endpoints = (*(options.listen or ()), *config.bus.connect)
     return [
         *(sys.executable, "-P", "-m", "engage_hri", "run", name, "--attended", "--robot", config.robot),
         *(("--config", str(options.config)) if options.config else ()),

@@ -1,6 +1,5 @@
 """Command `engage watch`: follow a running system, as text or as JSON lines."""
 
-import asyncio
 from collections.abc import Collection
 from contextlib import ExitStack
 from dataclasses import dataclass
@@ -102,9 +101,9 @@ def main(options: Options) -> int:
 
 
 async def _watch(options: Options, config: Config, wanted: Wanted) -> None:
-    from engage_hri.services.bus.zenoh.neighbors import tell_if_alone
+    from engage_hri.services.bus.zenoh.neighbors import hinting
 
-    async with await options.open(config.robot) as hub:
+    async with await options.open(config.bus) as hub:
         bus = hub.join(unique_name("watch"))
         # Text without a selection includes what people do and say, but no statistics, which would drown the rest.
         everything = wanted.is_everything and not options.json
@@ -117,15 +116,14 @@ async def _watch(options: Options, config: Config, wanted: Wanted) -> None:
 
         async with following(bus, (tell,), patterns=wanted.patterns, kinds=wanted.kinds):
             bus.declare_alive()
-            async with asyncio.TaskGroup() as group:
-                group.create_task(tell_if_alone(bus, options.connect or ()), name="hint")
+            async with hinting(bus, config.bus.connect):
                 await forever()
 
 
 async def _watch_nets(options: Options, config: Config) -> None:
-    from engage_hri.services.bus.zenoh.neighbors import tell_if_alone
+    from engage_hri.services.bus.zenoh.neighbors import hinting
 
-    async with await options.open(config.robot) as hub:
+    async with await options.open(config.bus) as hub:
         bus = hub.join(unique_name("watch"))
         console = Terminal()
         with ExitStack() as shown:
@@ -137,8 +135,7 @@ async def _watch_nets(options: Options, config: Config) -> None:
                 show = NetLog(console, bus.now())
             async with following(bus, (show,), patterns=(keys.NET,)):
                 bus.declare_alive()
-                async with asyncio.TaskGroup() as group:
-                    group.create_task(tell_if_alone(bus, options.connect or ()), name="hint")
+                async with hinting(bus, config.bus.connect):
                     await forever()
 
 

@@ -4,8 +4,11 @@ import logging
 
 import pytest
 
+from engage_hri.schemas import keys
+from engage_hri.schemas.status import BusHealth, Reachable, Status
+from engage_hri.schemas.units import Stamp
 from engage_hri.services.bus.zenoh.hub import open_hub
-from engage_hri.services.bus.zenoh.neighbors import robots, tell_if_alone
+from engage_hri.services.bus.zenoh.neighbors import Unseen, robots, tell_who_is_missing, told, unseen
 from tests.bus.places import free_endpoint
 
 pytestmark = pytest.mark.real_time
@@ -19,7 +22,7 @@ async def test_a_robot_of_another_name_is_named(caplog: pytest.LogCaptureFixture
     ):
         there.join("generation").declare_alive()
         with caplog.at_level(logging.WARNING, logger="engage"):
-            await tell_if_alone(here.join("me"), [endpoint], after=0.0)
+            await tell_who_is_missing(here.join("me"), [endpoint], after=0.0)
 
     assert "no robot 'robot' here yet; there are: 'melvin'; waiting" in caplog.text
 
@@ -30,8 +33,40 @@ async def test_nobody_is_named_where_nobody_is_and_nothing_is_said_where_the_rob
     endpoint = free_endpoint()
     assert await robots([free_endpoint()]) == ()
     async with await open_hub("robot", listen=[endpoint]) as hub:
-        hub.join("generation").declare_alive()
+        for name in keys.SERVICES:
+            hub.join(name).declare_alive()
         with caplog.at_level(logging.WARNING, logger="engage"):
-            await tell_if_alone(hub.join("me"), [endpoint], after=0.2)
+            await tell_who_is_missing(hub.join("me"), [endpoint], after=0.2)
 
     assert caplog.text == ""
+
+
+def status(name: str, *peers: str, **places: str) -> Status:
+    health = BusHealth(
+        peers=(name, *peers), reachable=tuple(Reachable(each, (place,)) for each, place in places.items())
+    )
+    return Status(participant=name, run="1", version="1", at=Stamp("c", 0.0), joined=Stamp("c", 0.0), bus=health)
+
+
+def test_what_others_see_is_told_with_the_reason_why_it_cannot_be_seen_from_here() -> None:
+    control = status(
+        "control", "realizer", "recognition", realizer="tcp/127.0.0.1:0", recognition="tcp/192.0.2.7:7447"
+    )
+    missing = unseen(["generation", "realizer", "recognition"], [control, status("simulation", "recognition")])
+
+    assert missing == [
+        Unseen("generation"),
+        Unseen("realizer", ("control",), ("tcp/127.0.0.1:0",)),
+        Unseen("recognition", ("control", "simulation"), ("tcp/192.0.2.7:7447",)),
+    ]
+    loopback, unreachable, nobody = told(missing)
+    assert loopback.startswith(
+        "realizer cannot be seen from here, though control can see it: it listens on 127.0.0.1 only;"
+    )
+    assert "engage router" in loopback
+    assert unreachable.endswith("it listens on tcp/192.0.2.7:7447, which cannot be reached from here")
+    assert nobody == "nobody here sees generation yet; waiting"
+    assert told([Unseen("control", ("realizer",))]) == [
+        "control cannot be seen from here, though realizer can see it: it is a client of a router that this process"
+        " has no link to"
+    ]

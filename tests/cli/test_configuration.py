@@ -4,10 +4,12 @@ from pathlib import Path
 import pytest
 
 from engage_hri.schemas.faults import InputRefused
+from engage_hri.services.bus.config import BusConfig, Mode, mode_of
 from engage_hri.services.commandline import up
 from engage_hri.services.commandline.config import Config, load
 from engage_hri.services.commandline.roster import NAMES, service
-from engage_hri.services.commandline.settings import ELSEWHERE, RobotConfig, read
+from engage_hri.services.commandline.settings import ELSEWHERE, RobotConfig
+from engage_hri.services.runtime.configuration import read
 
 ROOT = Path(__file__).parents[2]
 
@@ -26,11 +28,13 @@ def test_without_a_file_everything_has_its_default() -> None:
 
 def test_a_setting_is_stronger_than_the_file_and_the_file_than_a_default(tmp_path: Path) -> None:
     path = tmp_path / "engage.toml"
-    path.write_text("robot = 'file'\n[recognition]\ngaze_resolution = 'object'\n[control.variability]\nseed = 3\n")
+    path.write_text(
+        "[bus]\nrobot = 'file'\n[recognition]\ngaze_resolution = 'object'\n[control.variability]\nseed = 3\n"
+    )
 
     config = load(
         path,
-        settings=["robot=setting", "control.variability.noise=0.1"],
+        settings=["bus.robot=setting", "control.variability.noise=0.1"],
         defaults=["recognition.gaze_resolution=table", "generation.dwell=0.7"],
     )
 
@@ -42,14 +46,15 @@ def test_a_setting_is_stronger_than_the_file_and_the_file_than_a_default(tmp_pat
 
 def test_a_robot_passes_over_the_sections_of_others_but_not_over_what_nobody_has(tmp_path: Path) -> None:
     path = tmp_path / "engage.toml"
-    path.write_text("robot = 'file'\n[simulation]\nseed = 3\n[collaboration]\nmode = 'task'\n")
+    path.write_text("[bus]\nrobot = 'file'\n[simulation]\nseed = 3\n[collaboration]\nmode = 'task'\n")
 
-    assert read(RobotConfig, path, settings=["simulation.human=none"]) == RobotConfig(robot="file")
+    found = read(RobotConfig, path, settings=["simulation.human=none"], elsewhere=ELSEWHERE)
+    assert found == RobotConfig(bus=BusConfig(robot="file"))
     assert {*ELSEWHERE} == {*Config.__struct_fields__} - {*RobotConfig.__struct_fields__}
     path.write_text("[simulaton]\nseed = 3\n")
     for kind in (RobotConfig, Config):
         with pytest.raises(InputRefused, match="unknown key `simulaton`"):
-            read(kind, path)
+            read(kind, path, elsewhere=ELSEWHERE)
 
 
 def test_all_who_remember_covered_objects_do_so_for_as_long() -> None:
@@ -73,11 +78,11 @@ def test_the_example_on_the_page_is_good(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("setting", "reason"),
     [
-        ("robot", "no value"),
+        ("bus.robot", "no value"),
         ("=3", "bad setting"),
-        ("robot=3", "Expected `str`"),
+        ("bus.robot=3", "Expected `str`"),
         ("generation.dwell=long", "`generation.dwell`"),
-        ("robot=a b", "cannot be part of a key"),
+        ("bus.robot=a b", "cannot be part of a key"),
     ],
 )
 def test_a_bad_setting_is_refused_with_its_key(setting: str, reason: str) -> None:
@@ -106,7 +111,45 @@ def test_a_number_out_of_its_range_is_refused_and_says_the_range(setting: str, r
 
 
 def test_a_setting_is_stronger_than_an_option_of_the_simulation_and_the_robots_name_than_a_setting() -> None:
-    options = up.Options(seed=3, human="listening", robot="melvin", settings=["simulation.seed=4", "robot=other"])
+    options = up.Options(seed=3, human="listening", robot="melvin", settings=["simulation.seed=4", "bus.robot=other"])
     config = options.load()
 
     assert (config.simulation.seed, config.simulation.human, config.robot) == (4, "listening", "melvin")
+
+
+def test_the_environment_is_stronger_than_the_file_and_weaker_than_a_setting(tmp_path: Path) -> None:
+    path = tmp_path / "engage.toml"
+    path.write_text("[bus]\nrobot = 'file'\nmode = 'peer'\nconnect = ['tcp/192.0.2.1:1']\n")
+    variables = {
+        "ENGAGE_CONFIG": str(path), "ENGAGE_BUS_ROBOT": "shell", "ENGAGE_BUS_CONNECT": "tcp/a:1,tls/b:2 tcp/[::1]:3",
+        "HOME": "/",
+    }  # fmt: skip
+
+    found = read(RobotConfig, variables=variables, settings=["bus.robot=option"]).bus
+
+    assert found == BusConfig(robot="option", mode="peer", connect=("tcp/a:1", "tls/b:2", "tcp/[::1]:3"))
+    assert read(RobotConfig, variables=variables).robot == "shell"
+    with pytest.raises(InputRefused, match="ENGAGE_BUS_CONECT: unknown variable of the environment"):
+        read(RobotConfig, variables={"ENGAGE_BUS_CONECT": "tcp/a:1"})
+    with pytest.raises(InputRefused, match="'tcp/a' is not an endpoint"):
+        read(RobotConfig, variables={"ENGAGE_BUS_CONNECT": "tcp/a"})
+    with pytest.raises(InputRefused, match="'client' takes an endpoint"):
+        read(RobotConfig, variables={"ENGAGE_BUS_MODE": "client"})
+
+
+@pytest.mark.parametrize(
+    ("mode", "connect", "listen", "found"),
+    [
+        ("auto", (), (), "peer"),
+        ("auto", ("tcp/127.0.0.1:7447", "tcp/localhost:1", "tcp/[::1]:1"), (), "peer"),
+        ("auto", ("tcp/127.0.0.1:7447", "tcp/192.0.2.1:7447"), (), "client"),
+        ("auto", ("tcp/localhost.example:7447",), (), "client"),
+        ("auto", ("tcp/192.0.2.1:7447",), ("tcp/192.0.2.2:0",), "peer"),
+        ("client", ("tcp/127.0.0.1:7447",), (), "client"),
+        ("peer", ("tcp/192.0.2.1:7447",), (), "peer"),
+    ],
+)
+def test_who_connects_to_another_machine_is_a_client_unless_others_connect_to_it(
+    mode: Mode, connect: tuple[str, ...], listen: tuple[str, ...], found: str
+) -> None:
+    assert mode_of(mode, connect, listen) == found

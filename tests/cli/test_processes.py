@@ -341,7 +341,9 @@ async def test_playing_to_nobody_fails_readably(endpoint: str, tmp_path: Path, t
     assert play.returncode == 3
     assert b"is %s running?" % server in err
     assert b"no answer within 5 s" in err
-    assert err.count(b"\n") == 1  # one patience for all
+    hint, reason = err.splitlines()  # one patience for all
+    assert b"no robot 'nobody' here yet" in hint
+    assert b"no answer" in reason
 
 
 async def test_watch_prints_json_lines_of_a_running_system(endpoint: str, tmp_path: Path) -> None:

@@ -145,7 +145,7 @@ def test_a_bad_world_is_refused(engage: Engage, tmp_path: Path, world: str, reas
         ("[recognition]\ngaze_resolution = 'room'", "recognition.gaze_resolution"),
         ("[recognition]\nspeed = 3", "`speed`"),
         ("[generation]\nglance_factor = -1", "glance_factor must be positive"),
-        ("robot = 'a/b'", "a/b"),
+        ("[bus]\nrobot = 'a/b'", "a/b"),
         ("generation = 3", "generation"),
     ],
 )

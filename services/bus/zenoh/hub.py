@@ -19,13 +19,22 @@ from engage_hri.schemas.faults import EngageError, Fault, InputRefused, NoReply
 from engage_hri.schemas.messages import Message, decode, encode, encoding_of, published
 from engage_hri.schemas.status import BusHealth
 from engage_hri.schemas.units import Seconds, Stamp
+from engage_hri.services.bus.config import Mode, mode_of
 from engage_hri.services.bus.interface import LOG, Answer, Bus, Hub, Keep, Received, Subscription
 from engage_hri.services.bus.zenoh.clocks import Clocks
 from engage_hri.services.bus.zenoh.foreign_clients import ForeignClients, form_asked, in_form, refuse
 from engage_hri.services.bus.zenoh.order import Envelope, Pulse, SentLog
 from engage_hri.services.bus.zenoh.peers import Peers, finish, pack
 from engage_hri.services.bus.zenoh.readers import Readers
-from engage_hri.services.bus.zenoh.session import QOS, RENDEZVOUS, STREAM_QOS, LoopBridge, open_session
+from engage_hri.services.bus.zenoh.session import (
+    LOOPBACK,
+    QOS,
+    RENDEZVOUS,
+    STREAM_QOS,
+    LoopBridge,
+    open_client,
+    open_session,
+)  # fmt: skip
 
 FIRST_PULSE: Seconds = 0.25
 NEXT_PULSE: Seconds = 1.0
@@ -40,16 +49,28 @@ QUIET: Seconds = 0.25
 
 
 async def open_hub(
-    robot: str, *, connect: Sequence[str] = (), listen: Sequence[str] = (), rendezvous: str | None = RENDEZVOUS
+    robot: str,
+    *,
+    connect: Sequence[str] = (),
+    listen: Sequence[str] = (),
+    mode: Mode = "auto",
+    rendezvous: str | None = RENDEZVOUS,
 ) -> "ZenohHub":
     """Join the bus of `robot`. Processes may start in any order: this waits for others for `OPENING` at most.
+
+    A client waits for a router for as long as it takes.
 
     connect, listen: Zenoh endpoints (`tcp/HOST:PORT`). Without any, the processes of this machine find one another
     at `rendezvous`. Raises InputRefused when an endpoint is misspelled, RunFailed when it is taken.
     """
-    # Blocks the loop for milliseconds, before its work has started: Zenoh has no async API, and we start no thread.
-    session, calls = open_session(robot, connect, listen, None if connect or listen else rendezvous)
-    hub = ZenohHub(robot, session)
+    # Both block the loop for a moment, before its work has started: Zenoh has no async API, and we start no thread.
+    places: tuple[str, ...] = ()
+    if mode_of(mode, connect, listen) == "client":
+        session, calls = await open_client(robot, connect), True
+    else:
+        session, calls = open_session(robot, connect, listen, None if connect or listen else rendezvous)
+        places = tuple(listen) or (LOOPBACK,)
+    hub = ZenohHub(robot, session, places)
     if calls:
         await hub.peers.wait_for_discovery(asyncio.get_running_loop().time() + OPENING)
     return hub
@@ -58,7 +79,8 @@ async def open_hub(
 class ZenohHub(Hub):
     """The hub of a process on a Zenoh session."""
 
-    def __init__(self, robot: str, session: zenoh.Session) -> None:
+    def __init__(self, robot: str, session: zenoh.Session, places: Sequence[str] = ()) -> None:
+        """places: endpoints at which others may connect to this process."""
         self.robot = robot
         self.run = str(session.zid())
         self.session = session
@@ -71,7 +93,7 @@ class ZenohHub(Hub):
         self._buses: dict[str, ZenohBus] = {}
         self._pulse: asyncio.TimerHandle | None = None
         self._closed = False
-        self.peers = Peers(session, self.bridge, self._sent, self.clocks)
+        self.peers = Peers(session, self.bridge, self._sent, self.clocks, places)
         self.readers = Readers(session, self.bridge, self._sent, self.peers)
         self._foreign = ForeignClients(session, self.bridge)
         self.peers.stand(self.readers.process_came, self.readers.participant_changed)
@@ -81,7 +103,7 @@ class ZenohHub(Hub):
         """Figures of the process, without those of its participants."""
         traffic = self.bridge.traffic
         return BusHealth(
-            peers=tuple(sorted(self.peers.names)), refused=self.readers.refused,
+            peers=tuple(sorted(self.peers.names)), reachable=self.peers.reachable, refused=self.readers.refused,
             passed=traffic.passed, dropped=traffic.dropped, depth=traffic.depth, lag=traffic.lag,
             waiting=self.bridge.waiting,
         )  # fmt: skip

@@ -1,32 +1,121 @@
-"""Other robots on the bus: a hint for a client that waits for one that is not there."""
+"""Hints for a process that waits for others: who is not in sight, and why. They change nothing."""
 
 import asyncio
-from collections.abc import AsyncIterator, Sequence
-from typing import Any
+from collections.abc import AsyncIterator, Collection, Iterable, Sequence
+from contextlib import asynccontextmanager
+from typing import Any, NamedTuple
 
 import zenoh
 
 from engage_hri.schemas import keys
 from engage_hri.schemas.faults import EngageError
+from engage_hri.schemas.status import AskStatus, Status
 from engage_hri.schemas.units import Seconds
+from engage_hri.services.bus.config import is_on_this_machine
 from engage_hri.services.bus.interface import LOG, Bus
 from engage_hri.services.bus.zenoh.session import RENDEZVOUS, open_session
 
 LOOK: Seconds = 1.0
-"""Time that the other robots have to answer; nothing else waits for that."""
+"""Time that others have to answer; nothing else waits for that."""
 POLL: Seconds = 0.05
 AFTER: Seconds = 3.0
-"""Time that a client waits before it gets the hint."""
+"""Time that a process waits before it gets the hint."""
+REMEDY = "let all connect to one router (`engage router`), or give it --listen with an address of its machine"
 
 
-async def tell_if_alone(bus: Bus, connect: Sequence[str], after: Seconds = AFTER) -> None:
-    """Log a warning that names the robots on the bus, if none of this robot's services is there after this time."""
+class Unseen(NamedTuple):
+    """A participant that is not in sight. seen_by: who sees it. places: where others may connect to its process."""
+
+    name: str
+    seen_by: tuple[str, ...] = ()
+    places: tuple[str, ...] = ()
+
+
+@asynccontextmanager
+async def hinting(bus: Bus, connect: Sequence[str], wanted: Collection[str] = keys.SERVICES) -> AsyncIterator[None]:
+    """Run the body of `async with`, and beside it `tell_who_is_missing`."""
+    hint = asyncio.create_task(tell_who_is_missing(bus, connect, wanted), name="hint")
+    try:
+        yield
+    finally:
+        hint.cancel()
+        await asyncio.gather(hint, return_exceptions=True)
+
+
+async def tell_who_is_missing(
+    bus: Bus, connect: Sequence[str], wanted: Collection[str] = keys.SERVICES, after: Seconds = AFTER
+) -> None:
+    """Log a warning for those of the `wanted` participants that are not in sight after this time, with the reason.
+
+    connect: the endpoints that this process connects to.
+    """
     await asyncio.sleep(after)
-    if set(bus.health.peers) & set(keys.SERVICES):
+    absent = sorted(set(wanted) - {bus.name} - set(bus.health.peers))
+    if not absent:
         return
-    others = [name for name in await robots(connect) if name != bus.robot]
-    there = f"; there are: {', '.join(map(repr, others))}" if others else ""
-    LOG.warning("no robot %r here yet%s; waiting (`engage up --robot %s` starts one)", bus.robot, there, bus.robot)
+    if not set(bus.health.peers) & set(keys.SERVICES) - {bus.name}:
+        others = [name for name in await robots(connect) if name != bus.robot]
+        there = f"; there are: {', '.join(map(repr, others))}" if others else ""
+        LOG.warning(
+            "no robot %r here yet%s; waiting (`engage up --robot %s` starts one)", bus.robot, there, bus.robot
+        )
+        return
+    for line in told(unseen(absent, await _statuses(bus))):
+        LOG.warning("%s", line)
+
+
+def unseen(absent: Iterable[str], statuses: Iterable[Status]) -> list[Unseen]:
+    """Participants that are not in sight here, with what others tell of them."""
+    known = list(statuses)
+    return [
+        Unseen(
+            name,
+            tuple(sorted(each.participant for each in known if name in each.bus.peers)),
+            tuple(
+                sorted(
+                    {
+                        place
+                        for each in known
+                        for there in each.bus.reachable
+                        if there.participant == name
+                        for place in there.endpoints
+                    }
+                )
+            ),
+        )
+        for name in absent
+    ]
+
+
+def told(missing: Sequence[Unseen]) -> list[str]:
+    """Lines about participants that are not in sight: one for each that others see, one for all the rest."""
+    lines = []
+    for name, seen_by, places in missing:
+        if not seen_by:
+            continue
+        if places and all(map(is_on_this_machine, places)):
+            why = f"it listens on {', '.join(_host(place) for place in places)} only; {REMEDY}"
+        elif places:
+            why = f"it listens on {', '.join(places)}, which cannot be reached from here"
+        else:
+            why = "it is a client of a router that this process has no link to"
+        lines.append(f"{name} cannot be seen from here, though {', '.join(seen_by)} can see it: {why}")
+    if nowhere := [name for name, seen_by, _ in missing if not seen_by]:
+        lines.append(f"nobody here sees {', '.join(nowhere)} yet; waiting")
+    return lines
+
+
+def _host(place: str) -> str:
+    return place.partition("/")[2].rpartition(":")[0]
+
+
+async def _statuses(bus: Bus) -> list[Status]:
+    """Status of each service that is in sight."""
+    there = [name for name in bus.health.peers if name in keys.ROLES and name != bus.name]
+    answers = await asyncio.gather(
+        *(bus.query(keys.status(name), AskStatus(), LOOK) for name in there), return_exceptions=True
+    )
+    return [each for each in answers if isinstance(each, Status)]
 
 
 async def robots(connect: Sequence[str]) -> tuple[str, ...]:

@@ -1,7 +1,8 @@
 """Peers on the bus, and the questions of processes to one another: for the past, for the time, and for a flush."""
 
 import asyncio
-from collections.abc import Callable
+import re
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from typing import Any
 
@@ -9,6 +10,7 @@ import msgspec
 import zenoh
 
 from engage_hri.schemas import keys
+from engage_hri.schemas.status import Reachable
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.zenoh.clocks import Clocks
 from engage_hri.services.bus.zenoh.order import Missing, Past, Pulse, SentLog
@@ -36,10 +38,15 @@ class Peers:
     number of times that a peer has come or gone.
     """
 
-    def __init__(self, session: zenoh.Session, bridge: LoopBridge, sent: SentLog, clocks: Clocks) -> None:
+    def __init__(
+        self, session: zenoh.Session, bridge: LoopBridge, sent: SentLog, clocks: Clocks, places: Sequence[str] = ()
+    ) -> None:
+        """places: endpoints at which others may connect to this process."""
         self.processes: set[str] = set()
         self.names: dict[str, set[str]] = {}
         self.changes = 0
+        self._places: dict[str, set[str]] = {sent.run: {_without_settings(place) for place in places}}
+        """For each process, where others may connect to it; of a client nothing."""
         self.clocks = clocks
         self._loop = asyncio.get_running_loop()
         self._session = session
@@ -64,6 +71,10 @@ class Peers:
         handler = self._bridge.on_loop(self._token_changed)
         self._declared += (
             liveliness.declare_subscriber(keys.ANY_TOKEN, handler, history=True),
+            *(
+                liveliness.declare_token(keys.own(self._sent.run, f"at/{place}"))
+                for place in sorted(self._places[self._sent.run])
+            ),
             liveliness.declare_token(keys.own(self._sent.run, "process")),
         )
 
@@ -94,9 +105,23 @@ class Peers:
                 self._on_process(run)
             else:
                 self.processes.discard(run)
+        elif subject[:1] == ["at"]:
+            places, place = self._places.setdefault(run, set()), "/".join(subject[1:])
+            (places.add if there else places.discard)(place)
+            if not places:
+                del self._places[run]
         elif len(subject) == 2 and subject[0] == "alive":
             self.note(subject[1], run, there)
         self._wake_watchers()
+
+    @property
+    def reachable(self) -> tuple[Reachable, ...]:
+        """Participants, and the endpoints at which others may connect to their processes."""
+        found = []
+        for name, runs in sorted(self.names.items()):
+            if places := {each for run in runs for each in self._places.get(run, ())}:
+                found.append(Reachable(name, tuple(sorted(places))))
+        return tuple(found)
 
     def note(self, name: str, run: str, there: bool) -> None:
         """Note that a participant has come or gone; the hub does so for those of the own process."""
@@ -201,6 +226,11 @@ class Peers:
             question = pack((self._sent.run, Pulse(counts)))
             self.ask(keys.ANY_FLUSH, question, lambda reply: None, lambda _: _resolve(done), FLUSH)
             await done
+
+
+def _without_settings(endpoint: str) -> str:
+    """The endpoint without what follows `?` or `#`, which cannot be in a key, or is of no use to others."""
+    return re.split("[?#]", endpoint)[0]
 
 
 def finish(query: zenoh.Query) -> None:

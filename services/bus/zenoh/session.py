@@ -1,4 +1,4 @@
-"""Opens a Zenoh session as the bus needs it, and passes everything from Zenoh's threads to the loop."""
+"""Opens Zenoh sessions as the bus needs them, and passes everything from Zenoh's threads to the loop."""
 
 import asyncio
 import json
@@ -12,19 +12,23 @@ from msgspec import Struct
 
 from engage_hri.schemas.faults import Fault, InputRefused, RunFailed
 from engage_hri.schemas.units import Seconds
+from engage_hri.services.bus.config import ADVICE, is_endpoint
+from engage_hri.services.bus.interface import LOG
 
 RENDEZVOUS = "tcp/127.0.0.1:7447"
 """Endpoint at which the processes of one machine find one another: the first listens there, all others connect."""
-ADVICE = "tcp/HOST:PORT or tls/HOST:PORT"
 LOOPBACK = "tcp/127.0.0.1:0"
 LEASE_MS = 2000
 """Time in which a silent link counts as alive: with shorter ones peers seem to go and come on cuts of 0.4 s."""
 STALL_US = 200_000
 """Time that a full link may stall `put`, and so the loop, before it is closed. Zenoh's default is 5 s."""
-ENDPOINT = re.compile(r"(?:tcp|tls)/[^\s/]+:(\d{1,5})(?:[?#]\S*)?")
-"""Endpoints of protocols that retransmit. Zenoh itself would go on calling a misspelled one in silence."""
 RUST_PLACE = re.compile(r" at /\S+\.rs:\d+\.?")
 """Place in Zenoh's source, at the end of its errors: of no use to a user."""
+ROUTER_MS = 2000
+"""Time that one try to reach a router may take, in which the loop stands still: nothing runs on it yet."""
+TRY_AGAIN: Seconds = 0.25
+TELL_AFTER: Seconds = 3.0
+"""Time without a router after which it is told that there is none."""
 RETRY_MS = {"period_init_ms": 100, "period_max_ms": 500, "period_increase_factor": 2}
 BATCH = 256
 CROWD = 65_536
@@ -49,10 +53,7 @@ def open_session(
     An endpoint where nobody listens costs nothing. robot None: in no namespace. rendezvous None: only the endpoints
     given. Raises InputRefused when one is misspelled, RunFailed when it is taken, or not of this machine.
     """
-    for endpoint in (*connect, *listen):
-        match = ENDPOINT.fullmatch(endpoint)
-        if match is None or int(match[1]) > 65535:
-            raise InputRefused(Fault(reason=f"{endpoint!r} is not an endpoint", advice=ADVICE))
+    _check(*connect, *listen)
     if rendezvous is not None:
         try:
             session = zenoh.open(_config(robot, connect, (*listen, LOOPBACK, rendezvous), mode))
@@ -68,6 +69,36 @@ def open_session(
         raise RunFailed(Fault(reason=f"cannot open the bus: {reason}", where=where, advice=ADVICE)) from error
 
 
+async def open_client(robot: str, connect: Sequence[str]) -> zenoh.Session:
+    """Open a session as a client of the first of these routers that answers. Waits for one, and says so in the log.
+
+    Raises InputRefused when an endpoint is misspelled.
+    """
+    _check(*connect)
+    loop = asyncio.get_running_loop()
+    tell_at = loop.time() + TELL_AFTER
+    while True:
+        try:
+            return zenoh.open(_config(robot, connect, (), "client"))
+        except zenoh.ZError:
+            if loop.time() > tell_at:
+                tell_at = float("inf")
+                where = ", ".join(connect)
+                LOG.warning("no router answers at %s; waiting (`engage router --listen ENDPOINT` starts one)", where)
+        await asyncio.sleep(TRY_AGAIN)
+
+
+def open_router(connect: Sequence[str], listen: Sequence[str]) -> zenoh.Session:
+    """Open a session that passes on what others send one another. Raises InputRefused, RunFailed."""
+    return open_session(None, connect, listen, None, mode="router")[0]
+
+
+def _check(*endpoints: str) -> None:
+    for endpoint in endpoints:
+        if not is_endpoint(endpoint):
+            raise InputRefused(Fault(reason=f"{endpoint!r} is not an endpoint", advice=ADVICE))
+
+
 def _config(robot: str | None, connect: Sequence[str], listen: Sequence[str], mode: str) -> zenoh.Config:
     config = zenoh.Config()
     settings: dict[str, object] = {
@@ -77,9 +108,10 @@ def _config(robot: str | None, connect: Sequence[str], listen: Sequence[str], mo
         # A background retry of listening makes close() hang for 10 s (1.10.2).
         "listen/timeout_ms": 0,
         "connect/endpoints": list(connect),
-        "connect/exit_on_failure": False,
-        # Keep trying in the background; 0 would give up for good on an endpoint where nobody listens yet.
-        "connect/timeout_ms": -1,
+        # A client must have a router from the start. Others keep trying in the background; 0 would give up for good
+        # on an endpoint where nobody listens yet.
+        "connect/exit_on_failure": mode == "client",
+        "connect/timeout_ms": ROUTER_MS if mode == "client" else -1,
         "connect/retry": RETRY_MS,
         "scouting/multicast/enabled": False,
         "scouting/gossip/enabled": True,
