@@ -359,3 +359,42 @@ async def test_once_a_held_block_has_ended_others_are_late_again() -> None:
         await other.outcome
 
     assert any(each.kind == "LATE" for each in seen.warnings())
+
+
+NOD = Head(id="nod", lexeme="NOD")
+
+
+@pytest.mark.parametrize("since", [0.2, 1.5, 2.3])
+async def test_what_is_tied_to_a_held_behavior_does_not_go_on_without_it(since: float) -> None:
+    """The nod cannot wait at its stroke, so it waits before it sets out."""
+    ties = (together("beat:start", "w:end"), together("nod:stroke", "beat:stroke"))
+    async with stage() as seen:
+        performing = seen.ask(block((Wait(id="w", duration=2.0), BEAT, NOD), *ties))
+        await asyncio.sleep(since)
+        await steered(seen, "hold", "b", "beat")
+        await asyncio.sleep(9.0)
+        await steered(seen, "continue", "b", "beat")
+        outcome = await performing.outcome
+
+    assert isinstance(outcome, BlockOutcome)
+    assert outcome.status == "done"
+    times = seen.times()
+    assert times["nod:stroke"] == pytest.approx(times["beat:stroke"], abs=0.02)
+    assert times["beat:stroke"] > since + 9.0
+
+
+@pytest.mark.parametrize("held", ["", "beat", "s"])
+async def test_words_with_an_offset_to_a_stroke_keep_it_after_a_hold(held: str) -> None:
+    ties = (together("beat:start", "w:end"), together("s:start+0.4", "beat:stroke"))
+    async with stage() as seen:
+        performing = seen.ask(block((Wait(id="w", duration=1.0), BEAT, STORY), *ties))
+        await asyncio.sleep(0.5)
+        await steered(seen, "hold", "b" if held else "", held)
+        await asyncio.sleep(6.0)
+        await steered(seen, "continue", "b" if held else "", held)
+        outcome = await performing.outcome
+
+    assert isinstance(outcome, BlockOutcome)
+    assert outcome.status == "done"
+    times = seen.times()
+    assert times["beat:stroke"] - times["s:start"] == pytest.approx(0.4, abs=0.02)

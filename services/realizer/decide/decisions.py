@@ -117,6 +117,7 @@ class Decisions:
         facts.hold(behaviors, now)
         self.net.hold(behaviors, now)
         self.foresight.prolong()
+        self.foresight.none_before(now)
         changed = [each for each in sorted(facts.begun) if facts.is_held(each) != (each in before)]
         changed = [each for each in changed if not facts.has_ended(each)]
         going_on = [each for each in changed if each in before]

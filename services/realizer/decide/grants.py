@@ -6,6 +6,7 @@ prediction it comes on time. Only instants that something has changed for are lo
 """
 
 import heapq
+from collections import defaultdict
 
 from engage_hri.schemas.behaviors import Speech
 from engage_hri.schemas.units import Seconds
@@ -44,6 +45,12 @@ class Grants(Observer):
         self._dirty: set[int] = set()
         """Instants that something has changed for."""
         self._pauses = _pauses(plan)
+        self._tied: dict[int, list[int]] = defaultdict(list)
+        """For each instant, those from which it comes at a fixed time."""
+        for place in plan.net.places:
+            if place.kind == "delay" and place.source:
+                self._tied[place.target].append(place.source)
+                self._tied[place.source].append(place.target)
 
     # -- what happens (see `Observer`) ---------------------------------------------------------------------------
 
@@ -97,7 +104,7 @@ class Grants(Observer):
         if not self._net.is_open(transition):
             return []
         members = self._plan.members[transition]
-        if self._facts.is_holding and any(self._is_held(member) for member in members):
+        if self._facts.is_holding and self._waits_for_held(transition):
             return []
         missing = [member for member in members if member.kind != "start" and not self._is_there(member)]
         may_pass = missing[0] if len(missing) == 1 and missing[0].can_wait else None
@@ -132,6 +139,35 @@ class Grants(Observer):
 
     def _is_held(self, member: Member) -> bool:
         return self._facts.is_held(member.behavior) and member.point not in self._facts.reached
+
+    def _waits_for_held(self, transition: int) -> bool:
+        """True if an instant has to wait for a behavior that is held: one of its own, or of those tied to it.
+
+        Of one that comes at a fixed time after this, what it has yet to do before that counts.
+        """
+        members = self._plan.members[transition]
+        if any(self._is_held(member) or self._goes_to_held(member) for member in members):
+            return True
+        tied = (other for each in self._tied[transition] for other in self._plan.members[each])
+        held = [other.behavior for other in tied if self._is_held(other) and other.behavior in self._plan.chains]
+        return any(self._sets_out(each) <= self._plan.schedule[transition] + EPSILON for each in held)
+
+    def _sets_out(self, behavior: str) -> Seconds:
+        """Planned time of the next point of a behavior, from the block's start."""
+        points = self._plan.chains[behavior].points
+        return self._plan.predicted(points[min(self._facts.next_number(behavior), len(points) - 1)])
+
+    def _goes_to_held(self, member: Member) -> bool:
+        """True if a behavior cannot wait any more before an instant that is tied to a point of one that is held."""
+        chain = self._plan.chains.get(member.behavior)
+        for point in chain.points[chain.points.index(member.point) + 1 :] if chain is not None else ():
+            here = self._plan.at[point]
+            together = (other for each in (here, *self._tied[here]) for other in self._plan.members[each])
+            if any(other.behavior != member.behavior and self._is_held(other) for other in together):
+                return True
+            if self._net.part_of[point].can_wait or point in self._pauses:
+                return False
+        return False
 
     def _is_there(self, member: Member) -> bool:
         can_wait = member.can_wait or member.point in self._pauses

@@ -105,6 +105,12 @@ class Foresight(Observer):
         if (forecast := self.forecast) is not None:
             self._news += [(forecast.prolong, *each) for each in self._prolonged]
 
+    def none_before(self, now: Seconds) -> None:
+        """Expect nothing that has not happened before now: what was held has not come in the meantime."""
+        if (forecast := self.forecast) is not None:
+            coming = [each for each in range(len(self.plan.members)) if each not in self._net.instants]
+            self._news += [(forecast.overdue, each, now) for each in coming]
+
     def go_on(self, behavior: str, now: Seconds) -> None:
         """Expect a behavior that was held, and is not any more, at its next point as much later, at most."""
         number, chain = self._facts.next_number(behavior), self.plan.chains[behavior]
