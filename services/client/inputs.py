@@ -1,6 +1,6 @@
 """Checks of a client's input before it is sent: a fragment in any form, a request as its server will read it."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -15,13 +15,39 @@ from engage_hri.schemas.requests import Request
 
 FragmentSource = TurnFragment | str | bytes | Path | dict[str, Any]
 """A fragment, or EBML or JSON that describes one (a language model's tool input, too), or the file it stands in."""
+BlockSource = Block | str | bytes | Path | dict[str, Any]
+"""A block, or BML or JSON that describes one, or the file it stands in."""
 
 
 def fragment_in(source: FragmentSource, unnamed: str) -> TurnFragment:
     """Read a fragment. unnamed: the id for one without an id. Raises InputRefused with file, line or JSON path."""
+    if isinstance(source, TurnFragment):
+        return source
+    things, place = _things(source, unnamed)
+    match things:
+        case (TurnFragment() as fragment,):
+            return fragment
+        case (Block(),):
+            raise InputRefused(Fault(reason="a BML block, not a turn fragment", where=place, advice="use `realize`"))
+    raise InputRefused(Fault(reason=f"{len(things)} things, not one turn fragment", where=place))
+
+
+def block_in(source: BlockSource, unnamed: str) -> Block:
+    """Read a block. unnamed: the id for one without an id. Raises InputRefused with file, line or JSON path."""
+    if isinstance(source, Block):
+        return source
+    things, place = _things(source, unnamed)
+    match things:
+        case (Block() as block,):
+            return block
+        case (TurnFragment(),):
+            raise InputRefused(Fault(reason="a turn fragment, not a BML block", where=place, advice="use `perform`"))
+    raise InputRefused(Fault(reason=f"{len(things)} things, not one block", where=place))
+
+
+def _things(source: str | bytes | Path | dict[str, Any], unnamed: str) -> tuple[Sequence[TurnFragment | Block], str]:
+    """Everything that input describes, and the file that it is from."""
     match source:
-        case TurnFragment():
-            return source
         case Path():
             try:
                 data, place = source.read_bytes(), str(source)
@@ -33,13 +59,7 @@ def fragment_in(source: FragmentSource, unnamed: str) -> TurnFragment:
             data, place = source, ""
         case dict():
             data, place = _encoded(lambda: msgspec.json.encode(source)), ""
-    things = read(data, place, unnamed)
-    match things:
-        case (TurnFragment() as fragment,):
-            return fragment
-        case (Block(),):
-            raise InputRefused(Fault(reason="a BML block, not a turn fragment", where=place, advice="use `realize`"))
-    raise InputRefused(Fault(reason=f"{len(things)} things, not one turn fragment", where=place))
+    return read(data, place, unnamed), place
 
 
 R = TypeVar("R", bound=Request)

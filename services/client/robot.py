@@ -38,7 +38,7 @@ from engage_hri.services.bus.config import Mode
 from engage_hri.services.bus.interface import Bus, Hub, Keep
 from engage_hri.services.client.event_stream import EventStream
 from engage_hri.services.client.feeds import EventFeed, Feed
-from engage_hri.services.client.inputs import FragmentSource, checked, fragment_in
+from engage_hri.services.client.inputs import BlockSource, FragmentSource, block_in, checked, fragment_in
 from engage_hri.services.client.results import in_time, successful
 from engage_hri.services.client.steering import Steering
 from engage_hri.services.requests.ends import Pending, Requester, RequestRefused
@@ -140,7 +140,7 @@ class Robot(Steering):
 
     async def realize(
         self,
-        block: Block | str,
+        block: BlockSource,
         behaviors: Iterable[BlockBehavior] = (),
         constraints: Iterable[Constraint] = (),
         *,
@@ -149,8 +149,9 @@ class Robot(Steering):
     ) -> BlockOutcome:
         """Realize a BML block, past the policies: `realize(block)`, or `realize("greet", [Gaze(...), ...])`.
 
-        block: a whole block, or the id of the one to make of the other arguments.
-        behaviors: of the block to make.
+        block: a whole block, the path of a file with BML or JSON, such a text itself, or JSON as a dict; or the id of
+            the block to make of the other arguments.
+        behaviors: of the block to make; without any, `block` is no id.
         constraints: between the sync points of these behaviors.
         composition: beside what runs (`MERGE`), after it (`APPEND`), or in its place (`REPLACE`).
         timeout: seconds to wait for it to be accepted; None: for ever.
@@ -160,14 +161,14 @@ class Robot(Steering):
             PerformFailed: it began, and failed.
             RunFailed: the realizer is gone, or has not come within `timeout`.
         """
-        if isinstance(block, str):
-            block = Block(
-                id=block, behaviors=tuple(behaviors), constraints=tuple(constraints), composition=composition
-            )
-        request = PerformBlock(id=self._request_id(block.id), block=block)
+        if isinstance(block, str) and (parts := tuple(behaviors)):
+            made = Block(id=block, behaviors=parts, constraints=tuple(constraints), composition=composition)
+        else:
+            made = block_in(block, f"{self._bus.name}-{self._life}-{next(self._numbers)}")
+        request = PerformBlock(id=self._request_id(made.id), block=made)
         outcome = await self._ask(keys.BLOCK, request, timeout)
         assert isinstance(outcome, BlockOutcome)
-        return successful(outcome, block.id)
+        return successful(outcome, made.id)
 
     @asynccontextmanager
     async def inhibit_gaze(

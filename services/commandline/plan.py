@@ -67,9 +67,9 @@ def _as_text(plan: Plan) -> str:
 
 async def estimated(block: Block, world: World, config: Config) -> tuple[Estimate, ...]:
     """Estimates of the simulated body for a block, from its home position."""
-    from engage_hri.services.control.torso.body import SimulatedBody
+    from engage_hri.services.control.service import simulated_body
     from engage_hri.services.realizer.points import performer
 
-    body = SimulatedBody(config.control.no_point_zones, config.control.variability)
+    body = simulated_body(config.control)
     asked = [behavior for behavior in block.behaviors if performer(behavior) == "body"]
     return tuple(body.estimate(behavior, None, world) for behavior in asked)

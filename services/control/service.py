@@ -59,7 +59,7 @@ async def embody(
     bus: Bus, ready: Ready, config: ControlConfig, body: Body | None = None, *, covered_for: Seconds = COVERED_FOR
 ) -> None:
     """Serve until cancelled. body: the simulated one unless given. covered_for: see `CoveredObjects`."""
-    body = body or _simulated(config)
+    body = body or simulated_body(config)
     async with asyncio.TaskGroup() as tasks:
         control = _Control(bus, config, body, tasks, CoveredObjects(covered_for))
         with bus.subscribe(*RequestDesk.patterns("control"), keys.WORLD) as inbox:
@@ -75,7 +75,7 @@ async def embody(
                 control.close()
 
 
-def _simulated(config: ControlConfig) -> Body:
+def simulated_body(config: ControlConfig) -> Body:
     """Create the simulated torso. Imported here: a robot with its own body never loads it. Raises InputRefused."""
     from engage_hri.services.control.torso.body import SimulatedBody
     from engage_hri.services.control.torso.repertoire import BUILT_IN, extended

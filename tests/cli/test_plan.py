@@ -76,3 +76,14 @@ def test_a_fragment_is_planned_as_the_block_it_becomes(engage: Engage, tmp_path:
 
     assert document["block"] == "ask"
     assert any("stroke_start" in points for points in document["behaviors"].values())
+
+
+def test_lexemes_of_a_users_repertoire_are_planned(engage: Engage, tmp_path: Path) -> None:
+    (tmp_path / "mine.toml").write_text('[gesture]\nCONDUIT = "BEAT"\n')
+    (tmp_path / "it.xml").write_text('<bml id="b"><gesture id="g" lexeme="CONDUIT"/></bml>')
+    done = engage("plan", "--set", f"control.repertoire={tmp_path / 'mine.toml'}", tmp_path / "it.xml")
+    missing = engage("plan", "--set", "control.repertoire=no.toml", tmp_path / "it.xml")
+
+    assert (done.code, "g:stroke" in done.out, done.err) == (0, True, "")
+    assert missing.code == 2
+    assert "no.toml: No such file" in missing.err

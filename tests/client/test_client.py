@@ -178,7 +178,12 @@ async def test_a_lease_is_renewed_while_it_is_held_and_then_released(hub: Memory
     assert [(type(it), it.reason) for it in seen if isinstance(it, Cancel)] == [(Cancel, "released")]
 
 
-async def test_a_block_goes_past_the_policies_to_the_realizer(hub: MemoryHub) -> None:
+NOD = '<bml id="nod"><head id="h" lexeme="NOD"/></bml>'
+EBML = """<ebml:ebml xmlns:ebml="edu.wpi.ebml" xmlns="org.mindmakers.bml" id="ask" turnIndex="1" turnStatus="full">
+  <speech id="please"><text>Please move</text></speech></ebml:ebml>"""
+
+
+async def test_a_block_goes_past_the_policies_to_the_realizer(hub: MemoryHub, tmp_path: Path) -> None:
     async def realizer(bus: Bus, ready: Ready) -> None:
         desk = RequestDesk(bus, "realizer", lambda cancel: None)
         with bus.subscribe(*RequestDesk.patterns("realizer")) as inbox:
@@ -191,6 +196,16 @@ async def test_a_block_goes_past_the_policies_to_the_realizer(hub: MemoryHub) ->
     async with running(hub, {"realizer": realizer}), connect(hub=hub) as robot:
         outcome = await robot.realize(Block(id="wave"))
         again = await robot.realize("wave", HELLO.behaviors)  # type: ignore[arg-type]
+        (tmp_path / "nod.xml").write_text(NOD)
+        for source in (tmp_path / "nod.xml", NOD, NOD.encode()):
+            assert (await robot.realize(source)).block == "nod"
+        for wrong, why in (
+            ("nod.xml", "neither XML nor JSON"),
+            (tmp_path / "no.xml", "No such file"),
+            (EBML, "use `perform`"),
+        ):
+            with pytest.raises(InputRefused, match=why):
+                await robot.realize(wrong)
 
     assert (outcome.block, outcome.status) == ("wave", "done")
     assert again.status == "done"
