@@ -1,15 +1,19 @@
 """How long a look takes depends on what was looked at before it."""
 
+import asyncio
 from itertools import pairwise
 
 from engage_hri.schemas.behaviors import After, BlockBehavior, Constraint, Gaze, Gesture, Pointing, Speech, Timing
 from engage_hri.schemas.blocks import Block
 from engage_hri.schemas.body import BodyPose, Estimate, JointAngle, Phase
 from engage_hri.schemas.faults import Fault
+from engage_hri.services.control.config import Variability
 from engage_hri.services.realizer.plan.planner import plan_block
 from engage_hri.services.realizer.plan.poses import poses_before
 from tests.realizer.fake_body import FakeBody
+from tests.realizer.planning import timed
 from tests.realizer.stage import after, block, stage
+from tests.realizer.test_simulated_body import robot
 
 
 def estimate(behavior: str, *points: str, pan: float = 0.0) -> Estimate:
@@ -104,3 +108,17 @@ async def test_a_gesture_without_time_to_wait_for_its_arm_is_dropped_if_the_free
 
     assert outcome.dropped == ("q",)
     assert [(each.kind, each.behavior) for each in seen.warnings()] == [("IMPOSSIBLE_TO_SCHEDULE", "q")]
+
+
+async def test_a_gesture_is_performed_with_the_arm_that_it_is_planned_for() -> None:
+    """No hand is named: the body must not choose anew as each begins, for the others are planned around its arm."""
+    beats = [(0.0, Gesture(id="g", lexeme="BEAT")), (0.5, timed(Gesture(id="g", lexeme="BEAT"), start="1.2"))]
+    beats.append((0.6, timed(Gesture(id="g", lexeme="BEAT"), start="1.5")))
+    async with robot(Variability()) as seen:
+        asked = []
+        for number, (at, beat) in enumerate(beats):
+            await asyncio.sleep(at - asyncio.get_running_loop().time())
+            asked.append(seen.ask(block((beat,), id=f"b{number}")))
+        outcomes = [await each.outcome for each in asked]
+
+    assert [getattr(each, "status", "") for each in outcomes] == ["done", "done", "done"]

@@ -17,6 +17,7 @@ from engage_hri.services.realizer.perform.futures import SyncPointFutures
 from engage_hri.services.realizer.perform.handed_over import has_lost_nothing, loss
 from engage_hri.services.realizer.perform.recognition_link import RecognitionLink
 from engage_hri.services.realizer.perform.spoken import Spoken
+from engage_hri.services.realizer.plan.phases import with_planned_hand
 from engage_hri.services.realizer.plan.plan import Plan
 from engage_hri.services.realizer.points import EPSILON, Point, performer
 from engage_hri.services.requests.ends import NeverEnded, Pending, RequestRefused
@@ -98,7 +99,7 @@ class BehaviorRun:
         """Wait until it may begin, and perform it to its end."""
         block = self._block
         await block.futures.granted(Point(self.id, "start"))
-        behavior = self.behavior = block.decisions.plan.chains[self.id].behavior
+        behavior = self.behavior = with_planned_hand(block.decisions.plan.chains[self.id])
         match behavior:
             case Wait(duration=duration):
                 await self._wait(duration or 0.0)

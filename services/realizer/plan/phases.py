@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 
 from msgspec import Struct
+from msgspec.structs import replace
 
 from engage_hri.schemas.behavior_types import TYPES
 from engage_hri.schemas.behaviors import BlockBehavior, Gesture, Hand, Head, Pointing
@@ -30,6 +31,16 @@ class Chain(Struct, frozen=True):
     segments: tuple[Segment, ...]
     longest: tuple[Seconds | None, ...]
     parts: tuple[str, ...] = ()
+
+
+def with_planned_hand(chain: Chain) -> BlockBehavior:
+    """The behavior of a chain, with the hand that it is planned for: the body would choose anew as it begins."""
+    behavior = chain.behavior
+    if isinstance(behavior, Gesture | Pointing) and behavior.mode is None:
+        arms = tuple(part for part in ARMS["BOTH_HANDS"] if part in chain.parts)
+        hand = next((hand for hand, parts in ARMS.items() if tuple(parts) == arms), None)
+        return behavior if hand is None else replace(behavior, mode=hand)
+    return behavior
 
 
 def chain(behavior: BlockBehavior, estimate: Estimate | None) -> Chain:
