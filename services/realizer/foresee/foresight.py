@@ -7,6 +7,7 @@ what it is told waits until `update`.
 import heapq
 from collections.abc import Callable, Iterable, Mapping
 from itertools import pairwise
+from math import inf
 from typing import Any
 
 from engage_hri.schemas.units import Seconds
@@ -17,6 +18,7 @@ from engage_hri.services.realizer.net.facts import Facts
 from engage_hri.services.realizer.net.running import Observer, RunningNet
 from engage_hri.services.realizer.plan.known import BLOCK_END, BLOCK_START
 from engage_hri.services.realizer.plan.plan import Plan
+from engage_hri.services.realizer.plan.slack import slack
 from engage_hri.services.realizer.points import EPSILON, ORIGIN, SHIFTS, Member, Point, performer
 
 SURPRISE: Seconds = 0.1
@@ -42,6 +44,8 @@ class Foresight(Observer):
         self.paces: dict[str, Pace] = {}
         self.may_be_slower: set[str] = set()
         """Behaviors that were told to pass a hold point before its instant."""
+        self._missed: dict[Point, Seconds] = {}
+        """Times at which behaviors were expected that were overdue then, as the next report of each."""
         self._stops: dict[str, set[str]] = {}
         """Hold points within the pace of each behavior at which it has to wait for leave."""
         self.not_before: dict[str, Seconds] = {}
@@ -217,6 +221,7 @@ class Foresight(Observer):
             if facts.is_held(behavior):
                 until = max(now, due)
             elif due < now - EPSILON:  # and not slower on purpose
+                self._missed.setdefault(chain.points[number], expected)
                 until = self.not_before[behavior] = now + (now - due)
                 self.forecast.overdue(self.plan.at[chain.points[number]], until)
             heapq.heappush(self._arrivals, (until, expected, behavior, number))
@@ -230,10 +235,14 @@ class Foresight(Observer):
         return self._arrivals[0][0] + SURPRISE if self._followed and self._arrivals else None
 
     def asked(self, point: Point, natural: Seconds) -> Seconds:
-        """Time at which the behavior was told to be at `point`; `natural` if it was told none, or waits there."""
+        """Time at which the behavior was told to be at `point`; `natural` if it was told none, or waits there.
+
+        What it is told once it is overdue there is no excuse: that may be late because it is itself.
+        """
         if point.sync in self._stops.get(point.behavior, ()):
             return natural
-        return dict(self.paces.get(point.behavior, ())).get(point.sync, natural)
+        told = dict(self.paces.get(point.behavior, ())).get(point.sync, natural)
+        return min(told, self._missed.get(point, inf))
 
     def due(self, transition: int, ripe: Seconds) -> Seconds:
         """Time at which an instant is due, no earlier than all that it waits for is `ripe`."""
@@ -293,7 +302,7 @@ class Foresight(Observer):
                     is_paced = is_paced or at > natural + NOTICEABLE
                 if behavior in self.may_be_slower and self._net.part_of[point].can_wait and may_pass(point):
                     is_paced = is_paced or forecast.times[here] > at + EPSILON
-                    at = max(at, forecast.times[here])
+                    at = max(at, min(forecast.times[here], at + slack(plan, point)))
             before = here
             if not may_pass(point):
                 if is_hurried and index:

@@ -1,0 +1,48 @@
+"""Arms that stand still for ever: each is given up in its own time, whatever else is late for the same reason."""
+
+import asyncio
+
+import pytest
+
+from engage_hri.schemas.behaviors import Gesture
+from engage_hri.services.control.config import Stall, Variability
+from engage_hri.services.realizer.config import RealizerConfig
+from tests.realizer.planning import timed
+from tests.realizer.stage import block, together
+from tests.realizer.test_simulated_body import robot
+
+RIGHT = Gesture(id="r", lexeme="BEAT", mode="RIGHT_HAND")
+LEFT = Gesture(id="l", lexeme="BEAT", mode="LEFT_HAND")
+CONFIG = RealizerConfig()
+LIMIT = CONFIG.stall + (CONFIG.stall_factor + 2.0) * 0.6
+"""Most seconds after the time it was to come until an arm is given up: no phase of a beat takes 0.6 s, nor is it asked
+to take more than twice as long."""
+SETTLED = 3.0
+"""Seconds in which an arm that was given up is home."""
+
+
+@pytest.mark.parametrize("before", ["stroke_start", "stroke", "stroke_end", "relax", "end"])
+@pytest.mark.parametrize("end", [2.2, 2.5, 3.5])
+async def test_an_arm_that_is_to_end_at_a_fixed_time(before: str, end: float) -> None:
+    """It is told to be slower so as to meet the time, but not for being late itself."""
+    async with robot(Variability(stall=(Stall(part="right_arm", before=before),))) as seen:
+        async with asyncio.timeout(60.0):
+            outcome = await seen.ask(block((timed(RIGHT, end=str(end)),))).outcome
+        taken = asyncio.get_running_loop().time()
+    assert seen.kinds() == ["LATE", "EXECUTION_FAILURE"]
+    assert outcome.dropped == ("r",)
+    assert taken <= end + LIMIT + SETTLED
+
+
+@pytest.mark.parametrize("before", ["stroke_start", "stroke", "stroke_end", "relax"])
+async def test_two_that_are_tied_to_each_other(before: str) -> None:
+    """That one is late for the other is no reason to wait for both for ever."""
+    stalls = tuple(Stall(part=part, before=before) for part in ("right_arm", "left_arm"))
+    tied = [together(f"r:{sync}", f"l:{sync}") for sync in ("stroke_start", "stroke", "stroke_end", "relax")]
+    async with robot(Variability(stall=stalls)) as seen:
+        async with asyncio.timeout(60.0):
+            outcome = await seen.ask(block((RIGHT, LEFT), *tied)).outcome
+        taken = asyncio.get_running_loop().time()
+    assert sorted(seen.kinds()) == ["EXECUTION_FAILURE", "EXECUTION_FAILURE", "LATE", "LATE"]
+    assert sorted(outcome.dropped) == ["l", "r"]
+    assert taken <= 2.5 + 2 * LIMIT + SETTLED
