@@ -15,8 +15,10 @@ RIGHT = Gesture(id="r", lexeme="BEAT", mode="RIGHT_HAND")
 LEFT = Gesture(id="l", lexeme="BEAT", mode="LEFT_HAND")
 CONFIG = RealizerConfig()
 LIMIT = CONFIG.stall + (CONFIG.stall_factor + 2.0) * 0.6
-"""Most seconds after the time it was to come until an arm is given up: no phase of a beat takes 0.6 s, nor is it asked
-to take more than twice as long."""
+"""Most seconds after the time it was to come until an arm is given up.
+
+No phase of a beat takes 0.6 s, nor is it asked to take more than twice as long.
+"""
 SETTLED = 3.0
 """Seconds in which an arm that was given up is home."""
 
