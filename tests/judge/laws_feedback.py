@@ -3,7 +3,7 @@
 from collections import Counter
 from collections.abc import Iterator
 
-from engage_hri.schemas.feedback import BlockProgress, SyncPointProgress
+from engage_hri.schemas.feedback import BlockProgress, SyncPointProgress, WarningFeedback
 from tests.judge.case import Case, Finding
 
 HARMLESS = ("LATE", "DEGRADED")
@@ -105,6 +105,21 @@ def _of_losses(case: Case, block: str) -> Counter[str]:
         others = [kind for kind in all if kind != "IMPOSSIBLE_TO_SCHEDULE"]
         counts[behavior] = len(others) if is_speech and others else len(all)
     return counts
+
+
+def talked_over(case: Case) -> Iterator[Finding]:
+    """No words are lost because another block is speaking: they wait. Within one block an author may ask for both."""
+    record = case.record
+    for told in record.told if case.is_told_true else ():
+        message = told.message
+        if not (isinstance(message, WarningFeedback) and "the voice is busy" in message.message):
+            continue
+        block, speaking = message.block, set[str]()
+        for point in record.points(block):
+            if point.behavior in case.blocks[block].speeches and point.at.seconds <= told.at:
+                (speaking.discard if point.sync == "end" else speaking.add)(point.behavior)
+        if not speaking:
+            yield Finding("talked over", block, f"{message.behavior}: {message.message}")
 
 
 def words(case: Case) -> Iterator[Finding]:

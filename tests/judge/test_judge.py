@@ -22,7 +22,7 @@ ENFORCED = (
     "hang", "crash", "end", "points", "losses", "required", "words", "wrong length", "out of turn", "parts",
     "in the air", "spoken order", "broken", "broken across blocks", "broken, point was past",
     "needless loss", "unmade end of a stroke", "moves though held", "late for a hold",
-    "pointless",
+    "pointless", "talked over",
 )  # fmt: skip
 """Laws that no story may break."""
 ALONE = ("left too early",)

@@ -116,6 +116,14 @@ def another_status(messages: list[Any]) -> list[Any]:
     ]
 
 
+def busy(messages: list[Any]) -> list[Any]:
+    """Someone else spoke when the first speech was to begin."""
+    message = WarningFeedback(
+        block="b", kind="CANNOT_CREATE_BEHAVIOR", behavior="s", message="s: the voice is busy with 'No'"
+    )
+    return [Told(0.4, message), *messages]
+
+
 def ends(change: Callable[[list[Any]], list[Any]]) -> Callable[[Record], Record]:
     return lambda record: replace(record, ends={**record.ends, "b": change(record.ends["b"])})
 
@@ -232,6 +240,7 @@ TAMPERED = [
     ("something begins while it is held", held("q"), "moves though held"),
     ("a voice goes on while it is held", held("s", since=0.01), "moves though held"),
     ("a word is said twice", lambda record: replace(record, words=[*record.words, record.words[-1]]), "words"),
+    ("words are lost to another block", told(busy), "talked over"),
     ("a bug was logged", lambda record: replace(record, errors=["KeyError"]), "crash"),
 ]  # fmt: skip
 

@@ -28,7 +28,8 @@ class Decisions:
     """The state of one performance: facts, the net that they move, and what is decided.
 
     began: loop time of the block's start; all times are of that clock. observers: told what happens in the net, but
-    not again what had happened before another plan.
+    not again what had happened before another plan. is_free: False for a behavior that is not to begin before
+    there is another plan.
     """
 
     def __init__(
@@ -37,11 +38,12 @@ class Decisions:
         began: Seconds,
         config: RealizerConfig,
         observers: Callable[[Plan, RunningNet, Seconds], Sequence[Observer]] = lambda plan, net, began: (),
+        is_free: Callable[[str], bool] = lambda behavior: True,
     ) -> None:
         self.began = began
         self.facts = Facts(began)
         self.foresight = Foresight(plan, self.facts)
-        self.grants = Grants(self.facts, self.foresight, config)
+        self.grants = Grants(self.facts, self.foresight, config, is_free)
         self.lateness_watch = LatenessWatch(config)
         self.held_up = HeldUp()
         self._observers = observers

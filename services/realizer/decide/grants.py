@@ -7,6 +7,7 @@ prediction it comes on time. Only instants that something has changed for are lo
 
 import heapq
 from collections import defaultdict
+from collections.abc import Callable
 
 from engage_hri.schemas.behaviors import Speech
 from engage_hri.schemas.units import Seconds
@@ -26,12 +27,20 @@ class Grants(Observer):
     was last allowed to go further.
     """
 
-    def __init__(self, facts: Facts, foresight: Foresight, config: RealizerConfig) -> None:
+    def __init__(
+        self,
+        facts: Facts,
+        foresight: Foresight,
+        config: RealizerConfig,
+        is_free: Callable[[str], bool] = lambda behavior: True,
+    ) -> None:
+        """is_free: False for a behavior that is not to begin now, since another block has a part of it."""
         self.touched: set[str] = set()
         self.granted_at: dict[str, Seconds] = {}
         self._facts = facts
         self._foresight = foresight
         self._config = config
+        self._is_free = is_free
         self._through: dict[str, int] = {}
         """For each behavior, the number of the last point that it may go through."""
 
@@ -130,12 +139,13 @@ class Grants(Observer):
             return []
         if may_pass is not None:
             self._grant(transition, may_pass)
-        if missing:
-            return []
+        begun = self._facts.begun
+        beginning = [each.behavior for each in members if each.kind == "start" and each.behavior not in begun]
+        if missing or not all(self._is_free(each) for each in beginning):
+            return []  # Where another block is in the way, it is planned again.
         for member in members:
             self._grant(transition, member)
-        begun = self._facts.begun
-        return [each.behavior for each in members if each.kind == "start" and each.behavior not in begun]
+        return beginning
 
     def _is_held(self, member: Member) -> bool:
         return self._facts.is_held(member.behavior) and member.point not in self._facts.reached

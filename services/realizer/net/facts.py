@@ -4,7 +4,7 @@ Bodies report late, twice, out of order, and about what was never asked of them.
 changes nothing.
 """
 
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from functools import partial
 from math import isfinite
 
@@ -25,6 +25,7 @@ class Facts:
         self.reached: dict[Point, Seconds] = {}
         self.arrived: dict[Point, Seconds] = {}
         self.begun: dict[str, Seconds] = {}
+        self._under_way: set[str] = set()
         self._next: dict[str, int] = {}
         """For each behavior, the number of its points that are reached."""
         self._heard: dict[str, Seconds] = {}
@@ -55,6 +56,7 @@ class Facts:
     def begin(self, behavior: str, at: Seconds) -> None:
         """Note that a behavior was told to begin."""
         self.begun[behavior] = at
+        self._under_way.add(behavior)
         self._net.begin(behavior, at)
 
     def arrive(self, point: Point, at: Seconds) -> None:
@@ -72,6 +74,8 @@ class Facts:
         self._heard[point.behavior] = at = self.bounded(point, at)
         self._next[point.behavior] = known + len(news)
         self.reached.update(dict.fromkeys(news, at))
+        if point == points[-1]:
+            self._under_way.discard(point.behavior)
         for each in news:
             self._net.reach(each, at)
         return news
@@ -107,6 +111,11 @@ class Facts:
         """True if the behavior has passed all its points, or is not in the block any more."""
         points = self._points.get(behavior)
         return points is None or points[-1] in self.reached
+
+    @property
+    def under_way(self) -> Iterable[str]:
+        """Behaviors that have begun and not ended."""
+        return (behavior for behavior in self._under_way if not self.has_ended(behavior))
 
     def next_number(self, behavior: str) -> int:
         """Number of points of the behavior that are reached."""

@@ -1,6 +1,6 @@
 """Knowledge about other live blocks, gathered for the planning of one: points, parts, and who depends on whom."""
 
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Container, Iterable, Mapping, Sequence
 from typing import Protocol
 
 from msgspec import Struct
@@ -28,6 +28,9 @@ from engage_hri.services.realizer.plan.plan import Plan
 from engage_hri.services.realizer.plan.relations import Elsewhere
 from engage_hri.services.realizer.points import Point, performer
 
+MOMENT: Seconds = 0.001
+"""Least time that a behavior is expected to keep a part after now, if it has not let go of it yet."""
+
 
 class Performed(Protocol):
     """A block that is being performed, as far as others plan with it."""
@@ -42,7 +45,9 @@ class Performed(Protocol):
 class Asker(Struct, frozen=True):
     """The block that is planned. since: loop time from which its plan counts.
 
-    named: points of other blocks that it names. parts: those that it may use. blocks: see `Known`.
+    named: points of other blocks that it names. parts: those that it may use. blocks: see `Known`. met: behaviors
+    of others, by `block:behavior`, that have a part that one of its behaviors was to take. later: blocks of which
+    only these count, since they have begun after it.
     """
 
     block: str
@@ -51,6 +56,8 @@ class Asker(Struct, frozen=True):
     named: Collection[Point]
     parts: Collection[str]
     blocks: Elsewhere
+    met: Container[str] = ()
+    later: Container[str] = ()
 
 
 def knowledge(asker: Asker, others: Iterable[Performed], live_blocks: LiveBlocks) -> Known:
@@ -68,11 +75,15 @@ def knowledge(asker: Asker, others: Iterable[Performed], live_blocks: LiveBlocks
     for each in concerned:
         plan, decisions = each.decisions.plan, each.decisions
         block = plan.block.id
+        names = {id: f"{block}:{id}" for id in plan.chains}
         for point, at in decisions.foresight.times(asker.now).items():
             if not is_foreign(point.behavior):
+                if point not in decisions.facts.reached and names.get(point.behavior) in asker.met:
+                    at = max(at, asker.now + MOMENT)
                 points[qualified(block, point)] = at - asker.since
         if not each.is_ending:
-            over = {id for id in plan.chains if decisions.facts.has_ended(id) or f"{block}:{id}" in dependent}
+            over = {id for id, name in names.items() if decisions.facts.has_ended(id) or name in dependent}
+            over |= {id for id, name in names.items() if block in asker.later and name not in asker.met}
             kept = plan.constrained | live_blocks.named(block)
             reached = decisions.facts.next_number
             named = {id: taker.partition(":") for id, (taker, _) in plan.successors.items()}

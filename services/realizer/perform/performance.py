@@ -93,7 +93,7 @@ class BlockPerformance:
     async def run(self) -> BlockOutcome:
         """Perform the block to its end, whatever that is. Ends everything it began."""
         began, block = self.bus.now(), self.plan.block.id
-        self.decisions = Decisions(self.plan, began, self._config, self._observers)
+        self.decisions = Decisions(self.plan, began, self._config, self._observers, self.ties.is_free)
         if self._is_held:
             self.decisions.hold_up(True, began)
             self.decisions.hold(self._held, began)
@@ -337,11 +337,15 @@ class BlockPerformance:
         else:
             self.report.warn(kind, str(fault), id)
             if id in self.decisions.facts.begun and not at_rest:
-                self._go_home(self._parts(id), id)
+                self._go_home(self.plan.parts(id), id)
             if id in self.plan.required:
                 self._live.stop(Ending("failed", Fault(reason=fault.reason, where=f"{self.plan.block.id}: {id}")))
         self._let_go(id)
-        self._needs_replan = True  # later and once, for all that is lost in one go
+        self.plan_again()
+
+    def plan_again(self) -> None:
+        """Plan again, later and once, for all that happens in one go."""
+        self._needs_replan = True
         asyncio.get_running_loop().call_soon(self.take_in)
 
     def lose_body(self, fault: Fault) -> None:
@@ -387,14 +391,10 @@ class BlockPerformance:
     @property
     def parts_used(self) -> set[str]:
         """Parts of the body used by behaviors that have begun so far."""
-        return {part for id in self.decisions.facts.begun for part in self._parts(id)}
+        return {part for id in self.decisions.facts.begun for part in self.plan.parts(id)}
 
     @property
     def parts_moving(self) -> set[str]:
         """Parts of the body used by behaviors that have begun and not ended."""
         moving = {id for id, run in self._runs.items() if run.behavior is not None} - self._dropped.keys()
-        return {part for id in moving if not self.decisions.facts.has_ended(id) for part in self._parts(id)}
-
-    def _parts(self, id: str) -> set[str]:
-        estimate = self.plan.estimates.get(id)
-        return set(estimate.parts) if estimate else set()
+        return {part for id in moving if not self.decisions.facts.has_ended(id) for part in self.plan.parts(id)}

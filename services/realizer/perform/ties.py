@@ -11,6 +11,7 @@ from engage_hri.services.realizer.decide.decisions import Decisions
 from engage_hri.services.realizer.perform.feedback import Reporter
 from engage_hri.services.realizer.perform.knowledge import Asker, Performed, knowledge, parts_of
 from engage_hri.services.realizer.perform.live_blocks import LiveBlocks
+from engage_hri.services.realizer.plan.handover import is_overlaid
 from engage_hri.services.realizer.plan.known import Known, block_of, is_named_in
 from engage_hri.services.realizer.plan.plan import Plan
 from engage_hri.services.realizer.plan.relations import needing
@@ -30,6 +31,9 @@ class Tied(Performed, Protocol):
 
     def replan(self) -> None:
         """Plan again what is left, with what is known now."""
+
+    def plan_again(self) -> None:
+        """Plan again soon, and once, for all that happens in one go."""
 
     def fail(self, behavior: str, fault: Fault) -> None:
         """End the block as failed, and say that it is because of this behavior."""
@@ -59,6 +63,8 @@ class Ties:
         self.foreign_ties = frozenset(point for point in owner.plan.foreign if point in owner.plan.constrained)
         self.vanished: set[str] = set()
         self.given: dict[str, Point] = {}
+        self._met: set[tuple[str, str]] = set()
+        """Behaviors of this block, each with one of another block that had its part when it was to begin."""
 
     # -- news of other blocks --------------------------------------------------------------------------------------
 
@@ -104,19 +110,52 @@ class Ties:
 
     # -- parts that change hands -----------------------------------------------------------------------------------
 
+    def is_free(self, behavior: str) -> bool:
+        """False if another block has a part of a behavior that is to begin, and the plan does not say what then.
+
+        So it is where one comes sooner or later than was planned. The block is planned again with what is in the way,
+        once for two behaviors.
+        """
+        plan = self._owner.decisions.plan
+        chain, met = plan.chains[behavior], set[tuple[str, str]]()
+        for other in self._others() if chain.parts else ():
+            if other is self._owner or other.is_ending:
+                continue
+            chains, block = other.decisions.plan.chains, other.decisions.plan.block.id
+            for id in other.decisions.facts.under_way:
+                is_shared = not set(chain.parts).isdisjoint(chains[id].parts)
+                if is_shared and not (is_overlaid(chains[id], chain) or is_overlaid(chain, chains[id])):
+                    met.add((behavior, f"{block}:{id}"))
+        met = {(behavior, name) for behavior, name in met - self._met if name not in plan.takes}
+        if met:
+            self._met |= met
+            self._owner.plan_again()
+        return not met
+
     def known(self) -> Known:
-        """Blocks that began earlier, and what of this one has begun, as known now. Times from this block's start."""
+        """Other blocks, and what of this one has begun, as known now. Times from this block's start.
+
+        Blocks that began earlier count, and those that this one names; of others only what was in its way.
+        """
         owner, decisions = self._owner, self._owner.decisions
         plan = decisions.plan
-        earlier, is_later = [], False
+        others, later, is_later = [], set[str](), False
         for each in self._others():
             is_later = is_later or each is owner
-            if each is not owner and (not is_later or is_named_in(each.decisions.plan.block.id, self.foreign_ties)):
-                earlier.append(each)
+            block = each.decisions.plan.block.id
+            if each is owner:
+                continue
+            if is_later and not is_named_in(block, self.foreign_ties):
+                later.add(block)
+                if not any(name.startswith(f"{block}:") for _, name in self._met):
+                    continue
+                self.blocks[block] = self._live_blocks.blocks[block]
+            others.append(each)
+        met = frozenset(name for _, name in self._met)
         parts = parts_of(plan.block.behaviors, plan.estimates.values())
         now = owner.report.now()
-        asker = Asker(plan.block.id, decisions.began, now, self.foreign, parts, self.blocks)
-        found = knowledge(asker, earlier, self._live_blocks)
+        asker = Asker(plan.block.id, decisions.began, now, self.foreign, parts, self.blocks, met, later)
+        found = knowledge(asker, others, self._live_blocks)
         points = dict(found.points)
         performances = self._performances
         for taker in self.given.values():

@@ -86,3 +86,8 @@ class Plan(Struct, frozen=True, kw_only=True):
     def foreign(self) -> tuple[Point, ...]:
         """Points of other blocks that this one is tied to, or waits for."""
         return tuple([point for point in self.at if is_foreign(point.behavior)])
+
+    def parts(self, behavior: str) -> set[str]:
+        """Parts of the body that a behavior uses, by its estimate."""
+        estimate = self.estimates.get(behavior)
+        return set(estimate.parts) if estimate is not None else set()
