@@ -129,3 +129,20 @@ async def test_nothing_is_lost_to_another_block_whenever_waits_are_cut_short(see
 async def _cut_short(seen: Robot, number: int) -> None:
     with suppress(RequestRefused):  # the wait is over by itself
         await interrupt(seen, f"k{number}", f"w{number}")
+
+
+async def test_who_has_begun_comes_before_its_neighbor_when_what_it_was_tied_to_vanishes() -> None:
+    """Without its tie it would come second, as in the document; but it is in the middle of its stroke."""
+    tied = timed(Gesture(id="h", lexeme="BEAT", mode="BOTH_HANDS"), stroke_end="a:w:end")
+    async with robot(Variability()) as seen:
+        first = seen.ask(block((Wait(id="w", duration=1.5),), id="a"))
+        await asyncio.sleep(0.0)
+        second = seen.ask(block((LEFT, tied), id="b"))
+        await asyncio.sleep(0.8)
+        assert "h:start" in seen.times()
+        await interrupt(seen, "a", "w")
+        await asyncio.gather(first.outcome, second.outcome)
+
+    assert seen.kinds() == ["INTERRUPTED"]
+    times = seen.times()
+    assert times["l:start"].at.seconds >= times["h:stroke_end"].at.seconds

@@ -10,7 +10,7 @@ from engage_hri.schemas.syncref import BLOCK_ITSELF
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.realizer.plan.phases import Chain
 from engage_hri.services.realizer.plan.relations import Elsewhere
-from engage_hri.services.realizer.points import Point
+from engage_hri.services.realizer.points import EPSILON, Point
 
 
 class Holder(Struct, frozen=True):
@@ -57,6 +57,15 @@ class Known(Struct, frozen=True, kw_only=True):
         if not self.points:
             return times
         return {**self.points, **{point: at for point, at in times.items() if not is_foreign(point.behavior)}}
+
+    def in_truth(self, chains: Iterable[Chain], times: Mapping[Point, Seconds]) -> Mapping[Point, Seconds]:
+        """The same, with behaviors of the block no earlier than they began, or can begin now."""
+        late: dict[Point, Seconds] = {}
+        for chain in chains if self.points else ():
+            start = chain.points[0]
+            if (by := self.points.get(start, times[start]) - times[start]) > EPSILON:
+                late |= {point: times[point] + by for point in chain.points}
+        return {**self.with_own(times), **late}
 
 
 NOTHING = Known()

@@ -114,6 +114,8 @@ class _Planner:
                 if behavior.id not in self.dropped:
                     self._read(behavior)
             yield 4 * len(portion)
+        begun = sorted(self.known.begun & self.chains.keys(), key=lambda id: self.known.points[Point(id, "start")])
+        self.chains = {id: self.chains[id] for id in dict.fromkeys((*begun, *self.chains))}
         self.speeches = {id for id, chain in self.chains.items() if chain.type == "speech"}
         self.order = SpeakingOrder([id for id in self.chains if id in self.speeches], len(self.chains))
 
@@ -205,7 +207,7 @@ class _Planner:
             assembler, assembly, solution = yield from self._solved(assembler, arrangement, classes)
             times = {point: solution.times[transition] for point, transition in assembly.at.items()}
             yield len(times) // 4
-            everywhere = self.known.with_own(times)
+            everywhere = self.known.in_truth(self.chains.values(), times)
             rounds = assembly.rounds(solution.times)
             yield len(times) // 4
             arranged, conflicts = yield from arrange(

@@ -44,7 +44,7 @@ def share(
     """
     if not known.holders and not known.given:
         return arranged, []
-    shared = _Sharing(chains, relations, known, arranged, {**times, **dict(_not_past(chains, known, times))}, barred)
+    shared = _Sharing(chains, relations, known, arranged, times, barred)
     for id in chains:
         yield 2 + len(known.holders) // 8
         shared.give(id)
@@ -56,16 +56,6 @@ def share(
         replace(arranged, lasting=lasting, successors=shared.successors, cuts=shared.cuts, takes=shared.takes),
         shared.conflicts,
     )
-
-
-def _not_past(
-    chains: Mapping[str, Chain], known: Known, times: Mapping[Point, Seconds]
-) -> Iterator[tuple[Point, Seconds]]:
-    """Times of the behaviors that can only come later than in the schedule, since it is later than that by now."""
-    for id, chain in chains.items():
-        start = chain.points[0]
-        if id not in known.begun and (late := known.points.get(start, times[start]) - times[start]) > EPSILON:
-            yield from ((point, times[point] + late) for point in chain.points)
 
 
 class _Sharing:
