@@ -8,6 +8,7 @@ prediction it comes on time. Only instants that something has changed for are lo
 import heapq
 from collections import defaultdict
 from collections.abc import Callable
+from math import inf
 
 from engage_hri.schemas.behaviors import Speech
 from engage_hri.schemas.units import Seconds
@@ -159,13 +160,15 @@ class Grants(Observer):
         if any(self._is_held(member) or self._goes_to_held(member) for member in members):
             return True
         tied = (other for each in self._tied[transition] for other in self._plan.members[each])
-        held = [other.behavior for other in tied if self._is_held(other) and other.behavior in self._plan.chains]
+        held = [other for other in tied if self._is_held(other)]
         return any(self._sets_out(each) <= self._plan.schedule[transition] + EPSILON for each in held)
 
-    def _sets_out(self, behavior: str) -> Seconds:
-        """Planned time of the next point of a behavior, from the block's start."""
-        points = self._plan.chains[behavior].points
-        return self._plan.predicted(points[min(self._facts.next_number(behavior), len(points) - 1)])
+    def _sets_out(self, member: Member) -> Seconds:
+        """Planned time of the next point of a behavior, from the block's start; of another block, it may be now."""
+        if (chain := self._plan.chains.get(member.behavior)) is None:
+            return -inf
+        points = chain.points
+        return self._plan.predicted(points[min(self._facts.next_number(member.behavior), len(points) - 1)])
 
     def _goes_to_held(self, member: Member) -> bool:
         """True if a behavior cannot wait any more before an instant that is tied to a point of one that is held."""

@@ -64,8 +64,8 @@ class Steering:
             self._desk.end(PerformanceSteered(id=request.id, blocks=blocks))
 
     def held(self, block: str) -> frozenset[str] | None:
-        """Behaviors of the block that are held now; None: all of them."""
-        return self._holds.of_block(block)
+        """Behaviors of the block and of others that are held now (see `Holds`); None: all of the block."""
+        return self._holds.of_block(block, [live.request.block for live in self._live.values()])
 
     @property
     def is_holding(self) -> bool:
@@ -89,7 +89,9 @@ class Steering:
         return [live for live in self._live.values() if block in ("", live.request.block.id)]
 
     def _apply(self) -> None:
-        for performance in self._performances.values():
+        # In the order in which they came: who is tied to another knows when that goes on before it decides itself.
+        performed = [self._performances[id] for id in self._live if id in self._performances]
+        for performance in performed:
             performance.hold(self.held(performance.plan.block.id), is_held=self.is_holding)
         since = self._holds.earliest()
         self._timer.set(None if since is None else since + self._longest)
