@@ -12,8 +12,9 @@ from engage_hri.schemas.behaviors import BlockBehavior, Gaze, Gesture, Head, Spe
 from engage_hri.schemas.blocks import Block, InterruptBehavior
 from engage_hri.services.control.config import Slow, Variability
 from engage_hri.services.requests.ends import RequestRefused
+from tests.realizer.fake_body import FakeBody, Script
 from tests.realizer.planning import timed
-from tests.realizer.stage import block
+from tests.realizer.stage import after, block, stage
 from tests.realizer.test_simulated_body import Robot, robot
 
 LEFT = Gesture(id="l", lexeme="BEAT", mode="LEFT_HAND")
@@ -146,3 +147,14 @@ async def test_who_has_begun_comes_before_its_neighbor_when_what_it_was_tied_to_
     assert seen.kinds() == ["INTERRUPTED"]
     times = seen.times()
     assert times["l:start"].at.seconds >= times["h:stroke_end"].at.seconds
+
+
+async def test_a_stroke_that_comes_after_words_waits_for_them_where_it_can() -> None:
+    """It cannot wait at its stroke, and by prediction the words would be over by then."""
+    async with stage(FakeBody({"s": Script(slow=3.0)})) as seen:
+        await seen.perform(block((Speech(id="s", text="one"), LEFT), after("s:end", "l:stroke")))
+
+    times = seen.times()
+    assert times["s:end"] == 3.0
+    assert times["l:stroke"] == 3.5  # half a second after its hold point
+    assert [each.behavior for each in seen.warnings()] == ["s"]  # it is late itself
