@@ -61,8 +61,8 @@ NATURAL: Seconds = 0.001
 
 
 def chain(id: str, links: int) -> Block:
-    """Speeches, each starting when the one before has ended."""
-    speeches = tuple(Speech(id=f"speech-{number}", text="go") for number in range(links))
+    """Speeches, each starting when the one before has ended. Each block has a voice of its own."""
+    speeches = tuple(Speech(id=f"{id}-{number}", text="go") for number in range(links))
     ties = tuple(
         Constraint(operators=(Synchronize(syncs=(f"{before.id}:end", after.id + ":start")),))
         for before, after in itertools.pairwise(speeches)
@@ -74,7 +74,9 @@ def estimate(question: Message) -> Message:
     assert isinstance(question, EstimateBehaviors)
     phase = Phase(since="start", to="end", shortest=NATURAL, natural=NATURAL)
     items = (
-        Estimate(behavior=item.behavior.id, feasible=True, parts=("voice",), phases=(phase,))
+        Estimate(
+            behavior=item.behavior.id, feasible=True, parts=(item.behavior.id.rpartition("-")[0],), phases=(phase,)
+        )
         for item in question.items
     )
     return Estimates(items=tuple(items))

@@ -99,7 +99,9 @@ class BehaviorRun:
         """Wait until it may begin, and perform it to its end."""
         block = self._block
         await block.futures.granted(Point(self.id, "start"))
-        behavior = self.behavior = with_planned_hand(block.decisions.plan.chains[self.id])
+        if (chain := block.decisions.plan.chains.get(self.id)) is None:
+            return  # It was lost before its turn on the loop came.
+        behavior = self.behavior = with_planned_hand(chain)
         match behavior:
             case Wait(duration=duration):
                 await self._wait(duration or 0.0)

@@ -147,9 +147,10 @@ class Ties:
                 continue
             if is_later and not is_named_in(block, self.foreign_ties):
                 later.add(block)
-                if not any(name.startswith(f"{block}:") for _, name in self._met):
+                content = self._live_blocks.blocks.get(block)
+                if content is None or not any(name.startswith(f"{block}:") for _, name in self._met):
                     continue
-                self.blocks[block] = self._live_blocks.blocks[block]
+                self.blocks[block] = content
             others.append(each)
         met = frozenset(name for _, name in self._met)
         parts = parts_of(plan.block.behaviors, plan.estimates.values())
