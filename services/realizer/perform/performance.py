@@ -272,10 +272,9 @@ class BlockPerformance:
         match effect:
             case Begin(behavior=id) | Extend(behavior=id):
                 self._runs[id].command(effect)
-            case Late(behavior=id, sync=sync, overdue=overdue):
+            case Late():
                 if not self._shared.peers.has_left("control"):
-                    instant = self.decisions.net.part_of[Point(id, sync)].point
-                    self.report.late(instant, f"{sync} is {overdue:.1f} s overdue")
+                    self.report.overdue(self.decisions, effect)
                 self.decisions.foresight.is_surprised = True
             case Stalled(behavior=id, sync=sync, overdue=overdue):
                 self.body.abort(id)
