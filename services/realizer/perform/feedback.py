@@ -167,10 +167,11 @@ class Reporter:
         )
         self._say(warning)
 
-    def interrupted(self, behavior: str, spoken: SpokenText | None) -> None:
-        """Warn that a behavior was ended on request."""
+    def interrupted(self, behavior: str, spoken: SpokenText | None, reason: str) -> None:
+        """Warn that a behavior was ended on request, or for a reason."""
         said = f" after {spoken.text!r}" if spoken is not None else ""
-        self.warn("INTERRUPTED", f"interrupted{said}", behavior)
+        why = f": {reason}" if reason else ""
+        self.warn("INTERRUPTED", f"interrupted{said}{why}", behavior)
 
     def ended(self, status: str, began: Seconds) -> None:
         now = self._no_earlier(self._bus.now())

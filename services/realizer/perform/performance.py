@@ -69,8 +69,8 @@ class BlockPerformance:
         why = {each.behavior: each.message.removesuffix(DROPPED) for each in reversed(plan.problems)}
         self._dropped = {id: why.get(id, "") for id in plan.dropped}
         """Behaviors that were dropped, each with the reason."""
-        self._interrupted: set[str] = set()
-        """Behaviors that are ended on request."""
+        self._interrupted: dict[str, str] = {}
+        """Behaviors that are ended on request, each with the reason if one was given."""
         self.ties = Ties(self, shared.others, shared.live_blocks, elsewhere)
         self.spoken = Spoken(plan.block.behaviors)
         self._ending = live.ending
@@ -144,10 +144,10 @@ class BlockPerformance:
         is_left = behavior in self._tasks and behavior not in self._dropped
         return is_left and not self._ending.done() and not self.decisions.facts.has_ended(behavior)
 
-    async def interrupt(self, behavior: str) -> bool:
+    async def interrupt(self, behavior: str, reason: str = "") -> bool:
         """End one behavior on request; the others go on. Returns once it has ended: True if it came to its end."""
         task, run = self._tasks[behavior], self._runs[behavior]
-        self._interrupted.add(behavior)
+        self._interrupted[behavior] = reason
         if run.pending is not None and run.is_by_body:
             self.body.abort(behavior)
             await asyncio.wait([task])
@@ -332,7 +332,7 @@ class BlockPerformance:
         self._dropped[id] = str(fault)
         if id in self._interrupted:
             # Its parts go home by themselves: the body does not need to be told, nor to forget what it looked at.
-            self.report.interrupted(id, self.spoken.of(id))
+            self.report.interrupted(id, self.spoken.of(id), self._interrupted[id])
         else:
             self.report.warn(kind, str(fault), id)
             if id in self.decisions.facts.begun and not at_rest:
