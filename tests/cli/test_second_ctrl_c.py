@@ -31,11 +31,12 @@ async def test_a_second_ctrl_c_ends_it_at_once_without_a_word(tmp_path: Path, pa
             await line(play, "b:w:start", log=False)
             realizer.send_signal(signal.SIGSTOP)
             play.send_signal(signal.SIGINT)
-            await asyncio.sleep(pause)
-            for _ in range(2):  # of two that are pending at once the process sees one
+            for seconds in (pause, 0.05):  # of two that are pending at once the process sees one
+                later = asyncio.get_running_loop().create_future()
+                asyncio.get_running_loop().call_later(seconds, later.set_result, None)
+                await later
                 with suppress(ProcessLookupError):
                     play.send_signal(signal.SIGINT)
-                await asyncio.sleep(0.05)
             async with asyncio.timeout(PATIENCE):
                 _, err = await play.communicate()
         finally:
