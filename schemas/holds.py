@@ -1,4 +1,4 @@
-"""What is held of what the robot performs: see `SteerPerformance`."""
+"""Holds on what the robot performs, as they are told: see `SteerPerformance`."""
 
 from msgspec import Struct
 
