@@ -27,10 +27,10 @@ the values of attributes. What is performed needs no warning. What is degraded i
 is dropped costs the behavior, with one warning. This page is made from the code: `make generate`.
 
 The tables hold the words of the standards only. The simulated body has a few lexemes more, which
-`services/control/torso/repertoire.toml` lists; where a lexeme is not known, the warning names those that there are. For
-lexemes of your own write a repertoire file and name it with `control.repertoire`: it may add words, or replace what is
-performed for a word of these tables ([control.md](control.md#repertoire) has an example). `engage plan` and `engage play` take
-it with `--set control.repertoire=FILE`. A lexeme of yours is performed without a warning.
+`services/control/torso/repertoire.toml` lists; where a lexeme is not known, the warning names those that there are.
+For lexemes of your own write a repertoire file and name it with `control.repertoire`: it may add words, or replace
+what is performed for a word of these tables ([control.md](control.md#repertoire) has an example). `engage plan` and
+`engage play` take it with `--set control.repertoire=FILE`. A lexeme of yours is performed without a warning.
 """
 COLUMNS = "| element | attribute | performed | degraded | dropped |\n|---|---|---|---|---|"
 WORLD = World(
