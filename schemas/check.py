@@ -6,7 +6,6 @@ world.
 
 import math
 from collections.abc import Iterator, Mapping, Set
-from difflib import get_close_matches
 from itertools import pairwise
 
 from msgspec import Struct
@@ -17,6 +16,7 @@ from engage_hri.schemas.behaviors import Behavior, Event, Head, Reference, Speec
 from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.fragments import TurnFragment
 from engage_hri.schemas.references import AnyInput, Input, disambiguated, marks, sites
+from engage_hri.schemas.suggestion import suggestion
 from engage_hri.schemas.syncref import BLOCK_ITSELF, LONGEST_ID, SYNC_POINTS, SyncRef, is_id, is_sync_point
 
 MOST_NODS = 1000
@@ -183,11 +183,11 @@ def _references(thing: Input) -> Iterator[Problem]:
             continue
         if reference.behavior not in points:
             reason = f"unknown behavior {reference.behavior!r} in {site.text!r}"
-            yield Problem(reason, site.path, site.name, site.line, _nearest(reference.behavior, points.keys()))
+            yield Problem(reason, site.path, site.name, site.line, suggestion(reference.behavior, points.keys()))
         elif isinstance(thing, TurnFragment) and canonical_sync(reference.sync) not in points[reference.behavior]:
             known = points[reference.behavior]
             reason = f"{reference.behavior!r} has no sync point {reference.sync!r}"
-            yield Problem(reason, site.path, site.name, site.line, _nearest(reference.sync, known))
+            yield Problem(reason, site.path, site.name, site.line, suggestion(reference.sync, known))
 
 
 def _inline(fragment: TurnFragment, points: Mapping[str, Set[str]]) -> Iterator[Problem]:
@@ -201,7 +201,7 @@ def _inline(fragment: TurnFragment, points: Mapping[str, Set[str]]) -> Iterator[
             if canonical_sync(timing.sync) not in known:
                 path = f"$.behaviors[{index}].timing[{number}].sync"
                 reason = f"{behavior.id!r} has no sync point {timing.sync!r}"
-                yield Problem(reason, path, behavior.id, behavior.line, _nearest(timing.sync, known))
+                yield Problem(reason, path, behavior.id, behavior.line, suggestion(timing.sync, known))
 
 
 def _points(thing: Input) -> dict[str, Set[str]]:
@@ -213,8 +213,3 @@ def _points(thing: Input) -> dict[str, Set[str]]:
         else frozenset(SYNC_POINTS)
         for behavior in thing.behaviors
     }
-
-
-def _nearest(name: str, known: Set[str]) -> str:
-    near = get_close_matches(name, sorted(known), n=1)
-    return f"did you mean {near[0]!r}?" if near else f"known: {', '.join(sorted(known)[:12]) or 'none'}"

@@ -14,7 +14,7 @@ WarningKind = Literal[
 ]  # fmt: skip
 """CUSTOM_BEHAVIOR_NOT_SUPPORTED, CUSTOM_ATTRIBUTE_NOT_SUPPORTED: it is of a namespace that is not BML's.
 DEGRADED: a behavior is performed with the nearest that the body has, or without a detail; nothing is dropped.
-INTERRUPTED: a behavior was ended on request.
+INTERRUPTED: a behavior was ended on request, or was held for too long; without a behavior: its block or all was.
 POLICY: generation performs a fragment otherwise than it asks, for example with a less reliable reference."""
 
 

@@ -43,6 +43,7 @@ ANY_CONNECTION_EVENT = f"{PREFIX}/evt/recognition/connection_event/*/*"
 
 WORLD = f"{PREFIX}/state/perception/world"
 HEAD_OWNER = f"{PREFIX}/state/generation/head_owner"
+HELD = f"{PREFIX}/state/realizer/held"
 
 ROBOT_STATE = f"{PREFIX}/stream/control/robot_state"
 NET = f"{PREFIX}/stream/realizer/net"

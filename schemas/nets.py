@@ -63,6 +63,19 @@ class NetPlanned(Struct, frozen=True, kw_only=True, tag="net_planned", omit_defa
     fired: tuple[Fired, ...] = ()
 
 
+class NetWaiting(Struct, frozen=True, kw_only=True, tag="net_waiting", omit_defaults=True):
+    """stream: realizer: a block waits for its turn, since its composition asks for that; it has no net yet.
+
+    Told when it begins to wait, whenever it waits for fewer, and every two seconds; then `NetPlanned` follows, or a
+    `NetMarked` that says that it is over.
+    since: when it began to wait. waits_for: ids of the live blocks that have to end before.
+    """
+
+    block: str
+    since: Stamp
+    waits_for: tuple[str, ...] = ()
+
+
 class NetMarked(Struct, frozen=True, kw_only=True, tag="net_marked", omit_defaults=True):
     """stream: realizer: what has changed in the marking of a block's net since the last message.
 

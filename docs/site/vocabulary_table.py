@@ -24,8 +24,13 @@ HEAD = """\
 Everything that BML 1.0 and the draft of 2007 define, as `schemas/vocabulary.py` lists it: elements, attributes, and
 the values of attributes. What is performed needs no warning. What is degraded is performed with one warning
 (`DEGRADED`) that names what was asked and what is done instead; an attribute that is ignored costs only itself. What
-is dropped costs the behavior, with one warning. Your repertoire file ([control.md](control.md)) adds lexemes, or does
-others for these. This page is made from the code: `make generate`.
+is dropped costs the behavior, with one warning. This page is made from the code: `make generate`.
+
+The tables hold the words of the standards only. The simulated body has a few lexemes more, which
+`services/control/torso/repertoire.toml` lists; where a lexeme is not known, the warning names those that there are.
+For lexemes of your own write a repertoire file and name it with `control.repertoire`: it may add words, or replace
+what is performed for a word of these tables ([control.md](control.md#repertoire) has an example). `engage plan` and
+`engage play` take it with `--set control.repertoire=FILE`. A lexeme of yours is performed without a warning.
 """
 COLUMNS = "| element | attribute | performed | degraded | dropped |\n|---|---|---|---|---|"
 WORLD = World(
@@ -150,7 +155,8 @@ def _cell(found: list[tuple[Term, Told]], outcome: Outcome) -> str:
     for term, became in found:
         if became.outcome == outcome:
             _, _, instead = became.warning.rpartition("; it ") if outcome == "degraded" else ("", "", "")
-            instead = instead.removeprefix("is ").removesuffix(", the nearest").replace("'", "")
+            instead = instead.removeprefix("is ").removesuffix(", the nearest")
+            instead = instead.replace(repr(VALUES["target"]), "the target").replace("'", "")
             words.append((term.value or "yes") + (f" ({instead})" if instead else ""))
     return ", ".join(words)
 

@@ -1,8 +1,8 @@
 """Log lines for messages as they are published, and for peers that come and go. Spoken words are in none.
 
 A line for each block, fragment and turn that has ended, each connection event that is decided, each person and peer
-that comes or goes, each warning and refusal; at level DEBUG one for every message but the streams. Loggers are named
-`engage.<service>`, or `engage.<role>` for a participant that is no service.
+that comes or goes, each warning and refusal, and for what is held; at level DEBUG one for every message but the
+streams. Loggers are named `engage.<service>`, or `engage.<role>` for a participant that is no service.
 """
 
 import logging
@@ -14,6 +14,7 @@ from engage_hri.schemas.actions import ActorFound, ActorLost
 from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.feedback import BlockProgress, WarningFeedback
 from engage_hri.schemas.fragments import FragmentOutcome, TurnClosed
+from engage_hri.schemas.holds import Held
 from engage_hri.schemas.messages import Message
 from engage_hri.schemas.presence import PeerAlive, PeerGone
 from engage_hri.schemas.recognition import ENDINGS, ConnectionEvent
@@ -62,7 +63,8 @@ def _block(message: BlockProgress) -> Entry:
 
 
 def _warning(message: WarningFeedback) -> Entry:
-    return WARNING, f"block {message.place}: {message.kind}: {message.message}"
+    place = f"block {message.place}" if message.place else "no block"
+    return WARNING, f"{place}: {message.kind}: {message.message}"
 
 
 def _fragment(message: FragmentOutcome) -> Entry:
@@ -83,6 +85,11 @@ def _event(message: ConnectionEvent) -> Entry:
     about = f" about {', '.join(message.objects)}" if message.objects else ""
     who = f"{message.initiator} to {message.responder}"
     return level, f"event {message.id}: {message.kind} from {who}{about}: {message.state}{delay}"
+
+
+def _held(message: Held) -> Entry:
+    names = [": ".join(filter(None, (each.block, each.behavior))) or "everything" for each in message.holds]
+    return INFO if names else DEBUG, f"held: {', '.join(names) or 'nothing'}"
 
 
 def _refused(message: Refused) -> Entry:
@@ -107,6 +114,7 @@ _TOLD: dict[type, Callable[[Any], Entry]] = {
     FragmentOutcome: _fragment,
     TurnClosed: _turn,
     ConnectionEvent: _event,
+    Held: _held,
     Refused: _refused,
     Fault: _fault,
     ActorFound: _actor,

@@ -30,6 +30,7 @@ from engage_hri.schemas.blocks import (
 from engage_hri.schemas.faults import Fault, InputRefused, RunFailed
 from engage_hri.schemas.feedback import Feedback
 from engage_hri.schemas.fragments import FragmentOutcome, PerformFragment, TurnClosed, TurnFragment
+from engage_hri.schemas.holds import Held
 from engage_hri.schemas.recognition import Statistics
 from engage_hri.schemas.requests import Outcome, Request
 from engage_hri.schemas.units import Seconds, Stamp
@@ -273,6 +274,10 @@ class Robot(Steering):
     def head_owners(self) -> Feed[HeadOwner]:
         """Follow the owner of the robot's head, with the reason: now, and at every change."""
         return self._feed((HeadOwner,), keys.HEAD_OWNER)
+
+    def holds(self) -> Feed[Held]:
+        """Follow what is held of what the robot performs: now, and at every change."""
+        return self._feed((Held,), keys.HELD)
 
     async def world(self, timeout: Seconds | None = None) -> World:
         """Return what is perceived now; waits for perception.

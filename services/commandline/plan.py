@@ -9,12 +9,14 @@ import typer
 
 from engage_hri.schemas.blocks import Block
 from engage_hri.schemas.body import Estimate
+from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.world import World
 from engage_hri.services.commandline.config import Config
+from engage_hri.services.commandline.ends import readable
 from engage_hri.services.commandline.generating import generated
 from engage_hri.services.commandline.options import Configured, Strict, WorldFile
 from engage_hri.services.commandline.outputs import Terminal
-from engage_hri.services.commandline.process import DONE
+from engage_hri.services.commandline.process import DONE, FAILED
 from engage_hri.services.commandline.prose import strict_refusal
 from engage_hri.services.commandline.sources import read_source, read_world
 from engage_hri.services.realizer.plan.plan import Plan
@@ -34,12 +36,13 @@ class Options(Configured):
 
 def main(options: Options) -> int:
     from engage_hri.services.realizer import export
+    from engage_hri.services.realizer.perform.outcome import nothing_is_left
 
     config = options.load()
     source = read_source(options.file)
     around = read_world(options.world)
     writers = {"text": _as_text, "json": export.as_json, "dot": export.as_dot, "pnml": export.as_pnml}
-    texts, warnings = [], 0
+    texts, warnings, code = [], 0, DONE
     with source.naming_file():
         for plan in generated(source.things, around, config, str(options.file)):
             estimates = run_virtual(estimated(plan.block, around, config))
@@ -48,10 +51,14 @@ def main(options: Options) -> int:
             for problem in planned.problems:
                 warnings += 1
                 print(f"! {problem.kind} {problem.behavior or plan.block.id}: {problem.message}", file=sys.stderr)
+            if nothing_is_left(plan.block, planned.dropped):
+                reason = "it would fail: every behavior of it was dropped, and nothing is left to perform"
+                print(readable(Fault(reason=reason, where=plan.block.id), options.file), file=sys.stderr)
+                code = FAILED
     print("\n".join(text.rstrip("\n") for text in texts))
-    if options.strict and warnings:
+    if options.strict and warnings and code == DONE:
         raise strict_refusal(warnings)
-    return DONE
+    return code
 
 
 def _as_text(plan: Plan) -> str:

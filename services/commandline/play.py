@@ -251,7 +251,8 @@ async def _perform(job: Job, source: InputFile, robot: Robot, patience: Seconds 
             print(f"{source.path}: {thing.id} was {outcome.status} without {left_out}", file=sys.stderr)
         code = job.played.exit_code(outcome)
         if code != DONE:
-            print(f"{source.path}: {thing.id} was {outcome.status}", file=sys.stderr)
+            why = f": {outcome.fault.reason}" if outcome.fault is not None else ""
+            print(f"{source.path}: {thing.id} was {outcome.status}{why}", file=sys.stderr)
         worst = max(worst, code)
     return worst
 

@@ -7,6 +7,7 @@ import sys
 import uuid
 from collections.abc import Coroutine
 from importlib import import_module
+from types import FrameType
 from typing import Any, TypeVar
 
 from engage_hri.services.runtime.virtual_time import VirtualTimeLoop
@@ -14,6 +15,7 @@ from engage_hri.services.runtime.virtual_time import VirtualTimeLoop
 T = TypeVar("T")
 DONE, REFUSED, FAILED, UNREAD = 0, 2, 3, 128 + signal.SIGPIPE
 """Exit codes: all done; input refused, nothing moved; failed while running; reader of the output gone."""
+SHOW_CURSOR = b"\x1b[?25h"
 _stopping = [signal.SIGINT]
 """Signals received; the last one is the reason to stop."""
 
@@ -22,15 +24,42 @@ def run(main: Coroutine[Any, Any, T], *, virtual_time: bool = False) -> T:
     """Run to the end, on uvloop if it is installed (measured a fifth faster on Zenoh), or in virtual time.
 
     Ctrl-C and SIGTERM cancel `main`; when it has ended, KeyboardInterrupt is raised. A second Ctrl-C does not wait
-    for that; a second SIGTERM is ignored.
+    for that: it ends the process. A SIGTERM is ignored after either.
     """
     # asyncio.Runner cancels `main` only if it finds this handler. A shell that starts us in the background has had
     # Ctrl-C ignored.
     signal.signal(signal.SIGINT, signal.default_int_handler)
     del _stopping[1:]
     signal.signal(signal.SIGTERM, _terminate)
-    with asyncio.Runner(loop_factory=VirtualTimeLoop if virtual_time else _fastest_loop()) as runner:
-        return runner.run(main)
+    try:
+        with asyncio.Runner(loop_factory=VirtualTimeLoop if virtual_time else _fastest_loop()) as runner:
+            return runner.run(_interruptible(main))
+    finally:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+async def _interruptible(main: Coroutine[Any, Any, T]) -> T:
+    """Run `main`, so that a second Ctrl-C ends the process.
+
+    The handler of asyncio.Runner raises KeyboardInterrupt then, wherever the program is. The error may be lost in a
+    callback, or break off the end of a task that others wait for: then the process would never end.
+    """
+    cancel = signal.getsignal(signal.SIGINT)
+    assert callable(cancel)
+
+    def interrupt(number: int, frame: FrameType | None) -> None:
+        signal.signal(signal.SIGINT, _leave)
+        cancel(number, frame)
+
+    signal.signal(signal.SIGINT, interrupt)
+    return await main
+
+
+def _leave(number: int, frame: FrameType | None) -> None:
+    """End the process at once, and show the cursor that a live view has hidden."""
+    if sys.stdout is not None and sys.stdout.isatty():
+        os.write(sys.stdout.fileno(), SHOW_CURSOR)
+    os._exit(interrupted())
 
 
 def run_until_signal(main: Coroutine[Any, Any, None]) -> None:
@@ -53,8 +82,9 @@ async def forever() -> None:
     await asyncio.get_running_loop().create_future()
 
 
-def _terminate(number: int, frame: object) -> None:
-    if _stopping[-1] != signal.SIGTERM:  # `timeout` sends it twice, to the process and to its group
+def _terminate(number: int, frame: FrameType | None) -> None:
+    is_stopping = signal.getsignal(signal.SIGINT) is _leave
+    if not is_stopping and _stopping[-1] != signal.SIGTERM:  # `timeout` sends it twice, to the process and its group
         _stopping.append(signal.SIGTERM)
         signal.raise_signal(signal.SIGINT)
 

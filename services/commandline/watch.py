@@ -12,6 +12,7 @@ from engage_hri.schemas.attention import HeadOwner
 from engage_hri.schemas.behaviors import EventKind
 from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.feedback import BlockProgress, SyncPointProgress, WarningFeedback
+from engage_hri.schemas.holds import Held
 from engage_hri.schemas.messages import Message
 from engage_hri.schemas.recognition import ConnectionEvent, Statistics
 from engage_hri.schemas.units import Seconds
@@ -23,12 +24,13 @@ from engage_hri.services.console.follow import FOLLOWED, Sink, following
 from engage_hri.services.console.live import LiveNets, Log, NetLog
 from engage_hri.services.console.log import Telling
 
-OTHERS = (keys.ANY_FEEDBACK, keys.HEAD_OWNER, keys.ANY_FAULT)
+OTHERS = (keys.ANY_FEEDBACK, keys.HEAD_OWNER, keys.HELD, keys.ANY_FAULT)
 SUBJECTS: dict[str, tuple[type[Message], ...]] = {
     "events": (ConnectionEvent,),
     "statistics": (Statistics,),
     "feedback": (BlockProgress, SyncPointProgress, WarningFeedback),
     "head": (HeadOwner,),
+    "holds": (Held,),
     "faults": (Fault,),
 }
 
@@ -38,7 +40,7 @@ class Options(Connected):
     json: Annotated[bool, typer.Option("--json", help="JSON lines instead of text.")] = False
     only: Annotated[
         list[str] | None,
-        typer.Option(metavar="WHAT", help="events, statistics, feedback, head or faults; may be repeated."),
+        typer.Option(metavar="WHAT", help="events, statistics, feedback, head, holds or faults; may be repeated."),
     ] = None
     net: Annotated[bool, typer.Option("--net", help="Petri nets of live blocks, and where their tokens are.")] = False
     actor: Annotated[str, typer.Option(metavar="ID", help="Only what goes on with this person.")] = ""
@@ -133,7 +135,7 @@ async def _watch_nets(options: Options, config: Config) -> None:
                 show = shown.enter_context(LiveNets(console))
             else:
                 show = NetLog(console, bus.now())
-            async with following(bus, (show,), patterns=(keys.NET,)):
+            async with following(bus, (show,), patterns=(keys.NET, keys.HELD)):
                 bus.declare_alive()
                 async with hinting(bus, config.bus.connect):
                     await forever()

@@ -6,7 +6,9 @@ from contextlib import asynccontextmanager
 
 from engage_hri.schemas import keys
 from engage_hri.schemas.attention import HeadOwner
+from engage_hri.schemas.holds import Held
 from engage_hri.schemas.messages import Message
+from engage_hri.schemas.nets import NetWaiting
 from engage_hri.schemas.recognition import ConnectionEvent, OpenEvents
 from engage_hri.schemas.units import Seconds, Stamp
 from engage_hri.services.bus.interface import Bus, Received
@@ -21,6 +23,7 @@ FOLLOWED = (
     keys.ANY_OPEN_EVENTS,
     keys.ANY_STATISTICS,
     keys.HEAD_OWNER,
+    keys.HELD,
     keys.ANY_REQUEST_STATE,
     keys.ANY_FAULT,
     keys.ANY_ALIVE,
@@ -40,7 +43,8 @@ async def following(
     """Feed the sinks, in order, while the body of `async with` runs; messages that have arrived by its end are still
     fed.
 
-    past: feed also earlier messages that the bus still has; of connection events those that are open.
+    past: feed also earlier messages that the bus still has; of connection events those that are open. What is held
+    now is fed in any case.
     kinds: of connection events; empty: all.
     """
     sinks = tuple(sinks)
@@ -54,7 +58,8 @@ async def following(
         message, at = received.message, instant(bus, received.message, received.at)
         for event in events.feed(message, at, bus.now(), past=received.past):
             tell(event, instant(bus, event, at))
-        if not isinstance(message, ConnectionEvent | OpenEvents) and (past or not received.past):
+        is_now = past or not received.past or isinstance(message, Held)
+        if is_now and not isinstance(message, ConnectionEvent | OpenEvents):
             tell(message, at)
 
     with bus.subscribe(*patterns) as inbox:
@@ -81,5 +86,5 @@ async def following(
 
 def instant(bus: Bus, message: Message, arrived: Seconds) -> Seconds:
     """Instant that a message tells of, in local loop time; that of its arrival if it has none."""
-    at = message.since if isinstance(message, HeadOwner) else getattr(message, "at", None)
+    at = message.since if isinstance(message, HeadOwner | NetWaiting) else getattr(message, "at", None)
     return bus.local(at) if isinstance(at, Stamp) else arrived

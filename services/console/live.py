@@ -71,16 +71,19 @@ class LiveNets(_Picture):
 
     def __init__(self, console: Console) -> None:
         self.nets: nets.Nets = {}
+        self._scene = view.empty("", 0.0)
         super().__init__(console)
 
     def __call__(self, message: Message, at: Seconds) -> None:
         self.nets = nets.feed(self.nets, message, at, asyncio.get_running_loop().time())
+        self._scene = view.feed(self._scene, message, at)
         self._draw_soon()
 
     def _picture(self) -> RenderableType:
         now = asyncio.get_running_loop().time()
         self.nets = nets.without_old(self.nets, now)
-        return picture(tuple(self.nets.values()), self._console.width, self._console.height, now)
+        held = [wording.held(each.hold) for each in self._scene.held]
+        return picture(tuple(self.nets.values()), self._console.width, self._console.height, now, held)
 
     def _draw(self) -> None:
         super()._draw()
@@ -93,11 +96,15 @@ class NetLog:
 
     def __init__(self, console: Console, began: Seconds) -> None:
         self.nets: nets.Nets = {}
+        self._scene = view.empty("", began)
         self._console = console
         self._began = began
 
     def __call__(self, message: Message, at: Seconds) -> None:
         now = asyncio.get_running_loop().time()
+        scene, self._scene = self._scene, view.feed(self._scene, message, at)
+        for text in log.holds(scene, self._scene, at):
+            _print(self._console, f"{wording.clock(now - self._began):>8}  {text}")
         before, self.nets = self.nets, nets.without_old(nets.feed(self.nets, message, at, now), now)
         for block, net in self.nets.items():
             if net is not before.get(block):

@@ -1,16 +1,22 @@
 """Lines of the log, one for each message that matters: for a file, a pipe, or a screen reader."""
 
+from collections.abc import Iterator
+
 from msgspec import Struct
 
 from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost
 from engage_hri.schemas.attention import HeadOwner
 from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.feedback import BlockProgress, SyncPointProgress, WarningFeedback
+from engage_hri.schemas.holds import Held
 from engage_hri.schemas.messages import Message
 from engage_hri.schemas.recognition import ConnectionEvent, Statistics
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.console import wording
 from engage_hri.services.console.view import OWN_BLOCKS, Scene
+
+NOTICED: Seconds = 0.1
+"""Time for which something is held that is told with it."""
 
 
 class Telling(Struct, frozen=True, kw_only=True):
@@ -29,11 +35,11 @@ class Telling(Struct, frozen=True, kw_only=True):
 
 def line(message: Message, before: Scene, after: Scene, at: Seconds, telling: Telling) -> str | None:
     """Write the line for one message; None for most. before, after: the scene around it. at: its local instant."""
-    text = _text(message, before, after, telling)
+    text = _text(message, before, after, at, telling)
     return None if text is None else f"{wording.clock(at - after.began):>8}  {text}"
 
 
-def _text(message: Message, before: Scene, after: Scene, telling: Telling) -> str | None:
+def _text(message: Message, before: Scene, after: Scene, at: Seconds, telling: Telling) -> str | None:
     match message:
         case ActionBegan() | ActionEnded() | ActorFound() | ActorLost():
             return _action(message, before) if telling.actions else None
@@ -49,6 +55,8 @@ def _text(message: Message, before: Scene, after: Scene, telling: Telling) -> st
         case HeadOwner() if telling.head:
             waiting = ", ".join(claim.kind for claim in message.waiting)
             return f"head: {wording.claim(message.owner)}" + (f"; waiting: {waiting}" if waiting else "")
+        case Held():
+            return "; ".join(holds(before, after, at)) or None
         case BlockProgress(progress="end", block=str() as block) if not block.startswith(OWN_BLOCKS):
             return f"block {block}: {message.status}"
         case WarningFeedback() if telling.warnings:
@@ -56,6 +64,19 @@ def _text(message: Message, before: Scene, after: Scene, telling: Telling) -> st
         case Fault():
             return f"! {message.service or 'fault'}: {message}"
     return None
+
+
+def holds(before: Scene, after: Scene, at: Seconds) -> Iterator[str]:
+    """Words for each hold that has begun since the scene before, and for each that is no more."""
+    at = max(at, after.began)  # It may have been told before anybody listened.
+    known, left = ([each.hold for each in scene.held] for scene in (before, after))
+    for each in after.held:
+        if each.hold not in known:
+            already = f"for {wording.seconds(at - each.since)} already and " if at - each.since > NOTICED else ""
+            yield f"held: {wording.held(each.hold)}, {already}for at most {wording.seconds(each.until - at)}"
+    for each in before.held:
+        if each.hold not in left:
+            yield f"no longer held: {wording.held(each.hold)}, after {wording.seconds(at - each.since)}"
 
 
 def _action(message: ActionBegan | ActionEnded | ActorFound | ActorLost, before: Scene) -> str | None:

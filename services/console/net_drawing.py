@@ -61,6 +61,8 @@ class _Row(NamedTuple):
 
 def drawing(net: NetInView, width: int = 80, height: int | None = None, now: Seconds | None = None) -> list[str]:
     """The lines of a net. width, height: most cells and lines; None: as many as it takes. now: local time."""
+    if net.waits_for:
+        return [_cut(_title(net, now), width)]
     rows, ties = _behaviors(net), _ties(net)
     left = min(LABEL, max(cell_len(printable(row.name)) for row in (*rows, *ties))) if rows else 0
     left = max(7, min(left, width // 3)) + 1
@@ -83,11 +85,14 @@ def drawing(net: NetInView, width: int = 80, height: int | None = None, now: Sec
     return [_cut(line, width) for line in lines]
 
 
-def picture(nets: Sequence[NetInView], width: int, height: int, now: Seconds) -> Text:
-    """Draw the nets of all live blocks, as large as the terminal: the newest first, those of mere looks last."""
+def picture(nets: Sequence[NetInView], width: int, height: int, now: Seconds, held: Sequence[str] = ()) -> Text:
+    """Draw the nets of all live blocks, as large as the terminal: the newest first, those of mere looks last.
+
+    held: what is held, above them.
+    """
+    lines = [_cut(f"held: {printable(', '.join(held))}", width)] if held else []
     if not nets:
-        return Text("no block runs", style="dim")
-    lines: list[str] = []
+        return Text("\n".join([*lines, "no block runs"]), style="dim")
     newest = [net for own in (False, True) for net in reversed(nets) if net.block.startswith(OWN_BLOCKS) == own]
     for net in newest:
         room = height - len(lines) - 2  # the legend, and the line where the cursor stands
@@ -99,6 +104,7 @@ def picture(nets: Sequence[NetInView], width: int, height: int, now: Seconds) ->
     text = Text("\n".join(lines), no_wrap=True)
     text.highlight_regex(f"{TOKEN}+", "bold green")
     text.highlight_regex("(?m)^block .*$", "bold")
+    text.highlight_regex("^held: .*$", "bold yellow")
     return text
 
 
@@ -119,6 +125,8 @@ def _title(net: NetInView, now: Seconds | None) -> str:
         parts.append("over,")
     elif now is not None:
         parts.append(f"{max(0.0, now - net.began):.1f} s,")
+    if net.waits_for:
+        return " ".join((*parts, f"waits for {', '.join(map(printable, net.waits_for))}"))
     fired = f"{len(net.fired)} of {len(net.transitions)} instants have fired"
     return " ".join((*parts, f"{fired}, {len(net.marked)} {TOKEN}"))
 

@@ -1,4 +1,4 @@
-"""Nets of live blocks with their tokens, as values: made of `NetPlanned` and `NetMarked` alone.
+"""Nets of live blocks with their tokens, as values: made of `NetPlanned`, `NetMarked` and `NetWaiting` alone.
 
 `feed(nets, message, at, now)` gives the next nets; `services/console/net_drawing.py` draws one, `told` says what a
 message changed.
@@ -10,7 +10,7 @@ from msgspec import Struct
 from msgspec.structs import replace
 
 from engage_hri.schemas.messages import Message
-from engage_hri.schemas.nets import Fired, NetMarked, NetPlace, NetPlanned, NetTransition
+from engage_hri.schemas.nets import Fired, NetMarked, NetPlace, NetPlanned, NetTransition, NetWaiting
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.console.wording import seconds
 
@@ -24,7 +24,8 @@ class NetInView(Struct, frozen=True, kw_only=True):
     """The net of a block. began: local instant of the block's start. marked: places that hold a token.
 
     fired: transitions with their times, seconds from the block's start. heard: when something was told of it last.
-    is_over: the block has ended.
+    is_over: the block has ended. waits_for: blocks that have to end before it begins: it has no net yet, and `began`
+    is when it began to wait.
     """
 
     block: str
@@ -35,6 +36,7 @@ class NetInView(Struct, frozen=True, kw_only=True):
     began: Seconds = 0.0
     heard: Seconds = 0.0
     is_over: bool = False
+    waits_for: tuple[str, ...] = ()
 
 
 Nets = Mapping[str, NetInView]
@@ -58,6 +60,14 @@ def in_view(message: NetPlanned, began: Seconds = 0.0, now: Seconds = 0.0) -> Ne
     )
 
 
+def _waiting(block: str, waits_for: tuple[str, ...], began: Seconds, now: Seconds) -> NetInView:
+    """A block that has no net yet."""
+    nothing = frozenset[int]()
+    return NetInView(
+        block=block, transitions=(), places=(), marked=nothing, fired={}, began=began, heard=now, waits_for=waits_for
+    )
+
+
 def _times(fired: tuple[Fired, ...], size: int) -> dict[int, Seconds]:
     return {each.transition: each.time for each in fired if 0 <= each.transition < size}
 
@@ -67,6 +77,8 @@ def feed(nets: Nets, message: Message, at: Seconds, now: Seconds) -> Nets:
     match message:
         case NetPlanned(block=block) if (net := in_view(message, at, now)) is not None:
             return {**nets, block: net}
+        case NetWaiting(block=block, waits_for=waits_for) if waits_for:
+            return {**nets, block: _waiting(block, waits_for, at, now)}
         case NetMarked(block=block) if (known := nets.get(block)) is not None:
             put = frozenset(message.put) & frozenset(range(len(known.places)))
             net = replace(
@@ -90,6 +102,14 @@ def without_old(nets: Nets, now: Seconds) -> Nets:
 def told(before: NetInView | None, after: NetInView) -> Iterator[str]:
     """Lines about what has changed in a net: a new one, instants that fired, tokens that came, the end."""
     block = after.block
+    if after.waits_for and (before is None or before.waits_for != after.waits_for):
+        yield f"{block}: waits for {', '.join(after.waits_for)}"
+    if after.waits_for:
+        if after.is_over:
+            yield f"{block}: over"
+        return
+    if before is not None and before.waits_for:
+        before = None
     is_new = before is None or (before.transitions, before.places) != (after.transitions, after.places)
     if is_new or before is None:
         anew = "" if before is None else ", planned anew"

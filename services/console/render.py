@@ -94,7 +94,7 @@ def _style(scene: Scene, actor: str) -> str:
 
 
 def _people(scene: Scene) -> list[Text]:
-    """Lines for all actors, the robot first, and a last one for the owner of its head."""
+    """Lines for all actors, the robot first, then one for the owner of its head, and one for what is held."""
     actors = sorted(scene.actors, key=lambda actor: actor.id != scene.robot)
     wide = max((len(printable(actor.id)) for actor in actors), default=0)
     lines = [
@@ -106,6 +106,10 @@ def _people(scene: Scene) -> list[Text]:
         if scene.waiting:
             line += Text(f"; waiting: {', '.join(claim.kind for claim in scene.waiting)}", style="dim")
         lines.append(line)
+    if scene.held:
+        now = scene.now
+        texts = [f"{wording.held(each.hold)} for {wording.seconds(now - each.since)}" for each in scene.held]
+        lines.append(Text(f"{'held'.ljust(wide)} {printable(', '.join(texts))}", style="bold yellow"))
     for line in lines:
         line.no_wrap, line.overflow = True, "ellipsis"
     return lines

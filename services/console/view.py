@@ -12,6 +12,7 @@ from engage_hri.schemas.behaviors import Action
 from engage_hri.schemas.body import WordSpoken
 from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.feedback import BlockProgress, PredictionFeedback, SyncPointProgress, WarningFeedback
+from engage_hri.schemas.holds import Held, Hold
 from engage_hri.schemas.messages import Message
 from engage_hri.schemas.recognition import ConnectionEvent, Statistics, WindowStatistics
 from engage_hri.schemas.speakable import joined
@@ -87,6 +88,14 @@ class EventInView(Struct, frozen=True, kw_only=True):
     began: Seconds
 
 
+class HoldInView(Struct, frozen=True):
+    """A hold in force. since, until: local instants of its beginning and of its end, unless it is let go before."""
+
+    hold: Hold
+    since: Seconds
+    until: Seconds
+
+
 class Scene(Struct, frozen=True, kw_only=True):
     """State of everything that is shown. robot: its actor id. began: the instant that counts as zero."""
 
@@ -101,6 +110,7 @@ class Scene(Struct, frozen=True, kw_only=True):
     waiting: tuple[Claim, ...] = ()
     session: WindowStatistics | None = None
     notes: tuple[str, ...] = ()
+    held: tuple[HoldInView, ...] = ()
 
     def actor(self, id: str) -> Actor:
         return self.actors.get(id) or Actor(id=id)
@@ -138,10 +148,15 @@ def feed(scene: Scene, message: Message, at: Seconds) -> Scene:
             return _event(scene, message, at)
         case HeadOwner(owner=owner, waiting=waiting):
             return replace(scene, owner=owner, waiting=waiting)
+        case Held(holds=holds, at=told):
+            since = [at + (each.since.seconds - told.seconds) for each in holds]
+            lasts = [each.until.seconds - each.since.seconds for each in holds]
+            held = zip(holds, since, lasts, strict=True)
+            return replace(scene, held=tuple(HoldInView(hold, began, began + last) for hold, began, last in held))
         case Statistics(actor="", session=session):
             return replace(scene, session=session)
         case WarningFeedback(kind=kind, message=text):
-            return _note(scene, f"{kind} {message.place}: {text}")
+            return _note(scene, f"{' '.join(filter(None, (kind, message.place)))}: {text}")
         case Fault():
             return _note(scene, f"{message.service or 'fault'}: {message}")
     return scene

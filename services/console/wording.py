@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from engage_hri.schemas.attention import Claim
 from engage_hri.schemas.behaviors import Action, EventKind
 from engage_hri.schemas.feedback import WarningFeedback
+from engage_hri.schemas.holds import Hold
 from engage_hri.schemas.recognition import ConnectionEvent, Statistics
 from engage_hri.schemas.units import Seconds
 
@@ -69,8 +70,8 @@ def decision(event: ConnectionEvent) -> str:
 
 
 def warning(message: WarningFeedback) -> str:
-    """Write a warning as `! NO_SUCH_TARGET block:behavior: what is wrong`."""
-    return f"! {message.kind} {message.place}: {message.message}"
+    """Write a warning as `! NO_SUCH_TARGET block:behavior: what is wrong`, or without a place if it has none."""
+    return f"! {' '.join(filter(None, (message.kind, message.place)))}: {message.message}"
 
 
 def statistics(statistics: Statistics) -> str:
@@ -80,6 +81,13 @@ def statistics(statistics: Statistics) -> str:
     count = statistics.session.events
     events = f"{count} event{'' if count == 1 else 's'}, MTBCE {seconds(statistics.session.mtbce)}"
     return f"{statistics.actor or 'all'}: {engagement}{reasons}; {events}"
+
+
+def held(hold: Hold) -> str:
+    """Name what a hold holds: `everything`, `block b`, or `b: wave`."""
+    if not hold.block:
+        return "everything"
+    return f"{hold.block}: {hold.behavior}" if hold.behavior else f"block {hold.block}"
 
 
 def claim(claim: Claim) -> str:

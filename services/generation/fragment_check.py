@@ -6,7 +6,6 @@ A bad fragment is refused as a whole, and the fault says where it is wrong.
 import sys
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from difflib import get_close_matches
 
 from msgspec.structs import replace
 
@@ -14,9 +13,13 @@ from engage_hri.schemas.behaviors import Gaze, GazeShift, HeadDirectionShift, Po
 from engage_hri.schemas.check import validated
 from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.fragments import TurnFragment
+from engage_hri.schemas.suggestion import suggestion
 from engage_hri.schemas.syncref import SyncRef
 from engage_hri.schemas.tool_call import in_call
 from engage_hri.schemas.world import Entity, World
+
+EMPTY = "the world is empty"
+"""Advice where there is nothing that could be named."""
 
 
 def checked(fragment: TurnFragment, world: World, robot: str, longest: int = sys.maxsize) -> TurnFragment:
@@ -63,7 +66,8 @@ def _check_targets(fragment: TurnFragment, world: World, robot: str) -> None:
     known = {entity.id: entity for entity in world.entities}
     for path, target, line in _targets(fragment):
         if target not in known and target != robot:
-            raise _refused(fragment, path, f"the world does not know {target!r}", line, _nearest(target, known))
+            advice = suggestion(target, known, EMPTY)
+            raise _refused(fragment, path, f"the world does not know {target!r}", line, advice)
     for index, behavior in enumerate(fragment.behaviors):
         if isinstance(behavior, Reference):
             _check_objects(fragment, index, behavior, known)
@@ -110,14 +114,14 @@ def _check_objects(fragment: TurnFragment, index: int, reference: Reference, kno
     if reference.target not in objects:
         reason = f"the world does not know the object {reference.target!r}"
         path = f"$.behaviors[{index}].target"
-        raise _refused(fragment, path, reason, reference.line, _nearest(reference.target, objects))
+        raise _refused(fragment, path, reason, reference.line, suggestion(reference.target, objects, EMPTY))
     for number, option in enumerate(reference.options or ()):
         for place, distractor in enumerate(option.distractors):
             if distractor not in objects:
                 path = f"$.behaviors[{index}].options[{number}].distractors[{place}]"
                 reason = f"the world does not know the object {distractor!r}"
                 line = option.line or reference.line
-                raise _refused(fragment, path, reason, line, _nearest(distractor, objects))
+                raise _refused(fragment, path, reason, line, suggestion(distractor, objects, EMPTY))
 
 
 def _check_timing(fragment: TurnFragment, index: int, reference: Reference) -> None:
@@ -137,13 +141,6 @@ def _targets(fragment: TurnFragment) -> Iterator[tuple[str, str, int]]:
             yield f"$.behaviors[{index}].target", behavior.target, behavior.line
     if fragment.delay_target:
         yield "$.delay_target", fragment.delay_target, fragment.line
-
-
-def _nearest(name: str, known: Mapping[str, Entity]) -> str:
-    if not known:
-        return "the world is empty"
-    near = get_close_matches(name, sorted(known), n=1)
-    return f"did you mean {near[0]!r}?" if near else f"known: {', '.join(sorted(known)[:12])}"
 
 
 def _refused(fragment: TurnFragment, path: str, reason: str, line: int, advice: str) -> InputRefused:

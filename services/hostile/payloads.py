@@ -12,8 +12,9 @@ from engage_hri.schemas.blocks import BehaviorInterrupted, BlockOutcome, Perform
 from engage_hri.schemas.body import RobotState, SyncPointArrived, SyncPointReached, WordSpoken
 from engage_hri.schemas.feedback import BlockProgress, PredictionFeedback, SyncPointProgress, WarningFeedback
 from engage_hri.schemas.fragments import FragmentOutcome, TurnClosed
+from engage_hri.schemas.holds import Held
 from engage_hri.schemas.messages import COMMANDS, MAJOR, Message
-from engage_hri.schemas.nets import NetMarked, NetPlanned
+from engage_hri.schemas.nets import NetMarked, NetPlanned, NetWaiting
 from engage_hri.schemas.perception import HeadPose, VoiceActivity
 from engage_hri.schemas.recognition import ConnectionEvent, EventOutcome, OpenEvents, Statistics, TurnOutcome
 from engage_hri.schemas.requests import Cancel, KeepAlive, Request
@@ -38,7 +39,7 @@ FIXED_KEYS: Mapping[type, str] = {
     **dict.fromkeys((SyncPointArrived, SyncPointReached, WordSpoken), keys.SYNC_POINT),
     **dict.fromkeys((ActorFound, ActorLost), keys.PERCEIVED_ACTION),
     TurnClosed: keys.TURN_CLOSED, World: keys.WORLD, HeadOwner: keys.HEAD_OWNER, RobotState: keys.ROBOT_STATE,
-    NetPlanned: keys.NET, NetMarked: keys.NET,
+    NetPlanned: keys.NET, NetMarked: keys.NET, NetWaiting: keys.NET, Held: keys.HELD,
 }  # fmt: skip
 """Key of each type of message that always has the same."""
 

@@ -1,13 +1,14 @@
 """A plan for people and programs: text, JSON, a drawing of its net (DOT), and the net for other tools (PNML)."""
 
 import json
+from collections.abc import Iterable, Iterator
 
 from msgspec.structs import asdict
 
 from engage_hri.schemas.nets import NetPlanned
-from engage_hri.schemas.units import Stamp
+from engage_hri.schemas.units import Seconds, Stamp
 from engage_hri.services.realizer.net import pnml
-from engage_hri.services.realizer.net.petri_net import Bound, Place, is_live, is_safe
+from engage_hri.services.realizer.net.petri_net import is_live, is_safe
 from engage_hri.services.realizer.perform.net_message import described
 from engage_hri.services.realizer.plan.plan import Plan
 from engage_hri.services.realizer.plan.planner import plan_block
@@ -30,18 +31,37 @@ def as_text(plan: Plan) -> str:
         f"{'*' if each in critical else ' '}{plan.schedule[each]:8.3f} s  {net.transitions[each].name}"
         for each in by_time
     ]
-    ties = [_tie(plan, place) for place in net.places if place.kind not in ("phase", "idle") and place.source]
-    ties += [_tie(plan, bound) for bound in net.bounds if bound.kind != "phase"]
+    ties = list(_ties(plan))
     lines += ["", *ties] if ties else []
     lines += [f"ends when something takes its place, or with the block: {id}" for id in sorted(plan.natural)]
     return "\n".join(lines) + "\n"
 
 
-def _tie(plan: Plan, tie: Place | Bound) -> str:
+def _ties(plan: Plan) -> Iterator[str]:
+    """A line for each tie between instants; a lower and an upper limit that are equal are one instant."""
+    net = plan.net
+    limits: dict[tuple[int, int, Seconds], set[int]] = {}
+    for bound in net.bounds:
+        if bound.kind != "phase":
+            limits.setdefault((bound.target, bound.source, -bound.lag), set()).update(bound.lines)
+    for place in net.places:
+        if place.kind in ("phase", "idle"):
+            continue
+        if (limit := limits.pop((place.source, place.target, place.lag), None)) is not None:
+            yield _tie(plan, place.target, "at", place.source, place.lag, {*place.lines, *limit})
+        elif place.source:
+            yield _tie(plan, place.target, "no earlier than", place.source, place.lag, place.lines)
+    for (source, target, lag), said in limits.items():
+        yield _tie(plan, target, "no later than", source, lag, said)
+
+
+def _tie(plan: Plan, one: int, how: str, other: int, seconds: Seconds, lines: Iterable[int]) -> str:
+    """Write `  g:end  no later than  bml:start +2 s  (line 4)`."""
     names = plan.net.transitions
-    because = f"  (line {', '.join(map(str, tie.lines))})" if tie.lines else ""
-    offset = f" {tie.lag:+g} s" if tie.lag else ""
-    return f"  {names[tie.target].name}  no earlier than  {names[tie.source].name}{offset}{because}"
+    said = ", ".join(map(str, sorted(lines)))
+    because = f"  (line {said})" if said else ""
+    offset = f" {seconds:+g} s" if seconds else ""
+    return f"  {names[one].name}  {how}  {names[other].name}{offset}{because}"
 
 
 def as_json(plan: Plan) -> str:

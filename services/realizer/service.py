@@ -30,6 +30,7 @@ from engage_hri.services.realizer.config import RealizerConfig
 from engage_hri.services.realizer.perform.control_link import LONGEST_WAY
 from engage_hri.services.realizer.perform.live import Ending, Live
 from engage_hri.services.realizer.perform.live_blocks import LiveBlocks
+from engage_hri.services.realizer.perform.net_stream import telling_of_turn
 from engage_hri.services.realizer.perform.performance import BlockPerformance
 from engage_hri.services.realizer.perform.planning import Planning
 from engage_hri.services.realizer.perform.shared_context import Moving, Presence, SharedContext
@@ -179,7 +180,8 @@ class _Realizer:
                 return
             if plan is not None:
                 self.desk.accept(live.request.id)
-                plan = await _result_or_stopped(live.ending, self._await_turn(live, plan, elsewhere))
+                with telling_of_turn(self.bus, live):
+                    plan = await _result_or_stopped(live.ending, self._await_turn(live, plan, elsewhere))
             if plan is None:
                 await self._end(live, live.outcome)
                 return
@@ -287,6 +289,7 @@ async def realize(bus: Bus, ready: Ready, config: RealizerConfig) -> None:
     patterns = dict.fromkeys((*RequestDesk.patterns("realizer"), *Requester.PATTERNS, keys.SYNC_POINT))
     try:
         with bus.subscribe(*patterns) as inbox:
+            realizer.steering.tell()
             ready()
             async with asyncio.TaskGroup() as tasks:
                 async for received in inbox:

@@ -12,6 +12,7 @@ from engage_hri.schemas.body import WordSpoken
 from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.feedback import BlockProgress, WarningFeedback
 from engage_hri.schemas.fragments import FragmentOutcome, TurnClosed
+from engage_hri.schemas.holds import Held, Hold
 from engage_hri.schemas.messages import Message
 from engage_hri.schemas.presence import PeerAlive, PeerGone
 from engage_hri.schemas.recognition import ConnectionEvent
@@ -35,6 +36,9 @@ def happened(state: str, delay: float | None = None) -> ConnectionEvent:
     )  # fmt: skip
 
 
+LASTS = {"since": AT, "until": AT}
+
+
 @pytest.mark.parametrize(
     ("message", "level", "text"),
     [
@@ -49,6 +53,18 @@ def happened(state: str, delay: float | None = None) -> ConnectionEvent:
             "WARNING",
             "block b:g: LATE: too late",
         ),
+        (
+            WarningFeedback(block=None, kind="INTERRUPTED", message="held"),
+            "WARNING",
+            "no block: INTERRUPTED: held",
+        ),
+        (Held(at=AT, holds=(Hold(**LASTS),)), "INFO", "held: everything"),
+        (
+            Held(at=AT, holds=(Hold(block="b", **LASTS), Hold(block="c", behavior="g", **LASTS))),
+            "INFO",
+            "held: b, c: g",
+        ),
+        (Held(at=AT), "DEBUG", "held: nothing"),
         (FragmentOutcome(id="f", requester="me", fragment="f", status="done"), "INFO", "fragment f of me: done"),
         (
             FragmentOutcome(id="f", requester="me", fragment="f", status="interrupted", replaced_by="g"),

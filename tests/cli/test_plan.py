@@ -87,3 +87,28 @@ def test_lexemes_of_a_users_repertoire_are_planned(engage: Engage, tmp_path: Pat
     assert (done.code, "g:stroke" in done.out, done.err) == (0, True, "")
     assert missing.code == 2
     assert "no.toml: No such file" in missing.err
+
+
+LOST = '<gaze id="g" target="nobody"/><gesture id="x" lexeme="NONE"/>'
+
+
+@pytest.mark.parametrize(("rest", "code"), [("", 3), ('<wait id="w" duration="1"/>', 0)])
+@pytest.mark.parametrize("options", [(), ("--format", "json")])
+def test_a_block_of_which_nothing_is_left_is_told_so_and_ends_as_when_it_is_played(
+    engage: Engage, tmp_path: Path, rest: str, code: int, options: tuple[str, ...]
+) -> None:
+    path = tmp_path / "lost.xml"
+    path.write_text(f'<bml id="b">{LOST}{rest}</bml>')
+
+    planned, played = engage("plan", path, *options), engage("play", path, "--embedded", "--virtual-time")
+    assert (planned.code, played.code) == (code, code)
+    end = f"{path}: b: it would fail: every behavior of it was dropped, and nothing is left to perform"
+    assert (end in planned.err.splitlines()) == bool(code)
+    assert planned.out
+
+
+def test_a_strict_plan_of_which_nothing_is_left_ends_as_that(engage: Engage, tmp_path: Path) -> None:
+    path = tmp_path / "lost.xml"
+    path.write_text(f'<bml id="b">{LOST}</bml>')
+
+    assert engage("plan", path, "--strict").code == 3

@@ -1,7 +1,9 @@
 """`engage steer` beside a realizer of its own process, over real sockets. The test itself is the body."""
 
 import asyncio
+import re
 from asyncio.subprocess import Process
+from pathlib import Path
 
 import pytest
 
@@ -47,6 +49,36 @@ async def test_a_robot_is_held_goes_on_and_is_stopped_from_the_command_line() ->
             await stopped(realizer)
             body.cancel()
             await asyncio.gather(body, return_exceptions=True)
+
+
+async def test_who_plays_is_told_what_is_held_and_that_it_was_stopped(tmp_path: Path) -> None:
+    endpoint = free_endpoint()
+    where = ("--robot", "steered", "--connect", endpoint)
+    (tmp_path / "b.xml").write_text('<bml id="b"><wait id="w" duration="60" start="0"/></bml>')
+    async with await open_hub("steered", listen=[endpoint]) as hub, connect(hub=hub) as robot:
+        body = asyncio.create_task(FakeBody().serve(hub.join("control"), lambda: None))
+        realizer = await start("run", "realizer", *where)
+        try:
+            await line(realizer, "realizer is ready")
+            assert await robot.hold() == ()  # before it comes
+            play = await start("play", tmp_path / "b.xml", *where, "--verbose")
+            held = await line(play, "held: everything", log=False)
+            assert re.search(r"held: everything, for \S+ s already and for at most \S+ s", held)
+            await robot.resume()
+            begun = [await line(play, "", log=False) for _ in range(2)]  # in any order
+            assert any("no longer held: everything" in each for each in begun)
+            assert any("b:w:start" in each for each in begun)
+            await robot.hold("b", "w")
+            assert "held: b: w, for at most 60.00 s" in await line(play, "held", log=False)
+            await robot.stop("b")
+            code, out, error = await said(play)
+        finally:
+            await stopped(realizer)
+            body.cancel()
+            await asyncio.gather(body, return_exceptions=True)
+
+    assert "no longer held: b: w" in out
+    assert (code, error) == (3, f"{tmp_path / 'b.xml'}: b was interrupted: stopped on request")
 
 
 async def test_a_behavior_without_a_block_is_refused() -> None:

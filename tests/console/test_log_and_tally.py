@@ -6,6 +6,7 @@ from rich.console import Console
 
 from engage_hri.schemas.feedback import WarningFeedback
 from engage_hri.schemas.fragments import FragmentOutcome
+from engage_hri.schemas.holds import Held, Hold
 from engage_hri.schemas.messages import Message
 from engage_hri.schemas.recognition import Statistics, WindowStatistics
 from engage_hri.schemas.units import Seconds
@@ -47,6 +48,38 @@ def test_a_warning_is_told_with_its_place() -> None:
     warning = WarningFeedback(block="b", behavior="p", kind="NO_SUCH_TARGET", message="no 'cup'")
 
     assert lines(((warning, 10.0),), Telling()) == ["0:00.0  ! NO_SUCH_TARGET b:p: no 'cup'"]
+
+
+def test_a_warning_about_no_block_has_no_place() -> None:
+    warning = WarningFeedback(block=None, kind="INTERRUPTED", message="the robot was held")
+
+    assert lines(((warning, 10.0),), Telling()) == ["0:00.0  ! INTERRUPTED: the robot was held"]
+
+
+def test_it_is_told_what_is_held_and_when_it_is_held_no_longer() -> None:
+    everything = Hold(since=at(3.0), until=at(63.0))
+    wave = Hold(block="b", behavior="wave", since=at(14.0), until=at(74.0))
+    block = Hold(block="c", since=at(15.5), until=at(75.5))
+    early = log.line(
+        Held(at=at(4.0), holds=(everything,)),
+        view.empty("robot", 10.0),
+        view.feed(view.empty("robot", 10.0), Held(at=at(4.0), holds=(everything,)), 4.0),
+        4.0,
+        Telling(),
+    )
+    assert early == "  0:00.0  held: everything, for 7.00 s already and for at most 53.00 s"
+    told = ((everything,), (everything, wave), (everything, wave), (wave, block), ())
+    messages = tuple(
+        (Held(at=at(when), holds=holds), when)
+        for when, holds in zip((13.0, 14.0, 15.0, 15.5, 20.0), told, strict=True)
+    )
+
+    assert lines(messages, Telling()) == [
+        "0:03.0  held: everything, for 10.00 s already and for at most 50.00 s",
+        "0:04.0  held: b: wave, for at most 60.00 s",
+        "0:05.5  held: block c, for at most 60.00 s; no longer held: everything, after 12.50 s",
+        "0:10.0  no longer held: b: wave, after 6.00 s; no longer held: block c, after 4.50 s",
+    ]
 
 
 def test_the_tally_counts_each_event_once_by_its_decision() -> None:

@@ -5,10 +5,11 @@ from io import StringIO
 
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from msgspec.structs import replace
 from rich.cells import cell_len
 from rich.console import Console
 
-from engage_hri.schemas.nets import Fired, NetMarked, NetPlace, NetPlanned, NetPoint, NetTransition
+from engage_hri.schemas.nets import Fired, NetMarked, NetPlace, NetPlanned, NetPoint, NetTransition, NetWaiting
 from engage_hri.schemas.units import Stamp
 from engage_hri.services.console import nets
 from engage_hri.services.console.live import LiveNets, NetLog
@@ -222,6 +223,27 @@ def test_changes_are_told_one_by_one() -> None:
     ]
     assert list(told(after["b"], feed(after, over, 0.0, 0.3)["b"])) == ["b: over"]
     assert list(told(after["b"], feed(after, FIGURE_4_8, 0.0, 0.3)["b"])) == ["b: ● b at rest"]
+
+
+def test_a_block_that_waits_for_its_turn_is_told_and_drawn_with_those_that_it_waits_for() -> None:
+    running = feed({}, FIGURE_4_8, 0.0, 0.0)
+    waiting = feed(running, NetWaiting(block="c", since=AT, waits_for=("b", "a")), 0.0, 0.0)
+    fewer = feed(waiting, NetWaiting(block="c", since=AT, waits_for=("b",)), 0.0, 1.0)
+    again = feed(fewer, NetWaiting(block="c", since=AT, waits_for=("b",)), 0.0, 2.0)
+    begun = feed(again, replace(FIGURE_4_8, block="c"), 3.0, 3.0)
+    over = feed(again, NetMarked(block="c", is_over=True), 0.0, 3.0)
+
+    assert list(told(None, waiting["c"])) == ["c: waits for b, a"]
+    assert list(told(waiting["c"], fewer["c"])) == ["c: waits for b"]
+    assert list(told(fewer["c"], again["c"])) == []
+    assert list(told(again["c"], begun["c"])) == list(told(None, begun["c"]))
+    assert list(told(again["c"], over["c"])) == ["c: over"]
+    assert drawing(again["c"], 80, 20, 2.5) == ["block c: 2.5 s, waits for b"]
+    assert "c" not in nets.without_old(over, 5.0)
+    lines = picture(tuple(again.values()), 80, 40, 2.5, ["everything"]).plain.split("\n")
+    assert lines[:2] == ["held: everything", "block c: 2.5 s, waits for b"]
+    assert any(line.startswith("block b: 2.5 s, 0 of 13 instants") for line in lines)
+    assert picture((), 80, 24, 0.0, ["b: g"]).plain == "held: b: g\nno block runs"
 
 
 def test_a_net_goes_a_moment_after_its_end_and_when_nobody_speaks_of_it() -> None:

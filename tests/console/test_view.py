@@ -12,6 +12,7 @@ from rich.console import Console
 from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorLost
 from engage_hri.schemas.attention import Claim, HeadOwner
 from engage_hri.schemas.feedback import BlockProgress, PlannedPoint, PredictionFeedback, SyncPointProgress
+from engage_hri.schemas.holds import Held, Hold
 from engage_hri.services.console import tally, view
 from engage_hri.services.console.render import render
 from tests.console.scenes import SCENE, at, event, fed
@@ -337,6 +338,16 @@ def test_what_people_do_is_drawn(scene: view.Scene) -> None:
     assert "moves blue-square" in text
     assert "nods" in text
     assert "has left" in drawn(view.feed(scene, ActorLost(actor="human", at=at(14.0)), 20.0))
+
+
+def test_what_is_held_is_drawn_as_long_as_it_is(scene: view.Scene) -> None:
+    holds = (Hold(since=at(12.0), until=at(72.0)), Hold(block="b", behavior="g", since=at(13.0), until=at(73.0)))
+
+    held = view.feed(scene, Held(at=at(13.0), holds=holds), 13.0)
+    later = view.feed(held, Held(at=at(14.0)), 14.0)
+
+    assert "everything for 1.00 s, b: g for 0.00 s" in drawn(held)
+    assert "everything for" not in drawn(later)
 
 
 def test_who_waits_for_the_head_is_drawn(scene: view.Scene) -> None:

@@ -220,7 +220,7 @@ async def test_estimates_chain_over_poses():
 @pytest.mark.parametrize(
     ("behavior", "warning", "reason"),
     [
-        (Gaze(id="b", target="nobody"), "NO_SUCH_TARGET", "no 'nobody'"),
+        (Gaze(id="b", target="behin"), "NO_SUCH_TARGET", "no 'behin' (did you mean 'behind'?)"),
         (Gaze(id="b", target="behind"), "CANNOT_CREATE_BEHAVIOR", "neck_yaw cannot turn"),
         (Pointing(id="b", target="far"), "CANNOT_CREATE_BEHAVIOR", "farther than"),
         (Pointing(id="b", target="cup"), "CANNOT_CREATE_BEHAVIOR", "no-point zone"),

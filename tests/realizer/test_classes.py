@@ -28,6 +28,11 @@ def term(number: int, offset: float, line: int) -> Term:
     return Term(point(number), offset, f"{point(number)}{offset:+g}", line)
 
 
+def _point(text: str) -> Point:
+    """The point of a term as `term` writes it."""
+    return next(each for each in (*POINTS, ORIGIN) if re.fullmatch(rf"{each}[+-].*", text))
+
+
 def ways(graph: Graph, start: Point) -> dict[Point, tuple[float, list[int]]]:
     """Seconds and lines from a point to all that it is tied to, but not by way of the block's start."""
     found: dict[Point, tuple[float, list[int]]] = {start: (0.0, [])}
@@ -106,17 +111,21 @@ def check_contradiction(
     assert refused.kind == "IMPOSSIBLE_TO_SCHEDULE"
     fault = refused.fault
     assert fault.where == "block"
-    told = re.search(rf"cannot be one instant: {to} is already (\S+) s from {since}", fault.reason)
+    sooner, later = (since, to) if known >= 0 else (to, since)
+    form = r"cannot be one instant: (\S+) is already (?:(\S+) s after|the same instant as) (\S+) \("
+    told = re.search(form, fault.reason)
     assert told is not None
-    assert float(told[1]) == known
-    named = [int(each) for each in re.findall(r"\d+", fault.advice.removeprefix("see lines "))] or [line]
+    assert (told[1], told[3], float(told[2] or 0)) == (str(later), str(sooner), abs(known))
+    assert fault.advice.startswith("leave one of them out")
+    named = [int(each) for each in re.findall(r"\d+", fault.advice)] or [line]
     assert named == sorted(set(named))
     assert (line in named, fault.line) == (True, line)
-    through = re.search(r"\(through (.*)\)", fault.reason)
-    assert through is not None
-    way = [since, *(each for name in through[1].split(", ") for each in (*POINTS, ORIGIN) if str(each) == name)]
-    said = [graph[one][other][1] for one, other in pairwise(way)]
-    assert way[-1] == to
+    said_so = re.search(r" \((.*)\)$", fault.reason)
+    assert said_so is not None
+    way = [[_point(name) for name in each.split(" = ")] for each in said_so[1].split(", ")]
+    assert (way[0][0], way[-1][1]) == (since, to)
+    assert all(one[1] == other[0] for one, other in pairwise(way))
+    said = [graph[one][other][1] for one, other in way]
     assert named == sorted({*said, line})
 
 

@@ -3,9 +3,6 @@
 Random rings of waits, tied in all ways that BML has, with other behaviors around them that are in no circle.
 """
 
-import re
-from itertools import pairwise
-
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -13,9 +10,11 @@ from msgspec import Struct, field
 
 from engage_hri.schemas.behaviors import After, Before, BlockBehavior, Constraint, Synchronize, Wait
 from engage_hri.schemas.blocks import Block
-from engage_hri.services.realizer.plan.deadlocks import Loss, Losses
+from engage_hri.services.realizer.net.petri_net import Bound, PetriNet, Place, Transition
+from engage_hri.services.realizer.plan.deadlocks import Loss, Losses, way_round
 from engage_hri.services.realizer.plan.planner import plan_block
 from engage_hri.services.realizer.plan.relations import BlockRefused
+from tests.realizer.way_round import closed, read
 
 Operator = Synchronize | After | Before
 
@@ -102,17 +101,14 @@ def test_a_refusal_tells_the_points_and_lines_of_the_circle_and_no_others(ring: 
     assert refusal.value.kind == "IMPOSSIBLE_TO_SCHEDULE"
     assert (fault.where, fault.line) == ("b", min(ring.lines))
     told = sorted(ring.lines)
-    assert fault.advice == (f"see lines {', '.join(map(str, told))}" if len(told) > 1 else "")
+    assert fault.advice == "leave one of them out" + (f"; see lines {_list(told)}" if len(told) > 1 else "")
     words, _, route = fault.reason.partition(": ")
     assert words == "these points wait for each other in a circle"
-    steps = [re.fullmatch(r"(.*) \((\S+) s\)", each) for each in route.split(" -> ")[:-1]]
-    names = [each[1] for each in steps if each]
-    assert route.split(" -> ")[-1] == names[0]
     followed = [
         (since, to, seconds)
-        for (name, other), step in zip(pairwise((*names, names[0])), steps, strict=True)
+        for names, others, took in closed(read(route))
         for since, to, seconds in ring.ties
-        if step and since in name.split(" = ") and to in other.split(" = ") and seconds == float(step[2])
+        if since in names and to in others and seconds == took
     ]
     assert sorted(followed) == sorted(ring.ties)
 
@@ -124,8 +120,47 @@ def test_points_of_one_line_are_told_with_that_line_alone_and_without_lines_with
         behaviors = (Wait(id="a", duration=1.0), Wait(id="b", duration=1.0))
         with pytest.raises(BlockRefused) as refusal:
             plan_block(Block(id="b", behaviors=behaviors, constraints=(constraint,)))
-        assert (refusal.value.fault.line, refusal.value.fault.advice) == (told, "")
+        assert (refusal.value.fault.line, refusal.value.fault.advice) == (told, "leave one of them out")
+        assert refusal.value.fault.reason == (
+            "these points wait for each other in a circle: b:start is not before a:end, b takes 1 s from b:start to "
+            "b:end, a:start is not before b:end, a takes 1 s from a:start to a:end"
+        )
+
+
+def _list(lines: list[int]) -> str:
+    return ", ".join(map(str, lines))
 
 
 def test_losses_are_told_with_their_reasons() -> None:
     assert str(Losses([Loss("a", "is late"), Loss("b", "is early")])) == "a is late; b is early"
+
+
+NET = PetriNet(tuple(Transition(name, ()) for name in ("bml:start", "a:start", "a:ready", "a:end = b:start")), ())
+
+
+@pytest.mark.parametrize(
+    ("tie", "seconds", "words"),
+    [
+        (Place("phase", 1, 2, 1.0, 0.5, "a"), 0.5, "a takes 0.5 s from a:start to a:ready"),
+        (Bound("phase", 2, 1, -1.0, 0.25, "a"), -1.25, "a takes at most 1.25 s from a:start to a:ready"),
+        (Place("delay", 0, 1, 2.0, 2.0), 2.0, "a:start is 2 s after bml:start"),
+        (Bound("delay", 1, 0, -2.0), -2.0, "a:start is 2 s after bml:start"),
+        (Place("order", 1, 3, 0.0), 0.0, "a:end = b:start is not before a:start"),
+        (Place("series", 1, 3, 0.75, 0.75), 0.75, "a:end = b:start is at least 0.75 s after a:start"),
+        (Bound("order", 3, 0, -1.5), -1.5, "a:end = b:start is at most 1.5 s after bml:start"),
+        (Bound("order", 3, 0, 0.0), 0.0, "a:end = b:start is not after bml:start"),
+    ],
+)
+def test_each_tie_of_a_circle_has_its_words(tie: Place | Bound, seconds: float, words: str) -> None:
+    assert way_round(NET, ((tie, seconds),)) == words
+
+
+def test_phases_that_follow_one_another_are_one_wherever_the_circle_begins() -> None:
+    ready, end = (Place("phase", since, since + 1, 1.0, 1.0, "a") for since in (1, 2))
+    back = Bound("delay", 3, 1, -0.5)
+    circle = ((ready, 1.0), (end, 0.75), (back, -0.5))
+    for number in range(3):
+        turned = (*circle[number:], *circle[:number])
+        assert sorted(way_round(NET, turned).split(", ")) == [
+            "a takes 1.75 s from a:start to a:end = b:start", "a:end = b:start is 0.5 s after a:start",
+        ]  # fmt: skip

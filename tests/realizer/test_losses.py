@@ -22,6 +22,7 @@ from engage_hri.services.realizer.plan.steps import finished
 from engage_hri.services.realizer.points import ORIGIN, Point
 from tests.realizer.oracle import SEVEN, estimate, phases_of, points_of, relaxed
 from tests.realizer.planning import timed as at_times
+from tests.realizer.way_round import closed, read
 
 BEHAVIORS: tuple[BlockBehavior, ...] = (
     Head(id="x", lexeme="NOD"),
@@ -74,9 +75,8 @@ def test_what_takes_too_long_is_told_with_both_times_and_the_way_round(data: st.
     assert f"x:{steps[0][0]}" in told[2].split(" = ")
     assert f"x:{points[_last(shortest, last)]}" in told[3].split(" = ")
     assert (told[4], told[5]) == (f"{needed:.2f}", f"{time:.2f}")
-    way = [re.fullmatch(r"(.*) \((\S+) s\)", each) for each in told[6].split(" -> ")[:-1]]
-    assert told[6].split(" -> ")[-1] == (way[0][1] if way[0] else "")
-    assert sum(float(each[2]) for each in way if each) == pytest.approx(needed - time, abs=2e-3 * len(way))
+    way = closed(read(told[6]))
+    assert sum(seconds for *_, seconds in way) == pytest.approx(needed - time, abs=2e-3 * len(way))
     if isinstance(behavior, Speech):
         assert (made.dropped, tuple(made.given_up)) == ((), ("x",))
         assert told[7] == f"x:{points[last]} = {refs[1]} is given up, so that the words are said"
@@ -237,8 +237,8 @@ def test_of_a_phase_that_cannot_last_so_long_the_way_round_is_told() -> None:
     assert isinstance(block, Block)
 
     assert [each.message for each in planned(block).problems] == [
-        "line 1: cannot be on time: bml:start (+2 s) -> n:ready (-0.312 s) -> n:start (-1 s) -> bml:start; "
-        "the behavior is dropped"
+        "line 1: cannot be on time: n:ready is 2 s after bml:start, n takes at most 0.312 s from n:start to n:ready, "
+        "n:start is 1 s after bml:start; the behavior is dropped"
     ]
 
 

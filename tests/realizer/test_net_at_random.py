@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from msgspec.structs import replace
 
-from engage_hri.schemas.behaviors import Gaze, Pointing, Speech
+from engage_hri.schemas.behaviors import Gaze, Pointing, Speech, Wait
 from engage_hri.services.realizer.export import as_dot, as_json, as_message, as_text
 from engage_hri.services.realizer.net import pnml
 from engage_hri.services.realizer.net.petri_net import (
@@ -163,6 +163,23 @@ BEHAVIORS = (
 EXAMPLE = block(BEHAVIORS, after("p:stroke+0.25", "s:start"), before("p:end+2", "t:start"), id="ex")
 
 
+def test_what_is_one_instant_is_told_once_and_not_as_two_limits() -> None:
+    """A fixed time, points so many seconds apart, and what two constraints say of the same points."""
+    behaviors = (
+        Wait(id="v", duration=1.0),
+        timed(Wait(id="w"), start="v:start+0.5", end="4"),
+        Wait(id="x", duration=1.0),
+    )
+    ordered = (after("v:end+2", "x:start"), before("v:end+2", "x:start"))
+    lines = as_text(plan(block(behaviors, *ordered))).splitlines()
+    said = [
+        line for line in lines if any(how in line for how in ("  at  ", "  no earlier than  ", "  no later than  "))
+    ]
+    assert [line for line in said if not line.startswith("  bml:end")] == [
+        "  w:end  at  bml:start +4 s", "  w:start  at  v:start +0.5 s", "  x:start  at  v:end +2 s",
+    ]  # fmt: skip
+
+
 def test_a_plan_in_words() -> None:
     """Each instant with its time, in order, a star on the critical path; ties with seconds and lines; what lasts."""
     made = plan(EXAMPLE)
@@ -180,11 +197,13 @@ def test_a_plan_in_words() -> None:
         assert is_critical == (number in made.critical)
     ties = lines[second + 1 : -1]
     assert "  s:start  no earlier than  p:stroke +0.25 s" in ties
-    assert "  p:end  no earlier than  t:start -2 s" in ties
+    assert "  t:start  no later than  p:end +2 s" in ties
+    assert "  p:start  at  bml:start +1.5 s" in ties
     assert "  t:start  no earlier than  s:end  (line 5)" in ties
     assert not [line for line in ties if line.startswith("  p:ready") or "no earlier than  bml:start" in line]
     assert len(ties) == len({place for place in made.net.places if place.kind in ("order", "series") and place.source}
                             | {bound for bound in made.net.bounds if bound.kind != "phase"})  # fmt: skip
+    assert len(ties) == len(set(ties))
     assert lines[-1] == "ends when something takes its place, or with the block: g"
 
 

@@ -7,9 +7,9 @@ from contextlib import asynccontextmanager, suppress
 import pytest
 
 from engage_hri.schemas import keys
-from engage_hri.schemas.behaviors import Gaze, Pointing, Speech
-from engage_hri.schemas.blocks import Block, BlockOutcome
-from engage_hri.schemas.nets import Fired, NetMarked, NetPlanned
+from engage_hri.schemas.behaviors import Gaze, Pointing, Speech, Wait
+from engage_hri.schemas.blocks import Block, BlockOutcome, Composition
+from engage_hri.schemas.nets import Fired, NetMarked, NetPlanned, NetWaiting
 from engage_hri.services.bus.interface import Bus
 from tests.realizer.fake_body import FakeBody, Script
 from tests.realizer.stage import Stage, after, block, stage, together
@@ -264,3 +264,67 @@ async def test_a_net_is_told_no_more_when_its_block_has_ended() -> None:
 
     assert watcher.is_over
     assert len(watcher.seen) == count
+
+
+# -- blocks that wait for their turn ---------------------------------------------------------------------------------
+
+
+async def told_of_turn(*asked: tuple[float, Block], stops: float | None = None) -> list[tuple[float, object]]:
+    """What is told of the last block: its messages with their times. stops: when it is cancelled."""
+    told: list[tuple[float, object]] = []
+    name, loop = asked[-1][1].id, asyncio.get_running_loop()
+
+    async def listen(bus: Bus) -> None:
+        with bus.subscribe(keys.NET) as inbox:
+            async for received in inbox:
+                if getattr(received.message, "block", "") == name:
+                    told.append((round(loop.time(), 2), received.message))
+
+    async with stage() as seen:
+        listening = asyncio.create_task(listen(seen.hub.join("listener")))
+        pending = []
+        for at, each in asked:
+            await asyncio.sleep(at - loop.time())
+            pending.append(seen.ask(each))
+        if stops is not None:
+            await asyncio.sleep(stops - loop.time())
+            seen.requests.cancel(pending[-1].request.id, "no more")
+        for one in pending:
+            await one.outcome
+        await asyncio.sleep(0.2)
+        listening.cancel()
+        await asyncio.wait([listening])
+    return told
+
+
+def waits(id: str, seconds: float, composition: Composition = "MERGE") -> Block:
+    return Block(id=id, behaviors=(Wait(id="w", duration=seconds),), composition=composition)
+
+
+async def test_a_block_that_waits_for_its_turn_tells_for_whom_and_again_for_who_comes_late() -> None:
+    told = await told_of_turn((0.0, waits("a", 3.0)), (0.0, waits("b", 5.2)), (0.5, waits("c", 1.0, "APPEND")))
+
+    waiting = [(at, each.since.seconds, each.waits_for) for at, each in told if isinstance(each, NetWaiting)]
+    assert waiting == [
+        (0.5, 0.5, ("a", "b")), (2.5, 0.5, ("a", "b")), (3.0, 0.5, ("b",)), (5.0, 0.5, ("b",)), (5.2, 0.5, ()),
+    ]  # fmt: skip
+    assert isinstance(told[5][1], NetPlanned)
+    assert told[5][0] == 5.2
+    assert not any(isinstance(each, NetWaiting) for _, each in told[5:])
+
+
+async def test_a_block_that_ends_while_it_waits_for_its_turn_is_told_to_be_over() -> None:
+    told = await told_of_turn((0.0, waits("a", 3.0)), (0.5, waits("c", 1.0, "APPEND")), stops=1.5)
+
+    assert [(at, type(each)) for at, each in told] == [(0.5, NetWaiting), (1.5, NetMarked)]
+    assert told[-1][1] == NetMarked(block="c", is_over=True)
+
+
+@pytest.mark.parametrize(
+    "asked", [((0.0, waits("c", 1.0, "APPEND")),), ((0.0, waits("a", 3.0)), (0.5, waits("c", 1.0)))]
+)
+async def test_a_block_that_need_not_wait_tells_of_no_turn(asked: tuple[tuple[float, Block], ...]) -> None:
+    told = await told_of_turn(*asked)
+
+    assert isinstance(told[0][1], NetPlanned)
+    assert not any(isinstance(each, NetWaiting) for _, each in told)

@@ -1,15 +1,19 @@
 """What a block says of its points, held against when they come: whoever comes wrong, and in both directions."""
 
+import re
+
 import pytest
 
 from engage_hri.schemas.behaviors import FaceLexeme, Wait
+from engage_hri.schemas.blocks import Block
+from engage_hri.schemas.documents.xml_decode import decode_xml
 from engage_hri.services.realizer.plan.promises import broken_by
 from engage_hri.services.realizer.plan.relations import Relations, relation_steps
 from engage_hri.services.realizer.plan.steps import finished
 from engage_hri.services.realizer.points import ORIGIN, Point
 from tests.realizer.fake_body import FakeBody, Script
 from tests.realizer.planning import timed
-from tests.realizer.stage import after, before, block, together
+from tests.realizer.stage import after, before, block, stage, together
 from tests.realizer.test_sharing import MORE, OTHER, RIGHT, WORDS, instants, told, warned
 
 A, B, C = Wait(id="a", duration=1.0), Wait(id="b", duration=1.0), Wait(id="c", duration=1.0)
@@ -97,6 +101,45 @@ async def test_an_order_with_a_point_of_another_block_that_is_past_is_told() -> 
 
     assert [(each.behavior, each.kind) for each in seen.warnings()] == [("h", "LATE")]
     assert "1.50 s later than it should: h:start <= one:s:m1" in seen.warnings()[0].message
+
+
+LATE_XML = """<bml id="b">
+  <head id="n" lexeme="NOD" start="0"/>
+  <speech id="s"><text>one <mark name="m"/>two</text></speech>
+  <constraint>
+    {}
+  </constraint>
+</bml>"""
+
+
+@pytest.mark.parametrize(
+    ("said", "message"),
+    [
+        ('<synchronize ref="s:m+0.5"><sync ref="n:stroke"/></synchronize>', "s:m+0.5 = n:stroke"),
+        ('<before ref="1"><sync ref="n:stroke"/></before>', "n:stroke <= 1"),
+    ],
+)
+async def test_what_is_late_is_told_with_the_line_that_asks_for_it(said: str, message: str) -> None:
+    late = FakeBody({"n": Script(durations=(0.5, 0.25, 0.8, 0.25, 0.25, 0.5))})
+    written = decode_xml(LATE_XML.format(said))
+    assert isinstance(written, Block)
+    async with stage(late) as seen:
+        await seen.perform(written)
+
+    (warning,) = [each for each in seen.warnings() if each.kind == "LATE" and "should" in each.message]
+    assert re.fullmatch(
+        rf"line 5: stroke came \d\.\d\d s later than it should: {re.escape(message)}", warning.message
+    )
+
+
+async def test_what_is_overdue_is_told_with_the_line_of_the_behavior() -> None:
+    written = decode_xml(LATE_XML.format(""))
+    assert isinstance(written, Block)
+    async with stage(FakeBody({"n": Script(stall="stroke")})) as seen:
+        await seen.perform(written)
+
+    (warning,) = [each for each in seen.warnings() if each.kind == "LATE"]
+    assert re.fullmatch(r"line 2: stroke is \d\.\d s overdue", warning.message)
 
 
 async def test_what_was_past_by_less_than_people_notice_is_not_told() -> None:

@@ -35,3 +35,19 @@ async def test_the_time_that_is_told_is_enough(xml: str, time: float, span: str)
     needed = float(told[1]) + 0.006
     assert await warnings_of(xml.format(round(needed, 3))) == []
     assert await warnings_of(xml.format(round(needed - 0.012, 3))) != []
+
+
+ORDERS = [
+    ('<wait id="n" start="3" end="1.5"/>', "start", "end"),
+    ('<head id="n" lexeme="NOD" start="3" end="1.5"/>', "start", "end"),
+    ('<head id="n" lexeme="NOD" stroke="3" relax="1.5"/>', "stroke", "relax"),
+    ('<head id="n" lexeme="NOD" ready="3" strokeEnd="1.5"/>', "ready", "stroke_end"),
+]
+
+
+@pytest.mark.parametrize(("xml", "first", "last"), ORDERS)
+async def test_an_end_before_the_start_is_told_as_that(xml: str, first: str, last: str) -> None:
+    """Also where nothing takes any time, as of a wait without a duration."""
+    (message,) = await warnings_of(xml)
+
+    assert message.startswith(f"line 1: cannot be on time: n:{last} would come 1.50 s before n:{first}: ")

@@ -29,6 +29,7 @@ from engage_hri.schemas.behaviors import (
     Wait,
     posed,
 )
+from engage_hri.schemas.suggestion import suggestion
 from engage_hri.schemas.syncref import SYNC_POINTS
 from engage_hri.schemas.units import Degrees, Seconds
 from engage_hri.schemas.vocabulary import normal
@@ -105,7 +106,8 @@ def plan(behavior: BlockBehavior, situation: Situation) -> Course:
 
 def _entity(target: str, world: World) -> Entity:
     if (entity := world.entity(target)) is None:
-        raise Impossible("NO_SUCH_TARGET", f"the world has no {target!r}")
+        advice = suggestion(target, (each.id for each in world.entities), "it is empty")
+        raise Impossible("NO_SUCH_TARGET", f"the world has no {target!r} ({advice})")
     return entity
 
 

@@ -19,8 +19,10 @@ from engage_hri.schemas.feedback import (
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.interface import Bus
 from engage_hri.services.realizer.decide.decisions import Decisions
+from engage_hri.services.realizer.decide.lateness import Late
 from engage_hri.services.realizer.plan.plan import Plan
 from engage_hri.services.realizer.plan.promises import Broken
+from engage_hri.services.realizer.plan.relations import at_line
 from engage_hri.services.realizer.points import Point
 
 NOTICEABLE: Seconds = 0.1
@@ -140,8 +142,13 @@ class Reporter:
 
     def _broken(self, instant: Point, broken: Broken, verb: str) -> None:
         if broken.seconds > self._tolerance:
-            way, sync = broken.direction, broken.point.sync
-            self.late(instant, f"{sync} {verb} {broken.seconds:.2f} s {way} than it should: {broken.said}")
+            self.late(instant, broken.told(verb))
+
+    def overdue(self, decisions: Decisions, late: Late) -> None:
+        """Warn that a behavior takes too long."""
+        instant = decisions.net.part_of[Point(late.behavior, late.sync)].point
+        line = decisions.plan.chains[late.behavior].behavior.line
+        self.late(instant, at_line(line, f"{late.sync} is {late.overdue:.1f} s overdue"))
 
     def late(self, instant: Point, message: str) -> None:
         """Warn that a behavior is late for an instant: once for each."""
@@ -160,10 +167,11 @@ class Reporter:
         )
         self._say(warning)
 
-    def interrupted(self, behavior: str, spoken: SpokenText | None) -> None:
-        """Warn that a behavior was ended on request."""
+    def interrupted(self, behavior: str, spoken: SpokenText | None, reason: str) -> None:
+        """Warn that a behavior was ended on request, or for a reason."""
         said = f" after {spoken.text!r}" if spoken is not None else ""
-        self.warn("INTERRUPTED", f"interrupted{said}", behavior)
+        why = f": {reason}" if reason else ""
+        self.warn("INTERRUPTED", f"interrupted{said}{why}", behavior)
 
     def ended(self, status: str, began: Seconds) -> None:
         now = self._no_earlier(self._bus.now())

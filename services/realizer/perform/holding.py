@@ -7,7 +7,7 @@ from engage_hri.schemas.syncref import BLOCK_ITSELF
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.realizer.points import EPSILON
 
-Held = tuple[str, str]
+Named = tuple[str, str]
 """A block and a behavior of it. An empty behavior: the whole block; an empty block: the robot."""
 
 
@@ -15,7 +15,7 @@ class Holds:
     """Holds by what they hold, each with the time since when."""
 
     def __init__(self) -> None:
-        self._since: dict[Held, Seconds] = {}
+        self._since: dict[Named, Seconds] = {}
 
     def hold(self, block: str, behavior: str, now: Seconds) -> None:
         """Hold it from now on, if it is not held already."""
@@ -40,15 +40,20 @@ class Holds:
             held |= {f"{other.id}:{each}" for each in (*whole, *parts) if each and other.id != block}
         return frozenset(held)
 
+    @property
+    def in_force(self) -> list[tuple[Named, Seconds]]:
+        """All holds, each with the time since when, the oldest first."""
+        return sorted(self._since.items(), key=lambda each: each[1])
+
     def earliest(self) -> Seconds | None:
         """Time since when something is held, the longest; None: nothing is."""
         return min(self._since.values(), default=None)
 
-    def expired(self, now: Seconds, longest: Seconds) -> list[Held]:
+    def expired(self, now: Seconds, longest: Seconds) -> list[Named]:
         """Holds that have been in force for so long: those whose time, begun plus longest, has come."""
         return [held for held, since in self._since.items() if since + longest <= now + EPSILON]
 
 
-def _is_part(one: Held, whole: Held) -> bool:
+def _is_part(one: Named, whole: Named) -> bool:
     block, behavior = whole
     return not block or (one[0] == block and (not behavior or one[1] == behavior))

@@ -1,15 +1,21 @@
 """The running net of a block, published for whoever watches: what has changed, at most twenty times a second.
 
+Before that, if it waits for its turn, for which blocks.
+
 Messages of a stream may be dropped, and watchers may come late. So all of it is told again every two seconds.
 """
+
+from collections.abc import Iterator
+from contextlib import contextmanager
 
 from msgspec.structs import replace
 
 from engage_hri.schemas import keys
-from engage_hri.schemas.nets import NetMarked
+from engage_hri.schemas.nets import NetMarked, NetWaiting
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.interface import Bus
 from engage_hri.services.realizer.net.running import Observer, RunningNet
+from engage_hri.services.realizer.perform.live import Live
 from engage_hri.services.realizer.perform.net_message import described, firings, tokens
 from engage_hri.services.realizer.plan.plan import Plan
 from engage_hri.services.runtime.alarm import Timer
@@ -73,3 +79,32 @@ class NetStream(Observer):
 
     def on_fired(self, transition: int, at: Seconds) -> None:
         self._fired[transition] = at
+
+
+@contextmanager
+def telling_of_turn(bus: Bus, live: Live) -> Iterator[None]:
+    """Publish, while the body of `with` runs, for which blocks a block waits, if it waits for its turn at all.
+
+    If it ends meanwhile, that is published, too.
+    """
+    block, since = live.request.block, bus.stamp()
+    others = live.earlier if block.composition != "MERGE" else []
+    again = Timer(lambda: tell())
+
+    def tell(_: object = None) -> None:
+        left = tuple(each.request.block.id for each in others if not each.ended.done())
+        bus.publish(keys.NET, NetWaiting(block=block.id, since=since, waits_for=left))
+        again.set(bus.now() + AGAIN)
+
+    if others:
+        tell()
+    for each in others:
+        each.ended.add_done_callback(tell)
+    try:
+        yield
+    finally:
+        again.set(None)
+        for each in others:
+            each.ended.remove_done_callback(tell)
+        if others and live.ending.done():
+            bus.publish(keys.NET, NetMarked(block=block.id, is_over=True))

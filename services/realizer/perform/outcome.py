@@ -1,6 +1,6 @@
 """The outcome of a block that was performed: what was said, what was dropped, whether anything was done at all."""
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Container, Mapping
 
 from msgspec.structs import replace
 
@@ -36,10 +36,16 @@ def completed(
     )
 
 
+def nothing_is_left(block: Block, dropped: Container[str]) -> bool:
+    """True if the block had behaviors, and each of them was dropped."""
+    had_any = bool(block.behaviors) or any(each.kind in _BEHAVIORS for each in block.unread)
+    return had_any and all(behavior.id in dropped for behavior in block.behaviors)
+
+
 def _nothing_performed(block: Block, dropped: Mapping[str, str]) -> Fault | None:
     """Fault of a block of whose behaviors each was dropped; None if it had none, or another is left."""
-    left_out = [each.message for each in block.unread if each.kind in _BEHAVIORS]
-    if not (block.behaviors or left_out) or any(behavior.id not in dropped for behavior in block.behaviors):
+    if not nothing_is_left(block, dropped):
         return None
+    left_out = [each.message for each in block.unread if each.kind in _BEHAVIORS]
     whys = [*(f"{id}: {why.removeprefix(f'{id}: ')}" if why else id for id, why in dropped.items()), *left_out]
     return Fault(reason=f"no behavior of it came to its end ({'; '.join(whys)})", where=block.id)

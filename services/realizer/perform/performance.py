@@ -34,7 +34,7 @@ from engage_hri.services.realizer.plan.plan import Plan
 from engage_hri.services.realizer.plan.planner import plan_block
 from engage_hri.services.realizer.plan.relations import DROPPED
 from engage_hri.services.realizer.points import FINISH, Point
-from engage_hri.services.runtime.alarm import Afterwards, Timer
+from engage_hri.services.runtime.alarm import Afterwards, Alarm, Timer
 
 
 class BlockPerformance:
@@ -69,13 +69,14 @@ class BlockPerformance:
         why = {each.behavior: each.message.removesuffix(DROPPED) for each in reversed(plan.problems)}
         self._dropped = {id: why.get(id, "") for id in plan.dropped}
         """Behaviors that were dropped, each with the reason."""
-        self._interrupted: set[str] = set()
-        """Behaviors that are ended on request."""
+        self._interrupted: dict[str, str] = {}
+        """Behaviors that are ended on request, each with the reason if one was given."""
         self.ties = Ties(self, shared.others, shared.live_blocks, elsewhere)
         self.spoken = Spoken(plan.block.behaviors)
         self._ending = live.ending
         self._timer = Timer(self.take_in)
         self._afterwards = Afterwards(self.take_in)
+        self._soon = Alarm(self.take_in)
         self._untold: list[News] = []
         self._needs_replan = False
 
@@ -144,10 +145,10 @@ class BlockPerformance:
         is_left = behavior in self._tasks and behavior not in self._dropped
         return is_left and not self._ending.done() and not self.decisions.facts.has_ended(behavior)
 
-    async def interrupt(self, behavior: str) -> bool:
+    async def interrupt(self, behavior: str, reason: str = "") -> bool:
         """End one behavior on request; the others go on. Returns once it has ended: True if it came to its end."""
         task, run = self._tasks[behavior], self._runs[behavior]
-        self._interrupted.add(behavior)
+        self._interrupted[behavior] = reason
         if run.pending is not None and run.is_by_body:
             self.body.abort(behavior)
             await asyncio.wait([task])
@@ -235,6 +236,7 @@ class BlockPerformance:
 
     def _close(self) -> None:
         self._timer.set(None)
+        self._soon.stop()
         self._net.close()
         self._afterwards.stop()
         self._tell()
@@ -272,10 +274,9 @@ class BlockPerformance:
         match effect:
             case Begin(behavior=id) | Extend(behavior=id):
                 self._runs[id].command(effect)
-            case Late(behavior=id, sync=sync, overdue=overdue):
+            case Late():
                 if not self._shared.peers.has_left("control"):
-                    instant = self.decisions.net.part_of[Point(id, sync)].point
-                    self.report.late(instant, f"{sync} is {overdue:.1f} s overdue")
+                    self.report.overdue(self.decisions, effect)
                 self.decisions.foresight.is_surprised = True
             case Stalled(behavior=id, sync=sync, overdue=overdue):
                 self.body.abort(id)
@@ -333,7 +334,7 @@ class BlockPerformance:
         self._dropped[id] = str(fault)
         if id in self._interrupted:
             # Its parts go home by themselves: the body does not need to be told, nor to forget what it looked at.
-            self.report.interrupted(id, self.spoken.of(id))
+            self.report.interrupted(id, self.spoken.of(id), self._interrupted[id])
         else:
             self.report.warn(kind, str(fault), id)
             if id in self.decisions.facts.begun and not at_rest:
@@ -346,7 +347,7 @@ class BlockPerformance:
     def plan_again(self) -> None:
         """Plan again, later and once, for all that happens in one go."""
         self._needs_replan = True
-        asyncio.get_running_loop().call_soon(self.take_in)
+        self._soon.set(self.bus.now())
 
     def lose_body(self, fault: Fault) -> None:
         """End the block: what performs it is gone."""

@@ -3,11 +3,15 @@
 import asyncio
 from collections.abc import Iterable, Mapping
 
+from engage_hri.schemas import keys
 from engage_hri.schemas.blocks import PerformanceSteered, SteerPerformance
 from engage_hri.schemas.faults import Fault
+from engage_hri.schemas.feedback import WarningFeedback
+from engage_hri.schemas.holds import Held, Hold
+from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.interface import Bus
 from engage_hri.services.realizer.config import RealizerConfig
-from engage_hri.services.realizer.perform.holding import Holds
+from engage_hri.services.realizer.perform.holding import Holds, Named
 from engage_hri.services.realizer.perform.live import Ending, Live
 from engage_hri.services.realizer.perform.performance import BlockPerformance
 from engage_hri.services.requests.ends import RequestDesk
@@ -34,6 +38,8 @@ class Steering:
         self._live = live
         self._performances = performances
         self._holds = Holds()
+        self._told: list[tuple[Named, Seconds]] = []
+        """What was told last to be held."""
         self._timer = Timer(self._expire)
         self._stopping: set[asyncio.Task[None]] = set()
 
@@ -58,10 +64,24 @@ class Steering:
                     self._holds.let_go(block, behavior)
                 case "stop":
                     self._holds.let_go(block, behavior)
-                    await self._stop(concerned, behavior, "stopped on request")
+                    await self._stop(concerned, behavior, "" if behavior else "stopped on request")
             self._apply()
             blocks = tuple(live.request.block.id for live in concerned)
             self._desk.end(PerformanceSteered(id=request.id, blocks=blocks))
+
+    def tell(self) -> None:
+        """Publish what is held now."""
+        self._told = self._holds.in_force
+        holds = tuple(
+            Hold(
+                block=block,
+                behavior=behavior,
+                since=self._bus.stamp(since),
+                until=self._bus.stamp(since + self._longest),
+            )
+            for (block, behavior), since in self._told
+        )
+        self._bus.publish(keys.HELD, Held(at=self._bus.stamp(), holds=holds))
 
     def held(self, block: str) -> frozenset[str] | None:
         """Behaviors of the block and of others that are held now (see `Holds`); None: all of the block."""
@@ -95,12 +115,14 @@ class Steering:
             performance.hold(self.held(performance.plan.block.id), is_held=self.is_holding)
         since = self._holds.earliest()
         self._timer.set(None if since is None else since + self._longest)
+        if self._holds.in_force != self._told:
+            self.tell()
 
     async def _stop(self, concerned: list[Live], behavior: str, reason: str) -> None:
         if behavior:
             performed = [self._performances.get(live.request.id) for live in concerned]
             going_on = [each for each in performed if each is not None and each.is_going_on(behavior)]
-            await asyncio.gather(*[each.interrupt(behavior) for each in going_on])
+            await asyncio.gather(*[each.interrupt(behavior, reason) for each in going_on])
             return
         _interrupt(concerned, reason)
         if concerned:
@@ -108,9 +130,9 @@ class Steering:
 
     def _expire(self) -> None:
         """Stop what has been held for too long."""
+        reason = f"held for {self._longest:g} s, the longest time (`realizer.longest_hold`)"
         for block, behavior in self._holds.expired(self._bus.now(), self._longest):
             self._holds.let_go(block, behavior)
-            reason = f"held for {self._longest:g} s, the longest time (`realizer.longest_hold`)"
             if behavior:
                 task = asyncio.create_task(
                     self._stop(self._concerned(block), behavior, reason), name=f"stop {behavior}"
@@ -118,8 +140,19 @@ class Steering:
                 self._stopping.add(task)
                 task.add_done_callback(self._stopping.discard)
             else:
+                self._warn(block, reason)
                 _interrupt(self._concerned(block), reason)
         self._apply()
+
+    def _warn(self, block: str, reason: str) -> None:
+        """Warn that a block, or all, was held for too long; in order with the other feedback of the block."""
+        performed = [each for each in self._performances.values() if block and each.plan.block.id == block]
+        for each in performed:
+            each.report.warn("INTERRUPTED", reason)
+        if not performed:
+            message = reason if block else f"the robot was {reason}: what comes is performed again"
+            warning = WarningFeedback(block=block or None, kind="INTERRUPTED", message=message, at=self._bus.stamp())
+            self._bus.publish(keys.FEEDBACK, warning)
 
 
 def _interrupt(concerned: Iterable[Live], reason: str) -> None:

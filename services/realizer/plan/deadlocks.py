@@ -1,10 +1,11 @@
 """Blame for points that wait for each other in a circle: a behavior is dropped, or the whole block refused."""
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
-from itertools import accumulate
+from itertools import accumulate, groupby
 from typing import NamedTuple
 
 from engage_hri.schemas.faults import Fault
+from engage_hri.schemas.units import Seconds
 from engage_hri.services.realizer.net.petri_net import Bound, PetriNet, Place
 from engage_hri.services.realizer.plan.assembly import Assembly
 from engage_hri.services.realizer.plan.handover import Turn
@@ -134,22 +135,27 @@ def _loss(
                     (id for id in touched & rank.keys() if chains[id].type == "speech"), key=rank.__getitem__
                 )
                 points = [point for id in speeches for point in chains[id].points if point in among]
-                reason = f"cannot be on time: {_shortage(net, circle, lost)}{_route(net, circle)}"
+                reason = f"cannot be on time: {_shortage(net, circle, lost)}{way_round(net, circle)}"
                 return Loss(lost, reason, tuple(points) if lost in speeches else (), among, turn)
     return None
 
 
 def _shortage(net: PetriNet, circle: Circle, lost: str) -> str:
     """Explain what takes more time than there is, if phases of the lost behavior do; else nothing."""
-    own = [isinstance(tie, Place) and tie.kind == "phase" and tie.behavior == lost for tie, _ in circle]
-    first = next((number for number, is_own in enumerate(own) if is_own and not own[number - 1]), 0)
+    own = [_phase_of(tie) == lost for tie, _ in circle]
+    begin = [number for number, is_own in enumerate(own) if is_own and not own[number - 1]]
+    first = next(iter(begin), 0)
     phases = [circle[number] for number in (*range(first, len(circle)), *range(first)) if own[number]]
     took = [(tie, seconds) for tie, seconds in phases if seconds > 0]
-    if not took:
-        return ""
     needed, excess = sum(seconds for _, seconds in took), sum(seconds for _, seconds in circle)
-    since, to = (net.transitions[end].name for end in (took[0][0].source, took[-1][0].target))
-    return f"from {since} to {to} it takes {needed:.2f} s at least, and there are {max(0.0, needed - excess):.2f} s: "
+    is_before = (time := needed - excess) < -EPSILON and len(begin) == 1
+    if not (took or is_before):
+        return ""
+    shown = phases if is_before else took
+    since, to = (net.transitions[end].name for end in (shown[0][0].source, shown[-1][0].target))
+    if is_before:
+        return f"{to} would come {-time:.2f} s before {since}: "
+    return f"from {since} to {to} it takes {needed:.2f} s at least, and there are {max(0.0, time):.2f} s: "
 
 
 def _touched(circle: Circle, net: PetriNet) -> set[str]:
@@ -161,17 +167,50 @@ def _deadlock(circle: Circle, net: PetriNet, orders: Sequence[Order], classes: C
     ties = [tie for tie, _ in circle]
     lines = sorted({line for tie in ties for line in tie.lines} | _lines_of_instants(ties, net, orders, classes))
     fault = Fault(
-        reason=f"these points wait for each other in a circle: {_route(net, circle)}",
+        reason=f"these points wait for each other in a circle: {way_round(net, circle)}",
         where=block,
         line=lines[0] if lines else 0,
-        advice=f"see lines {', '.join(map(str, lines))}" if len(lines) > 1 else "",
+        advice="leave one of them out" + (f"; see lines {', '.join(map(str, lines))}" if len(lines) > 1 else ""),
     )
     return BlockRefused(fault, "IMPOSSIBLE_TO_SCHEDULE")
 
 
-def _route(net: PetriNet, circle: Circle) -> str:
-    steps = [f"{net.transitions[tie.source].name} ({round(seconds, 3) + 0.0:+g} s)" for tie, seconds in circle]
-    return " -> ".join((*steps, net.transitions[circle[0][0].source].name))
+def way_round(net: PetriNet, circle: Circle) -> str:
+    """Words for each tie of a circle; phases of a behavior that follow one another are said as one."""
+    ours = [_phase_of(tie) for tie, _ in circle]
+    first = next((number for number, id in enumerate(ours) if not id or id != ours[number - 1]), 0)
+    said = []
+    for id, run in groupby((*circle[first:], *circle[:first]), lambda each: _phase_of(each[0])):
+        ties = list(run)
+        if id:
+            since, to = (net.transitions[end].name for end in (ties[0][0].source, ties[-1][0].target))
+            said.append(f"{id} takes {_seconds(sum(seconds for _, seconds in ties))} from {since} to {to}")
+        else:
+            said += [_said(net, tie, seconds) for tie, seconds in ties]
+    return ", ".join(said)
+
+
+def _phase_of(tie: Place | Bound) -> str:
+    """The behavior of which a place is a phase; empty: it is none."""
+    return tie.behavior if isinstance(tie, Place) and tie.kind == "phase" else ""
+
+
+def _said(net: PetriNet, tie: Place | Bound, seconds: Seconds) -> str:
+    """Words for a tie other than the phase of a behavior: `g:end is 2 s after bml:start`."""
+    since, to = (net.transitions[end].name for end in (tie.source, tie.target))
+    if isinstance(tie, Bound):
+        if tie.kind == "phase":
+            return f"{tie.behavior} takes at most {_seconds(-seconds)} from {to} to {since}"
+        to, since, seconds = since, to, -seconds
+    if tie.kind == "delay":
+        return f"{to} is {_seconds(seconds)} after {since}"
+    if isinstance(tie, Bound):
+        return f"{to} is at most {_seconds(seconds)} after {since}" if seconds else f"{to} is not after {since}"
+    return f"{to} is at least {_seconds(seconds)} after {since}" if seconds else f"{to} is not before {since}"
+
+
+def _seconds(seconds: Seconds) -> str:
+    return f"{round(seconds, 3) + 0.0:g} s"
 
 
 def _lines_of_instants(

@@ -27,6 +27,10 @@ class Instant(Struct, frozen=True, gc=False):
     at: Seconds | None = None
 
 
+Link = tuple[Term, Term]
+"""A tie: what is said of the point where it begins, and of the one where it ends."""
+
+
 class Classes:
     """Classes of points that are tied together, each so many seconds from the others.
 
@@ -40,7 +44,7 @@ class Classes:
         self._parent: dict[Point, Point] = {}
         self._offset: dict[Point, Seconds] = {}
         """Seconds from a point's parent to the point."""
-        self._links: dict[Point, list[tuple[Point, Term]]] = defaultdict(list)
+        self._links: dict[Point, list[tuple[Point, Link]]] = defaultdict(list)
 
     def add(self, point: Point) -> None:
         """Take in a point, in a class of its own."""
@@ -85,8 +89,8 @@ class Classes:
             known = self.offset_between(first.point, term.point)
             if known is not None and abs(known - apart) > EPSILON:
                 raise self._contradiction(first, term, known, block)
-            self._links[first.point].append((term.point, term))
-            self._links[term.point].append((first.point, first))
+            self._links[first.point].append((term.point, (first, term)))
+            self._links[term.point].append((first.point, (term, first)))
             self._merge(first.point, term.point, apart)
 
     def _merge(self, one: Point, other: Point, apart: Seconds) -> None:
@@ -111,28 +115,29 @@ class Classes:
 
     def lines(self, one: Point, other: Point) -> set[int]:
         """Lines that tie the two points; empty if nothing does."""
-        return {term.line for term in self._chain(one, other)} - {0}
+        return {term.line for _, term in self._chain(one, other)} - {0}
 
     def _contradiction(self, first: Term, second: Term, known: Seconds, block: str) -> BlockRefused:
         chain = self._chain(first.point, second.point)
-        lines = sorted({term.line for term in (first, second, *chain)} - {0})
-        via = ", ".join(dict.fromkeys(str(term.point) for term in chain))
-        reason = (
-            f"{first.text!r} and {second.text!r} cannot be one instant: {second.point} is already "
-            f"{known:+g} s from {first.point}" + (f" (through {via})" if via else "")
-        )
-        advice = f"see lines {', '.join(map(str, lines))}" if len(lines) > 1 else ""
+        lines = sorted({term.line for term in (first, second, *(term for _, term in chain))} - {0})
+        sooner, later = (first.point, second.point) if known >= 0 else (second.point, first.point)
+        apart = f"{abs(round(known, 6)):g} s after {sooner}" if known else f"the same instant as {sooner}"
+        said = ", ".join(f"{one.text} = {other.text}" for one, other in chain)
+        why = f"{later} is already {apart} ({said})" if chain else "they are one sync point, with two offsets"
+        reason = f"{first.text!r} and {second.text!r} cannot be one instant: {why}"
+        advice = "leave one of them out" + (f"; see lines {', '.join(map(str, lines))}" if len(lines) > 1 else "")
         fault = Fault(reason=reason, where=block, line=max(lines, default=0), advice=advice)
         return BlockRefused(fault, "IMPOSSIBLE_TO_SCHEDULE")
 
-    def _chain(self, start: Point, end: Point) -> list[Term]:
-        came: dict[Point, tuple[Point, Term] | None] = {start: None}
+    def _chain(self, start: Point, end: Point) -> "list[Link]":
+        """The ties that lead from one point to another."""
+        came: dict[Point, tuple[Point, Link] | None] = {start: None}
         queue = deque([start])
         while queue and end not in came:
             here = queue.popleft()
-            for there, term in self._links[here]:
+            for there, link in self._links[here]:
                 if there not in came:
-                    came[there] = (here, term)
+                    came[there] = (here, link)
                     queue.append(there)
         chain = []
         while (step := came.get(end)) is not None:

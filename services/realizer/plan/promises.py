@@ -6,7 +6,7 @@ from msgspec import Struct
 
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.realizer.plan.known import is_foreign
-from engage_hri.services.realizer.plan.relations import Equal, Order, Relations, Term
+from engage_hri.services.realizer.plan.relations import Equal, Order, Relations, Term, at_line
 from engage_hri.services.realizer.plan.steps import Steps, portions
 from engage_hri.services.realizer.points import EPSILON, ORIGIN, Point
 
@@ -15,7 +15,8 @@ class Broken(Struct, frozen=True):
     """Two points that do not come as a block says.
 
     early, late: the one that comes too early, and the one that comes too late for it. seconds: by which they are off.
-    said: what the block says of them. last: the one of the two that came last.
+    said: what the block says of them. last: the one of the two that came last. line: of the XML that says it; 0: not
+    known.
     """
 
     early: Point
@@ -23,6 +24,7 @@ class Broken(Struct, frozen=True):
     seconds: Seconds
     said: str
     last: Point
+    line: int = 0
 
     @property
     def point(self) -> Point:
@@ -35,12 +37,18 @@ class Broken(Struct, frozen=True):
         """The way in which `point` is wrong."""
         return "later" if self.point == self.late else "earlier"
 
+    def told(self, verb: str) -> str:
+        """The sentence of a warning, with its place. verb: `came`, or `is planned`."""
+        reason = f"{self.point.sync} {verb} {self.seconds:.2f} s {self.direction} than it should: {self.said}"
+        return at_line(self.line, reason)
+
 
 class _Same:
     """Terms that are one instant, and of those that have come the earliest and the latest."""
 
     def __init__(self, equal: Equal) -> None:
         self.said = " = ".join([term.text for term in equal.terms])
+        self.line = max(term.line for term in equal.terms)
         self.ends: tuple[tuple[Seconds, Point], tuple[Seconds, Point]] | None = None
 
     def come(self, term: Term, at: Seconds) -> Iterator[Broken]:
@@ -49,7 +57,7 @@ class _Same:
         self.ends = min(here, earliest), max(here, latest)
         for early, late in ((here, latest), (earliest, here)):
             if late[0] > early[0]:
-                yield Broken(early[1], late[1], late[0] - early[0], self.said, term.point)
+                yield Broken(early[1], late[1], late[0] - early[0], self.said, term.point, self.line)
 
 
 class _Ordered:
@@ -58,6 +66,7 @@ class _Ordered:
     def __init__(self, order: Order) -> None:
         self.terms = (order.earlier, order.later)
         self.said = f"{order.earlier.text} <= {order.later.text}"
+        self.line = max(order.earlier.line, order.later.line)
         self._came: dict[Term, Seconds] = {}
 
     def come(self, term: Term, at: Seconds) -> Iterator[Broken]:
@@ -65,7 +74,7 @@ class _Ordered:
         if len(self._came) == 2:
             before, after = self.terms
             if (seconds := self._came[before] - self._came[after]) > 0.0:
-                yield Broken(after.point, before.point, seconds, self.said, term.point)
+                yield Broken(after.point, before.point, seconds, self.said, term.point, self.line)
 
 
 class Promises:

@@ -25,6 +25,7 @@ from engage_hri.schemas.blocks import Block
 from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.feedback import WarningKind
 from engage_hri.schemas.references import type_name
+from engage_hri.schemas.suggestion import suggestion
 from engage_hri.schemas.syncref import BLOCK_ITSELF, SyncRef
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.realizer.plan.steps import PORTION, Steps, finished, portions
@@ -164,7 +165,8 @@ class _Reader:
             return Term(ORIGIN, ref.offset, text, line)
         behavior = self.behaviors.get(ref.behavior)
         if behavior is None:
-            raise self.refusal(f"unknown behavior {ref.behavior!r}", where, line, self._advice())
+            advice = suggestion(ref.behavior, self.behaviors, "the block has no behaviors")
+            raise self.refusal(f"unknown behavior {ref.behavior!r}", where, line, advice)
         sync = canonical_sync(ref.sync, type_name(behavior), self.block.dialect)
         if isinstance(behavior, Unknown):
             return Term(Point(behavior.id, sync), ref.offset, text, line)  # It is dropped with its behavior.
@@ -183,28 +185,39 @@ class _Reader:
 
     def _elsewhere(self, ref: SyncRef, text: str, where: str, line: int) -> Term:
         """The term for a point of another block, spelled as in this one."""
-        other = self.elsewhere.get(ref.block)
+        if ref.block not in self.elsewhere:
+            advice = suggestion(ref.block, self.elsewhere, "none is live")
+            advice = f"a block can be named from its request to its end; {advice}"
+            raise self.refusal(f"{text!r}: no live block is called {ref.block!r}", where, line, advice)
+        other = self.elsewhere[ref.block]
         if other is not None and ref.block not in self.theirs:
             self.theirs[ref.block] = {each.id: each for each in other.behaviors}
         known = self.theirs.get(ref.block, {})
         if isinstance(behavior := known.get(ref.behavior), Speech):
             ref = SyncRef.parse(text, [mark.id for mark in behavior.marks])
         sync = canonical_sync(ref.sync, type_name(behavior) if behavior else "", self.block.dialect)
-        if other is None or ref.behavior in ("", BLOCK_ITSELF):
-            is_there = ref.block in self.elsewhere
-        else:
-            is_there = behavior is not None and sync in sync_points(behavior) and ref.repetition < 2
-            is_there |= isinstance(behavior, Unknown)  # It is dropped there, and the tie with it.
-        if not is_there:
-            advice = "the block it names must be running when this one comes"
-            raise self.refusal(f"{text!r} is not a point of a live block", where, line, advice)
+        if other is not None and ref.behavior not in ("", BLOCK_ITSELF):
+            if behavior is None:
+                advice = suggestion(ref.behavior, known, "it has no behaviors")
+                reason = f"{text!r}: block {ref.block!r} has no behavior {ref.behavior!r}"
+                raise self.refusal(reason, where, line, advice)
+            if not isinstance(behavior, Unknown):  # Which is dropped there, and the tie with it.
+                self._check_point(ref, sync, behavior, text, where, line)
         return Term(Point(f"{ref.block}:{ref.behavior or BLOCK_ITSELF}", sync or "start"), ref.offset, text, line)
+
+    def _check_point(self, ref: SyncRef, sync: str, behavior: Behavior, text: str, where: str, line: int) -> None:
+        """Refuse a sync point that a behavior of another block does not have."""
+        of = f"{type_name(behavior)} {ref.behavior!r} of block {ref.block!r}"
+        if sync not in sync_points(behavior):
+            spelled = (dialect_sync(each, type_name(behavior), self.block.dialect) for each in sync_points(behavior))
+            advice = suggestion(ref.sync, [each for each in spelled if each is not None])
+            raise self.refusal(f"{text!r}: {of} has no sync point {ref.sync!r}", where, line, advice)
+        if ref.repetition > 1:
+            reason = f"{text!r}: of {of} only the first stroke can be named here"
+            raise self.refusal(reason, where, line, "leave out the number, or put both into one block")
 
     def refusal(self, reason: str, where: str, line: int, advice: str = "") -> BlockRefused:
         return BlockRefused(Fault(reason=reason, where=f"{self.block.id}: {where}", line=line, advice=advice))
-
-    def _advice(self) -> str:
-        return f"the block has {', '.join(sorted(self.behaviors)) or 'no behaviors'}"
 
     def read_constraints(self) -> Steps[None]:
         done = 0

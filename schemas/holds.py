@@ -1,0 +1,31 @@
+"""Holds on what the robot performs, as they are told: see `SteerPerformance`."""
+
+from msgspec import Struct
+
+from engage_hri.schemas.units import Stamp
+
+
+class Hold(Struct, frozen=True, kw_only=True, omit_defaults=True):
+    """A hold that is in force.
+
+    block: id of a live block; empty: all that the robot performs, and what comes. behavior: of that block; empty: all
+    of it. since: when it began. until: when what it holds is stopped, unless somebody lets it go on before.
+    """
+
+    since: Stamp
+    until: Stamp
+    block: str = ""
+    behavior: str = ""
+
+
+class Held(Struct, frozen=True, kw_only=True, tag="held", omit_defaults=True):
+    """state: realizer. All holds that are in force, the oldest first; none: nothing is held.
+
+    Published at every change; a late subscriber gets the last one. Of a hold that is not among them any more, what it
+    held goes on, or has ended.
+
+    at: when it was published.
+    """
+
+    at: Stamp
+    holds: tuple[Hold, ...] = ()

@@ -1,0 +1,48 @@
+"""A second Ctrl-C, sent to a process of its own that waits for what does not come."""
+
+import asyncio
+import signal
+from contextlib import suppress
+from pathlib import Path
+
+import pytest
+
+from engage_hri.services.bus.zenoh.hub import open_hub
+from tests.bus.places import free_endpoint
+from tests.cli.command import start
+from tests.cli.test_processes import PATIENCE, line, stopped
+from tests.realizer.fake_body import FakeBody
+
+pytestmark = pytest.mark.real_time
+
+
+@pytest.mark.parametrize("pause", [0.0, 0.0005, 0.005, 0.05])
+async def test_a_second_ctrl_c_ends_it_at_once_without_a_word(tmp_path: Path, pause: float) -> None:
+    """Whatever it does then. The realizer stands still: it does not say that the block has ended."""
+    endpoint = free_endpoint()
+    (tmp_path / "b.xml").write_text('<bml id="b"><wait id="w" duration="60"/></bml>')
+    where = ("--robot", "patient", "--connect", endpoint)
+    async with await open_hub("patient", listen=[endpoint]) as hub:
+        realizer = await start("run", "realizer", *where)
+        control = asyncio.create_task(FakeBody().serve(hub.join("control"), lambda: None))
+        try:
+            await line(realizer, "realizer is ready")
+            play = await start("play", tmp_path / "b.xml", *where, "--verbose")
+            await line(play, "b:w:start", log=False)
+            realizer.send_signal(signal.SIGSTOP)
+            play.send_signal(signal.SIGINT)
+            for seconds in (pause, 0.05):  # of two that are pending at once the process sees one
+                later = asyncio.get_running_loop().create_future()
+                asyncio.get_running_loop().call_later(seconds, later.set_result, None)
+                await later
+                with suppress(ProcessLookupError):
+                    play.send_signal(signal.SIGINT)
+            async with asyncio.timeout(PATIENCE):
+                _, err = await play.communicate()
+        finally:
+            realizer.send_signal(signal.SIGCONT)
+            await stopped(realizer)
+            control.cancel()
+            await asyncio.wait([control])
+
+    assert (play.returncode, err) == (130, b"")

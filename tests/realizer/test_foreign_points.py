@@ -1,0 +1,93 @@
+"""Points of other blocks in a plan: when they count, and the message about its net."""
+
+import pytest
+
+from engage_hri.schemas.behaviors import Head, Wait
+from engage_hri.schemas.blocks import Block
+from engage_hri.schemas.nets import Fired
+from engage_hri.schemas.units import Stamp
+from engage_hri.services.realizer.perform.net_message import described, firings, tokens
+from engage_hri.services.realizer.plan.known import Known
+from engage_hri.services.realizer.plan.plan import Plan
+from engage_hri.services.realizer.plan.planner import plan_block
+from engage_hri.services.realizer.points import Point
+from tests.realizer.oracle import estimate
+from tests.realizer.planning import timed
+from tests.realizer.stage import after, before, block, together
+
+NOD = Head(id="n", lexeme="NOD")
+OTHERS = {"other": Block(id="other", behaviors=(Wait(id="x"), Wait(id="y")))}
+
+
+def planned(*constraints: object, start: str = "", **ends: float) -> Plan:
+    """A nod, tied to the ends of two waits of another block, of which it is known when they come."""
+    nod = timed(NOD, start=start) if start else NOD
+    known = Known(blocks=OTHERS, points={Point(f"other:{id}", "end"): at for id, at in ends.items()})
+    return plan_block(block((nod,), *constraints), [estimate(NOD)], known=known)  # type: ignore[arg-type]
+
+
+def starts(made: Plan) -> float:
+    return round(made.predicted(Point("n", "start")), 6)
+
+
+@pytest.mark.parametrize(("x", "y"), [(1.0, 2.0), (2.0, 1.0), (2.0, 2.0), (-1.0, 2.0), (2.0, 0.0)])
+@pytest.mark.parametrize("way", ["together", "after"])
+def test_of_two_points_of_other_blocks_the_later_counts(way: str, x: float, y: float) -> None:
+    if way == "together":
+        made = planned(together("n:start", "other:x:end", "other:y:end"), x=x, y=y)
+    else:
+        made = planned(after("other:x:end", "n:start"), after("other:y:end", "n:start"), x=x, y=y)
+
+    assert starts(made) == 2.0
+
+
+@pytest.mark.parametrize(("x", "expected"), [(-1.0, 0.5), (-1.5, 0.0), (-3.0, 0.0), (0.0, 1.5), (4.0, 5.5)])
+def test_an_offset_counts_from_when_the_point_was_and_nothing_comes_before_the_block(
+    x: float, expected: float
+) -> None:
+    assert starts(planned(start="other:x:end+1.5", x=x)) == expected
+    assert starts(planned(after("other:x:end+1.5", "n:start"), x=x)) == expected
+
+
+def test_a_point_of_which_nobody_knows_when_it_comes_delays_nothing_in_the_plan() -> None:
+    assert starts(planned(start="other:x:end")) == 0.0
+    assert starts(planned(after("other:x:end", "n:start"), y=3.0)) == 0.0
+
+
+@pytest.mark.parametrize(("x", "is_told"), [(5.0, False), (1.0, True)])
+def test_who_cannot_be_before_a_point_of_another_block_is_told(x: float, *, is_told: bool) -> None:
+    made = planned(before("other:x:end", "n:start"), start="2", x=x)
+
+    assert starts(made) == 2.0
+    told = [(str(each.point), each.direction, each.seconds) for each in made.broken]
+    assert told == ([("n:start", "later", 1.0)] if is_told else [])
+
+
+# -- the message about a net -----------------------------------------------------------------------------------------
+
+
+def test_the_message_about_a_net_has_all_of_it() -> None:
+    made = planned(after("other:x:end", "n:stroke"), start="1", x=1.5)
+    message = described(made, Stamp("c", 7.0), made.net.initial, {0: 0.0, 2: 1.25})
+
+    assert (message.block, message.at) == ("b", Stamp("c", 7.0))
+    told = [[(each.behavior, each.sync) for each in one.points] for one in message.transitions]
+    assert (told[0][0], told[-1]) == (("", "start"), [("", "end")])
+    names = {point: number for number, points in enumerate(told) for point in points}
+    for point, at in made.at.items():
+        assert names[point.behavior, point.sync] == at
+        assert message.transitions[at].time == made.predicted(point)
+    assert len(message.places) == len(made.net.places)
+    for ours, theirs in zip(made.net.places, message.places, strict=True):
+        assert (ours.kind, ours.source, ours.target, ours.lag, ours.behavior) == (
+            theirs.kind, theirs.source, theirs.target, theirs.lag, theirs.behavior,
+        )  # fmt: skip
+    idle = [number for number, each in enumerate(message.places) if each.kind == "idle"]
+    assert list(message.marked) == idle != []
+    assert message.fired == (Fired(transition=0, time=0.0), Fired(transition=2, time=1.25))
+
+
+def test_tokens_and_firings_keep_their_numbers_and_their_order() -> None:
+    assert tokens(bytes((0, 1, 0, 2, 1))) == (1, 3, 4)
+    assert tokens(b"") == ()
+    assert firings({3: 0.5, 1: 0.25}) == (Fired(transition=3, time=0.5), Fired(transition=1, time=0.25))

@@ -1,0 +1,27 @@
+"""Advice about names that are not known."""
+
+import pytest
+
+from engage_hri.schemas.suggestion import suggestion
+
+
+@pytest.mark.parametrize(
+    ("name", "known", "advice"),
+    [
+        ("humn", ["table", "human"], "did you mean 'human'?"),
+        ("x", ["table", "human"], "known: human, table"),
+        ("x", [f"n{number:02}" for number in range(12)], f"known: {', '.join(f'n{each:02}' for each in range(12))}"),
+        (
+            "x",
+            [f"n{number:02}" for number in range(13)],
+            f"known: {', '.join(f'n{each:02}' for each in range(12))}, ...",
+        ),
+        ("x", [], "known: none"),
+    ],
+)
+def test_the_name_that_was_probably_meant_or_those_that_there_are(name: str, known: list[str], advice: str) -> None:
+    assert suggestion(name, known) == suggestion(name, reversed(known)) == advice
+
+
+def test_what_is_said_where_there_is_nothing_is_the_callers() -> None:
+    assert suggestion("x", (), "the world is empty") == "the world is empty"
