@@ -69,8 +69,8 @@ def of_class(kind: KeyClass) -> str:
 
 SERVICES = ("generation", "realizer", "recognition", "control")
 """Services that make up a robot."""
-ROLES = ("manager", *SERVICES, "perception", "observer")
-"""Roles of participants. Rules for access are given by role, not by name."""
+ROLES = ("manager", *SERVICES, "perception", "observer", "operator", "wizard")
+"""Roles of participants. What each may do is in schemas/access.py."""
 
 
 def commands(server: str) -> str:
