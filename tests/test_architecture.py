@@ -63,7 +63,7 @@ LAYERS = {
     "schemas": "documents > *",
     "services": "commandline > collaboration console control generation hostile realizer recognition simulation study"
     " > client > requests > runtime > bus > tangram",
-    "services/bus": "memory zenoh > interface payloads > config journal",
+    "services/bus": "memory zenoh > interface payloads > config journal keyring",
     "services/control": "service > torso > voice > actions waiting > body > variability > config",
     "services/generation": "service > fragment_runner > performance > body_link fragment_check pipeline > block head"
     " > references turns > permits > config",

@@ -308,6 +308,11 @@ class RequestDesk:
         if received.past and (message.life or self._serving.is_there(keys.requester_of(received.key))):
             return None
         requester = keys.requester_of(received.key) or message.requester
+        if message.requester and message.requester != requester:
+            what = f"{type(message).__name__} of {message.requester!r}"
+            self._bus.log.warning(
+                "%s: %s comes from %r; it counts as the sender's own", self._server, what, requester
+            )
         if requester != message.requester or not message.life:
             message = replace(message, requester=requester, life=message.life or received.life)
         if isinstance(message, KeepAlive):

@@ -1,6 +1,7 @@
 """Delivers what arrives: to the right subscriptions, in order; asks for missing messages. On the loop."""
 
 import asyncio
+from collections.abc import Callable
 from functools import partial
 from typing import Any
 
@@ -24,6 +25,8 @@ _pulses = msgspec.msgpack.Decoder(Pulse)
 _flushes = msgspec.msgpack.Decoder(tuple[str, Pulse])
 
 
+Trusts = Callable[[str, str, str], bool]
+"""Check of a message: the run of its process, its key, and the participant that it names."""
 TRIES = 3
 """Number of times that a process that is there, but does not answer, is asked for its past."""
 
@@ -40,7 +43,10 @@ class _Reader:
 class Readers:
     """All subscriptions of the process. refused: number of bad payloads. viewer: name for the log."""
 
-    def __init__(self, session: zenoh.Session, bridge: LoopBridge, sent: SentLog, peers: Peers) -> None:
+    def __init__(
+        self, session: zenoh.Session, bridge: LoopBridge, sent: SentLog, peers: Peers, trusts: Trusts | None = None
+    ) -> None:
+        """trusts: tells whether a message can be from its sender; None: whoever reaches the bus is believed."""
         self.refused = 0
         self.viewer = ""
         self._loop = asyncio.get_running_loop()
@@ -48,6 +54,7 @@ class Readers:
         self._bridge = bridge
         self._sent = sent
         self._peers = peers
+        self._trusts = trusts
         self._readers: list[_Reader] = []
         self._carriers: dict[str, tuple[Any, list[_Reader]]] = {}
         self._flushing: list[tuple[str, zenoh.Query]] = []
@@ -104,6 +111,8 @@ class Readers:
         key, payload, encoding = str(sample.key_expr), sample.payload.to_bytes(), str(sample.encoding)
         written = Written(key, encoding, payload, self._envelope(sample))
         envelope = written.envelope
+        if not self._is_trusted(written):
+            return
         if self._peers.clocks.heard(envelope.clock, envelope.sent, self._loop.time()) and envelope.run:
             self._peers.measure_clock(envelope.run, envelope.clock)
         for reader in tuple(self._carriers[pattern][1]) if pattern in self._carriers else ():
@@ -117,6 +126,16 @@ class Readers:
             for one in follower.take(written):
                 self._deliver(reader, one, past=False)
             self._ask_past(reader, envelope.run, follower)
+
+    def _is_trusted(self, written: Written) -> bool:
+        """False for a message that its sender may not send. One without an envelope is as good as its key."""
+        envelope = written.envelope
+        if self._trusts is None or not (envelope.clock or envelope.number):
+            return True
+        if self._trusts(envelope.run, written.key, envelope.source):
+            return True
+        self.refused += 1
+        return False
 
     def _envelope(self, sample: zenoh.Sample) -> Envelope:
         """Envelope of a sample; for one without, as programs in other languages send it, all but `run` is empty."""
@@ -177,6 +196,9 @@ class Readers:
 
         def caught_up(past: Past | None) -> None:
             follower.asking = False
+            if past is not None:
+                told = tuple(one for one in past.written if one.envelope.run == run and self._is_trusted(one))
+                past = msgspec.structs.replace(past, written=told)
             if past is None and run in self._peers.processes and tries < TRIES:
                 # The process is there, only slow, or the link was cut meanwhile: the past is not lost yet.
                 self._ask_past(reader, run, follower, tries + 1)
