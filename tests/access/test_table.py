@@ -1,4 +1,4 @@
-"""The table of access against what really flows: nothing flows that it denies, and no row of it is there for nothing."""
+"""The table of access against what really flows: nothing flows that it denies, and each row is of some use."""
 
 import asyncio
 from functools import partial
