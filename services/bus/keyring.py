@@ -51,7 +51,7 @@ class Keys(Struct, frozen=True):
         return str(self.folder / PRIVATE)
 
     def holders(self) -> tuple[Holder, ...]:
-        """To whom this router gives access. Raises InputRefused."""
+        """Read to whom this router gives access. Raises InputRefused."""
         return tuple(_read(self.folder / HOLDERS, tuple[Holder, ...]))
 
 

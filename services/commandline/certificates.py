@@ -52,7 +52,7 @@ def initialize(folder: Path, robot: str, holders: Sequence[tuple[str, str]], hos
     for holder in every:
         _check_length(holder)
     addresses = _alternatives((*HERE, *hosts))
-    if (folder / AUTHORITY).exists() or (folder / SECRET).exists():
+    if any([(folder / AUTHORITY).exists(), (folder / SECRET).exists(), *folder.glob(f"*/{PRIVATE}")]):
         raise InputRefused(
             Fault(reason="there are keys already", where=str(folder), advice="`engage keys add` gives out more")
         )

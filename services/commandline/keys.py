@@ -36,7 +36,7 @@ class Options:
 
 
 def main(options: Options) -> int:
-    """Do it. Exit 3 if `show` finds a certificate that has expired."""
+    """Make or show keys. Exit 3 if `show` finds a certificate that has expired."""
     if find_spec("cryptography") is None:
         advice = "pip install 'engage-hri[keys]', on the machine where keys are made; no other needs it"
         raise InputRefused(Fault(reason="the package `cryptography` is missing", where="engage keys", advice=advice))

@@ -1,4 +1,4 @@
-"""What a router refuses, in plain lines: links without a good certificate, and messages that no rule allows.
+"""Refusals of a router in plain lines: links without a good certificate, and messages that no rule allows.
 
 Zenoh tells both only in its log, which it writes to the standard output of the process, each message that is allowed
 among them. So the log goes through a pipe here, and the loop picks out what was refused.

@@ -56,7 +56,7 @@ def _grants(holder: Holder) -> Iterator[tuple[str, str, tuple[str, ...]]]:
         for does in ("publishes", "subscribes", "serves", "asks")
     )
     runs = f"{holder.mark}$*"
-    answered = tuple(keys.own(runs, subject) for subject in ("past", "clock", "flush"))
+    answered = tuple(keys.own(runs, subject) for subject in ("past", "counts", "clock", "flush"))
     shown = (
         keys.own(runs, "process"), keys.own(runs, "at/**"), keys.own(runs, "answers/**"),
         *_named((keys.own(runs, f"alive/{OWN}"),), holder.name),
