@@ -67,6 +67,18 @@ def of_class(kind: KeyClass) -> str:
     return f"{PREFIX}/{kind}/**"
 
 
+KEPT_CLASSES: tuple[KeyClass, ...] = ("state", "evt", "cmd")
+"""Classes of which a late subscriber gets what was published before."""
+
+
+def kept(pattern: str) -> tuple[str, ...]:
+    """Expressions that ask for the past of a pattern: none if it has none, and more than it if its class is open."""
+    name = pattern.split("/")[2:3]
+    if name in (["*"], ["**"]):
+        return tuple(map(of_class, KEPT_CLASSES))
+    return (pattern,) if name and name[0] in KEPT_CLASSES else ()
+
+
 SERVICES = ("generation", "realizer", "recognition", "control")
 """Services that make up a robot."""
 ROLES = ("manager", *SERVICES, "perception", "observer")
@@ -191,7 +203,7 @@ ANY_FLUSH = f"{PREFIX}/@bus/*/flush"
 def own(run: str, subject: str) -> str:
     """Key of the process with id `run`.
 
-    subject: `process`, `alive/<name>`, `at/<endpoint>`, `pulse`, `past`, `clock` or `flush`.
+    subject: `process`, `alive/<name>`, `at/<endpoint>`, `pulse`, `counts`, `clock` or `flush`.
     """
     return f"{PREFIX}/@bus/{run}/{subject}"
 

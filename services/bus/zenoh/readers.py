@@ -1,6 +1,7 @@
 """Delivers what arrives: to the right subscriptions, in order; asks for missing messages. On the loop."""
 
 import asyncio
+from collections.abc import Collection
 from functools import partial
 from typing import Any
 
@@ -13,34 +14,50 @@ from engage_hri.schemas.messages import Message
 from engage_hri.schemas.presence import PeerAlive, PeerGone
 from engage_hri.schemas.requests import Unreadable
 from engage_hri.services.bus import journal
-from engage_hri.services.bus.interface import Bus, Received, Subscription
+from engage_hri.services.bus.interface import LOG, Bus, Received, Subscription
 from engage_hri.services.bus.payloads import read_payload, unreadable
-from engage_hri.services.bus.zenoh.order import Envelope, Follower, Missing, Past, Pulse, SentLog, Written
-from engage_hri.services.bus.zenoh.peers import BAD, Peers, finish
+from engage_hri.services.bus.zenoh.history import BAD, History, envelopes, finish
+from engage_hri.services.bus.zenoh.order import Counts, Envelope, Follower, Missing, Past, SentLog, Written
+from engage_hri.services.bus.zenoh.peers import Peers
 from engage_hri.services.bus.zenoh.session import LoopBridge
 
-_envelopes = msgspec.msgpack.Decoder(Envelope)
-_pulses = msgspec.msgpack.Decoder(Pulse)
-_flushes = msgspec.msgpack.Decoder(tuple[str, Pulse])
-
+_pulses = msgspec.msgpack.Decoder(Counts)
+_flushes = msgspec.msgpack.Decoder(tuple[str, Counts])
 
 TRIES = 3
 """Number of times that a process that is there, but does not answer, is asked for its past."""
+RUNS_KEPT = 256
+"""Number of processes, there or gone, that a subscription remembers: one that is back gets on where it was."""
 
 
 class _Reader:
-    """A subscription of the participant `bus`, with its follower of each process, by run."""
+    """A subscription of the participant `bus`, with its follower of each process, by run.
+
+    kept: expressions that ask for the past of its keys.
+    """
 
     def __init__(self, bus: Bus, subscription: Subscription) -> None:
         self.bus = bus
         self.subscription = subscription
+        self.kept = tuple(dict.fromkeys(each for pattern in subscription.patterns for each in keys.kept(pattern)))
         self.followers: dict[str, Follower] = {}
+
+    def follower(self, run: str, there: Collection[str]) -> Follower:
+        """The follower of a process, also of one that is new. there: processes that are not forgotten for it."""
+        follower = self.followers.get(run)
+        if follower is None:
+            if len(self.followers) >= RUNS_KEPT and (gone := next((k for k in self.followers if k not in there), "")):
+                del self.followers[gone]
+            follower = self.followers[run] = Follower(self.subscription.patterns)
+        return follower
 
 
 class Readers:
     """All subscriptions of the process. refused: number of bad payloads. viewer: name for the log."""
 
-    def __init__(self, session: zenoh.Session, bridge: LoopBridge, sent: SentLog, peers: Peers) -> None:
+    def __init__(
+        self, session: zenoh.Session, bridge: LoopBridge, sent: SentLog, peers: Peers, history: History
+    ) -> None:
         self.refused = 0
         self.viewer = ""
         self._loop = asyncio.get_running_loop()
@@ -48,6 +65,7 @@ class Readers:
         self._bridge = bridge
         self._sent = sent
         self._peers = peers
+        self._history = history
         self._readers: list[_Reader] = []
         self._carriers: dict[str, tuple[Any, list[_Reader]]] = {}
         self._flushing: list[tuple[str, zenoh.Query]] = []
@@ -78,7 +96,8 @@ class Readers:
         for name, runs in self._peers.names.items():
             for run in sorted(runs):
                 self._offer_presence(reader, PeerAlive(participant=name, run=run))
-        for written in self._sent.past(Missing(subscription.patterns, {}), self._loop.time()).written:
+        oldest = self._loop.time() - keys.HISTORY_MAX_AGE
+        for written in self._sent.past(subscription.wants, Missing(), oldest).written:
             self._deliver(reader, written, past=True)
         for pattern in subscription.patterns:
             if pattern not in self._carriers:
@@ -86,8 +105,7 @@ class Readers:
                 carrier = self._session.declare_subscriber(pattern, handler, allowed_origin=zenoh.Locality.REMOTE)
                 self._carriers[pattern] = (carrier, [])
             self._carriers[pattern][1].append(reader)
-        for run in self._peers.processes:
-            self._follow(reader, run)
+        self._ask(reader, {run: reader.follower(run, self._peers.processes) for run in self._peers.processes})
 
     def detach(self, subscription: Subscription) -> None:
         self._readers = [reader for reader in self._readers if reader.subscription is not subscription]
@@ -102,10 +120,10 @@ class Readers:
         if sample.kind != zenoh.SampleKind.PUT:
             return
         key, payload, encoding = str(sample.key_expr), sample.payload.to_bytes(), str(sample.encoding)
-        written = Written(key, encoding, payload, self._envelope(sample))
-        envelope = written.envelope
-        if self._peers.clocks.heard(envelope.clock, envelope.sent, self._loop.time()) and envelope.run:
-            self._peers.measure_clock(envelope.run, envelope.clock)
+        run, envelope = self._origin(sample)
+        written = Written(key, encoding, payload, envelope, run)
+        if self._peers.clocks.heard(envelope.clock, envelope.sent, self._loop.time()):
+            self._peers.measure_clock(run, envelope.clock)
         for reader in tuple(self._carriers[pattern][1]) if pattern in self._carriers else ():
             # Only the first of overlapping patterns delivers, so that nothing comes twice.
             if reader.subscription.carrier(key) != pattern:
@@ -113,19 +131,23 @@ class Readers:
             if not envelope.number:
                 self._deliver(reader, written, past=False)
                 continue
-            follower = reader.followers.get(envelope.run) or self._follow(reader, envelope.run)
+            follower = reader.follower(run, self._peers.processes)
             for one in follower.take(written):
                 self._deliver(reader, one, past=False)
-            self._ask_past(reader, envelope.run, follower)
+            self._catch_up(reader, run, follower)
 
-    def _envelope(self, sample: zenoh.Sample) -> Envelope:
-        """Envelope of a sample; for one without, as programs in other languages send it, all but `run` is empty."""
-        if sample.attachment is not None:
+    def _origin(self, sample: zenoh.Sample) -> tuple[str, Envelope]:
+        """Run and envelope of a sample; an empty one where there is none, as programs in other languages send it.
+
+        An envelope counts only together with Zenoh's word for who sent it, which every process of ours gives.
+        """
+        if sample.attachment is not None and sample.source_info is not None:
             try:
-                return _envelopes.decode(sample.attachment.to_bytes())
+                envelope = envelopes.decode(sample.attachment.to_bytes())
+                return str(sample.source_info.source_id.zid), envelope
             except BAD:
                 self.refused += 1
-        return Envelope("", "", 0.0, self._foreign_life(sample))
+        return self._foreign_life(sample), Envelope("", "", 0.0)
 
     def _foreign_life(self, sample: zenoh.Sample) -> str:
         """Life of a program without an envelope, as far as Zenoh tells; else empty.
@@ -149,7 +171,7 @@ class Readers:
             return
         if message is not None:
             envelope = written.envelope
-            received = Received(written.key, message, envelope.source, self._loop.time(), past, envelope.run)
+            received = Received(written.key, message, envelope.source, self._loop.time(), past, written.run)
             reader.subscription.offer(received)
 
     def _decode(self, bus: Bus, written: Written) -> Message | None:
@@ -164,44 +186,52 @@ class Readers:
                 bus.publish(keys.fault(bus.name), fault)
             return unreadable(error, written.key, written.payload, written.encoding)
 
-    def _follow(self, reader: _Reader, run: str) -> Follower:
-        follower = reader.followers.get(run)
-        if follower is None:
-            follower = reader.followers[run] = Follower(reader.subscription.patterns)
-            self._ask_past(reader, run, follower)
-        return follower
+    def _catch_up(self, reader: _Reader, run: str, follower: Follower) -> None:
+        if follower.behind and not follower.asking:
+            self._ask(reader, {run: follower})
 
-    def _ask_past(self, reader: _Reader, run: str, follower: Follower, tries: int = 1) -> None:
-        if not follower.behind or follower.asking:
-            return
+    def _ask(self, reader: _Reader, waiting: dict[str, Follower], tries: int = 1) -> None:
+        """Ask processes for what is missing: one, or all when a reader comes. waiting: followers, by run."""
+        missing = Missing()
+        for follower in waiting.values():
+            follower.asking, missing = True, follower.missing()
 
-        def caught_up(past: Past | None) -> None:
-            follower.asking = False
-            if past is None and run in self._peers.processes and tries < TRIES:
-                # The process is there, only slow, or the link was cut meanwhile: the past is not lost yet.
-                self._ask_past(reader, run, follower, tries + 1)
-                return
-            again, follower.again = follower.again, False
-            for written, is_past in follower.catch_up(past):
-                self._deliver(reader, written, past=is_past)
-            if again:
-                follower.behind = True
-                self._ask_past(reader, run, follower)
-            self._answer_flushes()
+        def told(run: str, past: Past | None) -> None:
+            if (follower := waiting.pop(run, None)) is not None:
+                self._told(reader, run, follower, past)
 
-        follower.asking = True
-        self._peers.ask_past(run, follower.missing(), caught_up)
+        def ended() -> None:
+            for run, follower in tuple(waiting.items()):
+                if run in self._peers.processes and tries < TRIES:
+                    # The process is there, only slow, or the link was cut meanwhile: the past is not lost yet.
+                    self._ask(reader, {run: follower}, tries + 1)
+                else:
+                    told(run, None)
+
+        if reader.kept and waiting:
+            one = next(iter(waiting)) if len(waiting) == 1 else ""
+            self._history.ask(reader.kept, one, missing, told, ended)
+        else:
+            ended()
+
+    def _told(self, reader: _Reader, run: str, follower: Follower, past: Past | None) -> None:
+        follower.asking, known = False, follower.forged
+        for written, is_past in follower.catch_up(past):
+            self._deliver(reader, written, past=is_past)
+        if follower.forged > known:
+            LOG.warning("%s: dropped messages that say they are of %s, which never sent them", reader.bus.name, run)
+        if follower.again:
+            follower.again, follower.behind = False, True
+        self._catch_up(reader, run, follower)
+        self._answer_flushes()
 
     def process_came(self, run: str) -> None:
         for reader in self._readers:
-            follower = reader.followers.get(run)
-            if follower is None:
-                self._follow(reader, run)
-                continue
+            follower = reader.follower(run, self._peers.processes)
             # The process may be back after a cut in which messages were lost, or the answer to a question.
             follower.again = follower.asking
             follower.behind = True
-            self._ask_past(reader, run, follower)
+            self._catch_up(reader, run, follower)
 
     def _pulse_heard(self, sample: zenoh.Sample) -> None:
         run = keys.run_of(str(sample.key_expr))
@@ -213,11 +243,11 @@ class Readers:
             if run != self._sent.run:
                 self._compare(run, pulse)
 
-    def _compare(self, run: str, pulse: Pulse) -> None:
+    def _compare(self, run: str, pulse: Counts) -> None:
         for reader in self._readers:
-            follower = self._follow(reader, run)
+            follower = reader.follower(run, self._peers.processes)
             follower.pulse(pulse)
-            self._ask_past(reader, run, follower)
+            self._catch_up(reader, run, follower)
 
     def _flush_asked(self, query: zenoh.Query) -> None:
         try:

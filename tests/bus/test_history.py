@@ -16,7 +16,7 @@ from engage_hri.schemas.recognition import OpenEvents
 from engage_hri.schemas.requests import Accepted
 from engage_hri.schemas.status import AskStatus
 from engage_hri.services.bus.interface import Bus
-from engage_hri.services.bus.zenoh.foreign_clients import BATCH
+from engage_hri.services.bus.zenoh.history import BATCH
 from engage_hri.services.bus.zenoh.hub import ZenohHub, open_hub
 from engage_hri.services.runtime.service import Ready, running
 from tests.bus.places import PATIENCE, acquainted, echo, free_endpoint, state
