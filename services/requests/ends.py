@@ -30,7 +30,17 @@ from engage_hri.schemas.faults import (
 )
 from engage_hri.schemas.messages import COMMANDS, Message
 from engage_hri.schemas.presence import PeerAlive, PeerGone
-from engage_hri.schemas.requests import Accepted, Answer, Cancel, KeepAlive, Outcome, Refused, Request, Unreadable
+from engage_hri.schemas.requests import (
+    Accepted,
+    Answer,
+    Cancel,
+    KeepAlive,
+    Outcome,
+    Refused,
+    Request,
+    Unreadable,
+    is_life_of,
+)
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.interface import Bus, Containing, Received
 from engage_hri.services.requests import asking, serving
@@ -294,6 +304,8 @@ class RequestDesk:
         match message:
             case Unreadable(id=id, life=life, kind=kind, fault=fault) if id:
                 # What could be read names the request, which may be live, or have ended.
+                if not is_life_of(life, received.life):
+                    return None
                 requester, life = keys.requester_of(received.key), life or received.life
                 known = Cancel(id=id, requester=requester, life=life, of=kind)
                 return self._carry_out(self._serving.refuse(known, fault))
@@ -307,15 +319,20 @@ class RequestDesk:
         # An old command: its requester, if still there, sends it again; one that has left does not want it any more.
         if received.past and (message.life or self._serving.is_there(keys.requester_of(received.key))):
             return None
-        requester = keys.requester_of(received.key) or message.requester
+        sender, requester = received.life, keys.requester_of(received.key) or message.requester
+        if not is_life_of(message.life, sender):
+            where = f"{received.key} from {received.source or 'a stranger'}"
+            reason = f"{message.life!r} is the life of another process; ignored"
+            self._bus.publish(keys.fault(self._server), Fault(reason=reason, where=where, service=self._server))
+            return None
         if requester != message.requester or not message.life:
-            message = replace(message, requester=requester, life=message.life or received.life)
+            message = replace(message, requester=requester, life=message.life or sender)
         if isinstance(message, KeepAlive):
             sent = min(now, self._bus.local(message.at))
-            return self._carry_out(self._serving.keep_alive(message, sent, now))
+            return self._carry_out(self._serving.keep_alive(message, sent, now, sender))
         if (fault := _misplaced(message, received.key)) is not None:
             return self._carry_out(self._serving.refuse(message, fault))
-        return self._carry_out(self._serving.take(message, now))
+        return self._carry_out(self._serving.take(message, now, sender))
 
     def accept(self, name: str) -> None:
         """Tell the requester that the request is being performed."""

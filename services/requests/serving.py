@@ -29,6 +29,7 @@ from engage_hri.schemas.requests import (
     answering,
     is_life_of,
     kind_meant,
+    kind_of,
 )
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.requests.deadlines import Deadlines
@@ -83,13 +84,17 @@ _Key = tuple[str, str, str]
 
 
 class _Record:
-    """One request. run: the requester's life by its token. kind: of the request, or of what a cancellation ends."""
+    """One request. sender: the process that it came from. run: the requester's life by its token.
 
-    __slots__ = ("answer", "ended_at", "key", "kind", "lease", "name", "request", "run", "state")
+    kind: of the request, or of what a cancellation ends.
+    """
 
-    def __init__(self, name: str, request: Request, run: str) -> None:
+    __slots__ = ("answer", "ended_at", "key", "kind", "lease", "name", "request", "run", "sender", "state")
+
+    def __init__(self, name: str, request: Request, sender: str, run: str) -> None:
         self.name = name
         self.request = request
+        self.sender = sender
         self.run = run
         self.key = _key(request)
         self.kind = kind_meant(request)
@@ -142,18 +147,23 @@ class Serving:
 
     # -- events ---------------------------------------------------------------------------------------------------
 
-    def take(self, request: Request, now: Seconds) -> list[Effect]:
-        """Take a command that has come; its `requester` is the one that its key names."""
+    def take(self, request: Request, now: Seconds, sender: str = "") -> list[Effect]:
+        """Take a command that has come; its `requester` is the one that its key names.
+
+        sender: the process, or the connection, that it came from; empty if nothing tells.
+        """
         key, kind = _key(request), kind_meant(request)
         newest = self._newest.get(key)
-        if newest is not None and newest.state is not _ENDED and kind not in ("", newest.kind):
+        if newest is not None and self._is_claimed(newest, sender):
+            self._warn_stranger(request.id, kind_of(request))
+        elif newest is not None and newest.state is not _ENDED and kind not in ("", newest.kind):
             is_cancel = isinstance(request, Cancel)
             advice = f"`of` is the kind of what it ends: {newest.kind}" if is_cancel else "give it another id"
             self._refuse(request, f"{request.id!r} is the id of a live {newest.kind}", advice)
         else:
             record = self._record(key, kind)
-            if record is None or self._is_new(record, request, now):
-                record = self._new(request)
+            if record is None or record.sender != sender or self._is_new(record, request, now):
+                record = self._new(request, sender)
             self._step(record, _event(record, request), now, request)
         return self._new_effects()
 
@@ -168,13 +178,19 @@ class Serving:
         known = None if record is None else record.answer
         return [Publish(answering(request, known or Refused(id=request.id, fault=fault)))]
 
-    def keep_alive(self, message: KeepAlive, sent: Seconds, now: Seconds) -> list[Effect]:
-        """Renew the requests that a `KeepAlive` names. sent: when it was sent, by local time, not after `now`."""
+    def keep_alive(self, message: KeepAlive, sent: Seconds, now: Seconds, sender: str = "") -> list[Effect]:
+        """Renew the requests that a `KeepAlive` names. sent: when it was sent, by local time, not after `now`.
+
+        sender: as in `take`.
+        """
         for kept in message.live:
             record = self._known.get(((message.requester, message.life, kept.id), kept.kind))
             if record is None:
                 unknown = Cancel(id=kept.id, requester=message.requester, life=message.life, of=kept.kind)
-                record = _Record(kept.id, unknown, "")
+                record = _Record(kept.id, unknown, sender, "")
+            elif self._is_claimed(record, sender):
+                self._warn_stranger(kept.id, "keep_alive")
+                continue
             is_newer = record.request.is_updatable and kept.revision > record.request.revision
             self._step(record, Event.EXTENDED if is_newer else Event.NAMED, sent, kept)
         return self._new_effects()
@@ -241,13 +257,17 @@ class Serving:
             return newest
         return self._known.get((key, kind))
 
-    def _new(self, request: Request) -> _Record:
+    def _is_claimed(self, record: _Record, sender: str) -> bool:
+        """True if the request is another sender's. A mere cancellation of what has not come yet binds nobody."""
+        return record.sender != sender and not isinstance(record.request, Cancel)
+
+    def _new(self, request: Request, sender: str) -> _Record:
         run = self._runs.get(request.requester, "")
         if not is_life_of(request.life, run):
             run = ""  # The token of its new life is still on its way.
         while (name := self._names.unique(request.id)) in self._named:
             pass  # A live request from so long ago that `Names` has forgotten its name has this one.
-        record = _Record(name, request, run)
+        record = _Record(name, request, sender, run)
         known = (record.key, record.kind)
         if (before := self._known.get(known)) is not None:
             self._forget(before)
@@ -354,6 +374,10 @@ class Serving:
 
     def _complain(self, where: str, reason: str, advice: str, *, is_ours: bool) -> None:
         self._effects.append(Complain(self._fault(where, reason, advice), is_ours))
+
+    def _warn_stranger(self, id: str, what: str) -> None:
+        advice = "only who has asked can change, renew or cancel a request"
+        self._complain(id, f"{what} of a request that came from another process; ignored", advice, is_ours=False)
 
     def _warn_ended(self, name: str, answer: Answer, why: str) -> None:
         reason = f"request {name} {why}; now {type(answer).__name__}"

@@ -4,8 +4,8 @@ A `session.get` of all states (`keys.of_class`) brings them as they were publish
 timestamp. Parameters of the selector, joined by `;` as Zenoh has it: `format=json`; `age=SECONDS`, how far back
 commands and events go; `run=RUN`, to ask only that process.
 
-Our own processes send a `Missing` with the question. After the messages they get a reply with the `Counts` of these
-keys, so that they know when all has come, and that there is nothing else.
+Our own processes send a `Missing` with the question. They get what is missing of a key in one reply, and at the end
+one with the `Counts` of all these keys: so they know that all has come, and that there is nothing else.
 """
 
 import asyncio
@@ -34,6 +34,7 @@ BAD = (msgspec.DecodeError, UnicodeDecodeError)
 """Exceptions of decoding bytes from other programs."""
 pack = msgspec.msgpack.encode
 envelopes = msgspec.msgpack.Decoder(Envelope)
+_parts = msgspec.msgpack.Decoder(list[Written])
 _missings = msgspec.msgpack.Decoder(Missing)
 _counts = msgspec.msgpack.Decoder(Counts)
 
@@ -96,8 +97,8 @@ class History:
             replier = str(reply.replier_id.zid)
             answer = answers.setdefault(replier, _Answer())
             with suppress(*BAD):  # counts as no answer
-                if str(reply.ok.key_expr) != keys.own(replier, "counts"):
-                    answer.written.append(_written(reply.ok, replier))
+                if (key := str(reply.ok.key_expr)) != keys.own(replier, "counts"):
+                    answer.written += [one for one in _parts.decode(reply.ok.payload.to_bytes()) if one.key == key]
                     return
                 answer.parts.append(_counts.decode(reply.ok.payload.to_bytes()))
                 if len(answer.parts) == len(patterns):
@@ -129,7 +130,7 @@ class History:
         if query.parameters.get("run") not in (None, self._sent.run):
             finish(query)
             return
-        form, age, missing = "", keys.HISTORY_MAX_AGE, Missing()
+        form, age, missing = "", keys.HISTORY_MAX_AGE, None
         try:
             if query.payload is None:
                 form, age = form_asked(query, ""), _age(query.parameters)
@@ -143,11 +144,19 @@ class History:
         def is_wanted(key: str) -> bool:
             return keys.key_class(key) == kind and query.key_expr.intersects(zenoh.KeyExpr(key))
 
-        past = self._sent.past(is_wanted, missing, self._loop.time() - age)
-        told = None if query.payload is None else Counts(past.counts, past.number)
-        self._answer(query, deque(past.written), form, told)
+        past = self._sent.past(is_wanted, missing or Missing(), self._loop.time() - age)
+        if missing is None:
+            self._answer(query, deque(past.written), form)
+            return
+        parts: dict[str, list[object]] = {}
+        for one in past.written:
+            parts.setdefault(one.key, []).append((one.key, one.encoding, one.payload, one.envelope))
+        for key, part in parts.items():
+            query.reply(key, pack(part))
+        query.reply(keys.own(self._sent.run, "counts"), pack(Counts(past.counts, past.number)))
+        finish(query)
 
-    def _answer(self, query: zenoh.Query, waiting: deque[Written], form: str, told: Counts | None) -> None:
+    def _answer(self, query: zenoh.Query, waiting: deque[Written], form: str) -> None:
         for _ in range(min(BATCH, len(waiting)) if self._open else 0):
             one = waiting.popleft()
             payload, encoding = one.payload, one.encoding
@@ -156,17 +165,9 @@ class History:
             attachment = pack(one.envelope)
             query.reply(one.key, payload, encoding=encoding, attachment=attachment, timestamp=one.stamp)  # type: ignore[arg-type]
         if waiting and self._open:
-            self._loop.call_soon(self._answer, query, waiting, form, told)
-            return
-        if told is not None and self._open:
-            query.reply(keys.own(self._sent.run, "counts"), pack(told))
-        finish(query)
-
-
-def _written(sample: zenoh.Sample, run: str) -> Written:
-    attachment = sample.attachment.to_bytes() if sample.attachment is not None else b""
-    key, encoding = str(sample.key_expr), str(sample.encoding)
-    return Written(key, encoding, sample.payload.to_bytes(), envelopes.decode(attachment), run)
+            self._loop.call_soon(self._answer, query, waiting, form)
+        else:
+            finish(query)
 
 
 def form_asked(query: zenoh.Query, otherwise: str = "msgpack") -> str:

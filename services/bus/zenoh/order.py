@@ -43,17 +43,13 @@ class Envelope(Struct, frozen=True, array_like=True):
     nth: int = 0
 
 
-class Written(Struct, frozen=True):
-    """A message as it travels. run: the process, or the connection, that it came from; empty if nothing tells.
-
-    stamp: Zenoh's timestamp, for the process that keeps it.
-    """
+class Written(Struct, frozen=True, array_like=True):
+    """A message as it travels. stamp: Zenoh's timestamp, where it is kept."""
 
     key: str
     encoding: str
     payload: bytes
     envelope: Envelope
-    run: str = ""
     stamp: object = None
 
 
@@ -96,7 +92,7 @@ class SentLog:
         """Number the next message and keep it."""
         self.number += 1
         nth = self.counts[key] = self.counts.get(key, 0) + 1
-        written = Written(key, encoding, payload, Envelope(source, clock, now, self.number, nth), self.run, stamp)
+        written = Written(key, encoding, payload, Envelope(source, clock, now, self.number, nth), stamp)
         self._written_at[key] = now
         if keys.key_class(key) == "state":
             self._states[key] = written

@@ -98,7 +98,7 @@ class Readers:
                 self._offer_presence(reader, PeerAlive(participant=name, run=run))
         oldest = self._loop.time() - keys.HISTORY_MAX_AGE
         for written in self._sent.past(subscription.wants, Missing(), oldest).written:
-            self._deliver(reader, written, past=True)
+            self._deliver(reader, written, self._sent.run, past=True)
         for pattern in subscription.patterns:
             if pattern not in self._carriers:
                 handler = self._bridge.samples(partial(self._sample_came, pattern))
@@ -121,7 +121,7 @@ class Readers:
             return
         key, payload, encoding = str(sample.key_expr), sample.payload.to_bytes(), str(sample.encoding)
         run, envelope = self._origin(sample)
-        written = Written(key, encoding, payload, envelope, run)
+        written = Written(key, encoding, payload, envelope)
         if self._peers.clocks.heard(envelope.clock, envelope.sent, self._loop.time()):
             self._peers.measure_clock(run, envelope.clock)
         for reader in tuple(self._carriers[pattern][1]) if pattern in self._carriers else ():
@@ -129,11 +129,11 @@ class Readers:
             if reader.subscription.carrier(key) != pattern:
                 continue
             if not envelope.number:
-                self._deliver(reader, written, past=False)
+                self._deliver(reader, written, run, past=False)
                 continue
             follower = reader.follower(run, self._peers.processes)
             for one in follower.take(written):
-                self._deliver(reader, one, past=False)
+                self._deliver(reader, one, run, past=False)
             self._catch_up(reader, run, follower)
 
     def _origin(self, sample: zenoh.Sample) -> tuple[str, Envelope]:
@@ -162,7 +162,7 @@ class Readers:
         passed_on_by = {self._sent.run, *self._peers.processes, *map(str, self._session.info.routers_zid())}
         return "" if stamped_by in passed_on_by else stamped_by
 
-    def _deliver(self, reader: _Reader, written: Written, *, past: bool) -> None:
+    def _deliver(self, reader: _Reader, written: Written, run: str, *, past: bool) -> None:
         # One sample often has several readers: it is decoded once.
         if self._decoded is None or self._decoded[0] is not written:
             self._decoded = (written, self._decode(reader.bus, written))
@@ -171,7 +171,7 @@ class Readers:
             return
         if message is not None:
             envelope = written.envelope
-            received = Received(written.key, message, envelope.source, self._loop.time(), past, written.run)
+            received = Received(written.key, message, envelope.source, self._loop.time(), past, run)
             reader.subscription.offer(received)
 
     def _decode(self, bus: Bus, written: Written) -> Message | None:
@@ -217,7 +217,7 @@ class Readers:
     def _told(self, reader: _Reader, run: str, follower: Follower, past: Past | None) -> None:
         follower.asking, known = False, follower.forged
         for written, is_past in follower.catch_up(past):
-            self._deliver(reader, written, past=is_past)
+            self._deliver(reader, written, run, past=is_past)
         if follower.forged > known:
             LOG.warning("%s: dropped messages that say they are of %s, which never sent them", reader.bus.name, run)
         if follower.again:
