@@ -29,6 +29,8 @@ INHIBIT = f"{PREFIX}/cmd/generation/*/*/inhibit"
 BLOCK = f"{PREFIX}/cmd/realizer/*/*/block"
 EVENT = f"{PREFIX}/cmd/recognition/*/*/event"
 TURN = f"{PREFIX}/cmd/recognition/*/*/turn"
+ROBOT = f"{PREFIX}/cmd/realizer/*/*/robot"
+"""For all that the robot performs, whoever asked for it: a key of its own, so that rules can keep it to a few."""
 BEHAVIOR = f"{PREFIX}/cmd/control/*/*/behavior"
 
 FEEDBACK = f"{PREFIX}/evt/realizer/feedback"
@@ -81,7 +83,7 @@ def kept(pattern: str) -> tuple[str, ...]:
 
 SERVICES = ("generation", "realizer", "recognition", "control")
 """Services that make up a robot."""
-ROLES = ("manager", *SERVICES, "perception", "observer")
+ROLES = ("manager", *SERVICES, "perception", "observer", "operator", "wizard")
 """Roles of participants. Rules for access are given by role, not by name."""
 
 

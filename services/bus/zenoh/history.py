@@ -1,4 +1,4 @@
-"""What was published before, asked for on the messages' own keys, by our processes and by any program.
+"""History: what was published before, asked for on the messages' own keys by our processes and by any program.
 
 A `session.get` of all states (`keys.of_class`) brings them as they were published: encoding, attachment, Zenoh's
 timestamp. Parameters of the selector, joined by `;` as Zenoh has it: `format=json`; `age=SECONDS`, how far back
@@ -40,7 +40,7 @@ _counts = msgspec.msgpack.Decoder(Counts)
 
 
 class _Answer:
-    """What one process has answered so far. parts: the counts of each pattern that it has answered for."""
+    """The answer of one process so far. parts: the counts of each pattern that it has answered for."""
 
     def __init__(self) -> None:
         self.written: list[Written] = []
