@@ -131,14 +131,13 @@ class Serving:
         """
         key, kind = key_of(request), kind_meant(request)
         newest = self._newest.get(key)
-        if newest is not None and self._is_claimed(newest, sender):
-            self._warn_stranger(request.id, kind_of(request))
-        elif newest is not None and newest.state is not _ENDED and kind not in ("", newest.kind):
+        if newest is not None and newest.state is not _ENDED and kind not in ("", newest.kind):
             is_cancel = isinstance(request, Cancel)
             advice = f"`of` is the kind of what it ends: {newest.kind}" if is_cancel else "give it another id"
             self._refuse(request, f"{request.id!r} is the id of a live {newest.kind}", advice)
+        elif (record := self._record(key, kind)) is not None and self._is_claimed(record, sender):
+            self._warn_stranger(request.id, kind_of(request))
         else:
-            record = self._record(key, kind)
             if record is None or record.sender != sender or self._is_new(record, request, now):
                 record = self._new(request, sender)
             self._step(record, event_of(record, request), now, request)

@@ -1,13 +1,16 @@
 """The numbering behind the Zenoh bus, without Zenoh: whatever the wire loses, repeats or reorders."""
 
+from typing import Any
+
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from engage_hri.schemas import keys
 from engage_hri.schemas.units import Seconds
-from engage_hri.services.bus.zenoh.order import Follower, Past, SentLog, Written
+from engage_hri.services.bus.zenoh.order import Counts, Envelope, Follower, Past, SentLog, Written
 
 KEYS = (keys.BLOCK, keys.FEEDBACK, keys.SYNC_POINT, keys.INHIBIT)
+NUMBERS = st.integers(1, 10**9)
 HEARD = (keys.BLOCK, "engage/v1/evt/**")
 
 
@@ -93,6 +96,108 @@ def test_what_a_cut_link_lost_comes_in_order_across_keys(steps: list[tuple[str, 
 
     assert wire.delivered == wire.expected
     assert wire.follower.lost == 0
+
+
+class Deceived(Wire):
+    """The same, with messages that claim to be of this process, and an answer that may be on its way for a while."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.follower = Follower((*HEARD, keys.WORLD))
+        self.answer: Past | None = None
+        self.lies: list[Written] = []
+
+    def forge(self, key: str, ahead: int, number: int) -> None:
+        """A place that the process has not come to yet, nor will with its next message."""
+        nth = self.sent.counts.get(key, 0) + ahead
+        lie = Written(key, "application/msgpack", b"lie", Envelope("there", "clock", 0.0, number, nth))
+        self.lies.append(lie)
+        self.delivered += self.follower.take(lie)
+
+    def ask(self) -> None:
+        if self.follower.behind and self.answer is None:
+            self.answer = answer(self.sent, self.follower)
+
+    def arrive(self) -> None:
+        if self.answer is not None:
+            self.delivered += [one for one, _ in self.follower.catch_up(self.answer)]
+            self.answer = None
+
+    def settle(self) -> None:
+        self.arrive()
+        self.pulse()
+        for _ in range(2):  # what came under the first question is asked for with the second
+            self.ask()
+            self.arrive()
+
+
+STEPS = st.one_of(
+    st.tuples(st.just("send"), st.sampled_from((*KEYS, keys.WORLD)), st.sampled_from([0, 1, 1, 2])),
+    st.tuples(st.just("forge"), st.sampled_from((keys.BLOCK, keys.FEEDBACK, keys.WORLD)), st.integers(2, 9), NUMBERS),
+    st.tuples(st.just("claim"), st.sampled_from((keys.BLOCK, keys.FEEDBACK, keys.WORLD)), NUMBERS),
+    st.tuples(st.sampled_from(["pulse", "ask", "arrive"])),
+)
+
+
+@given(st.lists(STEPS, max_size=60))
+@settings(max_examples=300, deadline=None)
+def test_whatever_others_claim_in_the_name_of_a_process_its_own_messages_come_once_and_in_order(steps: list[Any]):
+    wire = Deceived()
+
+    for what, *how in steps:
+        match what:
+            case "claim":
+                key, nth = how
+                wire.follower.pulse(Counts({key: nth}))
+            case _:
+                getattr(wire, what)(*how)
+    wire.settle()
+
+    assert not wire.follower.behind
+    assert wire.follower.lost == 0
+    true = [one for one in wire.delivered if one.payload != b"lie"]
+    for key in (keys.BLOCK, keys.FEEDBACK, keys.SYNC_POINT):
+        assert [one for one in true if one.key == key] == [one for one in wire.expected if one.key == key]
+    # A forged event is never delivered; a forged state may be, until the next true one, or the next pulse.
+    assert {one.key for one in wire.delivered if one.payload == b"lie"} <= {keys.WORLD}
+    states = [one for one in wire.delivered if one.key == keys.WORLD]
+    published = [one for one in wire.expected if one.key == keys.WORLD]
+    assert states[-1:] == published[-1:] or not published
+
+
+def test_of_two_messages_that_claim_one_place_the_published_one_is_delivered():
+    for ahead in (1, 0):  # the lie comes before it, or after it
+        wire = Deceived()
+        wire.ask()
+        wire.arrive()
+        if ahead:
+            wire.forge(keys.BLOCK, ahead, 999)
+        wire.send(keys.BLOCK)
+        if not ahead:
+            wire.forge(keys.BLOCK, ahead, 999)
+        wire.send(keys.BLOCK)
+        wire.settle()
+
+        assert wire.delivered == [*(wire.lies if ahead else ()), *wire.expected]
+        assert wire.follower.lost == 0
+
+
+@given(st.integers(1, 9), st.integers(1, 3), st.booleans())
+def test_a_forged_state_lasts_until_the_next_pulse(ahead: int, published: int, goes_on: bool):
+    wire = Deceived()
+    wire.ask()
+    wire.arrive()
+    for _ in range(published):
+        wire.send(keys.WORLD)
+    wire.forge(keys.WORLD, ahead, 999)
+    if goes_on:
+        wire.send(keys.WORLD)
+
+    wire.settle()
+
+    assert wire.delivered[-1] == wire.expected[-1]
+    wire.send(keys.WORLD)
+    assert wire.delivered[-1] == wire.expected[-1]
 
 
 def test_the_first_question_gets_two_seconds_of_events_and_the_last_state():

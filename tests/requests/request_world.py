@@ -98,9 +98,10 @@ class World:
         if server is None or not known:
             return
         asked = self.lies.choice(known)
-        lies: list[Request] = [Cancel(id=asked.id), *(make(asked.id) for make, _ in REQUESTS)]
+        kind, made = kind_of(asked), [make(asked.id) for make, _ in REQUESTS]
+        lies = [Cancel(id=asked.id), Cancel(id=asked.id, of=kind), *(one for one in made if kind_of(one) == kind)]
         lies = [structs.replace(lie, revision=99, requester=name, life=client.life) for lie in lies]
-        kept = Kept(kind_of(asked), asked.id, 99, "end", 1e6)
+        kept = Kept(kind, asked.id, 99, "end", 1e6)
         still = KeepAlive(live=(kept,), at=Stamp("w", self.now), requester=name, life=client.life)
         effects = [effect for lie in lies for effect in server.machine.take(lie, self.now, "stranger")]
         effects += server.machine.keep_alive(still, self.now, self.now, "stranger")

@@ -223,8 +223,9 @@ class Follower:
     def _disproved(self, past: Past) -> list[Written]:
         """Correct the counts by the answer; returns what is held, without what the answer should know and doesn't."""
         for key, seen in self._seen.items():
-            if seen > past.counts.get(key, 0):
-                self._seen[key] = past.counts.get(key, 0)
+            if seen > (count := past.counts.get(key, 0)):
+                # The last true state comes again: it was overwritten.
+                self._seen[key] = max(0, count - 1) if _may_skip(key) else count
                 self.forged += 1
         before, since = self._held[: self._held_before], self._held[self._held_before :]
         published = [one for one in before if one.envelope.nth <= past.counts.get(one.key, 0)]
