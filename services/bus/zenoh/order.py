@@ -74,6 +74,11 @@ class Past(Struct, frozen=True):
     number: int
     written: tuple[Written, ...]
 
+    def of(self, wanted: Callable[[str], bool]) -> "Past":
+        """The part of it that is about these keys."""
+        counts = {key: nth for key, nth in self.counts.items() if wanted(key)}
+        return Past(counts, self.number, tuple(one for one in self.written if wanted(one.key)))
+
 
 class SentLog:
     """The messages that one process has published: numbers them, keeps them, gives them out again."""
@@ -160,7 +165,7 @@ class Follower:
             # Two messages claim the same place. At most one of them was published.
             self._seen[key] = seen - 1
             self._fall_behind()
-        elif envelope.nth > seen + 1 and not _may_skip(key):
+        elif envelope.nth > seen + 1:
             self._fall_behind()
         if self.behind:
             self._held.append(written)

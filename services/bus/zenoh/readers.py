@@ -121,6 +121,9 @@ class Readers:
             return
         key, payload, encoding = str(sample.key_expr), sample.payload.to_bytes(), str(sample.encoding)
         run, envelope = self._origin(sample)
+        if run == self._sent.run:
+            self.refused += 1  # from outside in this process' own name
+            return
         written = Written(key, encoding, payload, envelope)
         if self._peers.clocks.heard(envelope.clock, envelope.sent, self._loop.time()):
             self._peers.measure_clock(run, envelope.clock)
@@ -216,6 +219,8 @@ class Readers:
 
     def _told(self, reader: _Reader, run: str, follower: Follower, past: Past | None) -> None:
         follower.asking, known = False, follower.forged
+        if past is not None:  # which may hold more: see `keys.kept`
+            past = past.of(reader.subscription.wants)
         for written, is_past in follower.catch_up(past):
             self._deliver(reader, written, run, past=is_past)
         if follower.forged > known:
