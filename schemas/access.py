@@ -54,6 +54,7 @@ class Row(NamedTuple):
 SERVED = {
     "fragment": keys.FRAGMENT, "inhibit": keys.INHIBIT, "block": keys.BLOCK, "event": keys.EVENT, "turn": keys.TURN,
     "behavior": keys.BEHAVIOR,
+    "robot": keys.ROBOT,
 }  # fmt: skip
 """Commands by their subject."""
 WATCHED = (
@@ -95,10 +96,10 @@ def _watches(role: str, why: str = "") -> Iterator[Row]:
     yield Row(role, "asks", keys.DESCRIBE, "for programs that suit what they ask for to the body")
 
 
-def _manages(role: str, why: str = "") -> Iterator[Row]:
+def _manages(role: str, *more: str, why: str = "") -> Iterator[Row]:
     yield from _watches(role, why)
     yield from (Row(role, "subscribes", each, why) for each in (keys.TURN_CLOSED, keys.WORLD))
-    yield from _commands(role, "fragment", "inhibit", "block", why=why)
+    yield from _commands(role, "fragment", "inhibit", "block", *more, why=why)
     yield Row(role, "serves", keys.status(OWN), why)
 
 
@@ -141,8 +142,9 @@ TABLE: tuple[Row, ...] = (
     *(Row("observer", "subscribes", key, _NO_PROGRAM) for key in (keys.ROBOT_STATE, keys.TURN_CLOSED, keys.WORLD)),
     *_watches("operator", "what an operator sees"),
     Row("operator", "subscribes", keys.NET, "what an operator sees"),
-    *_commands("operator", "block", why="holds, continues and stops"),
-    *_manages("wizard", f"drives the robot by hand; {_NO_PROGRAM}"),
+    *_commands("operator", "robot"),
+    Row("operator", "publishes", keys.command(keys.BLOCK, "operator", OWN), "holds, continues and stops one block"),
+    *_manages("wizard", "robot", why=f"drives the robot by hand; {_NO_PROGRAM}"),
     Row("wizard", "publishes", keys.PERCEIVED_ACTION, f"says what perception does not see; {_NO_PROGRAM}"),
 )  # fmt: skip
 """The table. `tests/access` checks it against what really flows."""

@@ -72,7 +72,7 @@ class Fortress:
         """What the services log."""
         self._numbers = count(1)
         self._stack = ExitStack()
-        self.seen: list[tuple[str, Message, Any]] = []
+        self.seen: list[tuple[str, Message, zenoh.Sample]] = []
         self._sessions: list[zenoh.Session] = []
 
     @property
@@ -101,7 +101,7 @@ class Fortress:
 
     def _see(self, sample: zenoh.Sample) -> None:
         message = decode(sample.payload.to_bytes(), str(sample.encoding))
-        self.seen.append((str(sample.key_expr), message, sample.attachment and sample.attachment.to_bytes()))
+        self.seen.append((str(sample.key_expr), message, sample))
 
     def config(self, folder: Path | None, endpoint: str = "", **more: object) -> zenoh.Config:
         """Settings of a visitor. folder: of its keys; None: it has none, and believes everybody."""

@@ -23,9 +23,9 @@ from engage_hri.services.bus.config import Mode, is_encrypted, mode_of
 from engage_hri.services.bus.interface import LOG, Answer, Bus, Hub, Keep, Received, Subscription
 from engage_hri.services.bus.keyring import Keys
 from engage_hri.services.bus.zenoh.clocks import Clocks
-from engage_hri.services.bus.zenoh.foreign_clients import ForeignClients, form_asked, in_form, refuse
-from engage_hri.services.bus.zenoh.order import Envelope, Pulse, SentLog
-from engage_hri.services.bus.zenoh.peers import Peers, finish, pack
+from engage_hri.services.bus.zenoh.history import History, finish, form_asked, in_form, pack, refuse
+from engage_hri.services.bus.zenoh.order import Envelope, SentLog
+from engage_hri.services.bus.zenoh.peers import Peers
 from engage_hri.services.bus.zenoh.readers import Readers
 from engage_hri.services.bus.zenoh.rights import Rights
 from engage_hri.services.bus.zenoh.session import (
@@ -101,12 +101,14 @@ class ZenohHub(Hub):
         self.clocks = Clocks(_clock_name(self._loop, self.run), self._loop.time)
         self._sent = SentLog(self.run)
         self._publishers: dict[str, zenoh.Publisher] = {}
+        self._source = zenoh.SourceInfo(session.id, 0)
         self._buses: dict[str, ZenohBus] = {}
         self._pulse: asyncio.TimerHandle | None = None
         self._closed = False
         self.peers = Peers(session, self.bridge, self._sent, self.clocks, places)
-        self.readers = Readers(session, self.bridge, self._sent, self.peers, rights.trusts if rights else None)
-        self._foreign = ForeignClients(session, self.bridge)
+        self._history = History(session, self.bridge, self._sent)
+        trusts = rights.trusts if rights else None
+        self.readers = Readers(session, self.bridge, self._sent, self.peers, self._history, trusts)
         self.peers.stand(self.readers.process_came, self.readers.participant_changed)
 
     @property
@@ -158,7 +160,7 @@ class ZenohHub(Hub):
         if self._pulse is not None:
             self._pulse.cancel()
         self.readers.close()
-        self._foreign.close()
+        self._history.close()
         self.peers.close()
         for publisher in self._publishers.values():
             publisher.undeclare()  # type: ignore[no-untyped-call]
@@ -174,14 +176,15 @@ class ZenohHub(Hub):
         payload, encoding = published(message)
         stamp = self.session.new_timestamp()
         if ordered:
-            written = self._sent.write(key, encoding, payload, bus.name, self.clocks.own, now)
+            written = self._sent.write(key, encoding, payload, bus.name, self.clocks.own, now, stamp)
             envelope = written.envelope
-            self._foreign.note(written, stamp)
             if self._pulse is None:
                 self._pulse = self._loop.call_later(FIRST_PULSE, self._send_pulse)
         else:
-            envelope = Envelope(bus.name, self.clocks.own, now, self.run)
-        self._publisher(key, ordered).put(payload, encoding=encoding, attachment=pack(envelope), timestamp=stamp)
+            envelope = Envelope(bus.name, self.clocks.own, now)
+        self._publisher(key, ordered).put(
+            payload, encoding=encoding, attachment=pack(envelope), timestamp=stamp, source_info=self._source
+        )
         self.readers.offer(Received(key, message, bus.name, now, life=self.run))
 
     def _publisher(self, key: str, ordered: bool) -> zenoh.Publisher:
@@ -194,12 +197,10 @@ class ZenohHub(Hub):
 
     def _send_pulse(self) -> None:
         """Publish the recent counts, a few times: they show a receiver that it lost the last message of a burst."""
-        counts = self._sent.recent(self._loop.time())
-        self._pulse = self._loop.call_later(NEXT_PULSE, self._send_pulse) if counts else None
-        if counts:
-            self._publisher(keys.own(self.run, "pulse"), True).put(
-                pack(Pulse(counts)), encoding="application/msgpack"
-            )
+        recent = self._sent.recent(self._loop.time())
+        self._pulse = self._loop.call_later(NEXT_PULSE, self._send_pulse) if recent.counts else None
+        if recent.counts:
+            self._publisher(keys.own(self.run, "pulse"), True).put(pack(recent), encoding="application/msgpack")
 
 
 class ZenohBus(Bus):

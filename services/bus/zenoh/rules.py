@@ -16,7 +16,7 @@ EVERY_KIND = (
 )  # fmt: skip
 ANYTHING = ("**", f"*/{keys.ANY_TOKEN}")
 """Expressions for all keys: no wildcard includes the `@` of the bus' own."""
-_ANY_PAST = tuple(keys.of_class(kind) for kind in ("state", "evt", "cmd"))
+_ANY_PAST = tuple(map(keys.of_class, keys.KEPT_CLASSES))
 """What all processes answer about what they have published. Each reply is checked under its own key."""
 
 
@@ -56,12 +56,12 @@ def _grants(holder: Holder) -> Iterator[tuple[str, str, tuple[str, ...]]]:
         for does in ("publishes", "subscribes", "serves", "asks")
     )
     runs = f"{holder.mark}$*"
-    answered = tuple(keys.own(runs, subject) for subject in ("past", "counts", "clock", "flush"))
+    answered = tuple(keys.own(runs, subject) for subject in ("counts", "clock", "flush"))
     shown = (
         keys.own(runs, "process"), keys.own(runs, "at/**"), keys.own(runs, "answers/**"),
         *_named((keys.own(runs, f"alive/{OWN}"),), holder.name),
     )  # fmt: skip
-    asked = tuple(keys.own("*", subject) for subject in ("past", "clock", "flush"))
+    asked = tuple(keys.own("*", subject) for subject in ("clock", "flush"))
     yield "ingress", "put", (*publishes, keys.own(runs, "pulse"))
     yield "ingress", "declare_subscriber", (*subscribes, keys.ANY_PULSE)
     yield "ingress", "declare_queryable", (*serves, *answered, *_ANY_PAST)
