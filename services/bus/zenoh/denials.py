@@ -11,11 +11,14 @@ import sys
 from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
+from select import select
 
 import zenoh
 
-LEVELS = "error,zenoh_link_tls=debug,zenoh::net::routing::interceptor::access_control=trace"
-"""Parts of Zenoh's log that tell of refusals, and all errors."""
+LEVELS = (
+    "error,zenoh_link_tls=debug,zenoh::net::routing::interceptor::access_control=trace,zenoh::net::routing::hat=off"
+)
+"""Parts of Zenoh's log that tell of refusals, and all errors but those about the end of what was denied."""
 MOST = 1000
 """Number of different refusals that are told; a flood of them fills neither log nor memory."""
 PIPE = 2**20
@@ -104,13 +107,33 @@ class Denials:
             self._tell(f"{news} ({times} times)")
 
 
+class Unhurried:
+    """Teller that never waits for a reader: one who stops reading the router's lines must not stop the router.
+
+    file: where `tell` writes to.
+    """
+
+    def __init__(self, tell: Callable[[str], None], file: int) -> None:
+        self._tell = tell
+        self._file = file
+        self._lost = 0
+
+    def __call__(self, line: str) -> None:
+        if not select([], [self._file], [], 0)[1]:
+            self._lost += 1
+            return
+        lost, self._lost = self._lost, 0
+        self._tell(f"{line} ({lost} lines before it are lost: nobody read)" if lost else line)
+
+
 @contextmanager
-def telling_denials(tell: Callable[[str], None]) -> Iterator[None]:
+def telling_denials(tell: Callable[[str], None]) -> Iterator[Callable[[str], None]]:
     """Tell what is refused while the body of `with` runs; Zenoh sessions are opened in it. Once in a process.
 
-    Standard output is Zenoh's meanwhile; Python's `sys.stdout` goes where it went before.
+    Standard output is Zenoh's meanwhile; Python's `sys.stdout` goes where it went before. Gives a `tell` that
+    waits for no reader.
     """
-    loop, denials, rest = asyncio.get_running_loop(), Denials(tell), b""
+    loop, rest = asyncio.get_running_loop(), b""
     coming, going = os.pipe2(os.O_NONBLOCK | os.O_CLOEXEC)
     os.set_blocking(going, True)
     with suppress(ImportError, OSError):
@@ -127,6 +150,8 @@ def telling_denials(tell: Callable[[str], None]) -> Iterator[None]:
 
     before, kept = sys.stdout, os.dup(1)
     before.flush()
+    unhurried = Unhurried(tell, kept)
+    denials = Denials(unhurried)
     levels = os.environ.get("RUST_LOG")
     os.environ["RUST_LOG"] = LEVELS
     zenoh.init_log_from_env_or(LEVELS)
@@ -138,7 +163,7 @@ def telling_denials(tell: Callable[[str], None]) -> Iterator[None]:
     sys.stdout = open(kept, "w", closefd=False)  # noqa: SIM115 - closed below
     loop.add_reader(coming, read)
     try:
-        yield
+        yield unhurried
     finally:
         loop.remove_reader(coming)
         os.dup2(kept, 1)

@@ -31,7 +31,7 @@ async def routing(
         more: dict[str, object] = {}
         if keys_of_router is not None:
             more = _closed(keys_of_router, (*listen, *connect))
-            stack.enter_context(telling_denials(tell))
+            tell = stack.enter_context(telling_denials(tell))
         async with _passing_on(open_router(connect, listen, more), tell):
             yield
 
