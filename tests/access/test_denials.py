@@ -70,13 +70,27 @@ def test_a_refused_link_is_told_without_the_guess_about_files() -> None:
     ]
 
 
+def test_a_key_with_line_ends_is_one_line_and_does_nothing_to_a_terminal() -> None:
+    lie = f"{BOB.replace('bob', 'alice')} is unauthorized to Put (ingress) on KEY"
+    assert told(*f"{checked('Put', key='x')}\n{lie}".split("\n")) == ["denied: robot/manager/bob may not put x"]
+    assert "\x1b" not in told(checked("Put", key="x\x1b]0;title\x07"))[0]
+
+
 def test_a_flood_is_told_in_few_lines() -> None:
     assert told(*[checked("Put")] * 150) == [
         f"denied: robot/manager/bob may not put {KEY}{times}" for times in ("", " (10 times)", " (100 times)")
     ]
     many = told(*[checked("Put", key=f"k{number}") for number in range(MOST + 50)])
     assert len(many) == MOST + 2
-    assert many[-2:] == ["more is refused than can be told", "more is refused than can be told (10 times)"]
+    more = "more of what robot/manager/bob does is refused than can be told"
+    assert many[-2:] == [more, f"{more} (10 times)"]
+
+
+def test_a_flood_of_one_does_not_hide_another() -> None:
+    flood = [checked("Put", key=f"k{number}") for number in range(MOST + 50)]
+    assert (
+        told(*flood, checked("Put").replace("bob", "alice"))[-1] == f"denied: robot/manager/alice may not put {KEY}"
+    )
 
 
 def test_one_who_does_not_read_holds_nothing_up() -> None:

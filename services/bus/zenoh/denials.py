@@ -15,12 +15,14 @@ from select import select
 
 import zenoh
 
+from engage_hri.schemas.utf8 import printable
+
 LEVELS = (
     "error,zenoh_link_tls=debug,zenoh::net::routing::interceptor::access_control=trace,zenoh::net::routing::hat=off"
 )
 """Parts of Zenoh's log that tell of refusals, and all errors but those about the end of what was denied."""
-MOST = 1000
-"""Number of different refusals that are told; a flood of them fills neither log nor memory."""
+MOST = 200
+"""Number of different refusals of one holder that are told; a flood of them fills neither log nor memory."""
 PIPE = 2**20
 """Bytes of the log that may wait for the loop; beyond, the router waits."""
 _COLOR = re.compile(rb"\x1b\[[0-9;]*m")
@@ -34,7 +36,7 @@ _LAST_CACHED = "Declare Liveliness Subscriber"
 _ACCEPTED = re.compile(r"Accepted TLS connection .*Common Name: (?P<name>.*)\.$")
 _NOBODY = re.compile(r"(?P<zid>[0-9a-f]+) did not match any configured ACL subject")
 _REFUSED = re.compile(r"zenoh_link_tls\S*: (?P<reason>.*?)(?:\. Hint: .*)?$")
-_LEVEL = re.compile(r"^\S+ +(?P<level>[A-Z]+) ")
+_LEVEL = re.compile(r"\d{4}-\d\d-\d\dT\S+Z +(?P<level>[A-Z]+) ")
 
 
 class Denials:
@@ -53,12 +55,16 @@ class Denials:
         self._caching: dict[str, tuple[str, str]] = {}
         """Flow and key for which permissions are being worked out, by thread."""
         self._count: Counter[str] = Counter()
+        self._kinds: Counter[str] = Counter()
+        """Number of different refusals, by what they are about."""
 
     def feed(self, line: bytes) -> None:
         """Take a line of the log."""
         if b"Using cached result" in line and b"unauthorized" not in line:
             return  # by far the most
         text = _COLOR.sub(b"", line).decode(errors="replace").strip()
+        if (level := _LEVEL.match(text)) is None:
+            return  # the rest of a line: a key may have line ends
         found = _THREAD.search(text)
         thread = found[1] if found else ""
         if (checked := _CHECKED.search(text)) is not None:
@@ -71,7 +77,7 @@ class Denials:
             name = self._accepted.get(thread, "somebody")
             self._know(nobody["zid"], name)
             self._say(f"denied: {name} has a certificate, but is not let in: it may do nothing")
-        elif (level := _LEVEL.match(text)) is not None and level["level"] in ("WARN", "ERROR"):
+        elif level["level"] in ("WARN", "ERROR"):
             refused = _REFUSED.search(text)
             self._say(f"refused a link: {refused['reason']}" if refused else f"zenoh: {text}")
 
@@ -87,18 +93,23 @@ class Denials:
         # What is kept from somebody is nothing that they did; and the end of what never began is no news.
         if checked["verdict"] and checked["flow"] == "ingress" and not checked["what"].startswith("Undeclare"):
             who = self._names.get(checked["zid"], f"process {checked['zid']}")
-            self._say(f"denied: {who} may not {checked['what'].lower()} {checked['key']}")
+            self._say(f"denied: {who} may not {checked['what'].lower()} {checked['key']}", f"of what {who} does")
 
     def _know(self, zid: str, name: str) -> None:
         if zid not in self._names and len(self._names) >= MOST:
             self._names.pop(next(iter(self._names)))
         self._names[zid] = name
 
-    def _say(self, news: str) -> None:
+    def _say(self, news: str, part: str = "") -> None:
+        """Tell it, if it is new, or has come ten times as often. part: what one flood of news shall not hide."""
+        news = printable(news)
         # The time in a reason makes every refusal of an expired certificate another one.
         kind = re.sub(r"\d+", "0", news) if news.startswith("refused") else news
-        if kind not in self._count and len(self._count) >= MOST:
-            kind = news = "more is refused than can be told"
+        if kind not in self._count:
+            if self._kinds[part] >= MOST:
+                kind = news = f"more {part or 'that comes'} is refused than can be told"
+            else:
+                self._kinds[part] += 1
         self._count[kind] += 1
         times = self._count[kind]
         if times == 1:
