@@ -91,7 +91,7 @@ async def test_who_comes_back_under_a_question_is_asked_once_more_after_it(pair:
     told = await waiting.get()
 
     # The answer to the first question is from before the cut: it has nothing new.
-    told(there.run, Past({keys.WORLD: 1}, 1, ()))
+    told(there.run, Past({keys.WORLD: 1}, ()))
 
     assert numbers(await messages(inbox)) == [2]
     assert len(asked) == 2
