@@ -17,10 +17,12 @@ from engage_hri.schemas.recognition import OpenEvents
 from engage_hri.schemas.requests import Accepted
 from engage_hri.schemas.status import AskStatus
 from engage_hri.services.bus.interface import Bus
+from engage_hri.services.bus.zenoh import session as zenoh_session
 from engage_hri.services.bus.zenoh.history import BATCH
 from engage_hri.services.bus.zenoh.hub import ZenohHub, open_hub
 from engage_hri.services.runtime.service import Ready, running
 from tests.bus.places import PATIENCE, acquainted, echo, free_endpoint, messages, numbers, state
+from tests.commanding import command
 
 pytestmark = pytest.mark.real_time
 
@@ -277,3 +279,39 @@ async def test_one_key_of_one_process_can_be_asked_for(town: Town):
 
     assert {str(each.replier_id.zid): texts([each.ok]) for each in both} == {near.run: ["1"], far.run: ["2"]}  # type: ignore[list-item,union-attr]
     assert texts([each.ok for each in one]) == ["2"]  # type: ignore[misc]
+
+
+async def test_who_may_not_publish_on_a_key_hands_out_nothing_for_it(monkeypatch: pytest.MonkeyPatch):
+    """The rules know one process by its id. It keeps what it could not publish, and is asked for it."""
+    robot, end, viewer = f"ruled-{os.getpid()}", free_endpoint(), "abc1"
+    rule = {"id": "no commands", "permission": "deny", "flows": ["ingress"], "messages": ["put", "reply"]}
+    rules = {
+        "enabled": True, "default_permission": "allow",
+        "rules": [rule | {"key_exprs": [f"{robot}/{keys.of_class('cmd')}"]}],
+        "subjects": [{"id": "viewer", "zids": [viewer]}],
+        "policies": [{"rules": ["no commands"], "subjects": ["viewer"]}],
+    }  # fmt: skip
+    make = zenoh_session._config
+
+    def ruled(robot: str, connect: Any, listen: Any, mode: str) -> zenoh.Config:
+        config = make(robot, connect, listen, mode)
+        here = end in listen
+        config.insert_json5("access_control" if here else "id", json.dumps(rules if here else viewer))
+        return config
+
+    monkeypatch.setattr(zenoh_session, "_config", ruled)
+    near, far = await open_hub(robot, listen=[end]), await open_hub(robot, connect=[end])
+    await acquainted(near, far)
+    there = far.join("viewer")
+    assert far.run == viewer
+    command(there, keys.FRAGMENT, state(1))
+    there.publish(keys.FEEDBACK, state(2))
+
+    inbox = near.join("generation").subscribe(keys.commands("generation"), keys.FEEDBACK)
+    command(there, keys.FRAGMENT, state(3))
+    there.publish(keys.FEEDBACK, state(4))
+
+    assert numbers(await messages(inbox, 2)) == [2, 4]
+    assert await inbox.next(near.join("timer").now() + 1.5) is None  # after the next pulse, too
+    await far.close()
+    await near.close()

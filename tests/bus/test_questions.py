@@ -10,7 +10,7 @@ import pytest_asyncio
 from engage_hri.schemas import keys
 from engage_hri.services.bus.zenoh.hub import ZenohHub, open_hub
 from engage_hri.services.bus.zenoh.order import Missing, Past
-from engage_hri.services.bus.zenoh.readers import TRIES
+from engage_hri.services.bus.zenoh.readers import RUNS_KEPT, TRIES
 from tests.bus.places import acquainted, free_endpoint, messages, numbers, state
 
 pytestmark = pytest.mark.real_time
@@ -91,7 +91,19 @@ async def test_who_comes_back_under_a_question_is_asked_once_more_after_it(pair:
     told = await waiting.get()
 
     # The answer to the first question is from before the cut: it has nothing new.
-    told(there.run, Past({keys.WORLD: 1}, 1, ()))
+    told(there.run, Past({keys.WORLD: 1}, ()))
 
     assert numbers(await messages(inbox)) == [2]
     assert len(asked) == 2
+
+
+async def test_processes_that_come_and_go_are_forgotten_but_none_that_is_there(pair: tuple[ZenohHub, ZenohHub]):
+    here, there = pair
+    inbox = here.join("here").subscribe(keys.WORLD)
+    assert numbers(await messages(inbox)) == [1]
+    for number in range(2 * RUNS_KEPT):
+        here.readers.process_came(f"run-{number}")
+    [reader] = here.readers._readers
+
+    assert len(reader.followers) == RUNS_KEPT
+    assert there.run in reader.followers

@@ -47,11 +47,11 @@ class _Answer:
         self.parts: list[Counts] = []
 
     def past(self) -> Past:
-        counts: dict[str, int] = {}
+        counts: Counts = {}
         for part in self.parts:
-            for key, nth in part.counts.items():
+            for key, nth in part.items():
                 counts[key] = max(nth, counts.get(key, 0))
-        return Past(counts, min(part.number for part in self.parts), tuple(self.written))
+        return Past(counts, tuple(self.written))
 
 
 class History:
@@ -153,7 +153,7 @@ class History:
             parts.setdefault(one.key, []).append((one.key, one.encoding, one.payload, one.envelope))
         for key, part in parts.items():
             query.reply(key, pack(part))
-        query.reply(keys.own(self._sent.run, "counts"), pack(Counts(past.counts, past.number)))
+        query.reply(keys.own(self._sent.run, "counts"), pack(past.counts))
         finish(query)
 
     def _answer(self, query: zenoh.Query, waiting: deque[Written], form: str) -> None:

@@ -198,8 +198,8 @@ class ZenohHub(Hub):
     def _send_pulse(self) -> None:
         """Publish the recent counts, a few times: they show a receiver that it lost the last message of a burst."""
         recent = self._sent.recent(self._loop.time())
-        self._pulse = self._loop.call_later(NEXT_PULSE, self._send_pulse) if recent.counts else None
-        if recent.counts:
+        self._pulse = self._loop.call_later(NEXT_PULSE, self._send_pulse) if recent else None
+        if recent:
             self._publisher(keys.own(self.run, "pulse"), True).put(pack(recent), encoding="application/msgpack")
 
 

@@ -53,31 +53,27 @@ class Written(Struct, frozen=True, array_like=True):
     stamp: object = None
 
 
+Counts = dict[str, int]
+"""Counts of a process, by key: a receiver with a lower one has missed something."""
+
+
 class Missing(Struct, frozen=True):
-    """A follower's question for the past. seen: its last count, by key. since: -1 if it has never caught up."""
+    """A follower's question for the past. seen: its last count, by key. is_new: it has never caught up."""
 
-    seen: dict[str, int] = {}
-    since: int = -1
-
-
-class Counts(Struct, frozen=True):
-    """Counts of a process by key, at its message `number`: a receiver with a lower one has missed something."""
-
-    counts: dict[str, int]
-    number: int = 0
+    seen: Counts = {}
+    is_new: bool = True
 
 
 class Past(Struct, frozen=True):
     """The answer of a process: what was missing, in order, and its counts of all keys that were asked for."""
 
-    counts: dict[str, int]
-    number: int
+    counts: Counts
     written: tuple[Written, ...]
 
     def of(self, wanted: Callable[[str], bool]) -> "Past":
         """The part of it that is about these keys."""
         counts = {key: nth for key, nth in self.counts.items() if wanted(key)}
-        return Past(counts, self.number, tuple(one for one in self.written if wanted(one.key)))
+        return Past(counts, tuple(one for one in self.written if wanted(one.key)))
 
 
 class SentLog:
@@ -86,7 +82,7 @@ class SentLog:
     def __init__(self, run: str, kept: int = KEPT) -> None:
         self.run = run
         self.number = 0
-        self.counts: dict[str, int] = {}
+        self.counts: Counts = {}
         self._written_at: dict[str, Seconds] = {}
         self._kept: deque[Written] = deque(maxlen=kept)
         self._states: dict[str, Written] = {}
@@ -114,21 +110,19 @@ class SentLog:
             if one.key in counts and self._is_missing(one, missing, oldest)
         ]
         written.sort(key=_number)
-        return Past(counts, self.number, tuple(written))
+        return Past(counts, tuple(written))
 
     def _is_missing(self, one: Written, missing: Missing, oldest: Seconds) -> bool:
         is_state = one.key in self._states
-        if (seen := missing.seen.get(one.key)) is not None:
-            # Who has seen more than there was took a forged state for the last one.
-            return one.envelope.nth > seen or (is_state and seen > self.counts[one.key])
-        if missing.since >= 0:
-            return one.envelope.number > missing.since
-        return is_state or one.envelope.sent >= oldest
+        seen = missing.seen.get(one.key, 0)
+        if missing.is_new and not seen:
+            return is_state or one.envelope.sent >= oldest
+        # Who has seen more than there was took a forged state for the last one.
+        return one.envelope.nth > seen or (is_state and seen > self.counts[one.key])
 
     def recent(self, now: Seconds) -> Counts:
         """Counts of the keys written in the last `PULSE_FOR`."""
-        counts = {key: self.counts[key] for key, at in self._written_at.items() if now - at <= PULSE_FOR}
-        return Counts(counts, self.number)
+        return {key: self.counts[key] for key, at in self._written_at.items() if now - at <= PULSE_FOR}
 
 
 class Follower:
@@ -147,8 +141,8 @@ class Follower:
         self.gaps = 0
         self.lost = 0
         self.forged = 0
-        self._since = -1
-        self._seen: dict[str, int] = {}
+        self._is_new = True
+        self._seen: Counts = {}
         self._last: dict[str, Envelope] = {}
         """Envelope of the last message delivered, by key."""
         self._held: list[Written] = []
@@ -179,7 +173,7 @@ class Follower:
 
     def pulse(self, pulse: Counts) -> None:
         """Compare counts; sets `behind` if a message is missing, or if there was one too many."""
-        for key, nth in pulse.counts.items():
+        for key, nth in pulse.items():
             if nth != self._seen.get(key, 0) and any(keys.matches(pattern, key) for pattern in self.patterns):
                 self._fall_behind()
 
@@ -190,14 +184,14 @@ class Follower:
     def missing(self) -> Missing:
         """Make the question. Its answer decides on all that is held now."""
         self._held_before = len(self._held)
-        return Missing(dict(self._seen), self._since)
+        return Missing(dict(self._seen), self._is_new)
 
     def catch_up(self, past: Past | None) -> list[tuple[Written, bool]]:
         """Take the past (None: there was no answer). Returns the messages to deliver, and whether each is history.
 
         Still `behind` after it: what has come since the question does not join up, and is to be asked for, too.
         """
-        first = self._since < 0
+        first = self._is_new
         held = self._held if past is None else self._disproved(past)
         live = {(one.key, one.envelope.nth) for one in held}
         merged = {(one.key, one.envelope.nth): one for one in chain(held, past.written if past else ())}
@@ -220,7 +214,7 @@ class Follower:
                 seen = self._seen.get(key, 0)
                 self.lost += 0 if first or _may_skip(key) else max(0, nth - seen)
                 self._seen[key] = max(nth, seen)
-            self._since = past.number
+            self._is_new = False
         self._held = unknown
         self.behind = bool(unknown)
         return deliver

@@ -193,7 +193,7 @@ class Peers:
     async def flush(self) -> None:
         """Wait until all known processes have the last messages: an exit right after a put loses most of them."""
         recent = self._sent.recent(self._loop.time())
-        if recent.counts and self.processes:
+        if recent and self.processes:
             done: asyncio.Future[None] = self._loop.create_future()
             question = pack((self._sent.run, recent))
             self.ask(keys.ANY_FLUSH, question, lambda reply: None, lambda _: _resolve(done), FLUSH)
