@@ -293,8 +293,8 @@ async def test_who_may_not_publish_on_a_key_hands_out_nothing_for_it(monkeypatch
     }  # fmt: skip
     make = zenoh_session._config
 
-    def ruled(robot: str, connect: Any, listen: Any, mode: str) -> zenoh.Config:
-        config = make(robot, connect, listen, mode)
+    def ruled(robot: str, connect: Any, listen: Any, mode: str, *more: Any) -> zenoh.Config:
+        config = make(robot, connect, listen, mode, *more)
         here = end in listen
         config.insert_json5("access_control" if here else "id", json.dumps(rules if here else viewer))
         return config
