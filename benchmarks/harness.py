@@ -20,10 +20,10 @@ class Contender(Protocol):
 
 
 class OtherSide:
-    """The process at the other end: this benchmark's file again, as `FILE --serve ROLE ENDPOINT`."""
+    """The process at the other end: this benchmark's file again, as `FILE --serve ROLE ENDPOINT ...`."""
 
-    def __init__(self, file: str, role: str, endpoint: str) -> None:
-        self._command = [sys.executable, file, "--serve", role, endpoint]
+    def __init__(self, file: str, role: str, endpoint: str, *more: str) -> None:
+        self._command = [sys.executable, file, "--serve", role, endpoint, *more]
 
     def __enter__(self) -> Self:
         self._process = subprocess.Popen(self._command, stdout=subprocess.PIPE, text=True)

@@ -81,22 +81,35 @@ class BehaviorInterrupted(Outcome, frozen=True, kw_only=True, tag="behavior_inte
     was_done: bool = False
 
 
+Steer = Literal["hold", "continue", "stop"]
+"""What a performance is told.
+
+- hold: every behavior waits where it next can, at a hold point or between two words; nothing begins, clocks stop,
+  nothing counts as late for it. What is held for longer than `realizer.longest_hold` is stopped.
+- continue: it goes on from there, whoever held it.
+- stop: it ends safely; blocks end as interrupted.
+"""
+
+
 class SteerPerformance(Request, frozen=True, kw_only=True, tag="steer_performance", omit_defaults=True):
-    """cmd: anyone -> realizer: hold what is performed, let it continue, or stop it. Ends in `PerformanceSteered`.
+    """cmd: manager -> realizer: hold a block, let it continue, or stop it. Ends in `PerformanceSteered`.
 
-    to: `hold`: every behavior waits where it next can, at a hold point or between two words; nothing begins, clocks
-    stop, nothing counts as late for it. `continue`: it goes on from there, whoever held it. `stop`: it ends safely;
-    blocks end as interrupted.
-    block: id of a live block; empty: all that the robot performs, and what comes while it is held. behavior: of that
-    block; empty: all of it.
-
-    To continue a block lets all its behaviors go, too, and to continue the robot lets everything go. What is held for
-    longer than `realizer.longest_hold` is stopped.
+    block: id of a live block. behavior: of that block; empty: all of it, so that to continue the block lets all its
+    behaviors go, too.
     """
 
-    to: Literal["hold", "continue", "stop"]
-    block: str = ""
+    to: Steer
+    block: str
     behavior: str = ""
+
+
+class SteerRobot(Request, frozen=True, kw_only=True, tag="steer_robot", omit_defaults=True):
+    """cmd: operator, wizard -> realizer: the same for all that the robot performs. Ends in `PerformanceSteered`.
+
+    What comes while the robot is held waits, too. To continue the robot lets everything go.
+    """
+
+    to: Steer
 
 
 class PerformanceSteered(Outcome, frozen=True, kw_only=True, tag="performance_steered", omit_defaults=True):

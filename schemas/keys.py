@@ -29,6 +29,8 @@ INHIBIT = f"{PREFIX}/cmd/generation/*/*/inhibit"
 BLOCK = f"{PREFIX}/cmd/realizer/*/*/block"
 EVENT = f"{PREFIX}/cmd/recognition/*/*/event"
 TURN = f"{PREFIX}/cmd/recognition/*/*/turn"
+ROBOT = f"{PREFIX}/cmd/realizer/*/*/robot"
+"""For all that the robot performs, whoever asked for it: a key of its own, so that rules can keep it to a few."""
 BEHAVIOR = f"{PREFIX}/cmd/control/*/*/behavior"
 
 FEEDBACK = f"{PREFIX}/evt/realizer/feedback"
@@ -68,10 +70,22 @@ def of_class(kind: KeyClass) -> str:
     return f"{PREFIX}/{kind}/**"
 
 
+KEPT_CLASSES: tuple[KeyClass, ...] = ("state", "evt", "cmd")
+"""Classes of which a late subscriber gets what was published before."""
+
+
+def kept(pattern: str) -> tuple[str, ...]:
+    """Expressions that ask for the past of a pattern: none if it has none, and more than it if its class is open."""
+    name = pattern.split("/")[2:3]
+    if name in (["*"], ["**"]):
+        return tuple(map(of_class, KEPT_CLASSES))
+    return (pattern,) if name and name[0] in KEPT_CLASSES else ()
+
+
 SERVICES = ("generation", "realizer", "recognition", "control")
 """Services that make up a robot."""
-ROLES = ("manager", *SERVICES, "perception", "observer")
-"""Roles of participants. Rules for access are given by role, not by name."""
+ROLES = ("manager", *SERVICES, "perception", "observer", "operator", "wizard")
+"""Roles of participants. What each may do is in schemas/access.py."""
 
 
 def commands(server: str) -> str:
@@ -192,7 +206,7 @@ ANY_FLUSH = f"{PREFIX}/@bus/*/flush"
 def own(run: str, subject: str) -> str:
     """Key of the process with id `run`.
 
-    subject: `process`, `alive/<name>`, `at/<endpoint>`, `pulse`, `past`, `clock` or `flush`.
+    subject: `process`, `alive/<name>`, `at/<endpoint>`, `pulse`, `counts`, `clock` or `flush`.
     """
     return f"{PREFIX}/@bus/{run}/{subject}"
 

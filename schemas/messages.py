@@ -16,6 +16,7 @@ from engage_hri.schemas.blocks import (
     PerformanceSteered,
     PerformBlock,
     SteerPerformance,
+    SteerRobot,
 )
 from engage_hri.schemas.body import (
     AbortBehavior,
@@ -58,8 +59,8 @@ MAJOR = 1
 Message = (
     Heard | Accepted | Outdated | Refused | Cancel | KeepAlive | Unreadable | Fault
     | PerformFragment | FragmentOutcome | TurnClosed | Inhibit | InhibitionEnded | HeadOwner
-    | PerformBlock | BlockOutcome | InterruptBehavior | BehaviorInterrupted | SteerPerformance | PerformanceSteered
-    | Held | NetPlanned | NetMarked | NetWaiting
+    | PerformBlock | BlockOutcome | InterruptBehavior | BehaviorInterrupted | SteerPerformance | SteerRobot
+    | PerformanceSteered | Held | NetPlanned | NetMarked | NetWaiting
     | BlockProgress | SyncPointProgress | PredictionFeedback | WarningFeedback
     | PerformBehavior | AbortBehavior | BehaviorAborted | GoHome | HomeReached | BehaviorOutcome
     | SyncPointArrived | SyncPointReached | WordSpoken | RobotState
@@ -74,6 +75,7 @@ COMMANDS: Mapping[str, tuple[type[Request], ...]] = {
     keys.FRAGMENT: (PerformFragment,),
     keys.INHIBIT: (Inhibit,),
     keys.BLOCK: (PerformBlock, InterruptBehavior, SteerPerformance),
+    keys.ROBOT: (SteerRobot,),
     keys.EVENT: (RequestEvent,),
     keys.TURN: (SignalTurn,),
     keys.BEHAVIOR: (PerformBehavior, AbortBehavior, GoHome),

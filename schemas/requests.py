@@ -21,7 +21,8 @@ class Request(Struct, frozen=True, kw_only=True, omit_defaults=True):
     id: made by the requester; unique among its live requests of all kinds.
     requester: on arrival the participant that the key names; what the sender writes here is ignored.
     life: the life of the requester, so that a restarted one does not get the answers meant for the one before. A
-    program without lives leaves it out; its ended requests are remembered for 10 s, then an id is new again.
+    program without lives leaves it out; its ended requests are remembered for 10 s, then an id is new again. One
+    that begins with `@` is made by `life_of`, and counts only from the process that it names.
     revision: number of changes of the content; the server ignores older content.
     lease: seconds that the request stays alive at its server without being sent again or named by a `KeepAlive`;
     0: until it ends, which control replaces by its `dead_man`.
@@ -52,7 +53,7 @@ class Request(Struct, frozen=True, kw_only=True, omit_defaults=True):
 
 
 class Cancel(Request, frozen=True, kw_only=True, tag="cancel", omit_defaults=True):
-    """cmd: end one's own request `id`, as interrupted.
+    """cmd: end one's own request `id`, as interrupted. It counts only from the process that has asked.
 
     of: the kind of that request, its `type`; empty: any kind.
     """
@@ -144,13 +145,12 @@ def kind_of(request: Request) -> str:
 
 def life_of(run: str, number: int) -> str:
     """Id of one requester's life. number: of the requester, in this run of a participant."""
-    return f"{run[:16]}.{number}"
+    return f"@{run[:16]}.{number}"
 
 
 def is_life_of(life: str, run: str) -> bool:
     """Tell whether a life can belong to a run. False only for a life made by `life_of` in another run."""
-    before, _, number = life.rpartition(".")
-    return not (before and number.isdecimal()) or before == run[:16]
+    return not life.startswith("@") or life[1:].rpartition(".")[0] == run[:16]
 
 
 def kind_meant(request: Request) -> str:

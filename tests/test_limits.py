@@ -65,6 +65,27 @@ async def test_one_fragment_too_many_is_refused_and_the_others_are_performed(hub
     assert all("`generation.fragments` is the limit" in str(each) for each in outcomes[5:])
 
 
+async def test_a_world_whose_publisher_has_crashed_is_waited_for_as_at_start(hub: MemoryHub) -> None:
+    ann = Entity(id="ann", kind="person", position=(1.2, 0.0, 1.2))
+    config, world = load(), World(entities=(ann,))
+    services = {name: roster.service(name, config) for name in roster.ROBOT}
+    fragments = [TurnFragment(id=id, turn_status="full", behaviors=(Speech(id="s", text="hello"),)) for id in "abc"]
+    patience = GenerationConfig().world_patience
+    async with running(hub, services), connect(hub=hub) as robot:
+        async with running(hub, {"camera": partial(show_world, world=world)}):
+            assert (await robot.perform(fragments[0])).status == "done"
+            hub.kill("camera")
+        since = robot.now()
+        with pytest.raises(InputRefused, match="the world is unknown"):
+            await robot.perform(fragments[1])
+        assert robot.now() - since == pytest.approx(patience, abs=0.1)
+        waiting = asyncio.create_task(robot.perform(fragments[2]))
+        await asyncio.sleep(patience / 2)
+        assert not waiting.done()
+        async with running(hub, {"camera": partial(show_world, world=world)}):
+            assert (await waiting).status == "done"
+
+
 @pytest.mark.parametrize("comes", [True, False])
 async def test_a_fragment_waits_for_the_first_person(hub: MemoryHub, comes: bool) -> None:
     cup = Entity(id="cup", kind="object", position=(0.5, 0.0, 0.8))

@@ -27,6 +27,9 @@ class BusConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     another, as is quickest on one machine. auto: client if an endpoint to connect to is on another machine."""
     connect: tuple[str, ...] = ()
     """Endpoints to connect to, `tcp/HOST:PORT`. None: the processes of this machine find one another."""
+    keys: str = ""
+    """Folder of keys that `engage keys` has made, of one holder or of all. With keys, processes connect to a router
+    by `tls/HOST:PORT` (without `connect`: to one on this machine), and do only what the holder's role may."""
 
     def __post_init__(self) -> None:
         if not self.robot or not set(self.robot).isdisjoint("/*$#?@ "):
@@ -35,8 +38,12 @@ class BusConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
         for endpoint in self.connect:
             if not is_endpoint(endpoint):
                 raise ValueError(f"{endpoint!r} is not an endpoint, {ADVICE}")
-        if self.mode == "client" and not self.connect:
+        if self.mode == "client" and not self.connect and not self.keys:
             raise ValueError("mode 'client' takes an endpoint in `connect`")
+        if self.keys and self.mode == "peer":
+            raise ValueError("mode 'peer' with keys: the rules are the router's, so all are its clients")
+        if self.keys and (plain := [each for each in self.connect if not is_encrypted(each)]):
+            raise ValueError(f"{plain[0]!r} with keys: connect to tls/HOST:PORT")
 
 
 def is_endpoint(text: str) -> bool:
@@ -45,14 +52,21 @@ def is_endpoint(text: str) -> bool:
     return match is not None and int(match["port"]) <= 65535
 
 
+def is_encrypted(endpoint: str) -> bool:
+    """True for an endpoint whose link is encrypted."""
+    return endpoint.startswith("tls/")
+
+
 def is_on_this_machine(endpoint: str) -> bool:
     """True for an endpoint that only processes of this machine can reach."""
     match = ENDPOINT.fullmatch(endpoint)
     return match is not None and _OWN.fullmatch(match["host"]) is not None
 
 
-def mode_of(mode: Mode, connect: Sequence[str], listen: Sequence[str]) -> Literal["peer", "client"]:
+def mode_of(mode: Mode, connect: Sequence[str], listen: Sequence[str], keys: str = "") -> Literal["peer", "client"]:
     """The mode in which to come to the bus. Others can connect to a peer only, so who listens is one."""
+    if keys:
+        return "client"
     if mode == "auto":
         return "client" if not listen and not all(map(is_on_this_machine, connect)) else "peer"
     return mode

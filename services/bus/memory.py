@@ -88,7 +88,7 @@ class MemoryHub(Hub):
             try:
                 message = decode(payload, encoding)
             except InputRefused as error:  # as on a wire: the receivers refuse it, not the sender
-                self._refuse(key, error, payload, encoding)
+                self._refuse(key, error, payload, encoding, self._buses[sender].run)
                 return
         life = self._buses[sender].run
         self._pass_on(sender, Received(key, message, sender, self._loop.time(), life=life))
@@ -98,22 +98,25 @@ class MemoryHub(Hub):
         payload = encode(message)
         return decode(payload) if self._decodes else message
 
-    def inject(self, key: str, payload: bytes, encoding: str) -> None:
-        """Send a payload from outside, as another program would. A bad one is answered with a Fault."""
+    def inject(self, key: str, payload: bytes, encoding: str, life: str = "") -> None:
+        """Send a payload from outside, as another program would. A bad one is answered with a Fault.
+
+        life: of the connection that it comes by.
+        """
         try:
             message = read_payload(payload, encoding, key, "")
         except InputRefused as error:
-            self._refuse(key, error, payload, encoding)
+            self._refuse(key, error, payload, encoding, life)
         else:
-            self._pass_on("", Received(key, message, "", self._loop.time()))
+            self._pass_on("", Received(key, message, "", self._loop.time(), life=life))
 
-    def _refuse(self, key: str, error: InputRefused, payload: bytes, encoding: str) -> None:
+    def _refuse(self, key: str, error: InputRefused, payload: bytes, encoding: str, life: str = "") -> None:
         for bus in [bus for bus in self._buses.values() if bus.wants(key)]:
             bus.publish(keys.fault(bus.name), msgspec.structs.replace(error.fault, where=key, service=bus.name))
         refused = unreadable(error, key, payload, encoding)
         if refused is not None and (server := self._buses.get(keys.server_of(key))):
             self.sent += 1
-            server.deliver(Received(key, refused, "", self._loop.time()), self.sent)
+            server.deliver(Received(key, refused, "", self._loop.time(), life=life), self.sent)
 
     def _pass_on(self, sender: str, received: Received) -> None:
         self.sent += 1

@@ -1,10 +1,17 @@
 """Holding, continuing and ending what the robot performs, for its collaboration manager."""
 
 from abc import ABC, abstractmethod
-from typing import Literal
 
 from engage_hri.schemas import keys
-from engage_hri.schemas.blocks import BehaviorInterrupted, InterruptBehavior, PerformanceSteered, SteerPerformance
+from engage_hri.schemas.blocks import (
+    BehaviorInterrupted,
+    InterruptBehavior,
+    PerformanceSteered,
+    Steer,
+    SteerPerformance,
+    SteerRobot,
+)
+from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.requests import Outcome, Request
 from engage_hri.schemas.units import Seconds
 
@@ -46,12 +53,12 @@ class Steering(ABC):
         begins, clocks stop, and nothing counts as late for it. What is held for longer than `realizer.longest_hold`
         is stopped.
 
-        block: its id; empty: everything, and what comes meanwhile.
+        block: its id; empty: everything, and what comes meanwhile. Rules for access may keep that to operators.
         behavior: its id within the block; empty: all of it.
         timeout: seconds to wait for the request to be accepted; None: for ever.
 
         Raises:
-            InputRefused: it is not being performed.
+            InputRefused: it is not being performed, or a behavior is given without its block.
             RunFailed: the realizer is gone, or has not come within `timeout`.
         """
         return await self._steer("hold", block, behavior, timeout)
@@ -70,11 +77,14 @@ class Steering(ABC):
         """
         return await self._steer("stop", block, behavior, timeout)
 
-    async def _steer(
-        self, to: Literal["hold", "continue", "stop"], block: str, behavior: str, timeout: Seconds | None
-    ) -> tuple[str, ...]:
+    async def _steer(self, to: Steer, block: str, behavior: str, timeout: Seconds | None) -> tuple[str, ...]:
+        if behavior and not block:
+            raise InputRefused(Fault(reason="a behavior without its block", where=behavior))
         id = self._request_id(":".join((to, *filter(None, (block, behavior)))))
-        request = SteerPerformance(id=id, to=to, block=block, behavior=behavior)
-        outcome = await self._ask(keys.BLOCK, request, timeout)
+        if block:
+            named = SteerPerformance(id=id, to=to, block=block, behavior=behavior)
+            outcome = await self._ask(keys.BLOCK, named, timeout)
+        else:
+            outcome = await self._ask(keys.ROBOT, SteerRobot(id=id, to=to), timeout)
         assert isinstance(outcome, PerformanceSteered)
         return outcome.blocks

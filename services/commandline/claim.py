@@ -20,7 +20,7 @@ from engage_hri.services.bus.interface import Bus, Hub, Subscription
 
 PATIENCE: Seconds = 4.0
 """Time for which a killed `engage up` may still seem to be there."""
-_TOKEN = re.compile(r"(?P<starting>starting-)?up-(?P<id>[0-9a-f]{8})")
+_TOKEN = re.compile(r"up-(?P<starting>starting-)?(?P<id>[0-9a-f]{8})")
 
 
 class StartClaim:
@@ -97,7 +97,7 @@ class Claiming:
 async def claiming(hub: Hub, id: str = "") -> AsyncIterator[Claiming]:
     """Claim a robot while the body of `async with` runs. id: decides between two that are starting; empty: random."""
     id = id or uuid.uuid4().hex[:8]
-    starting, up = hub.join(f"starting-up-{id}"), hub.join(f"up-{id}")
+    starting, up = hub.join(f"up-starting-{id}"), hub.join(f"up-{id}")
     try:
         with starting.subscribe(keys.ANY_ALIVE) as presence:
             starting.declare_alive()

@@ -104,21 +104,31 @@ class Connected(Configured):
         list[str] | None, typer.Option(metavar="ENDPOINT", help="Zenoh endpoint to connect to; may be repeated.")
     ] = None
 
+    keys: Annotated[
+        Path | None, typer.Option(metavar="FOLDER", help="Keys made by `engage keys`.", show_default=False)
+    ] = None
+
     @property
     def overrides(self) -> tuple[str, ...]:
         """Settings of the options, which are stronger than `--set`."""
-        given = {"robot": self.robot, "mode": self.mode, "connect": self.connect}
+        keys = None if self.keys is None else str(self.keys)
+        given = {"robot": self.robot, "mode": self.mode, "connect": self.connect, "keys": keys}
         for option, value in given.items():
             if value and not all(map(is_utf8, [value] if isinstance(value, str) else value)):
                 raise InputRefused(Fault(reason=f"{option} {value!r} is not UTF-8"))
         own = [f"bus.{key}={json.encode(value).decode()}" for key, value in given.items() if value is not None]
         return (*super().overrides, *own)
 
-    async def open(self, bus: "BusConfig", listen: Sequence[str] = ()) -> "Hub":
-        """Open the Zenoh hub. Raises EngageError if an endpoint is bad or taken."""
+    async def open(self, bus: "BusConfig", holder: str, listen: Sequence[str] = ()) -> "Hub":
+        """Open the Zenoh hub. Raises EngageError if an endpoint is bad or taken.
+
+        holder: whose keys to take, where the folder of keys is that of several.
+        """
+        from engage_hri.services.bus.keyring import read_keys
         from engage_hri.services.bus.zenoh.hub import open_hub
 
-        return await open_hub(bus.robot, connect=bus.connect, listen=listen, mode=bus.mode)
+        keys = read_keys(bus.keys, holder) if bus.keys else None
+        return await open_hub(bus.robot, connect=bus.connect, listen=listen, mode=bus.mode, keys=keys)
 
 
 @dataclass(frozen=True, kw_only=True)

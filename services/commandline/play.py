@@ -165,7 +165,7 @@ async def _embedded(job: Job, config: Config, world: World) -> int:
 
 
 async def _remote(job: Job, config: Config) -> int:
-    async with await job.options.open(config.bus) as hub:
+    async with await job.options.open(config.bus, "manager") as hub:
         await _somebody_there(hub, job.servers, config)
         if job.has_fragments:
             async with connect(hub=hub) as robot:

@@ -2,11 +2,15 @@
 
 import sys
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Annotated
 
 import typer
 
+from engage_hri.schemas.access import ROUTER
+from engage_hri.services.bus.keyring import Keys, read_keys
 from engage_hri.services.commandline.process import DONE, forever, run_until_signal
+from engage_hri.services.runtime.configuration import bus_config
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -20,20 +24,28 @@ class Options:
     connect: Annotated[
         list[str] | None, typer.Option(metavar="ENDPOINT", help="Another router; may be repeated.")
     ] = None
+    keys: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FOLDER", help="Keys made by `engage keys`: strangers are refused, and all have a role.",
+            show_default="open to all",
+        ),
+    ] = None  # fmt: skip
 
 
 def main(options: Options) -> int:
     """Route until a signal."""
-    run_until_signal(_route(options))
+    folder = bus_config(keys=str(options.keys or "")).keys
+    run_until_signal(_route(options, read_keys(folder, ROUTER) if folder else None))
     return DONE
 
 
-async def _route(options: Options) -> None:
+async def _route(options: Options, keys: Keys | None) -> None:
     from engage_hri.services.bus.zenoh.router import routing
 
     def tell(line: str) -> None:
         print(line, flush=True)
 
-    async with routing(options.listen, options.connect or (), tell):
+    async with routing(options.listen, options.connect or (), tell, keys):
         print(f"router is ready at {', '.join(options.listen)}", file=sys.stderr, flush=True)
         await forever()

@@ -47,7 +47,7 @@ async def _serve(options: Options, config: RobotConfig) -> None:
         print(ready_line(name), file=sys.stderr, flush=True)
 
     async with AsyncExitStack() as stack:
-        hub = await stack.enter_async_context(await options.open(config.bus, options.listen or ()))
+        hub = await stack.enter_async_context(await options.open(config.bus, name, options.listen or ()))
         if not options.attended:  # `engage up` sees for itself who is there
             await stack.enter_async_context(
                 hinting(hub.join(unique_name("run")), config.bus.connect, {*ROBOT} - {name})

@@ -34,7 +34,10 @@ def main(options: Options) -> int:
 async def _steer(options: Options, config: Config) -> None:
     from engage_hri.services.client.robot import Robot
 
-    async with await options.open(config.bus) as hub, Robot.on(hub.join(unique_name("steer"))) as robot:
+    async with (
+        await options.open(config.bus, "operator") as hub,
+        Robot.on(hub.join(unique_name("steer"), "operator")) as robot,
+    ):
         steer = {"hold": robot.hold, "continue": robot.resume, "stop": robot.stop}[options.to]
         blocks = await steer(options.block, options.behavior, timeout=PATIENCE)
     what = f"{options.block}: {options.behavior}" if options.behavior else ", ".join(blocks)

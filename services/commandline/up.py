@@ -44,7 +44,7 @@ def main(options: Options) -> int:
 
 async def _up(options: Options, config: Config, outputs: Outputs, console: Console) -> None:
     # Our own session comes first and stays, for children find one another through it, and may crash.
-    async with await options.open(config.bus, options.listen or ()) as hub, claiming(hub) as claim:
+    async with await options.open(config.bus, "up", options.listen or ()) as hub, claiming(hub) as claim:
         await claim.granted()
         await hub.wait_until_free(*_names(options))
         bus = claim.bus
@@ -89,7 +89,7 @@ def command(name: str, options: Options, config: Config) -> list[str]:
         *options.overrides,
         f"recognition.gaze_resolution={config.recognition.gaze_resolution}",
         f"simulation.human={config.simulation.human}",
-        f"bus.mode={mode_of(config.bus.mode, config.bus.connect, options.listen or ())}",
+        f"bus.mode={mode_of(config.bus.mode, config.bus.connect, options.listen or (), config.bus.keys)}",
     )
     endpoints = (*(options.listen or ()), *config.bus.connect)
     return [

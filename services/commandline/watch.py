@@ -105,7 +105,7 @@ def main(options: Options) -> int:
 async def _watch(options: Options, config: Config, wanted: Wanted) -> None:
     from engage_hri.services.bus.zenoh.neighbors import hinting
 
-    async with await options.open(config.bus) as hub:
+    async with await options.open(config.bus, "viewer") as hub:
         bus = hub.join(unique_name("watch"))
         # Text without a selection includes what people do and say, but no statistics, which would drown the rest.
         everything = wanted.is_everything and not options.json
@@ -125,7 +125,7 @@ async def _watch(options: Options, config: Config, wanted: Wanted) -> None:
 async def _watch_nets(options: Options, config: Config) -> None:
     from engage_hri.services.bus.zenoh.neighbors import hinting
 
-    async with await options.open(config.bus) as hub:
+    async with await options.open(config.bus, "viewer") as hub:
         bus = hub.join(unique_name("watch"))
         console = Terminal()
         with ExitStack() as shown:

@@ -24,6 +24,7 @@ from engage_hri.services.generation.head.arbiter import Arbiter, Shift
 from engage_hri.services.generation.head.inhibitions import Leases
 from engage_hri.services.requests.ends import RequestDesk, Requester
 from engage_hri.services.requests.serving import GONE, LAPSED
+from engage_hri.services.runtime.publisher import Publisher
 from engage_hri.services.runtime.service import Ready
 
 NAME = "generation"
@@ -66,6 +67,7 @@ class _Generation:
             bus, config, self._desk, self._requests, self._arbiter, self._leases, self._after
         )
         self._objects = objects
+        self._perception = Publisher()
         self._early: dict[str, tuple[PerformFragment, Seconds]] = {}
         """Fragments that wait for a report of the world, or for a person, and until when; by request id."""
         self._changed = asyncio.Event()
@@ -82,18 +84,18 @@ class _Generation:
         now = self._bus.now()
         self._requests.feed(received)
         message = received.message
+        if self._perception.feed(message):
+            self._admit_early(now)
         if (request := self._desk.take(received)) is not None:
             with self._desk.serving(request):
                 self._serve(request, now)
         match message:
             case World():
+                self._perception.published(received.source, received.life)
                 world = self._objects.see(message, now)
                 self._runner.feed(world, now)
                 self._arbiter.feed(world, now)
-                early, self._early = self._early, {}
-                for request, until in early.values():
-                    with self._desk.serving(request):
-                        self._admit(request, now, until)
+                self._admit_early(now)
             case ConnectionEvent():
                 self._runner.feed(message, now)
                 self._arbiter.feed(message, now)
@@ -130,7 +132,7 @@ class _Generation:
 
     def _admit(self, request: PerformFragment, now: Seconds, until: Seconds) -> None:
         """Hand a fragment to the runner, or keep it while the world lacks what it needs. until: when to give up."""
-        world = self._objects.at(now)
+        world = self._world(now)
         if world is None or (now < until and lacks_people(request.fragment, world)):
             self._early[request.id] = (request, until)
             return
@@ -140,8 +142,19 @@ class _Generation:
             self._refuse(request.id, error.fault)
             self._warn(request.fragment.id, "PARSING_FAILURE", str(error.fault))
 
+    def _admit_early(self, now: Seconds) -> None:
+        """Try again with the fragments that wait, now that the world is known or has changed."""
+        early, self._early = self._early, {}
+        for request, until in early.values():
+            with self._desk.serving(request):
+                self._admit(request, now, until)
+
+    def _world(self, now: Seconds) -> World | None:
+        """The world as it probably is; None if it was never reported, or whoever reported it has gone."""
+        return self._objects.at(now) if self._perception.is_there else None
+
     def _grant(self, request: Inhibit, now: Seconds) -> None:
-        world = self._objects.at(now)
+        world = self._world(now)
         try:
             if request.target and world is not None and world.entity(request.target) is None:
                 raise InputRefused(Fault(reason=f"the world does not know {request.target!r}", where=request.id))
@@ -199,7 +212,7 @@ class _Generation:
         for id, (request, until) in list(self._early.items()):
             if now >= until:
                 del self._early[id]
-                if self._objects.at(now) is not None:
+                if self._world(now) is not None:
                     self._admit(request, now, until)  # too late to wait: refuses it for the missing person
                     continue
                 fault = Fault(reason="the world is unknown", where=id, advice="is perception running?")

@@ -10,7 +10,7 @@ from msgspec import Struct, field
 
 from engage_hri.schemas import keys
 from engage_hri.schemas.messages import Message, encode
-from engage_hri.schemas.requests import Answer, Cancel, KeepAlive, Outcome, Refused, Request, kind_meant
+from engage_hri.schemas.requests import Answer, Cancel, KeepAlive, Outcome, Refused, Request, is_life_of, kind_meant
 from engage_hri.schemas.units import Seconds
 
 PATIENCE: Seconds = 3.0
@@ -34,6 +34,7 @@ class Entry(Struct):
     """One request.
 
     is_owed: it has reached its server, which has not been restarted since. is_foreign: no service has sent it.
+    sender: the life of the connection by which it reached its server first.
     """
 
     name: RequestName
@@ -41,6 +42,7 @@ class Entry(Struct):
     role: str
     is_owed: bool
     is_foreign: bool
+    sender: str
     is_cancelled: bool = False
     ends: list[bytes] = field(default_factory=list)
     """Different terminal answers of its server since that was last restarted."""
@@ -63,7 +65,8 @@ class Audit:
         """Record a published message. arrives: its server is alive and gets it. is_foreign: not from a service."""
         match message:
             case Request() | KeepAlive() if key.startswith(f"{keys.PREFIX}/cmd/"):
-                self._ask(key, message, message.life or life, now, arrives, is_foreign)
+                if is_life_of(message.life, life):  # another's life counts for nothing
+                    self._ask(key, message, life, now, arrives, is_foreign)
             case Answer() if sender and key == keys.request_state(sender):
                 self._answer(sender, message, now)
 
@@ -78,6 +81,7 @@ class Audit:
         self, key: str, message: Request | KeepAlive, life: str, now: Seconds, arrives: bool, is_foreign: bool
     ) -> None:
         self.commands += 1
+        sender, life = life, message.life or life
         server, requester = keys.server_of(key), keys.requester_of(key)
         if isinstance(message, KeepAlive):
             for kept in message.live:
@@ -89,9 +93,10 @@ class Audit:
         entry = self.entries.get(name)
         if entry is None and not isinstance(message, Cancel):
             role = key.split("/")[4] if keys.expression_of(key) else "manager"
-            entry = self.entries[name] = Entry(name, now, role, arrives, is_foreign)
+            entry = self.entries[name] = Entry(name, now, role, arrives, is_foreign, sender)
         if entry is not None:
             entry.mentioned_at = now
+            entry.sender = entry.sender if entry.is_owed else sender
             entry.is_owed = entry.is_owed or arrives
             entry.is_cancelled = entry.is_cancelled or isinstance(message, Cancel)
 

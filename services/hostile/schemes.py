@@ -9,7 +9,14 @@ from msgspec.structs import replace
 
 from engage_hri.schemas import keys
 from engage_hri.schemas.attention import Inhibit
-from engage_hri.schemas.blocks import BlockOutcome, InterruptBehavior, PerformBlock, SteerPerformance
+from engage_hri.schemas.blocks import (
+    BlockOutcome,
+    InterruptBehavior,
+    PerformBlock,
+    Steer,
+    SteerPerformance,
+    SteerRobot,
+)
 from engage_hri.schemas.body import AbortBehavior, BehaviorOutcome, GoHome, PerformBehavior
 from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.fragments import FragmentOutcome, PerformFragment
@@ -33,6 +40,7 @@ from engage_hri.services.hostile.typed import NASTY_FLOATS, NASTY_INTS, RandomMe
 IDS = ("1", "2", "3", "same", "1~2")
 """Request ids that all peers share."""
 REMEMBERED = 32
+WISHES: tuple[Steer, ...] = ("hold", "continue", "stop")
 
 
 class Move(Struct, frozen=True):
@@ -171,10 +179,10 @@ class Schemer:
         if kind is InterruptBehavior:
             return InterruptBehavior(id="", block=self._word("block"), behavior=chance.choice(("b1", "b2", "b9")))
         if kind is SteerPerformance:
-            block = chance.choice(("", self._word("block")))
-            named = chance.choice(("", "", "b1")) if block else ""
-            wishes: tuple[Literal["hold", "continue", "stop"], ...] = ("hold", "continue", "stop")
-            return SteerPerformance(id="", to=chance.choice(wishes), block=block, behavior=named)
+            block, named = chance.choice(("", self._word("block"))), chance.choice(("", "", "b1"))
+            return SteerPerformance(id="", to=chance.choice(WISHES), block=block, behavior=named)
+        if kind is SteerRobot:
+            return SteerRobot(id="", to=chance.choice(WISHES))
         if kind is PerformBehavior:
             behavior = plausible.block(chance, name, self._entities).behaviors[0]
             through = chance.choice(("start", "end", "relax"))

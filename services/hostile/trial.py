@@ -328,7 +328,7 @@ class _Trial:
         requester = name.requester if keys.is_chunk(name.requester) else "mallory"
         cancel = Cancel(id=name.id, requester=name.requester, life=name.life, of=name.kind, reason="the end")
         key = keys.command(keys.cancel(name.server), role, requester)
-        self.hub.inject(key, encode(cancel), "application/msgpack")
+        self.hub.inject(key, encode(cancel), "application/msgpack", entry.sender)
 
     # -- the verdict ----------------------------------------------------------------------------------------------
 

@@ -14,6 +14,7 @@ from engage_hri.schemas.blocks import (
     InterruptBehavior,
     PerformBlock,
     SteerPerformance,
+    SteerRobot,
 )
 from engage_hri.schemas.body import (
     GoHome,
@@ -95,7 +96,7 @@ class _Realizer:
                 tasks.create_task(self._perform(live), name=f"block {request.block.id}")
             case InterruptBehavior():
                 tasks.create_task(self.interrupt(request), name=f"interruption {request.id}")
-            case SteerPerformance():
+            case SteerPerformance() | SteerRobot():
                 tasks.create_task(self.steering.steer(request), name=f"steering {request.id}")
             case Cancel():
                 self.cancel(request)

@@ -28,12 +28,13 @@ from engage_hri.schemas.faults import (
     RunFailed,
     ServerRestarted,
 )
-from engage_hri.schemas.messages import COMMANDS, Message
+from engage_hri.schemas.messages import Message
 from engage_hri.schemas.presence import PeerAlive, PeerGone
 from engage_hri.schemas.requests import Accepted, Answer, Cancel, KeepAlive, Outcome, Refused, Request, Unreadable
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.interface import Bus, Containing, Received
 from engage_hri.services.requests import asking, serving
+from engage_hri.services.requests.admission import borrowed, misplaced
 from engage_hri.services.requests.asking import Asking
 from engage_hri.services.requests.asking_table import State
 from engage_hri.services.requests.patience import Patience
@@ -294,6 +295,8 @@ class RequestDesk:
         match message:
             case Unreadable(id=id, life=life, kind=kind, fault=fault) if id:
                 # What could be read names the request, which may be live, or have ended.
+                if borrowed(life, received, self._server) is not None:
+                    return None
                 requester, life = keys.requester_of(received.key), life or received.life
                 known = Cancel(id=id, requester=requester, life=life, of=kind)
                 return self._carry_out(self._serving.refuse(known, fault))
@@ -307,15 +310,23 @@ class RequestDesk:
         # An old command: its requester, if still there, sends it again; one that has left does not want it any more.
         if received.past and (message.life or self._serving.is_there(keys.requester_of(received.key))):
             return None
-        requester = keys.requester_of(received.key) or message.requester
+        sender, requester = received.life, keys.requester_of(received.key) or message.requester
+        if message.requester and message.requester != requester:
+            what = f"{type(message).__name__} of {message.requester!r}"
+            self._bus.log.warning(
+                "%s: %s comes from %r; it counts as the sender's own", self._server, what, requester
+            )
+        if (fault := borrowed(message.life, received, self._server)) is not None:
+            self._bus.publish(keys.fault(self._server), fault)
+            return None
         if requester != message.requester or not message.life:
-            message = replace(message, requester=requester, life=message.life or received.life)
+            message = replace(message, requester=requester, life=message.life or sender)
         if isinstance(message, KeepAlive):
             sent = min(now, self._bus.local(message.at))
-            return self._carry_out(self._serving.keep_alive(message, sent, now))
-        if (fault := _misplaced(message, received.key)) is not None:
+            return self._carry_out(self._serving.keep_alive(message, sent, now, sender))
+        if (fault := misplaced(message, received.key)) is not None:
             return self._carry_out(self._serving.refuse(message, fault))
-        return self._carry_out(self._serving.take(message, now))
+        return self._carry_out(self._serving.take(message, now, sender))
 
     def accept(self, name: str) -> None:
         """Tell the requester that the request is being performed."""
@@ -371,19 +382,3 @@ class RequestDesk:
 
     def close(self) -> None:
         self._alarm.stop()
-
-
-def _misplaced(request: Request, key: str) -> Fault | None:
-    """A fault if this request must not be sent on this key, or has no id; None otherwise."""
-    expression = keys.expression_of(key)
-    expected = COMMANDS.get(expression, ())
-    if request.id and (isinstance(request, expected) or (expression and isinstance(request, Cancel))):
-        return None
-    server, name = keys.server_of(key), type(request).__name__
-    if not request.id:
-        return Fault(reason=f"{name} without an id", where=key, service=server, advice="make one up: `id`")
-    home = next((known for known, kinds in COMMANDS.items() if isinstance(request, kinds)), keys.cancel(server))
-    takes = f"takes {' and '.join(kind.__name__ for kind in expected)}" if expected else "is no command"
-    sender = key.split("/")[4:6] if expression else ["<role>", "<requester>"]
-    advice = f"send it on {home.replace('*/*', '/'.join(sender))}" if home else ""
-    return Fault(reason=f"{name} came on {key}, which {takes}", where=request.id, service=server, advice=advice)

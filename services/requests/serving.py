@@ -29,10 +29,12 @@ from engage_hri.schemas.requests import (
     answering,
     is_life_of,
     kind_meant,
+    kind_of,
 )
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.requests.deadlines import Deadlines
 from engage_hri.services.requests.names import Names
+from engage_hri.services.requests.records import Key, Record, content_of, event_of, key_of
 from engage_hri.services.requests.serving_table import TABLE, Do, Event, State
 
 GRACE: Seconds = 2.0
@@ -78,26 +80,6 @@ class Complain(Struct, frozen=True):
 Effect = Publish | Hand | Complain
 _Cause = Request | Answer | Kept | None
 """The message, or the part of a `KeepAlive`, that is the event; None with all other events."""
-_Key = tuple[str, str, str]
-"""Requester, life and id. Only one request of a key is live at a time."""
-
-
-class _Record:
-    """One request. run: the requester's life by its token. kind: of the request, or of what a cancellation ends."""
-
-    __slots__ = ("answer", "ended_at", "key", "kind", "lease", "name", "request", "run", "state")
-
-    def __init__(self, name: str, request: Request, run: str) -> None:
-        self.name = name
-        self.request = request
-        self.run = run
-        self.key = _key(request)
-        self.kind = kind_meant(request)
-        self.lease = (_LEASE_OVER, name)
-        """Name of its lease among the deadlines."""
-        self.state = _UNKNOWN
-        self.answer: Answer | None = None
-        self.ended_at: Seconds = inf
 
 
 class Serving:
@@ -106,12 +88,12 @@ class Serving:
     def __init__(self, server: str, term: Seconds | None = None) -> None:
         self._server = server
         self._term = term
-        self._known: dict[tuple[_Key, str], _Record] = {}
+        self._known: dict[tuple[Key, str], Record] = {}
         """Requests by key and kind, live or ended."""
-        self._newest: dict[_Key, _Record] = {}
+        self._newest: dict[Key, Record] = {}
         """The newest request of each key, of any kind."""
-        self._named: dict[str, _Record] = {}
-        self._ended: OrderedDict[str, _Record] = OrderedDict()
+        self._named: dict[str, Record] = {}
+        self._ended: OrderedDict[str, Record] = OrderedDict()
         self._names = Names()
         self._runs: dict[str, str] = {}
         self._deadlines: Deadlines[tuple[Event, str]] = Deadlines()
@@ -142,19 +124,23 @@ class Serving:
 
     # -- events ---------------------------------------------------------------------------------------------------
 
-    def take(self, request: Request, now: Seconds) -> list[Effect]:
-        """Take a command that has come; its `requester` is the one that its key names."""
-        key, kind = _key(request), kind_meant(request)
+    def take(self, request: Request, now: Seconds, sender: str = "") -> list[Effect]:
+        """Take a command that has come; its `requester` is the one that its key names.
+
+        sender: the process, or the connection, that it came from; empty if nothing tells.
+        """
+        key, kind = key_of(request), kind_meant(request)
         newest = self._newest.get(key)
         if newest is not None and newest.state is not _ENDED and kind not in ("", newest.kind):
             is_cancel = isinstance(request, Cancel)
             advice = f"`of` is the kind of what it ends: {newest.kind}" if is_cancel else "give it another id"
             self._refuse(request, f"{request.id!r} is the id of a live {newest.kind}", advice)
+        elif (record := self._record(key, kind)) is not None and self._is_claimed(record, sender):
+            self._warn_stranger(request.id, kind_of(request))
         else:
-            record = self._record(key, kind)
-            if record is None or self._is_new(record, request, now):
-                record = self._new(request)
-            self._step(record, _event(record, request), now, request)
+            if record is None or record.sender != sender or self._is_new(record, request, now):
+                record = self._new(request, sender)
+            self._step(record, event_of(record, request), now, request)
         return self._new_effects()
 
     def refuse(self, request: Request, fault: Fault) -> list[Effect]:
@@ -162,19 +148,25 @@ class Serving:
 
         If the same request is live here, or has ended, it stays as it is.
         """
-        record = self._record(_key(request), kind_meant(request))
+        record = self._record(key_of(request), kind_meant(request))
         if record is not None and record.state is not _ENDED:
             return [Complain(fault, False)]
         known = None if record is None else record.answer
         return [Publish(answering(request, known or Refused(id=request.id, fault=fault)))]
 
-    def keep_alive(self, message: KeepAlive, sent: Seconds, now: Seconds) -> list[Effect]:
-        """Renew the requests that a `KeepAlive` names. sent: when it was sent, by local time, not after `now`."""
+    def keep_alive(self, message: KeepAlive, sent: Seconds, now: Seconds, sender: str = "") -> list[Effect]:
+        """Renew the requests that a `KeepAlive` names. sent: when it was sent, by local time, not after `now`.
+
+        sender: as in `take`.
+        """
         for kept in message.live:
             record = self._known.get(((message.requester, message.life, kept.id), kept.kind))
             if record is None:
                 unknown = Cancel(id=kept.id, requester=message.requester, life=message.life, of=kept.kind)
-                record = _Record(kept.id, unknown, "")
+                record = Record(kept.id, unknown, sender, "")
+            elif self._is_claimed(record, sender):
+                self._warn_stranger(kept.id, "keep_alive")
+                continue
             is_newer = record.request.is_updatable and kept.revision > record.request.revision
             self._step(record, Event.EXTENDED if is_newer else Event.NAMED, sent, kept)
         return self._new_effects()
@@ -219,11 +211,11 @@ class Serving:
         effects, self._effects = self._effects, []
         return effects
 
-    def _live_of(self, requester: str) -> Iterable[_Record]:
+    def _live_of(self, requester: str) -> Iterable[Record]:
         live = (record for record in self._named.values() if record.state is not _ENDED)
         return [record for record in live if record.request.requester == requester]
 
-    def _is_new(self, record: _Record, request: Request, now: Seconds) -> bool:
+    def _is_new(self, record: Record, request: Request, now: Seconds) -> bool:
         """True if `request` is another than the one of `record`, which has ended.
 
         With a life it never is. Without one it is taken for another if its content differs, or after `LIFELESS_KEPT`.
@@ -231,30 +223,34 @@ class Serving:
         if record.state is not _ENDED or request.life:
             return False
         may_differ = not isinstance(request, Cancel) and not isinstance(record.request, Cancel)
-        differs = may_differ and _content(request) != _content(record.request)
+        differs = may_differ and content_of(request) != content_of(record.request)
         return differs or now - record.ended_at > LIFELESS_KEPT
 
-    def _record(self, key: _Key, kind: str) -> _Record | None:
+    def _record(self, key: Key, kind: str) -> Record | None:
         """The request of this key and kind; the newest of the key if no kind is given, or that one has none."""
         newest = self._newest.get(key)
         if newest is not None and (not kind or (not newest.kind and (key, kind) not in self._known)):
             return newest
         return self._known.get((key, kind))
 
-    def _new(self, request: Request) -> _Record:
+    def _is_claimed(self, record: Record, sender: str) -> bool:
+        """True if the request is another sender's. A mere cancellation of what has not come yet binds nobody."""
+        return record.sender != sender and not isinstance(record.request, Cancel)
+
+    def _new(self, request: Request, sender: str) -> Record:
         run = self._runs.get(request.requester, "")
         if not is_life_of(request.life, run):
             run = ""  # The token of its new life is still on its way.
         while (name := self._names.unique(request.id)) in self._named:
             pass  # A live request from so long ago that `Names` has forgotten its name has this one.
-        record = _Record(name, request, run)
+        record = Record(name, request, sender, run)
         known = (record.key, record.kind)
         if (before := self._known.get(known)) is not None:
             self._forget(before)
         self._known[known] = self._named[record.name] = self._newest[record.key] = record
         return record
 
-    def _forget(self, record: _Record) -> None:
+    def _forget(self, record: Record) -> None:
         self._ended.pop(record.name, None)
         self._named.pop(record.name, None)
         if self._known.get((record.key, record.kind)) is record:
@@ -262,7 +258,7 @@ class Serving:
         if self._newest.get(record.key) is record:
             del self._newest[record.key]
 
-    def _step(self, record: _Record, event: Event, now: Seconds, cause: _Cause = None) -> None:
+    def _step(self, record: Record, event: Event, now: Seconds, cause: _Cause = None) -> None:
         """Let `event` happen to a request: take its row of the table and do what that says."""
         before = record.state
         record.state, actions = TABLE[before][event]
@@ -279,18 +275,18 @@ class Serving:
 
     # -- actions of the table, each with the message that has caused it -------------------------------------------
 
-    def _hand_asked(self, record: _Record, now: Seconds, cause: _Cause) -> None:
+    def _hand_asked(self, record: Record, now: Seconds, cause: _Cause) -> None:
         assert isinstance(cause, Request)
         if not isinstance(cause, Cancel):
             record.request = cause
         self._hand(record, cause, is_asked=True)
 
-    def _hand_extended(self, record: _Record, now: Seconds, cause: _Cause) -> None:
+    def _hand_extended(self, record: Record, now: Seconds, cause: _Cause) -> None:
         """Hand over the old content with new authority; the answer `Outdated` then asks for the newest content."""
         assert isinstance(cause, Kept)
         self._hand(record, record.request.with_authority(cause.authority))
 
-    def _renew(self, record: _Record, now: Seconds, cause: _Cause) -> None:
+    def _renew(self, record: Record, now: Seconds, cause: _Cause) -> None:
         """Extend the lease. A late message never shortens what a newer one has granted."""
         term = cause.valid if isinstance(cause, Kept) else record.request.term
         if not 0.0 < term < inf:
@@ -299,47 +295,47 @@ class Serving:
             term = self._term
         self._deadlines.set(record.lease, max(self._deadlines[record.lease] or 0.0, now + term))
 
-    def _wait_grace(self, record: _Record, now: Seconds, cause: _Cause) -> None:
+    def _wait_grace(self, record: Record, now: Seconds, cause: _Cause) -> None:
         self._deadlines.set((_GRACE_OVER, record.name), now + GRACE)
 
-    def _stop_grace(self, record: _Record, now: Seconds, cause: _Cause) -> None:
+    def _stop_grace(self, record: Record, now: Seconds, cause: _Cause) -> None:
         self._deadlines.clear((_GRACE_OVER, record.name))
 
-    def _say_outdated(self, record: _Record, now: Seconds, cause: _Cause) -> None:
+    def _say_outdated(self, record: Record, now: Seconds, cause: _Cause) -> None:
         self._effects.append(Publish(answering(record.request, Outdated(id=record.name))))
 
-    def _answer(self, record: _Record, now: Seconds, cause: _Cause) -> None:
+    def _answer(self, record: Record, now: Seconds, cause: _Cause) -> None:
         assert isinstance(cause, Answer)
         record.answer = answering(record.request, cause)
         self._effects.append(Publish(record.answer))
 
-    def _repeat(self, record: _Record, now: Seconds, cause: _Cause) -> None:
+    def _repeat(self, record: Record, now: Seconds, cause: _Cause) -> None:
         """Answer again: the request that comes now, since a cancellation of no kind may have come before it."""
         asks = cause if isinstance(cause, Request) and not isinstance(cause, Cancel) else record.request
         self._effects.append(Publish(answering(asks, record.answer or Heard(id=record.name))))
 
-    def _refuse_unheard(self, record: _Record, now: Seconds, cause: _Cause) -> None:
+    def _refuse_unheard(self, record: Record, now: Seconds, cause: _Cause) -> None:
         reason = f"cancelled before {self._server} had heard of it; it is refused should it come yet"
         fault = self._fault(record.request.id, reason, "a cancellation names requester and life, too")
         self._answer(record, now, Refused(id=record.name, fault=fault))
 
-    def _refuse_forgotten(self, record: _Record, now: Seconds, cause: _Cause) -> None:
+    def _refuse_forgotten(self, record: Record, now: Seconds, cause: _Cause) -> None:
         self._refuse(record.request, f"{self._server} does not know it any more", "send it again under a new id")
 
-    def _warn_different(self, record: _Record, now: Seconds, cause: _Cause) -> None:
+    def _warn_different(self, record: Record, now: Seconds, cause: _Cause) -> None:
         which = "an ended" if record.state is _ENDED else "a live"
         reason = f"{which} {record.kind} of this id has other content, and that counts"
         self._complain(record.request.id, reason, "give what is new another id", is_ours=False)
 
-    def _warn_over(self, record: _Record, now: Seconds, cause: _Cause) -> None:
+    def _warn_over(self, record: Record, now: Seconds, cause: _Cause) -> None:
         assert isinstance(cause, Answer)
         self._warn_ended(record.name, cause, f"has ended already, with {record.answer}")
 
-    def _hand(self, record: _Record, request: Request, *, is_asked: bool = False) -> None:
+    def _hand(self, record: Record, request: Request, *, is_asked: bool = False) -> None:
         named = request if request.id == record.name else replace(request, id=record.name)
         self._effects.append(Hand(named, is_asked))
 
-    def _hand_end(self, record: _Record, now: Seconds, cause: _Cause, *, reason: str) -> None:
+    def _hand_end(self, record: Record, now: Seconds, cause: _Cause, *, reason: str) -> None:
         asked = record.request
         self._hand(record, Cancel(id=asked.id, requester=asked.requester, life=asked.life, reason=reason))
 
@@ -355,33 +351,16 @@ class Serving:
     def _complain(self, where: str, reason: str, advice: str, *, is_ours: bool) -> None:
         self._effects.append(Complain(self._fault(where, reason, advice), is_ours))
 
+    def _warn_stranger(self, id: str, what: str) -> None:
+        advice = "only who has asked can change, renew or cancel a request"
+        self._complain(id, f"{what} of a request that came from another process; ignored", advice, is_ours=False)
+
     def _warn_ended(self, name: str, answer: Answer, why: str) -> None:
         reason = f"request {name} {why}; now {type(answer).__name__}"
         self._complain(name, reason, "a mistake of this service", is_ours=True)
 
 
-def _key(request: Request) -> _Key:
-    return (request.requester, request.life, request.id)
-
-
-def _event(record: _Record, request: Request) -> Event:
-    """The event that this command is for the request of `record`."""
-    if isinstance(request, Cancel):
-        return Event.CANCEL
-    known = record.request
-    if record.state is _UNKNOWN or isinstance(known, Cancel) or request == known:
-        return Event.CAME
-    if not request.is_updatable:
-        return Event.CAME if _content(request) == _content(known) else Event.DIFFERED
-    return Event.CAME if request.revision < known.revision else Event.CHANGED
-
-
-def _content(request: Request) -> Request:
-    """The request without the fields that are no content."""
-    return replace(request, revision=0, lease=0.0)
-
-
-_ACTIONS: Mapping[Do, Callable[[Serving, _Record, Seconds, _Cause], None]] = {
+_ACTIONS: Mapping[Do, Callable[[Serving, Record, Seconds, _Cause], None]] = {
     Do.HAND: Serving._hand_asked,
     Do.HAND_EXTENDED: Serving._hand_extended,
     Do.HAND_CANCEL: Serving._hand_asked,

@@ -13,6 +13,7 @@ from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 
 from engage_hri.schemas import keys
+from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.messages import Message
 from engage_hri.schemas.status import AskStatus, Status
 from engage_hri.schemas.units import Stamp
@@ -27,6 +28,9 @@ async def serve(hub: Hub, name: str, service: Service, ready: Ready = lambda: No
     """Run one service on the hub until it is cancelled or fails. Raises InputRefused if another one is there."""
     await hub.wait_until_free(name)
     bus = hub.join(name, role=name if name in keys.ROLES else "manager")
+    if bus.name != name:
+        reason = f"the keys are those of {bus.name.removesuffix(f'-{name}')!r}, not of {name!r}"
+        raise InputRefused(Fault(reason=reason, where=name, advice="give it the folder of its own keys"))
     joined = bus.stamp()
     since: Stamp | None = None
 

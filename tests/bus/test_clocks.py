@@ -3,7 +3,7 @@ from math import inf
 import pytest
 
 from engage_hri.schemas.units import Stamp
-from engage_hri.services.bus.zenoh.clocks import REFRESH, Clocks
+from engage_hri.services.bus.zenoh.clocks import KEPT, REFRESH, Clocks
 
 
 def test_the_own_clock_needs_no_estimate():
@@ -52,3 +52,12 @@ def test_a_measurement_is_due_again_when_the_clocks_may_have_drifted():
 @pytest.mark.parametrize("clock", ["own", ""])
 def test_the_own_clock_and_none_are_never_measured(clock: str):
     assert not Clocks("own", lambda: 0.0).heard(clock, 0.0, 1e9)
+
+
+def test_clocks_that_come_and_go_are_forgotten():
+    clocks = Clocks("here", lambda: 100.0)
+    for number in range(2 * KEPT):
+        clocks.heard(f"loop-{number}", 50.0, 100.0)
+
+    known = [number for number in range(2 * KEPT) if clocks.local(Stamp(f"loop-{number}", 1.0)) != 100.0]
+    assert known == list(range(KEPT, 2 * KEPT))

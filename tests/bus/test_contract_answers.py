@@ -3,12 +3,15 @@
 import asyncio
 
 import pytest
+from msgspec.structs import replace
 
 from engage_hri.schemas import keys
-from engage_hri.schemas.blocks import PerformBlock
+from engage_hri.schemas.blocks import Block, PerformBlock
 from engage_hri.schemas.faults import Fault, InputRefused, NoReply
 from engage_hri.schemas.messages import encode, encode_json, encoding_of
-from engage_hri.schemas.requests import Accepted, Cancel
+from engage_hri.schemas.requests import Accepted, Cancel, KeepAlive, Kept
+from engage_hri.services.bus.interface import Bus
+from engage_hri.services.requests.ends import RequestDesk
 from tests.bus.places import Place, echo, messages, numbers, state, take
 
 pytestmark = pytest.mark.each_bus
@@ -113,3 +116,39 @@ async def test_other_programs_may_send_bml_as_it_is(place: Place, encoding: str)
     assert isinstance(request, PerformBlock)
     assert (request.id, request.block.id, request.requester) == ("b1", "b1", "me")
     assert [behavior.id for behavior in request.block.behaviors] == ["s1"]
+
+
+@pytest.mark.parametrize("copies", [False, True])
+async def test_a_request_is_cancelled_changed_and_renewed_only_by_who_has_asked(place: Place, copies: bool):
+    """A stranger with a session of its own speaks in the client's name; he may have copied its life, too."""
+    server = (await place.process()).join("realizer")
+    client, stranger = (await place.process()).join("client"), (await place.process()).join("stranger")
+    stopped: list[str] = []
+    desk = RequestDesk(server, "realizer", lambda cancel: stopped.append(cancel.id))
+    inbox = server.subscribe(*RequestDesk.patterns("realizer"))
+    faults = stranger.subscribe(keys.fault("realizer"))
+    life = client.new_life() if copies else "monday"
+    block = PerformBlock(id="b", requester="client", life=life, lease=60.0, block=Block(id="b"))
+    cancel = Cancel(id="b", requester="client", life=life)
+    key, stop = (keys.command(each, "manager", "client") for each in (keys.BLOCK, keys.cancel("realizer")))
+
+    client.publish(key, block)
+    [asked] = await take(inbox)
+    assert desk.take(asked) == block
+    stranger.publish(stop, cancel)
+    stranger.publish(key, replace(block, block=Block(id="c")))
+    stranger.publish(keys.command(keys.keep_alive("realizer"), "manager", "client"), kept(life, stranger))
+    assert [desk.take(received) for received in await take(inbox, 3)] == [None] * 3
+    for fault in await messages(faults, 3):
+        assert "another process" in fault.reason
+    assert desk.is_live("b")
+
+    client.publish(stop, cancel)
+    [withdrawn] = await take(inbox)
+    assert desk.take(withdrawn) == cancel
+    desk.close()
+
+
+def kept(life: str, bus: Bus) -> KeepAlive:
+    live = (Kept("perform_block", "b", 9, "", 1e6),)
+    return KeepAlive(live=live, at=bus.stamp(), requester="client", life=life)

@@ -1,17 +1,27 @@
 """The numbering behind the Zenoh bus, without Zenoh: whatever the wire loses, repeats or reorders."""
 
+from typing import Any
+
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from engage_hri.schemas import keys
-from engage_hri.services.bus.zenoh.order import Follower, Missing, Pulse, SentLog, Written
+from engage_hri.schemas.units import Seconds
+from engage_hri.services.bus.zenoh.order import Envelope, Follower, Past, SentLog, Written
 
 KEYS = (keys.BLOCK, keys.FEEDBACK, keys.SYNC_POINT, keys.INHIBIT)
+NUMBERS = st.integers(1, 10**9)
 HEARD = (keys.BLOCK, "engage/v1/evt/**")
 
 
 def write(sent: SentLog, key: str, now: float = 0.0) -> Written:
     return sent.write(key, "application/msgpack", b"", "there", "clock", now)
+
+
+def answer(sent: SentLog, follower: Follower, now: Seconds = 0.0) -> Past:
+    """The answer of a process to a follower of its."""
+    missing, oldest = follower.missing(), now - keys.HISTORY_MAX_AGE
+    return sent.past(lambda key: any(keys.matches(pattern, key) for pattern in follower.patterns), missing, oldest)
 
 
 def numbers(written: list[Written]) -> list[int]:
@@ -36,12 +46,11 @@ class Wire:
             self.delivered += self.follower.take(written)
 
     def pulse(self) -> None:
-        self.follower.pulse(Pulse(self.sent.recent(0.0)))
+        self.follower.pulse(self.sent.recent(0.0))
 
     def ask(self) -> None:
         if self.follower.behind:
-            past = self.sent.past(self.follower.missing(), 0.0)
-            self.delivered += [one for one, _ in self.follower.catch_up(past)]
+            self.delivered += [one for one, _ in self.follower.catch_up(answer(self.sent, self.follower))]
 
 
 @given(st.lists(st.tuples(st.sampled_from(KEYS), st.sampled_from([0, 1, 1, 2]), st.booleans(), st.booleans())))
@@ -89,6 +98,108 @@ def test_what_a_cut_link_lost_comes_in_order_across_keys(steps: list[tuple[str, 
     assert wire.follower.lost == 0
 
 
+class Deceived(Wire):
+    """The same, with messages that claim to be of this process, and an answer that may be on its way for a while."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.follower = Follower((*HEARD, keys.WORLD))
+        self.answer: Past | None = None
+        self.lies: list[Written] = []
+
+    def forge(self, key: str, ahead: int, number: int) -> None:
+        """Claim a place in the order of the process."""
+        nth = self.sent.counts.get(key, 0) + ahead
+        lie = Written(key, "application/msgpack", b"lie", Envelope("there", "clock", 0.0, number, nth))
+        self.lies.append(lie)
+        self.delivered += self.follower.take(lie)
+
+    def ask(self) -> None:
+        if self.follower.behind and self.answer is None:
+            self.answer = answer(self.sent, self.follower)
+
+    def arrive(self) -> None:
+        if self.answer is not None:
+            self.delivered += [one for one, _ in self.follower.catch_up(self.answer)]
+            self.answer = None
+
+    def settle(self) -> None:
+        self.arrive()
+        self.pulse()
+        for _ in range(2):  # what came under the first question is asked for with the second
+            self.ask()
+            self.arrive()
+
+
+FORGED = st.sampled_from((keys.BLOCK, keys.FEEDBACK, keys.WORLD))
+STEPS = st.one_of(
+    st.tuples(st.just("send"), st.sampled_from((*KEYS, keys.WORLD)), st.sampled_from([0, 1, 1, 2])),
+    st.tuples(st.just("forge"), FORGED, st.integers(100, 10**9), NUMBERS),
+    st.tuples(st.just("claim"), FORGED, NUMBERS),
+    st.tuples(st.sampled_from(["pulse", "ask", "arrive"])),
+)
+
+
+@given(st.lists(STEPS, max_size=60))
+@settings(max_examples=300, deadline=None)
+def test_whatever_others_claim_in_the_name_of_a_process_its_own_messages_come_once_and_in_order(steps: list[Any]):
+    wire = Deceived()
+
+    for what, *how in steps:
+        match what:
+            case "claim":
+                key, nth = how
+                wire.follower.pulse({key: nth})
+            case _:
+                getattr(wire, what)(*how)
+    wire.settle()
+
+    assert not wire.follower.behind
+    assert wire.follower.lost == 0
+    true = [one for one in wire.delivered if one.payload != b"lie"]
+    for key in (keys.BLOCK, keys.FEEDBACK, keys.SYNC_POINT):
+        assert [one for one in true if one.key == key] == [one for one in wire.expected if one.key == key]
+    assert true == wire.delivered
+    states = [one for one in wire.delivered if one.key == keys.WORLD]
+    published = [one for one in wire.expected if one.key == keys.WORLD]
+    assert states[-1:] == published[-1:] or not published
+
+
+def test_of_two_messages_that_claim_one_place_the_published_one_is_delivered():
+    for ahead in (1, 0):  # the lie comes before it, or after it
+        wire = Deceived()
+        wire.ask()
+        wire.arrive()
+        if ahead:
+            wire.forge(keys.BLOCK, ahead, 999)
+        wire.send(keys.BLOCK)
+        if not ahead:
+            wire.forge(keys.BLOCK, ahead, 999)
+        wire.send(keys.BLOCK)
+        wire.settle()
+
+        assert wire.delivered == [*(wire.lies if ahead else ()), *wire.expected]
+        assert wire.follower.lost == 0
+
+
+@given(st.integers(1, 9), st.integers(1, 3), st.booleans())
+def test_a_forged_state_lasts_until_the_next_pulse(ahead: int, published: int, goes_on: bool):
+    wire = Deceived()
+    wire.ask()
+    wire.arrive()
+    for _ in range(published):
+        wire.send(keys.WORLD)
+    wire.forge(keys.WORLD, ahead, 999)
+    if goes_on:
+        wire.send(keys.WORLD)
+
+    wire.settle()
+
+    assert wire.delivered[-1] == wire.expected[-1]
+    wire.send(keys.WORLD)
+    assert wire.delivered[-1] == wire.expected[-1]
+
+
 def test_the_first_question_gets_two_seconds_of_events_and_the_last_state():
     sent = SentLog("run")
     write(sent, keys.WORLD, now=0.0)
@@ -97,7 +208,7 @@ def test_the_first_question_gets_two_seconds_of_events_and_the_last_state():
     write(sent, keys.FEEDBACK, now=1.0)
     write(sent, keys.BLOCK, now=2.0)
 
-    past = sent.past(Missing((keys.FEEDBACK, keys.WORLD), {}), now=3.0)
+    past = answer(sent, Follower([keys.FEEDBACK, keys.WORLD]), 3.0)
 
     assert numbers(list(past.written)) == [3, 4]
     assert past.counts == {keys.WORLD: 2, keys.FEEDBACK: 2}
@@ -105,35 +216,36 @@ def test_the_first_question_gets_two_seconds_of_events_and_the_last_state():
 
 def test_after_a_cut_everything_kept_is_handed_out_however_old():
     sent, follower = SentLog("run"), Follower([keys.FEEDBACK, keys.BLOCK])
-    follower.catch_up(sent.past(follower.missing(), now=0.0))
+    follower.catch_up(answer(sent, follower, 0.0))
     cut = [write(sent, key, now=0.0) for key in (keys.FEEDBACK, keys.BLOCK, keys.FEEDBACK)]
 
     follower.behind = True
-    caught_up = follower.catch_up(sent.past(follower.missing(), now=100.0))
+    caught_up = follower.catch_up(answer(sent, follower, 100.0))
 
     assert caught_up == [(one, False) for one in cut]
 
 
 def test_what_is_no_longer_kept_counts_as_lost():
     sent, follower = SentLog("run", kept=2), Follower([keys.FEEDBACK])
-    follower.catch_up(sent.past(follower.missing(), now=0.0))
+    follower.catch_up(answer(sent, follower, 0.0))
     for _ in range(5):
         write(sent, keys.FEEDBACK)
     last = write(sent, keys.FEEDBACK)
 
     assert follower.take(last) == []
-    assert numbers([one for one, _ in follower.catch_up(sent.past(follower.missing(), 0.0))]) == [5, 6]
+    assert numbers([one for one, _ in follower.catch_up(answer(sent, follower, 0.0))]) == [5, 6]
     assert follower.lost == 4
 
 
-def test_a_state_that_was_skipped_is_not_missed():
+def test_a_state_that_was_overwritten_is_not_missed():
     sent, follower = SentLog("run"), Follower([keys.WORLD])
-    follower.catch_up(sent.past(follower.missing(), now=0.0))
+    follower.catch_up(answer(sent, follower, 0.0))
     write(sent, keys.WORLD)
     second = write(sent, keys.WORLD)
 
-    assert follower.take(second) == [second]
-    assert not follower.behind
+    assert follower.take(second) == []
+    assert follower.catch_up(answer(sent, follower, 0.0)) == [(second, False)]
+    assert follower.lost == 0
 
 
 def test_a_process_that_does_not_answer_holds_nothing_up():

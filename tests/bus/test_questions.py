@@ -2,7 +2,7 @@
 
 import asyncio
 import os
-from collections.abc import AsyncIterator, Callable
+from collections.abc import AsyncIterator, Callable, Sequence
 
 import pytest
 import pytest_asyncio
@@ -10,11 +10,12 @@ import pytest_asyncio
 from engage_hri.schemas import keys
 from engage_hri.services.bus.zenoh.hub import ZenohHub, open_hub
 from engage_hri.services.bus.zenoh.order import Missing, Past
-from engage_hri.services.bus.zenoh.readers import TRIES
+from engage_hri.services.bus.zenoh.readers import RUNS_KEPT, TRIES
 from tests.bus.places import acquainted, free_endpoint, messages, numbers, state
 
 pytestmark = pytest.mark.real_time
-Then = Callable[[Past | None], None]
+Told = Callable[[str, Past], None]
+Ended = Callable[[], None]
 
 
 @pytest_asyncio.fixture
@@ -33,16 +34,16 @@ async def pair() -> AsyncIterator[tuple[ZenohHub, ZenohHub]]:
 
 def unanswered(hub: ZenohHub, times: int) -> list[str]:
     """Let the next questions of the hub for somebody's past die; the list tells how many were asked."""
-    ask, asked = hub.peers.ask_past, []
+    ask, asked = hub._history.ask, []
 
-    def ask_past(run: str, missing: Missing, then: Then) -> None:
+    def ask_past(patterns: Sequence[str], run: str, missing: Missing, told: Told, ended: Ended) -> None:
         asked.append(run)
         if len(asked) <= times:
-            asyncio.get_running_loop().call_soon(then, None)
+            asyncio.get_running_loop().call_soon(ended)
         else:
-            ask(run, missing, then)
+            ask(patterns, run, missing, told, ended)
 
-    hub.peers.ask_past = ask_past  # type: ignore[method-assign]
+    hub._history.ask = ask_past  # type: ignore[method-assign]
     return asked
 
 
@@ -72,22 +73,37 @@ async def test_a_process_that_never_answers_holds_up_nobody_for_ever(pair: tuple
 async def test_who_comes_back_under_a_question_is_asked_once_more_after_it(pair: tuple[ZenohHub, ZenohHub]):
     here, there = pair
     inbox = here.join("here").subscribe(keys.WORLD)
-    waiting: asyncio.Queue[Then] = asyncio.Queue()
+    waiting: asyncio.Queue[Told] = asyncio.Queue()
     asked = unanswered(here, 0)
-    ask = here.peers.ask_past
+    ask = here._history.ask
 
-    def ask_late(run: str, missing: Missing, then: Then) -> None:
-        ask(run, missing, lambda past: waiting.put_nowait(then) if len(asked) == 1 else then(past))
+    def ask_late(patterns: Sequence[str], run: str, missing: Missing, told: Told, ended: Ended) -> None:
+        if len(asked) > 0:
+            ask(patterns, run, missing, told, ended)
+        else:
+            ask(patterns, run, missing, lambda run, past: waiting.put_nowait(told), lambda: None)
 
     assert numbers(await messages(inbox)) == [1]
-    here.peers.ask_past = ask_late  # type: ignore[method-assign]
+    here._history.ask = ask_late  # type: ignore[method-assign]
     here.readers.process_came(there.run)
     here.readers.process_came(there.run)
     there.join("another").publish(keys.WORLD, state(2))
-    then = await waiting.get()
+    told = await waiting.get()
 
     # The answer to the first question is from before the cut: it has nothing new.
-    then(Past(1, {keys.WORLD: 1}, ()))
+    told(there.run, Past({keys.WORLD: 1}, ()))
 
     assert numbers(await messages(inbox)) == [2]
     assert len(asked) == 2
+
+
+async def test_processes_that_come_and_go_are_forgotten_but_none_that_is_there(pair: tuple[ZenohHub, ZenohHub]):
+    here, there = pair
+    inbox = here.join("here").subscribe(keys.WORLD)
+    assert numbers(await messages(inbox)) == [1]
+    for number in range(2 * RUNS_KEPT):
+        here.readers.process_came(f"run-{number}")
+    [reader] = here.readers._readers
+
+    assert len(reader.followers) == RUNS_KEPT
+    assert there.run in reader.followers

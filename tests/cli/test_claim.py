@@ -65,7 +65,7 @@ async def test_one_that_was_killed_is_waited_out(hub: MemoryHub) -> None:
         async with starting(hub, LATE) as (more, (second,)):
             await asyncio.sleep(PATIENCE - 0.1)
             hub.kill(f"up-{EARLY}")
-            hub.kill(f"starting-up-{EARLY}")
+            hub.kill(f"up-starting-{EARLY}")
             more.set()
             await asyncio.sleep(1.0)
 
@@ -88,8 +88,8 @@ def test_two_claims_never_give_way_to_each_other_nor_both_go_on() -> None:
         for theirs in (False, True):
             one, other = StartClaim("r", EARLY), StartClaim("r", LATE)
             one.is_up, other.is_up = ours, theirs
-            one.feed(PeerAlive(participant=f"{'' if theirs else 'starting-'}up-{LATE}"))
-            other.feed(PeerAlive(participant=f"{'' if ours else 'starting-'}up-{EARLY}"))
+            one.feed(PeerAlive(participant=f"up-{'' if theirs else 'starting-'}{LATE}"))
+            other.feed(PeerAlive(participant=f"up-{'' if ours else 'starting-'}{EARLY}"))
 
             # Two that are up have met too late to give way.
             assert [one.is_good, other.is_good].count(True) == (2 if ours and theirs else 1)
@@ -97,7 +97,7 @@ def test_two_claims_never_give_way_to_each_other_nor_both_go_on() -> None:
 
 def test_nobody_else_is_in_the_way() -> None:
     claim = StartClaim("r", LATE)
-    for name in ("upright", "up-x", "control", f"up-{LATE}", f"starting-up-{LATE}", "up-123456789"):
+    for name in ("upright", "up-x", "control", f"up-{LATE}", f"up-starting-{LATE}", "up-123456789"):
         claim.feed(PeerAlive(participant=name))
     assert claim.is_good
 

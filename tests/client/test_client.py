@@ -17,9 +17,7 @@ from engage_hri.schemas.blocks import (
     Block,
     BlockOutcome,
     InterruptBehavior,
-    PerformanceSteered,
     PerformBlock,
-    SteerPerformance,
 )
 from engage_hri.schemas.faults import Fault, InputRefused, NoReply, RunFailed
 from engage_hri.schemas.fragments import FragmentOutcome, PerformFragment, TurnClosed, TurnFragment
@@ -229,30 +227,6 @@ async def test_one_behavior_of_a_block_is_interrupted_by_its_name(hub: MemoryHub
             await robot.interrupt("nod", "head-1")
 
     assert (outcome.behavior, outcome.spoken, outcome.was_done) == ("speech-1", "Hello", False)
-
-
-async def test_what_the_robot_performs_is_held_goes_on_and_is_stopped(hub: MemoryHub) -> None:
-    asked: list[tuple[str, str, str]] = []
-
-    async def realizer(bus: Bus, ready: Ready) -> None:
-        desk = RequestDesk(bus, "realizer", lambda cancel: None)
-        with bus.subscribe(*RequestDesk.patterns("realizer")) as inbox:
-            ready()
-            async for received in inbox:
-                match desk.take(received):
-                    case SteerPerformance(id=id, block="nod"):
-                        desk.refuse(id, Fault(reason="it is not being performed", where="nod"))
-                    case SteerPerformance(id=id, to=to, block=block, behavior=behavior):
-                        asked.append((to, block, behavior))
-                        desk.end(PerformanceSteered(id=id, blocks=("wave",)))
-
-    async with running(hub, {"realizer": realizer}), connect(hub=hub) as robot:
-        blocks = [await robot.hold(), await robot.resume("wave"), await robot.stop("wave", "speech-1")]
-        with pytest.raises(InputRefused, match="nod: it is not being performed"):
-            await robot.hold("nod")
-
-    assert blocks == [("wave",)] * 3
-    assert asked == [("hold", "", ""), ("continue", "wave", ""), ("stop", "wave", "speech-1")]
 
 
 async def test_connection_events_come_from_the_moment_they_are_asked_for(hub: MemoryHub) -> None:

@@ -13,7 +13,7 @@ from functools import partial
 import msgspec
 
 from engage_hri.schemas import keys
-from engage_hri.schemas.blocks import Block, BlockOutcome, InterruptBehavior, PerformBlock, SteerPerformance
+from engage_hri.schemas.blocks import Block, BlockOutcome, InterruptBehavior, PerformBlock
 from engage_hri.schemas.body import EstimateBehaviors, EstimateItem, Estimates, SyncPointReached, WordSpoken
 from engage_hri.schemas.documents.xml_decode import decode_xml
 from engage_hri.schemas.faults import EngageError, RequestRefused
@@ -32,6 +32,7 @@ from engage_hri.services.runtime.virtual_time import VirtualTimeLoop
 from tests.judge.lying import Lies, LyingBody
 from tests.judge.record import End, Record, Sample, Steered, Told
 from tests.judge.story import WORLD, Deed, Story
+from tests.realizer.steering import steer
 
 STEP = 0.02
 """Seconds between two measurements; each sync point is one more."""
@@ -103,10 +104,8 @@ class Player:
                 self.requests.send(keys.BLOCK, deeds)
             case "hold" | "continue":
                 self._number += 1
-                steer = SteerPerformance(
-                    id=f"s-{self._number}", requester="judge", to=deed.kind, block=deed.block, behavior=deed.behavior
-                )
-                asked = self.requests.send(keys.BLOCK, steer)
+                steering = steer(f"s-{self._number}", deed.kind, deed.block, deed.behavior)
+                asked = self.requests.send(*steering)
                 asked.outcome.add_done_callback(partial(self._steered, deed))
 
     def _steered(self, deed: Deed, future: "asyncio.Future[object]") -> None:

@@ -4,9 +4,7 @@ import asyncio
 
 import pytest
 
-from engage_hri.schemas import keys
 from engage_hri.schemas.behaviors import Gesture, Speech
-from engage_hri.schemas.blocks import SteerPerformance
 from engage_hri.schemas.feedback import WarningFeedback
 from engage_hri.services.control.config import Stall, Variability
 from engage_hri.services.realizer.decide.held_up import STANDING, HeldUp
@@ -14,6 +12,7 @@ from engage_hri.services.realizer.foresee.outlook import Outlook
 from engage_hri.services.realizer.points import Point
 from tests.realizer.planning import timed
 from tests.realizer.stage import block, together
+from tests.realizer.steering import steer
 from tests.realizer.test_simulated_body import Robot, robot
 
 BEAT = Gesture(id="g", lexeme="BEAT", mode="LEFT_HAND")
@@ -23,8 +22,7 @@ A, B, C = Point("a", "stroke"), Point("b", "stroke"), Point("c", "stroke")
 
 async def hold(seen: Robot, seconds: float, block: str = "b", behavior: str = "") -> None:
     for to in ("hold", "continue"):
-        request = SteerPerformance(id=to, requester="test", to=to, block=block, behavior=behavior)
-        await seen.requests.send(keys.BLOCK, request).outcome
+        await seen.requests.send(*steer(to, to, block, behavior)).outcome
         await asyncio.sleep(seconds if to == "hold" else 0.0)
 
 

@@ -3,7 +3,6 @@
 import asyncio
 import random
 from itertools import count
-from typing import Literal
 
 import pytest
 from hypothesis import given, settings
@@ -17,7 +16,7 @@ from engage_hri.schemas.blocks import (
     InterruptBehavior,
     PerformanceSteered,
     PerformBlock,
-    SteerPerformance,
+    Steer,
 )  # fmt: skip
 from engage_hri.schemas.feedback import SyncPointProgress
 from engage_hri.services.realizer.config import RealizerConfig
@@ -28,6 +27,7 @@ from engage_hri.services.runtime.virtual_time import run_virtual
 from tests.realizer.fake_body import FakeBody
 from tests.realizer.planning import timed
 from tests.realizer.stage import FakeRecognition, Stage, after, block, stage, together
+from tests.realizer.steering import steer
 from tests.realizer.test_properties import blocks
 
 BEAT = Gesture(id="beat", lexeme="BEAT", mode="RIGHT_HAND")
@@ -37,11 +37,8 @@ STORY = Speech(id="s", text="one two three", marks=(Mark("m1", 3), Mark("m2", 7)
 NUMBERS = count()
 
 
-async def steered(
-    seen: Stage, to: Literal["hold", "continue", "stop"], block: str = "", behavior: str = ""
-) -> tuple[str, ...]:
-    request = SteerPerformance(id=f"steer-{next(NUMBERS)}", requester="test", to=to, block=block, behavior=behavior)
-    outcome = await seen.requests.send(keys.BLOCK, request).outcome
+async def steered(seen: Stage, to: Steer, block: str = "", behavior: str = "") -> tuple[str, ...]:
+    outcome = await seen.requests.send(*steer(f"steer-{next(NUMBERS)}", to, block, behavior)).outcome
     assert isinstance(outcome, PerformanceSteered)
     return outcome.blocks
 

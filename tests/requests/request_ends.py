@@ -9,7 +9,7 @@ from engage_hri.schemas.behaviors import Wait
 from engage_hri.schemas.blocks import Block, BlockOutcome, InterruptBehavior, PerformBlock
 from engage_hri.schemas.body import BehaviorOutcome, PerformBehavior
 from engage_hri.schemas.faults import EngageError, Fault
-from engage_hri.schemas.requests import Accepted, Answer, Cancel, KeepAlive, Outcome, Refused, Request
+from engage_hri.schemas.requests import Accepted, Answer, Cancel, KeepAlive, Outcome, Refused, Request, life_of
 from engage_hri.schemas.units import Stamp
 from engage_hri.services.requests import asking, serving
 from engage_hri.services.requests.asking import Asking
@@ -33,10 +33,11 @@ class Asked(NamedTuple):
 class Client:
     """One life of one client."""
 
-    def __init__(self, world: "World", name: str, life: str) -> None:
+    def __init__(self, world: "World", name: str, run: str) -> None:
         self.world = world
         self.name = name
-        self.life = life
+        self.run = run
+        self.life = life = life_of(run, 1)
         self.machine = Asking(name, life, PATIENCE)
         self.is_alive = True
         self.ends: dict[str, list[Outcome | EngageError]] = defaultdict(list)

@@ -8,10 +8,14 @@ import heapq
 import random
 from collections.abc import Callable
 
+from msgspec import structs
+
 from engage_hri.schemas.faults import EngageError, RunFailed
-from engage_hri.schemas.requests import Answer, KeepAlive, Outcome, Refused, Request
+from engage_hri.schemas.requests import Answer, Cancel, KeepAlive, Kept, Outcome, Refused, Request, kind_of
+from engage_hri.schemas.units import Stamp
 from engage_hri.services.requests import asking
 from engage_hri.services.requests.asking import NeverEnded, RequestRefused
+from engage_hri.services.requests.serving import Complain
 from tests.requests.request_ends import REQUESTS, Asked, Client, Server
 
 CALM = 150.0
@@ -24,6 +28,7 @@ class World:
     def __init__(self, seed: int, *, is_fair: bool = False) -> None:
         """is_fair: nobody dies and no link is cut; a tenth of the messages is lost."""
         self.chance = random.Random(seed)
+        self.lies = random.Random(f"{seed} lies")
         self.is_fair = is_fair
         self.now = 0.0
         self.heap: list[tuple[float, int, Callable[[], None]]] = []
@@ -78,11 +83,29 @@ class World:
             if server is None:
                 return
             if isinstance(message, KeepAlive):
-                server.carry_out(server.machine.keep_alive(message, min(self.now, message.at.seconds), self.now))
+                sent = min(self.now, message.at.seconds)
+                server.carry_out(server.machine.keep_alive(message, sent, self.now, client.run))
             else:
-                server.carry_out(server.machine.take(message, self.now))
+                server.carry_out(server.machine.take(message, self.now, client.run))
 
         self.carry((client.name, "server"), arrive)
+
+    def deceive(self, name: str) -> None:
+        """A stranger speaks of a request that the server knows, in its requester's name. It must change nothing."""
+        server, client = self.server, self.clients[name]
+        names = server.names.values() if server is not None else ()
+        known = [asked for whose, asked in names if whose[:2] == (name, client.life)]
+        if server is None or not known:
+            return
+        asked = self.lies.choice(known)
+        kind, made = kind_of(asked), [make(asked.id) for make, _ in REQUESTS]
+        lies = [Cancel(id=asked.id), Cancel(id=asked.id, of=kind), *(one for one in made if kind_of(one) == kind)]
+        lies = [structs.replace(lie, revision=99, requester=name, life=client.life) for lie in lies]
+        kept = Kept(kind, asked.id, 99, "end", 1e6)
+        still = KeepAlive(live=(kept,), at=Stamp("w", self.now), requester=name, life=client.life)
+        effects = [effect for lie in lies for effect in server.machine.take(lie, self.now, "stranger")]
+        effects += server.machine.keep_alive(still, self.now, self.now, "stranger")
+        assert all(isinstance(effect, Complain) and not effect.is_ours for effect in effects)
 
     def to_clients(self, server: Server, answer: Answer) -> None:
         for client in list(self.clients.values()):
@@ -96,7 +119,7 @@ class World:
 
     def start_client(self, name: str) -> None:
         self.lives += 1
-        client = Client(self, name, f"{self.lives}.1")
+        client = Client(self, name, str(self.lives))
         self.clients[name] = client
         self.all_clients.append(client)
         run = str(self.lives)
@@ -105,7 +128,7 @@ class World:
         self.later(self.chance.uniform(0.0, 0.2), lambda: self.tell_server(name, run))
 
     def tell_server(self, name: str, run: str) -> None:
-        if self.server is not None and self.clients[name].life.partition(".")[0] == run:
+        if self.server is not None and self.clients[name].run == run:
             self.server.carry_out(self.server.machine.requester_there(name, run, self.now))
 
     def tell_client(self, client: Client, run: str) -> None:
@@ -131,7 +154,7 @@ class World:
             self.server = server = Server(self, str(self.lives))
             self.servers.append(server)
             for name, client in self.clients.items():
-                server.carry_out(server.machine.requester_there(name, client.life.partition(".")[0], self.now))
+                server.carry_out(server.machine.requester_there(name, client.run, self.now))
                 self.later(self.chance.uniform(0.0, 0.2), lambda client=client: self.tell_client(client, server.run))  # type: ignore[misc]
 
     def flap(self, name: str) -> None:
@@ -146,7 +169,7 @@ class World:
         def back() -> None:
             self.cut.discard(name)
             if self.server is server and self.clients[name] is client:
-                server.carry_out(server.machine.requester_there(name, client.life.partition(".")[0], self.now))
+                server.carry_out(server.machine.requester_there(name, client.run, self.now))
                 self.tell_client(client, server.run)
 
         self.later(self.chance.uniform(0.1, 20.0), back)
@@ -207,6 +230,7 @@ class World:
     def play(self, mishaps: int) -> None:
         for _ in range(mishaps):
             self.mishap()
+            self.deceive(self.lies.choice(("ann", "bob")))
             self.run(self.now + self.chance.choice([0.0, 0.1, 1.0, 5.0]))
         self.run(self.now + (12.0 if self.is_fair else 45.0))  # until every cut has healed
         self.contents = self._contents()

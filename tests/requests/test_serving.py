@@ -287,8 +287,8 @@ def test_a_cancellation_without_a_kind_means_what_is_live_not_what_was_stopped_l
 def test_the_first_request_of_a_new_life_may_come_before_its_token() -> None:
     serving = Serving("realizer")
     serving.requester_there("me", "1", 0.0)
-    serving.take(replace(BLOCK, id="old", life="1.1"), 1.0)
-    serving.take(replace(BLOCK, life="2.1"), 2.0)
+    serving.take(replace(BLOCK, id="old", life="@1.1"), 1.0)
+    serving.take(replace(BLOCK, life="@2.1"), 2.0)
 
     ended = handed(serving.requester_there("me", "2", 2.1))
 

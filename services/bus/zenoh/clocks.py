@@ -9,6 +9,10 @@ REFRESH: Seconds = 60.0
 """Time between two measurements: quartz clocks drift apart by some 10 ppm, under a millisecond in this time."""
 
 
+KEPT = 256
+"""Number of clocks that are remembered. Processes whose clock is their own come and go."""
+
+
 class _Offset(NamedTuple):
     """An estimate: local = remote + offset. error: half the round trip, or unknown (inf) for a one-way bound."""
 
@@ -37,6 +41,8 @@ class Clocks:
         if clock == self.own or not clock:
             return False
         known = self._offsets.get(clock)
+        if known is None and len(self._offsets) >= KEPT:
+            del self._offsets[next(iter(self._offsets))]
         # A message cannot arrive before it was sent, so arrived - sent is an upper bound, and the lowest is best.
         if known is None or (known.error == float("inf") and arrived - sent < known.offset):
             self._offsets[clock] = _Offset(arrived - sent, float("inf"), known.at if known else arrived - REFRESH)

@@ -19,17 +19,20 @@ from engage_hri.schemas.faults import EngageError, Fault, InputRefused, NoReply
 from engage_hri.schemas.messages import Message, decode, encode, encoding_of, published
 from engage_hri.schemas.status import BusHealth
 from engage_hri.schemas.units import Seconds, Stamp
-from engage_hri.services.bus.config import Mode, mode_of
+from engage_hri.services.bus.config import Mode, is_encrypted, mode_of
 from engage_hri.services.bus.interface import LOG, Answer, Bus, Hub, Keep, Received, Subscription
+from engage_hri.services.bus.keyring import Keys
 from engage_hri.services.bus.zenoh.clocks import Clocks
-from engage_hri.services.bus.zenoh.foreign_clients import ForeignClients, form_asked, in_form, refuse
-from engage_hri.services.bus.zenoh.order import Envelope, Pulse, SentLog
-from engage_hri.services.bus.zenoh.peers import Peers, finish, pack
+from engage_hri.services.bus.zenoh.history import History, finish, form_asked, in_form, pack, refuse
+from engage_hri.services.bus.zenoh.order import Envelope, SentLog
+from engage_hri.services.bus.zenoh.peers import Peers
 from engage_hri.services.bus.zenoh.readers import Readers
+from engage_hri.services.bus.zenoh.rights import Rights
 from engage_hri.services.bus.zenoh.session import (
     LOOPBACK,
     QOS,
     RENDEZVOUS,
+    ROUTER_WITH_KEYS,
     STREAM_QOS,
     LoopBridge,
     open_client,
@@ -55,22 +58,27 @@ async def open_hub(
     listen: Sequence[str] = (),
     mode: Mode = "auto",
     rendezvous: str | None = RENDEZVOUS,
+    keys: Keys | None = None,
 ) -> "ZenohHub":
     """Join the bus of `robot`. Processes may start in any order: this waits for others for `OPENING` at most.
 
     A client waits for a router for as long as it takes.
 
     connect, listen: Zenoh endpoints (`tcp/HOST:PORT`). Without any, the processes of this machine find one another
-    at `rendezvous`. Raises InputRefused when an endpoint is misspelled, RunFailed when it is taken.
+    at `rendezvous`. keys: those of this process; it is then a client of a router, with its holder's role and name.
+    Raises InputRefused when an endpoint is misspelled or does not go with the keys, RunFailed when it is taken.
     """
+    if keys is not None:
+        connect = connect or (ROUTER_WITH_KEYS,)
+        _check_keys(keys, robot, connect, listen, mode)
     # Both block the loop for a moment, before its work has started: Zenoh has no async API, and we start no thread.
     places: tuple[str, ...] = ()
-    if mode_of(mode, connect, listen) == "client":
-        session, calls = await open_client(robot, connect), True
+    if keys is not None or mode_of(mode, connect, listen) == "client":
+        session, calls = await open_client(robot, connect, keys), True
     else:
         session, calls = open_session(robot, connect, listen, None if connect or listen else rendezvous)
         places = tuple(listen) or (LOOPBACK,)
-    hub = ZenohHub(robot, session, places)
+    hub = ZenohHub(robot, session, places, Rights(keys.holder) if keys is not None else None)
     if calls:
         await hub.peers.wait_for_discovery(asyncio.get_running_loop().time() + OPENING)
     return hub
@@ -79,9 +87,12 @@ async def open_hub(
 class ZenohHub(Hub):
     """The hub of a process on a Zenoh session."""
 
-    def __init__(self, robot: str, session: zenoh.Session, places: Sequence[str] = ()) -> None:
-        """places: endpoints at which others may connect to this process."""
+    def __init__(
+        self, robot: str, session: zenoh.Session, places: Sequence[str] = (), rights: Rights | None = None
+    ) -> None:
+        """places: endpoints at which others may connect to this process. rights: those of its keys, if it has any."""
         self.robot = robot
+        self.rights = rights
         self.run = str(session.zid())
         self.session = session
         self.bridge = LoopBridge(self.failed)
@@ -90,12 +101,14 @@ class ZenohHub(Hub):
         self.clocks = Clocks(_clock_name(self._loop, self.run), self._loop.time)
         self._sent = SentLog(self.run)
         self._publishers: dict[str, zenoh.Publisher] = {}
+        self._source = zenoh.SourceInfo(session.id, 0)
         self._buses: dict[str, ZenohBus] = {}
         self._pulse: asyncio.TimerHandle | None = None
         self._closed = False
         self.peers = Peers(session, self.bridge, self._sent, self.clocks, places)
-        self.readers = Readers(session, self.bridge, self._sent, self.peers)
-        self._foreign = ForeignClients(session, self.bridge)
+        self._history = History(session, self.bridge, self._sent)
+        trusts = rights.trusts if rights else None
+        self.readers = Readers(session, self.bridge, self._sent, self.peers, self._history, trusts)
         self.peers.stand(self.readers.process_came, self.readers.participant_changed)
 
     @property
@@ -109,6 +122,8 @@ class ZenohHub(Hub):
         )  # fmt: skip
 
     def join(self, name: str, role: str = "manager") -> "ZenohBus":
+        if self.rights is not None:
+            name, role = self.rights.called(name), self.rights.holder.role
         if name in self._buses:
             raise ValueError(f"participant {name!r} is on the bus already")
         self._buses[name] = bus = ZenohBus(self, name, role)
@@ -145,7 +160,7 @@ class ZenohHub(Hub):
         if self._pulse is not None:
             self._pulse.cancel()
         self.readers.close()
-        self._foreign.close()
+        self._history.close()
         self.peers.close()
         for publisher in self._publishers.values():
             publisher.undeclare()  # type: ignore[no-untyped-call]
@@ -154,19 +169,22 @@ class ZenohHub(Hub):
     # -- publishing ---------------------------------------------------------------------------------------------
 
     def publish(self, bus: "ZenohBus", key: str, message: Message) -> None:
+        if self.rights is not None:
+            self.rights.check(bus.name, "publishes", key)
         ordered = keys.key_class(key) != "stream"
         now = self._loop.time()
         payload, encoding = published(message)
         stamp = self.session.new_timestamp()
         if ordered:
-            written = self._sent.write(key, encoding, payload, bus.name, self.clocks.own, now)
+            written = self._sent.write(key, encoding, payload, bus.name, self.clocks.own, now, stamp)
             envelope = written.envelope
-            self._foreign.note(written, stamp)
             if self._pulse is None:
                 self._pulse = self._loop.call_later(FIRST_PULSE, self._send_pulse)
         else:
-            envelope = Envelope(bus.name, self.clocks.own, now, self.run)
-        self._publisher(key, ordered).put(payload, encoding=encoding, attachment=pack(envelope), timestamp=stamp)
+            envelope = Envelope(bus.name, self.clocks.own, now)
+        self._publisher(key, ordered).put(
+            payload, encoding=encoding, attachment=pack(envelope), timestamp=stamp, source_info=self._source
+        )
         self.readers.offer(Received(key, message, bus.name, now, life=self.run))
 
     def _publisher(self, key: str, ordered: bool) -> zenoh.Publisher:
@@ -179,12 +197,10 @@ class ZenohHub(Hub):
 
     def _send_pulse(self) -> None:
         """Publish the recent counts, a few times: they show a receiver that it lost the last message of a burst."""
-        counts = self._sent.recent(self._loop.time())
-        self._pulse = self._loop.call_later(NEXT_PULSE, self._send_pulse) if counts else None
-        if counts:
-            self._publisher(keys.own(self.run, "pulse"), True).put(
-                pack(Pulse(counts)), encoding="application/msgpack"
-            )
+        recent = self._sent.recent(self._loop.time())
+        self._pulse = self._loop.call_later(NEXT_PULSE, self._send_pulse) if recent else None
+        if recent:
+            self._publisher(keys.own(self.run, "pulse"), True).put(pack(recent), encoding="application/msgpack")
 
 
 class ZenohBus(Bus):
@@ -214,6 +230,9 @@ class ZenohBus(Bus):
             self._hub.publish(self, key, message)
 
     def subscribe(self, *patterns: str, keep: Keep = Keep.EVERY, capacity: int = 4096) -> Subscription:
+        if self._hub.rights is not None:
+            for pattern in patterns:
+                self._hub.rights.check(self.name, "subscribes", pattern)
         subscription = Subscription(patterns, keep, capacity, self._drop)
         self._subscriptions.append(subscription)
         self._hub.readers.attach(self, subscription)
@@ -226,6 +245,8 @@ class ZenohBus(Bus):
             self._hub.readers.detach(subscription)
 
     async def query(self, key: str, message: Message, timeout: Seconds = 1.0) -> Message:
+        if self._hub.rights is not None:
+            self._hub.rights.check(self.name, "asks", key)
         deadline = self._loop.time() + timeout
         payload, encoding = encode(message), encoding_of(message)
         while self._loop.time() < deadline:
@@ -309,6 +330,19 @@ class ZenohBus(Bus):
             self._token.undeclare()
             self._hub.peers.note(self.name, self._hub.run, False)
         self._hub.forget(self.name)
+
+
+def _check_keys(keys: Keys, robot: str, connect: Sequence[str], listen: Sequence[str], mode: Mode) -> None:
+    where = str(keys.folder)
+    if keys.holder.robot != robot:
+        raise InputRefused(
+            Fault(reason=f"these keys are for robot {keys.holder.robot!r}, not {robot!r}", where=where)
+        )
+    if listen or mode == "peer":
+        reason = "with keys a process does not listen: the rules are the router's, so all are its clients"
+        raise InputRefused(Fault(reason=reason, where=where, advice="leave --listen and --mode out"))
+    if plain := [each for each in connect if not is_encrypted(each)]:
+        raise InputRefused(Fault(reason=f"{plain[0]!r} with keys", where=where, advice="tls/HOST:PORT"))
 
 
 def _is_ours(encoding: str) -> bool:

@@ -11,7 +11,7 @@ from engage_hri.schemas import keys
 from engage_hri.schemas.faults import EngageError
 from engage_hri.schemas.status import AskStatus, Status
 from engage_hri.schemas.units import Seconds
-from engage_hri.services.bus.config import is_on_this_machine
+from engage_hri.services.bus.config import is_encrypted, is_on_this_machine
 from engage_hri.services.bus.interface import LOG, Bus
 from engage_hri.services.bus.zenoh.session import RENDEZVOUS, open_session
 
@@ -120,6 +120,8 @@ async def _statuses(bus: Bus) -> list[Status]:
 
 async def robots(connect: Sequence[str]) -> tuple[str, ...]:
     """Names of the robots on the bus, in order; without endpoints: on this machine's. Raises nothing."""
+    if any(map(is_encrypted, connect)):
+        return ()  # a link without keys is refused there
     try:
         session, _ = open_session(None, connect or (RENDEZVOUS,), (), None)
     except EngageError:

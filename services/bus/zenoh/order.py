@@ -5,13 +5,16 @@ out on request. Every subscription follows each publishing process (`Follower`):
 holds what arrives meanwhile, and merges both by number; a gap in a key's count makes it ask again. So messages of
 one process arrive in its order across keys, each once, whether they came live, from history, or after a cut.
 
+What a message claims of itself anybody can write; what a process answers, only that process can. So its answer
+decides: what was there before the question and is beyond the counts of the answer was never published.
+
 Zenoh's own advanced subscribers do this per key: a replayed history and what is recovered after a cut come in no
 order across keys. Sync points and outcomes live on different keys and must not overtake one another, hence this file
 (measured in docs/decisions/0005).
 """
 
 from collections import deque
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from itertools import chain
 
 from msgspec import Struct
@@ -28,48 +31,49 @@ PULSE_FOR: Seconds = 3.0
 class Envelope(Struct, frozen=True, array_like=True):
     """The attachment of a sample: its sender, the time by the sender's clock, and its place in the order.
 
-    run: the publishing process' life; of a program that sends no envelope, the life that its connection tells.
-    number: among all its ordered messages, from 1; 0 on a stream, and from a program that sends no envelope.
-    nth: among its messages on this key, from 1.
+    Which process sent it, Zenoh says: nothing here can name another.
+    number: among all ordered messages of its process, from 1; 0 on a stream, and of a program without envelopes.
+    nth: among the messages of its process on this key, from 1.
     """
 
     source: str
     clock: str
     sent: Seconds
-    run: str = ""
     number: int = 0
     nth: int = 0
 
 
 class Written(Struct, frozen=True, array_like=True):
-    """A message as it travels, live or in a `Past`."""
+    """A message as it travels. stamp: Zenoh's timestamp, where it is kept."""
 
     key: str
     encoding: str
     payload: bytes
     envelope: Envelope
+    stamp: object = None
+
+
+Counts = dict[str, int]
+"""Counts of a process, by key: a receiver with a lower one has missed something."""
 
 
 class Missing(Struct, frozen=True):
-    """A follower's question for the past. seen: its last count, by key. since: -1 if it has never caught up."""
+    """A follower's question for the past. seen: its last count, by key. is_new: it has never caught up."""
 
-    patterns: tuple[str, ...]
-    seen: dict[str, int]
-    since: int = -1
+    seen: Counts = {}
+    is_new: bool = True
 
 
 class Past(Struct, frozen=True):
-    """The answer: messages in order, and the counts of all matching keys at this moment."""
+    """The answer of a process: what was missing, in order, and its counts of all keys that were asked for."""
 
-    number: int
-    counts: dict[str, int]
+    counts: Counts
     written: tuple[Written, ...]
 
-
-class Pulse(Struct, frozen=True):
-    """Recent counts by key: a receiver with a lower count has lost a message."""
-
-    counts: dict[str, int]
+    def of(self, wanted: Callable[[str], bool]) -> "Past":
+        """The part of it that is about these keys."""
+        counts = {key: nth for key, nth in self.counts.items() if wanted(key)}
+        return Past(counts, tuple(one for one in self.written if wanted(one.key)))
 
 
 class SentLog:
@@ -78,16 +82,18 @@ class SentLog:
     def __init__(self, run: str, kept: int = KEPT) -> None:
         self.run = run
         self.number = 0
-        self.counts: dict[str, int] = {}
+        self.counts: Counts = {}
         self._written_at: dict[str, Seconds] = {}
         self._kept: deque[Written] = deque(maxlen=kept)
         self._states: dict[str, Written] = {}
 
-    def write(self, key: str, encoding: str, payload: bytes, source: str, clock: str, now: Seconds) -> Written:
+    def write(
+        self, key: str, encoding: str, payload: bytes, source: str, clock: str, now: Seconds, stamp: object = None
+    ) -> Written:
         """Number the next message and keep it."""
         self.number += 1
         nth = self.counts[key] = self.counts.get(key, 0) + 1
-        written = Written(key, encoding, payload, Envelope(source, clock, now, self.run, self.number, nth))
+        written = Written(key, encoding, payload, Envelope(source, clock, now, self.number, nth), stamp)
         self._written_at[key] = now
         if keys.key_class(key) == "state":
             self._states[key] = written
@@ -95,25 +101,26 @@ class SentLog:
             self._kept.append(written)
         return written
 
-    def past(self, missing: Missing, now: Seconds) -> Past:
-        """Answer `missing`; a first joiner gets the last states and `HISTORY_MAX_AGE` of the rest."""
-        counts = {key: nth for key, nth in self.counts.items() if _wanted(missing.patterns, key)}
+    def past(self, wanted: Callable[[str], bool], missing: Missing, oldest: Seconds) -> Past:
+        """Answer `missing`; a first joiner gets the last states, and the rest from the time `oldest` on."""
+        counts = {key: nth for key, nth in self.counts.items() if wanted(key)}
         written = [
             one
             for one in chain(self._kept, self._states.values())
-            if one.key in counts and self._is_missing(one, missing, now)
+            if one.key in counts and self._is_missing(one, missing, oldest)
         ]
         written.sort(key=_number)
-        return Past(self.number, counts, tuple(written))
+        return Past(counts, tuple(written))
 
-    def _is_missing(self, one: Written, missing: Missing, now: Seconds) -> bool:
-        if one.key in missing.seen:
-            return one.envelope.nth > missing.seen[one.key]
-        if missing.since >= 0:
-            return one.envelope.number > missing.since
-        return one.key in self._states or now - one.envelope.sent <= keys.HISTORY_MAX_AGE
+    def _is_missing(self, one: Written, missing: Missing, oldest: Seconds) -> bool:
+        is_state = one.key in self._states
+        seen = missing.seen.get(one.key, 0)
+        if missing.is_new and not seen:
+            return is_state or one.envelope.sent >= oldest
+        # Who has seen more than there was took a forged state for the last one.
+        return one.envelope.nth > seen or (is_state and seen > self.counts[one.key])
 
-    def recent(self, now: Seconds) -> dict[str, int]:
+    def recent(self, now: Seconds) -> Counts:
         """Counts of the keys written in the last `PULSE_FOR`."""
         return {key: self.counts[key] for key, at in self._written_at.items() if now - at <= PULSE_FOR}
 
@@ -122,8 +129,8 @@ class Follower:
     """One publishing process as one subscription sees it.
 
     behind: the past is needed; until `catch_up` nothing is delivered. gaps: how often a message was missed.
-    lost: messages that were gone for good. asking, again: kept for `Readers`: the question is on its way, and is to
-    be asked once more after it.
+    lost: messages that were gone for good. forged: claims that the process' answers have disproved. asking, again:
+    kept for `Readers`: the question is on its way, and is to be asked once more after it.
     """
 
     def __init__(self, patterns: Iterable[str]) -> None:
@@ -133,28 +140,41 @@ class Follower:
         self.again = False
         self.gaps = 0
         self.lost = 0
-        self._since = -1
-        self._seen: dict[str, int] = {}
+        self.forged = 0
+        self._is_new = True
+        self._seen: Counts = {}
+        self._last: dict[str, Envelope] = {}
+        """Envelope of the last message delivered, by key."""
         self._held: list[Written] = []
+        self._held_before = 0
+        """Number of those in `_held` that were there when the question was asked."""
 
     def take(self, written: Written) -> list[Written]:
         """Take a message that has arrived; returns the messages to deliver now."""
-        envelope = written.envelope
-        expected = self._seen.get(written.key, 0) + 1
-        if envelope.nth < expected:
-            return []
-        if envelope.nth > expected and not self._may_skip(written.key):
+        key, envelope = written.key, written.envelope
+        seen = self._seen.get(key, 0)
+        if envelope.nth <= seen:
+            if envelope.nth < seen or self._last.get(key, envelope) == envelope:
+                return []
+            # Two messages claim the same place. At most one of them was published.
+            self._seen[key] = seen - 1
+            self._fall_behind()
+        elif envelope.nth > seen + 1:
             self._fall_behind()
         if self.behind:
             self._held.append(written)
             return []
-        self._seen[written.key] = envelope.nth
+        self._deliver(written)
         return [written]
 
-    def pulse(self, pulse: Pulse) -> None:
-        """Compare counts; sets `behind` if a message is missing."""
-        for key, nth in pulse.counts.items():
-            if nth > self._seen.get(key, 0) and _wanted(self.patterns, key):
+    def _deliver(self, written: Written) -> None:
+        self._seen[written.key] = written.envelope.nth
+        self._last[written.key] = written.envelope
+
+    def pulse(self, pulse: Counts) -> None:
+        """Compare counts; sets `behind` if a message is missing, or if there was one too many."""
+        for key, nth in pulse.items():
+            if nth != self._seen.get(key, 0) and any(keys.matches(pattern, key) for pattern in self.patterns):
                 self._fall_behind()
 
     def _fall_behind(self) -> None:
@@ -162,42 +182,60 @@ class Follower:
         self.behind = True
 
     def missing(self) -> Missing:
-        return Missing(self.patterns, dict(self._seen), self._since)
+        """Make the question. Its answer decides on all that is held now."""
+        self._held_before = len(self._held)
+        return Missing(dict(self._seen), self._is_new)
 
     def catch_up(self, past: Past | None) -> list[tuple[Written, bool]]:
-        """Take the past (None: there was no answer). Returns the messages to deliver, and whether each is history."""
-        first = self._since < 0
-        live = {one.envelope.number for one in self._held}
-        merged = {one.envelope.number: one for one in chain(past.written if past else (), self._held)}
-        deliver = []
-        for number in sorted(merged):
-            one = merged[number]
-            seen = self._seen.get(one.key, 0)
-            if one.envelope.nth <= seen:
-                continue
-            if not (first and one.key not in self._seen) and not self._may_skip(one.key):
-                self.lost += one.envelope.nth - seen - 1
-            self._seen[one.key] = one.envelope.nth
-            deliver.append((one, first and number not in live))
-        for key, nth in past.counts.items() if past else ():
+        """Take the past (None: there was no answer). Returns the messages to deliver, and whether each is history.
+
+        Still `behind` after it: what has come since the question does not join up, and is to be asked for, too.
+        """
+        first = self._is_new
+        held = self._held if past is None else self._disproved(past)
+        live = {(one.key, one.envelope.nth) for one in held}
+        merged = {(one.key, one.envelope.nth): one for one in chain(held, past.written if past else ())}
+        deliver, unknown = [], []
+        for one in sorted(merged.values(), key=_number):
+            key, nth = one.key, one.envelope.nth
             seen = self._seen.get(key, 0)
-            if nth > seen:
-                self.lost += 0 if first or self._may_skip(key) else nth - seen
-                self._seen[key] = nth
+            if nth <= seen or self._last.get(key) == one.envelope:
+                self._seen[key] = max(nth, seen)
+                continue
+            if past is not None and nth > max(seen, past.counts.get(key, 0)) + 1:
+                unknown.append(one)
+                continue
+            if not (first and key not in self._seen) and not _may_skip(key):
+                self.lost += nth - seen - 1
+            self._deliver(one)
+            deliver.append((one, first and (key, nth) not in live))
         if past is not None:
-            self._since = past.number
-        self._held = []
-        self.behind = False
+            for key, nth in past.counts.items():
+                seen = self._seen.get(key, 0)
+                self.lost += 0 if first or _may_skip(key) else max(0, nth - seen)
+                self._seen[key] = max(nth, seen)
+            self._is_new = False
+        self._held = unknown
+        self.behind = bool(unknown)
         return deliver
 
-    def _may_skip(self, key: str) -> bool:
-        """True for a state: only its last value counts, so older ones may be missing."""
-        return keys.key_class(key) == "state"
+    def _disproved(self, past: Past) -> list[Written]:
+        """Correct the counts by the answer; returns what is held, without what the answer should know and doesn't."""
+        for key, seen in self._seen.items():
+            if seen > (count := past.counts.get(key, 0)):
+                # The last true state comes again: it was overwritten.
+                self._seen[key] = max(0, count - 1) if _may_skip(key) else count
+                self.forged += 1
+        before, since = self._held[: self._held_before], self._held[self._held_before :]
+        published = [one for one in before if one.envelope.nth <= past.counts.get(one.key, 0)]
+        self.forged += len(before) - len(published)
+        return published + since
+
+
+def _may_skip(key: str) -> bool:
+    """True for a state: only its last value counts, so older ones may be missing."""
+    return keys.key_class(key) == "state"
 
 
 def _number(written: Written) -> int:
     return written.envelope.number
-
-
-def _wanted(patterns: tuple[str, ...], key: str) -> bool:
-    return any(keys.matches(pattern, key) for pattern in patterns)

@@ -1,4 +1,4 @@
-"""Peers on the bus, and the questions of processes to one another: for the past, for the time, and for a flush."""
+"""Peers on the bus, and the questions of processes to one another: for the time, and for a flush."""
 
 import asyncio
 import re
@@ -13,21 +13,15 @@ from engage_hri.schemas import keys
 from engage_hri.schemas.status import Reachable
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.zenoh.clocks import Clocks
-from engage_hri.services.bus.zenoh.order import Missing, Past, Pulse, SentLog
+from engage_hri.services.bus.zenoh.history import BAD, finish, pack
+from engage_hri.services.bus.zenoh.order import SentLog
 from engage_hri.services.bus.zenoh.session import QOS, LoopBridge
 
-CATCH_UP: Seconds = 1.0
-"""Time that a process has to hand out its past."""
 FLUSH: Seconds = 2.0
 """Time that closing waits until the others have everything: as long as a silent one counts as alive."""
 CLOCK_TRIPS = 5
 CLOCK_TIMEOUT: Seconds = 1.0
 
-BAD = (msgspec.DecodeError, UnicodeDecodeError)
-"""Exceptions of decoding bytes from other programs."""
-pack = msgspec.msgpack.encode
-_missings = msgspec.msgpack.Decoder(Missing)
-_pasts = msgspec.msgpack.Decoder(Past)
 _instants = msgspec.msgpack.Decoder(float)
 
 
@@ -53,10 +47,8 @@ class Peers:
         self._bridge = bridge
         self._sent = sent
         self._watchers: list[asyncio.Future[None]] = []
-        run = sent.run
         self._declared: tuple[Any, ...] = (
-            session.declare_queryable(keys.own(run, "past"), bridge.on_loop(self._tell_past)),
-            session.declare_queryable(keys.own(run, "clock"), bridge.on_loop(self._tell_time)),
+            session.declare_queryable(keys.own(sent.run, "clock"), bridge.on_loop(self._tell_time)),
         )
 
     def stand(self, on_process: Callable[[str], None], on_participant: Callable[[str, str, bool], None]) -> None:
@@ -180,26 +172,6 @@ class Peers:
             **QOS,
         )
 
-    def ask_past(self, run: str, missing: Missing, then: Callable[[Past | None], None]) -> None:
-        """Ask a process for its past; calls `then` with it, or with None if there is no answer."""
-        answer: list[Past] = []
-
-        def reply(got: zenoh.Reply) -> None:
-            if got.ok is not None:
-                with suppress(*BAD):  # counts as no answer
-                    answer.append(_pasts.decode(got.ok.payload.to_bytes()))
-
-        self.ask(keys.own(run, "past"), pack(missing), reply, lambda _: then(answer[0] if answer else None), CATCH_UP)
-
-    def _tell_past(self, query: zenoh.Query) -> None:
-        try:
-            missing = _missings.decode(query.payload.to_bytes() if query.payload else b"")
-        except BAD as error:
-            query.reply_err(str(error))
-        else:
-            query.reply(query.key_expr, pack(self._sent.past(missing, self._loop.time())))
-        finish(query)
-
     def measure_clock(self, run: str, clock: str, trips: int = CLOCK_TRIPS) -> None:
         """Read another machine's clock in a few round trips; the quickest tells the most."""
         asked = self._loop.time()
@@ -220,10 +192,10 @@ class Peers:
 
     async def flush(self) -> None:
         """Wait until all known processes have the last messages: an exit right after a put loses most of them."""
-        counts = self._sent.recent(self._loop.time())
-        if counts and self.processes:
+        recent = self._sent.recent(self._loop.time())
+        if recent and self.processes:
             done: asyncio.Future[None] = self._loop.create_future()
-            question = pack((self._sent.run, Pulse(counts)))
+            question = pack((self._sent.run, recent))
             self.ask(keys.ANY_FLUSH, question, lambda reply: None, lambda _: _resolve(done), FLUSH)
             await done
 
@@ -231,11 +203,6 @@ class Peers:
 def _without_settings(endpoint: str) -> str:
     """The endpoint without what follows `?` or `#`, which cannot be in a key, or is of no use to others."""
     return re.split("[?#]", endpoint)[0]
-
-
-def finish(query: zenoh.Query) -> None:
-    """Tell Zenoh that there will be no more replies: the asking process waits for that."""
-    query.drop()  # type: ignore[no-untyped-call]
 
 
 def _resolve(future: "asyncio.Future[None]") -> None:

@@ -1,6 +1,7 @@
 """Delivers what arrives: to the right subscriptions, in order; asks for missing messages. On the loop."""
 
 import asyncio
+from collections.abc import Callable, Collection
 from functools import partial
 from typing import Any
 
@@ -13,34 +14,59 @@ from engage_hri.schemas.messages import Message
 from engage_hri.schemas.presence import PeerAlive, PeerGone
 from engage_hri.schemas.requests import Unreadable
 from engage_hri.services.bus import journal
-from engage_hri.services.bus.interface import Bus, Received, Subscription
+from engage_hri.services.bus.interface import LOG, Bus, Received, Subscription
 from engage_hri.services.bus.payloads import read_payload, unreadable
-from engage_hri.services.bus.zenoh.order import Envelope, Follower, Missing, Past, Pulse, SentLog, Written
-from engage_hri.services.bus.zenoh.peers import BAD, Peers, finish
+from engage_hri.services.bus.zenoh.history import BAD, History, envelopes, finish
+from engage_hri.services.bus.zenoh.order import Counts, Envelope, Follower, Missing, Past, SentLog, Written
+from engage_hri.services.bus.zenoh.peers import Peers
 from engage_hri.services.bus.zenoh.session import LoopBridge
 
-_envelopes = msgspec.msgpack.Decoder(Envelope)
-_pulses = msgspec.msgpack.Decoder(Pulse)
-_flushes = msgspec.msgpack.Decoder(tuple[str, Pulse])
+_pulses = msgspec.msgpack.Decoder(Counts)
+_flushes = msgspec.msgpack.Decoder(tuple[str, Counts])
 
-
+Trusts = Callable[[str, str, str], bool]
+"""Check of a message: the run of its process, its key, and the participant that it names."""
 TRIES = 3
 """Number of times that a process that is there, but does not answer, is asked for its past."""
+RUNS_KEPT = 256
+"""Number of processes, there or gone, that a subscription remembers: one that is back gets on where it was."""
 
 
 class _Reader:
-    """A subscription of the participant `bus`, with its follower of each process, by run."""
+    """A subscription of the participant `bus`, with its follower of each process, by run.
+
+    kept: expressions that ask for the past of its keys.
+    """
 
     def __init__(self, bus: Bus, subscription: Subscription) -> None:
         self.bus = bus
         self.subscription = subscription
+        self.kept = tuple(dict.fromkeys(each for pattern in subscription.patterns for each in keys.kept(pattern)))
         self.followers: dict[str, Follower] = {}
+
+    def follower(self, run: str, there: Collection[str]) -> Follower:
+        """The follower of a process, also of one that is new. there: processes that are not forgotten for it."""
+        follower = self.followers.get(run)
+        if follower is None:
+            if len(self.followers) >= RUNS_KEPT and (gone := next((k for k in self.followers if k not in there), "")):
+                del self.followers[gone]
+            follower = self.followers[run] = Follower(self.subscription.patterns)
+        return follower
 
 
 class Readers:
     """All subscriptions of the process. refused: number of bad payloads. viewer: name for the log."""
 
-    def __init__(self, session: zenoh.Session, bridge: LoopBridge, sent: SentLog, peers: Peers) -> None:
+    def __init__(
+        self,
+        session: zenoh.Session,
+        bridge: LoopBridge,
+        sent: SentLog,
+        peers: Peers,
+        history: History,
+        trusts: Trusts | None = None,
+    ) -> None:
+        """trusts: tells whether a message can be from its sender; None: whoever reaches the bus is believed."""
         self.refused = 0
         self.viewer = ""
         self._loop = asyncio.get_running_loop()
@@ -48,6 +74,8 @@ class Readers:
         self._bridge = bridge
         self._sent = sent
         self._peers = peers
+        self._history = history
+        self._trusts = trusts
         self._readers: list[_Reader] = []
         self._carriers: dict[str, tuple[Any, list[_Reader]]] = {}
         self._flushing: list[tuple[str, zenoh.Query]] = []
@@ -78,16 +106,16 @@ class Readers:
         for name, runs in self._peers.names.items():
             for run in sorted(runs):
                 self._offer_presence(reader, PeerAlive(participant=name, run=run))
-        for written in self._sent.past(Missing(subscription.patterns, {}), self._loop.time()).written:
-            self._deliver(reader, written, past=True)
+        oldest = self._loop.time() - keys.HISTORY_MAX_AGE
+        for written in self._sent.past(subscription.wants, Missing(), oldest).written:
+            self._deliver(reader, written, self._sent.run, past=True)
         for pattern in subscription.patterns:
             if pattern not in self._carriers:
                 handler = self._bridge.samples(partial(self._sample_came, pattern))
                 carrier = self._session.declare_subscriber(pattern, handler, allowed_origin=zenoh.Locality.REMOTE)
                 self._carriers[pattern] = (carrier, [])
             self._carriers[pattern][1].append(reader)
-        for run in self._peers.processes:
-            self._follow(reader, run)
+        self._ask(reader, {run: reader.follower(run, self._peers.processes) for run in self._peers.processes})
 
     def detach(self, subscription: Subscription) -> None:
         self._readers = [reader for reader in self._readers if reader.subscription is not subscription]
@@ -102,30 +130,49 @@ class Readers:
         if sample.kind != zenoh.SampleKind.PUT:
             return
         key, payload, encoding = str(sample.key_expr), sample.payload.to_bytes(), str(sample.encoding)
-        written = Written(key, encoding, payload, self._envelope(sample))
-        envelope = written.envelope
-        if self._peers.clocks.heard(envelope.clock, envelope.sent, self._loop.time()) and envelope.run:
-            self._peers.measure_clock(envelope.run, envelope.clock)
+        run, envelope = self._origin(sample)
+        if run == self._sent.run:
+            self.refused += 1  # from outside in this process' own name
+            return
+        written = Written(key, encoding, payload, envelope)
+        if not self._is_trusted(written, run):
+            return
+        if self._peers.clocks.heard(envelope.clock, envelope.sent, self._loop.time()):
+            self._peers.measure_clock(run, envelope.clock)
         for reader in tuple(self._carriers[pattern][1]) if pattern in self._carriers else ():
             # Only the first of overlapping patterns delivers, so that nothing comes twice.
             if reader.subscription.carrier(key) != pattern:
                 continue
             if not envelope.number:
-                self._deliver(reader, written, past=False)
+                self._deliver(reader, written, run, past=False)
                 continue
-            follower = reader.followers.get(envelope.run) or self._follow(reader, envelope.run)
+            follower = reader.follower(run, self._peers.processes)
             for one in follower.take(written):
-                self._deliver(reader, one, past=False)
-            self._ask_past(reader, envelope.run, follower)
+                self._deliver(reader, one, run, past=False)
+            self._catch_up(reader, run, follower)
 
-    def _envelope(self, sample: zenoh.Sample) -> Envelope:
-        """Envelope of a sample; for one without, as programs in other languages send it, all but `run` is empty."""
-        if sample.attachment is not None:
+    def _is_trusted(self, written: Written, run: str) -> bool:
+        """False for a message that its process may not send. One without an envelope is as good as its key."""
+        envelope = written.envelope
+        if self._trusts is None or not (envelope.clock or envelope.number):
+            return True
+        if self._trusts(run, written.key, envelope.source):
+            return True
+        self.refused += 1
+        return False
+
+    def _origin(self, sample: zenoh.Sample) -> tuple[str, Envelope]:
+        """Run and envelope of a sample; an empty one where there is none, as programs in other languages send it.
+
+        An envelope counts only together with Zenoh's word for who sent it, which every process of ours gives.
+        """
+        if sample.attachment is not None and sample.source_info is not None:
             try:
-                return _envelopes.decode(sample.attachment.to_bytes())
+                envelope = envelopes.decode(sample.attachment.to_bytes())
+                return str(sample.source_info.source_id.zid), envelope
             except BAD:
                 self.refused += 1
-        return Envelope("", "", 0.0, self._foreign_life(sample))
+        return self._foreign_life(sample), Envelope("", "", 0.0)
 
     def _foreign_life(self, sample: zenoh.Sample) -> str:
         """Life of a program without an envelope, as far as Zenoh tells; else empty.
@@ -140,7 +187,7 @@ class Readers:
         passed_on_by = {self._sent.run, *self._peers.processes, *map(str, self._session.info.routers_zid())}
         return "" if stamped_by in passed_on_by else stamped_by
 
-    def _deliver(self, reader: _Reader, written: Written, *, past: bool) -> None:
+    def _deliver(self, reader: _Reader, written: Written, run: str, *, past: bool) -> None:
         # One sample often has several readers: it is decoded once.
         if self._decoded is None or self._decoded[0] is not written:
             self._decoded = (written, self._decode(reader.bus, written))
@@ -149,7 +196,7 @@ class Readers:
             return
         if message is not None:
             envelope = written.envelope
-            received = Received(written.key, message, envelope.source, self._loop.time(), past, envelope.run)
+            received = Received(written.key, message, envelope.source, self._loop.time(), past, run)
             reader.subscription.offer(received)
 
     def _decode(self, bus: Bus, written: Written) -> Message | None:
@@ -164,44 +211,56 @@ class Readers:
                 bus.publish(keys.fault(bus.name), fault)
             return unreadable(error, written.key, written.payload, written.encoding)
 
-    def _follow(self, reader: _Reader, run: str) -> Follower:
-        follower = reader.followers.get(run)
-        if follower is None:
-            follower = reader.followers[run] = Follower(reader.subscription.patterns)
-            self._ask_past(reader, run, follower)
-        return follower
+    def _catch_up(self, reader: _Reader, run: str, follower: Follower) -> None:
+        if follower.behind and not follower.asking:
+            self._ask(reader, {run: follower})
 
-    def _ask_past(self, reader: _Reader, run: str, follower: Follower, tries: int = 1) -> None:
-        if not follower.behind or follower.asking:
-            return
+    def _ask(self, reader: _Reader, waiting: dict[str, Follower], tries: int = 1) -> None:
+        """Ask processes for what is missing: one, or all when a reader comes. waiting: followers, by run."""
+        missing = Missing()
+        for follower in waiting.values():
+            follower.asking, missing = True, follower.missing()
 
-        def caught_up(past: Past | None) -> None:
-            follower.asking = False
-            if past is None and run in self._peers.processes and tries < TRIES:
-                # The process is there, only slow, or the link was cut meanwhile: the past is not lost yet.
-                self._ask_past(reader, run, follower, tries + 1)
-                return
-            again, follower.again = follower.again, False
-            for written, is_past in follower.catch_up(past):
-                self._deliver(reader, written, past=is_past)
-            if again:
-                follower.behind = True
-                self._ask_past(reader, run, follower)
-            self._answer_flushes()
+        def told(run: str, past: Past | None) -> None:
+            if (follower := waiting.pop(run, None)) is not None:
+                self._told(reader, run, follower, past)
 
-        follower.asking = True
-        self._peers.ask_past(run, follower.missing(), caught_up)
+        def ended() -> None:
+            for run, follower in tuple(waiting.items()):
+                if run in self._peers.processes and tries < TRIES:
+                    # The process is there, only slow, or the link was cut meanwhile: the past is not lost yet.
+                    self._ask(reader, {run: follower}, tries + 1)
+                else:
+                    told(run, None)
+
+        if reader.kept and waiting:
+            one = next(iter(waiting)) if len(waiting) == 1 else ""
+            self._history.ask(reader.kept, one, missing, told, ended)
+        else:
+            ended()
+
+    def _told(self, reader: _Reader, run: str, follower: Follower, past: Past | None) -> None:
+        follower.asking, known = False, follower.forged
+        if past is not None:  # which may hold more: see `keys.kept`
+            past = past.of(reader.subscription.wants)
+            trusted = tuple(one for one in past.written if self._is_trusted(one, run))
+            past = msgspec.structs.replace(past, written=trusted)
+        for written, is_past in follower.catch_up(past):
+            self._deliver(reader, written, run, past=is_past)
+        if follower.forged > known:
+            LOG.warning("%s: dropped messages that say they are of %s, which never sent them", reader.bus.name, run)
+        if follower.again:
+            follower.again, follower.behind = False, True
+        self._catch_up(reader, run, follower)
+        self._answer_flushes()
 
     def process_came(self, run: str) -> None:
         for reader in self._readers:
-            follower = reader.followers.get(run)
-            if follower is None:
-                self._follow(reader, run)
-                continue
+            follower = reader.follower(run, self._peers.processes)
             # The process may be back after a cut in which messages were lost, or the answer to a question.
             follower.again = follower.asking
             follower.behind = True
-            self._ask_past(reader, run, follower)
+            self._catch_up(reader, run, follower)
 
     def _pulse_heard(self, sample: zenoh.Sample) -> None:
         run = keys.run_of(str(sample.key_expr))
@@ -213,11 +272,11 @@ class Readers:
             if run != self._sent.run:
                 self._compare(run, pulse)
 
-    def _compare(self, run: str, pulse: Pulse) -> None:
+    def _compare(self, run: str, pulse: Counts) -> None:
         for reader in self._readers:
-            follower = self._follow(reader, run)
+            follower = reader.follower(run, self._peers.processes)
             follower.pulse(pulse)
-            self._ask_past(reader, run, follower)
+            self._catch_up(reader, run, follower)
 
     def _flush_asked(self, query: zenoh.Query) -> None:
         try:

@@ -4,7 +4,8 @@ import asyncio
 import json
 import re
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from secrets import token_hex
 from typing import Any
 
 import zenoh
@@ -14,7 +15,10 @@ from engage_hri.schemas.faults import Fault, InputRefused, RunFailed
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.config import ADVICE, is_endpoint
 from engage_hri.services.bus.interface import LOG
+from engage_hri.services.bus.keyring import Keys
 
+ROUTER_WITH_KEYS = "tls/localhost:7447"
+"""Endpoint of the router for processes with keys that name no other."""
 RENDEZVOUS = "tcp/127.0.0.1:7447"
 """Endpoint at which the processes of one machine find one another: the first listens there, all others connect."""
 LOOPBACK = "tcp/127.0.0.1:0"
@@ -46,12 +50,18 @@ STREAM_QOS: dict[str, Any] = {
 
 
 def open_session(
-    robot: str | None, connect: Sequence[str], listen: Sequence[str], rendezvous: str | None, mode: str = "peer"
+    robot: str | None,
+    connect: Sequence[str],
+    listen: Sequence[str],
+    rendezvous: str | None,
+    mode: str = "peer",
+    more: Mapping[str, object] = {},
 ) -> tuple[zenoh.Session, bool]:
     """Open a session in the robot's namespace; returns it, and whether it connects to others. Blocks for some ms.
 
     An endpoint where nobody listens costs nothing. robot None: in no namespace. rendezvous None: only the endpoints
-    given. Raises InputRefused when one is misspelled, RunFailed when it is taken, or not of this machine.
+    given. more: further settings of Zenoh. Raises InputRefused when one is misspelled, RunFailed when it is taken, or
+    not of this machine.
     """
     _check(*connect, *listen)
     if rendezvous is not None:
@@ -62,35 +72,56 @@ def open_session(
             # Another process listens there. Never both listen and connect: the first would call itself for ever.
             connect = (*connect, rendezvous)
     try:
-        session = zenoh.open(_config(robot, connect, tuple(listen) or (LOOPBACK,), mode))
+        session = zenoh.open(_config(robot, connect, tuple(listen) or (LOOPBACK,), mode, more))
         return session, bool(connect)
     except zenoh.ZError as error:
         where, reason = ", ".join((*listen, *connect)), RUST_PLACE.sub("", str(error))
         raise RunFailed(Fault(reason=f"cannot open the bus: {reason}", where=where, advice=ADVICE)) from error
 
 
-async def open_client(robot: str, connect: Sequence[str]) -> zenoh.Session:
+async def open_client(robot: str, connect: Sequence[str], keys: Keys | None = None) -> zenoh.Session:
     """Open a session as a client of the first of these routers that answers. Waits for one, and says so in the log.
 
-    Raises InputRefused when an endpoint is misspelled.
+    keys: those of this process; None: the link is open. Raises InputRefused when an endpoint is misspelled.
     """
     _check(*connect)
     loop = asyncio.get_running_loop()
     tell_at = loop.time() + TELL_AFTER
+    more = {} if keys is None else {**encrypted(keys), "id": f"{keys.holder.mark}{token_hex(12)}"}
     while True:
         try:
-            return zenoh.open(_config(robot, connect, (), "client"))
+            return zenoh.open(_config(robot, connect, (), "client", more))
         except zenoh.ZError:
             if loop.time() > tell_at:
                 tell_at = float("inf")
                 where = ", ".join(connect)
-                LOG.warning("no router answers at %s; waiting (`engage router --listen ENDPOINT` starts one)", where)
+                advice = "`engage router --listen ENDPOINT` starts one"
+                if keys is not None:
+                    advice += "; one that refuses our certificate says why in its log"
+                LOG.warning("no router answers at %s; waiting (%s)", where, advice)
         await asyncio.sleep(TRY_AGAIN)
 
 
-def open_router(connect: Sequence[str], listen: Sequence[str]) -> zenoh.Session:
-    """Open a session that passes on what others send one another. Raises InputRefused, RunFailed."""
-    return open_session(None, connect, listen, None, mode="router")[0]
+def open_router(connect: Sequence[str], listen: Sequence[str], more: Mapping[str, object] = {}) -> zenoh.Session:
+    """Open a session that passes on what others send one another. Raises InputRefused, RunFailed.
+
+    more: further settings of Zenoh.
+    """
+    return open_session(None, connect, listen, None, "router", more)[0]
+
+
+def encrypted(keys: Keys) -> dict[str, object]:
+    """Settings for links that are encrypted, between two sides that both show a certificate of our authority.
+
+    A link ends when a certificate does. Who connects checks that the router's certificate is for the host it called.
+    """
+    own = {
+        f"{side}_{what}": path
+        for side in ("listen", "connect")
+        for what, path in (("certificate", keys.certificate), ("private_key", keys.private))
+    }
+    trust = {"root_ca_certificate": keys.authority, "enable_mtls": True, "verify_name_on_connect": True}
+    return {"transport/link/tls": {**own, **trust, "close_link_on_expiration": True}}
 
 
 def _check(*endpoints: str) -> None:
@@ -99,7 +130,9 @@ def _check(*endpoints: str) -> None:
             raise InputRefused(Fault(reason=f"{endpoint!r} is not an endpoint", advice=ADVICE))
 
 
-def _config(robot: str | None, connect: Sequence[str], listen: Sequence[str], mode: str) -> zenoh.Config:
+def _config(
+    robot: str | None, connect: Sequence[str], listen: Sequence[str], mode: str, more: Mapping[str, object] = {}
+) -> zenoh.Config:
     config = zenoh.Config()
     settings: dict[str, object] = {
         "mode": mode,
@@ -123,7 +156,7 @@ def _config(robot: str | None, connect: Sequence[str], listen: Sequence[str], mo
     }
     if robot is not None:
         settings["namespace"] = robot
-    for key, value in settings.items():
+    for key, value in {**settings, **more}.items():
         config.insert_json5(key, json.dumps(value))
     return config
 

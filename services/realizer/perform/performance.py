@@ -96,8 +96,7 @@ class BlockPerformance:
         began, block = self.bus.now(), self.plan.block.id
         self.decisions = Decisions(self.plan, began, self._config, self._observers, self.ties.is_free)
         if self._is_held:
-            self.decisions.hold_up(True, began)
-            self.decisions.hold(self._held, began)
+            self._hold()
         self.report.started(self.plan, began)
         for problem in self.plan.problems:
             self.report.warn(problem.kind, problem.message, problem.behavior)

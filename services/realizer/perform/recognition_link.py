@@ -42,7 +42,7 @@ class RecognitionLink:
         if "recognition" in self._peers:
             self._requests.send(keys.TURN, message)
         else:
-            self._bus.publish(keys.TURN, message)
+            self._bus.publish(keys.command(keys.TURN, self._bus.role, self._bus.name), message)
 
     def ask(self, id: str, block: str, event: Event, began: Seconds) -> Pending | None:
         """Request the event; None if recognition is not there to decide it."""

@@ -4,7 +4,7 @@ import asyncio
 from collections.abc import Iterable, Mapping
 
 from engage_hri.schemas import keys
-from engage_hri.schemas.blocks import PerformanceSteered, SteerPerformance
+from engage_hri.schemas.blocks import PerformanceSteered, SteerPerformance, SteerRobot
 from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.feedback import WarningFeedback
 from engage_hri.schemas.holds import Held, Hold
@@ -43,18 +43,17 @@ class Steering:
         self._timer = Timer(self._expire)
         self._stopping: set[asyncio.Task[None]] = set()
 
-    async def steer(self, request: SteerPerformance) -> None:
+    async def steer(self, request: SteerPerformance | SteerRobot) -> None:
         """Carry out a request, and answer it."""
-        block, behavior = request.block, request.behavior
+        block, behavior = ("", "") if isinstance(request, SteerRobot) else (request.block, request.behavior)
         with self._desk.serving(request):
             concerned = self._concerned(block)
             performances = [each for each in self._performances.values() if each.plan.block.id == block]
-            is_there = (
-                any(each.is_going_on(behavior) for each in performances) if behavior else concerned or not block
-            )
-            if not is_there:
+            going_on = any(each.is_going_on(behavior) for each in performances) if behavior else concerned
+            if isinstance(request, SteerPerformance) and not (block and going_on):
                 where = f"{block}: {behavior}" if behavior else block
-                self._desk.refuse(request.id, Fault(reason="it is not being performed", where=where))
+                advice = "" if block else f"what is for the whole robot is `steer_robot`, on {keys.ROBOT}"
+                self._desk.refuse(request.id, Fault(reason="it is not being performed", where=where, advice=advice))
                 return
             self._desk.accept(request.id)
             match request.to:

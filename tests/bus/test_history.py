@@ -6,6 +6,7 @@ import os
 from collections.abc import AsyncIterator
 from typing import Any
 
+import msgspec
 import pytest
 import pytest_asyncio
 import zenoh
@@ -16,10 +17,12 @@ from engage_hri.schemas.recognition import OpenEvents
 from engage_hri.schemas.requests import Accepted
 from engage_hri.schemas.status import AskStatus
 from engage_hri.services.bus.interface import Bus
-from engage_hri.services.bus.zenoh.foreign_clients import BATCH
+from engage_hri.services.bus.zenoh import session as zenoh_session
+from engage_hri.services.bus.zenoh.history import BATCH
 from engage_hri.services.bus.zenoh.hub import ZenohHub, open_hub
 from engage_hri.services.runtime.service import Ready, running
-from tests.bus.places import PATIENCE, acquainted, echo, free_endpoint, state
+from tests.bus.places import PATIENCE, acquainted, echo, free_endpoint, messages, numbers, state
+from tests.commanding import command
 
 pytestmark = pytest.mark.real_time
 
@@ -238,3 +241,77 @@ async def test_what_is_for_programs_of_others_comes_as_json_but_they_may_ask_oth
     assert json.loads(plain.payload.to_bytes())["session"] == "life"
     assert str(asked.encoding) == "application/msgpack;engage.OpenEvents/1"
     assert decode(asked.payload.to_bytes(), str(asked.encoding)) == open_events
+
+
+@pytest.mark.parametrize("names_a_source", [False, True])
+async def test_a_forged_message_far_ahead_deafens_nobody(town: Town, names_a_source: bool, caplog: Any):
+    """A stranger puts one message with the envelope of another, only its number and its count are far higher."""
+    near, far, visitor = town
+    there, inbox = far.join("there"), near.join("here").subscribe(keys.FEEDBACK)
+    there.publish(keys.FEEDBACK, state(1))
+    assert numbers(await messages(inbox)) == [1]
+    [true] = await visitor.samples(keys.FEEDBACK)
+    envelope = msgspec.msgpack.decode(true.attachment.to_bytes())  # type: ignore[union-attr]
+    envelope[-2] = envelope[-1] = 10**9
+    source = {"source_info": zenoh.SourceInfo(far.session.id, 0)} if names_a_source else {}
+    key, payload, form = f"{visitor.robot}/{keys.FEEDBACK}", encode(state(-1)), "application/msgpack"
+
+    visitor.session.put(key, payload, encoding=form, attachment=msgspec.msgpack.encode(envelope), **source)
+    if not names_a_source:  # a message of a stranger, and nothing else
+        assert numbers(await messages(inbox)) == [-1]
+    for number in range(2, 5):
+        there.publish(keys.FEEDBACK, state(number))
+
+    assert numbers(await messages(inbox, 3)) == [2, 3, 4]
+    assert near.readers.missed(near._buses["here"])[1] == 0
+    if names_a_source:
+        assert await inbox.next(near.join("timer").now() + 1.5) is None  # after the next pulse, too
+        assert "never sent them" in caplog.text
+
+
+async def test_one_key_of_one_process_can_be_asked_for(town: Town):
+    near, far, visitor = town
+    near.join("here").publish(keys.FEEDBACK, state(1))
+    far.join("there").publish(keys.FEEDBACK, state(2))
+
+    both = await visitor.get(keys.FEEDBACK, consolidation=zenoh.ConsolidationMode.NONE)
+    one = await visitor.get(f"{keys.FEEDBACK}?run={far.run}")
+
+    assert {str(each.replier_id.zid): texts([each.ok]) for each in both} == {near.run: ["1"], far.run: ["2"]}  # type: ignore[list-item,union-attr]
+    assert texts([each.ok for each in one]) == ["2"]  # type: ignore[misc]
+
+
+async def test_who_may_not_publish_on_a_key_hands_out_nothing_for_it(monkeypatch: pytest.MonkeyPatch):
+    """The rules know one process by its id. It keeps what it could not publish, and is asked for it."""
+    robot, end, viewer = f"ruled-{os.getpid()}", free_endpoint(), "abc1"
+    rule = {"id": "no commands", "permission": "deny", "flows": ["ingress"], "messages": ["put", "reply"]}
+    rules = {
+        "enabled": True, "default_permission": "allow",
+        "rules": [rule | {"key_exprs": [f"{robot}/{keys.of_class('cmd')}"]}],
+        "subjects": [{"id": "viewer", "zids": [viewer]}],
+        "policies": [{"rules": ["no commands"], "subjects": ["viewer"]}],
+    }  # fmt: skip
+    make = zenoh_session._config
+
+    def ruled(robot: str, connect: Any, listen: Any, mode: str, *more: Any) -> zenoh.Config:
+        config = make(robot, connect, listen, mode, *more)
+        here = end in listen
+        config.insert_json5("access_control" if here else "id", json.dumps(rules if here else viewer))
+        return config
+
+    monkeypatch.setattr(zenoh_session, "_config", ruled)
+    near, far = await open_hub(robot, listen=[end]), await open_hub(robot, connect=[end])
+    await acquainted(near, far)
+    there = far.join("viewer")
+    assert far.run == viewer
+    command(there, keys.FRAGMENT, state(1))
+    there.publish(keys.FEEDBACK, state(2))
+
+    inbox = near.join("generation").subscribe(keys.commands("generation"), keys.FEEDBACK)
+    command(there, keys.FRAGMENT, state(3))
+    there.publish(keys.FEEDBACK, state(4))
+
+    assert numbers(await messages(inbox, 2)) == [2, 4]
+    assert await inbox.next(near.join("timer").now() + 1.5) is None  # after the next pulse, too
+    await far.close()
+    await near.close()

@@ -1,0 +1,199 @@
+"""Table of access: who publishes, subscribes to, serves and asks what. `engage keys acl` makes the rules from it.
+
+A certificate belongs to a holder: a role at a robot, with a name. All that a process does has to be in a row of its
+role. What is in no row is denied. `{own}` in a key stands for the holder's name; a process of this holder calls its
+participants so too, or by this name with `-` and more behind it.
+"""
+
+from collections.abc import Iterator
+from functools import lru_cache
+from hashlib import sha256
+from typing import Literal, NamedTuple
+
+from msgspec import Struct
+
+from engage_hri.schemas import keys
+
+Does = Literal["publishes", "subscribes", "serves", "asks"]
+OWN = "{own}"
+ROUTER = "router"
+"""Role of a router. It is no participant: it passes everything on, to the other routers too."""
+
+
+class Holder(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """The one to whom a certificate was given."""
+
+    robot: str
+    role: str
+    name: str
+
+    @property
+    def common_name(self) -> str:
+        """Common name of its certificate, by which the rules know it."""
+        return f"{self.robot}/{self.role}/{self.name}"
+
+    @property
+    def mark(self) -> str:
+        """Beginning of the ids of all its processes: the rules grant the bus' own keys of these ids only."""
+        return f"{_role_mark(self.role)}{_name_mark(self.name)}"
+
+    def called(self, name: str) -> str:
+        """Name of a participant in one of its processes: `name`, behind the holder's own if it is not that."""
+        return name if name == self.name or name.startswith(f"{self.name}-") else f"{self.name}-{name}"
+
+
+class Row(NamedTuple):
+    """A row of the table. why: the reason for a row that no program of ours needs yet."""
+
+    role: str
+    does: Does
+    key: str
+    why: str = ""
+
+
+SERVED = {
+    "fragment": keys.FRAGMENT, "inhibit": keys.INHIBIT, "block": keys.BLOCK, "event": keys.EVENT, "turn": keys.TURN,
+    "behavior": keys.BEHAVIOR,
+    "robot": keys.ROBOT,
+}  # fmt: skip
+"""Commands by their subject."""
+WATCHED = (
+    keys.ANY_REQUEST_STATE, keys.ANY_FEEDBACK, keys.SYNC_POINT, keys.ANY_ACTION, keys.ANY_CONNECTION_EVENT,
+    keys.ANY_FAULT, keys.HEAD_OWNER, keys.HELD, keys.ANY_OPEN_EVENTS, keys.ANY_STATISTICS, keys.ANY_ALIVE,
+)  # fmt: skip
+"""Expressions for all that a person watches, or a program that drives the robot."""
+ANY_STATUS = keys.status("*")
+_OWN_FAULT = keys.fault(OWN)
+_RARELY = "sent when something goes wrong"
+_WITHDRAWN = "sent when a request is withdrawn"
+_LONG = "sent for a request that goes on for a second"
+
+
+def _commands(role: str, *subjects: str, why: str = "") -> Iterator[Row]:
+    """Rows for sending these commands, and for withdrawing and keeping alive what was asked for."""
+    servers = dict.fromkeys(keys.server_of(SERVED[subject]) for subject in subjects)
+    expressions = [(SERVED[subject], why) for subject in subjects]
+    expressions += [(keys.cancel(server), why or _WITHDRAWN) for server in servers]
+    expressions += [(keys.keep_alive(server), why or _LONG) for server in servers]
+    for expression, reason in expressions:
+        yield Row(role, "publishes", keys.command(expression, role, OWN), reason)
+
+
+def _service(name: str, *published: str, heard: tuple[str, ...], served: tuple[str, ...] = ()) -> Iterator[Row]:
+    """Rows of one of the robot's services, without the commands that it sends itself."""
+    yield Row(name, "publishes", keys.request_state(name))
+    yield Row(name, "publishes", _OWN_FAULT, _RARELY)
+    yield from (Row(name, "publishes", each) for each in published)
+    yield from (Row(name, "subscribes", each) for each in (keys.commands(name), keys.ANY_ALIVE, *heard))
+    yield from (Row(name, "serves", each) for each in (keys.status(OWN), *served))
+    yield Row(name, "asks", ANY_STATUS, "asked by a service that waits for another, to say why")
+
+
+def _watches(role: str, why: str = "") -> Iterator[Row]:
+    yield from (Row(role, "subscribes", each, why) for each in WATCHED)
+    yield Row(role, "publishes", _OWN_FAULT, _RARELY)
+    yield Row(role, "asks", ANY_STATUS, "asked by a program that waits for a service, to say why")
+    yield Row(role, "asks", keys.DESCRIBE, "for programs that suit what they ask for to the body")
+
+
+def _manages(role: str, *more: str, why: str = "") -> Iterator[Row]:
+    yield from _watches(role, why)
+    yield from (Row(role, "subscribes", each, why) for each in (keys.TURN_CLOSED, keys.WORLD))
+    yield from _commands(role, "fragment", "inhibit", "block", *more, why=why)
+    yield Row(role, "serves", keys.status(OWN), why)
+
+
+_RAW = (keys.ANY_HEAD_POSE, keys.ANY_VOICE_ACTIVITY)
+_NO_PROGRAM = "of no program of ours: for those of others"
+
+TABLE: tuple[Row, ...] = (
+    *_service(
+        "generation", keys.FRAGMENT_FEEDBACK, keys.TURN_CLOSED, keys.HEAD_OWNER,
+        heard=(keys.ANY_REQUEST_STATE, keys.FEEDBACK, keys.ANY_CONNECTION_EVENT, keys.WORLD, keys.ANY_ACTION,
+               keys.ROBOT_STATE, keys.ANY_STATISTICS),
+    ),
+    *_commands("generation", "block", "behavior", "turn"),
+    Row("generation", "asks", keys.DESCRIBE),
+    Row("generation", "asks", keys.ESTIMATE),
+    *_service("realizer", keys.FEEDBACK, keys.NET, keys.HELD, heard=(keys.ANY_REQUEST_STATE, keys.SYNC_POINT)),
+    *_commands("realizer", "behavior", "event", "turn"),
+    Row("realizer", "asks", keys.ESTIMATE),
+    *_service(
+        "recognition", keys.ANY_CONNECTION_EVENT, keys.RECOGNIZED_ACTION, keys.ANY_OPEN_EVENTS, keys.ANY_STATISTICS,
+        heard=(keys.ROBOT_ACTION, keys.PERCEIVED_ACTION, keys.FEEDBACK, keys.HEAD_OWNER, keys.WORLD, *_RAW,
+               keys.ROBOT_STATE),
+    ),
+    *_service(
+        "control", keys.SYNC_POINT, keys.ROBOT_ACTION, keys.ROBOT_STATE,
+        heard=(keys.WORLD,), served=(keys.ESTIMATE, keys.DESCRIBE),
+    ),
+    *(Row("perception", "publishes", key) for key in (keys.WORLD, keys.PERCEIVED_ACTION, *_RAW)),
+    Row("perception", "publishes", _OWN_FAULT, _RARELY),
+    *(
+        Row("perception", "subscribes", key)
+        for key in (keys.ANY_ALIVE, keys.FEEDBACK, keys.SYNC_POINT, keys.ROBOT_ACTION, keys.ANY_CONNECTION_EVENT,
+                    keys.ROBOT_STATE)
+    ),
+    Row("perception", "serves", keys.status(OWN)),
+    Row("perception", "asks", ANY_STATUS, "asked by a service that waits for another, to say why"),
+    *_manages("manager"),
+    *_watches("observer"),
+    Row("observer", "subscribes", keys.NET),
+    *(Row("observer", "subscribes", key, _NO_PROGRAM) for key in (keys.ROBOT_STATE, keys.TURN_CLOSED, keys.WORLD)),
+    *_watches("operator", "what an operator sees"),
+    Row("operator", "subscribes", keys.NET, "what an operator sees"),
+    *_commands("operator", "robot"),
+    Row("operator", "publishes", keys.command(keys.BLOCK, "operator", OWN), "holds, continues and stops one block"),
+    *_manages("wizard", "robot", why=f"drives the robot by hand; {_NO_PROGRAM}"),
+    Row("wizard", "publishes", keys.PERCEIVED_ACTION, f"says what perception does not see; {_NO_PROGRAM}"),
+)  # fmt: skip
+"""The table. `tests/access` checks it against what really flows."""
+
+ROLES = tuple(dict.fromkeys(row.role for row in TABLE))
+"""Roles that a holder may have, without `ROUTER`."""
+PARTICIPANTS = {**{name: name for name in keys.SERVICES}, "simulation": "perception", "collaboration": "manager"}
+"""Roles of the services that have another name."""
+
+
+@lru_cache(64)
+def rows(role: str, does: Does) -> tuple[str, ...]:
+    """Keys of all rows of a role, `OWN` among them."""
+    return tuple(row.key for row in TABLE if (row.role, row.does) == (role, does))
+
+
+def owned(key: str, name: str) -> str:
+    """Put a holder's name, or an expression for it, into the key of a row."""
+    return key.replace(OWN, name)
+
+
+@lru_cache(4096)  # asked for every message
+def may_have_sent(run: str, key: str) -> bool:
+    """Tell whether the process with id `run` belongs to a holder who may publish on this key.
+
+    The rules do not see the id of the sender, which stands beside the message; they see it in the bus' own keys.
+    """
+    return any(_is_marked(run, role, row, key) for role in ROLES for row in rows(role, "publishes"))
+
+
+def _is_marked(run: str, role: str, row: str, key: str) -> bool:
+    if not run.startswith(_role_mark(role)) or not keys.matches(owned(row, "*"), key):
+        return False
+    if OWN not in row:
+        return True
+    name = key.split("/")[row.split("/").index(OWN)]
+    holders = [name, *(name[:at] for at, letter in enumerate(name) if letter == "-")]
+    return any(run.startswith(f"{_role_mark(role)}{_name_mark(holder)}") for holder in holders)
+
+
+@lru_cache(64)
+def _role_mark(role: str) -> str:
+    return f"e{_hash(role)[:3]}"  # a letter first: Zenoh drops zeros there
+
+
+@lru_cache(4096)
+def _name_mark(name: str) -> str:
+    return _hash(name)[:4]
+
+
+def _hash(text: str) -> str:
+    return sha256(text.encode()).hexdigest()

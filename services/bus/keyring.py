@@ -1,0 +1,88 @@
+"""Folders of keys, as a process of the bus reads them. `engage keys` makes them.
+
+A folder holds what one holder needs: its certificate with its private key, the certificate of the authority that all
+trust, and who it is. The folder above, with the folders of several holders, will do as well where a process knows
+whose keys it is to take.
+"""
+
+import time
+from pathlib import Path
+from typing import Any
+
+import msgspec
+from msgspec import Struct
+
+from engage_hri.schemas.access import Holder
+from engage_hri.schemas.faults import Fault, InputRefused
+
+AUTHORITY, CERTIFICATE, PRIVATE, WHO, HOLDERS = (
+    "ca.pem",
+    "certificate.pem",
+    "private.pem",
+    "holder.json",
+    "holders.json",
+)
+"""Files of a folder. `HOLDERS` is a router's: to whom it gives access."""
+_ADVICE = "`engage keys init` makes such folders"
+
+
+class Who(Holder, frozen=True, kw_only=True):
+    """A holder, and until when its certificate is valid, in seconds since 1970."""
+
+    until: int
+
+
+class Keys(Struct, frozen=True):
+    """Keys of one holder."""
+
+    folder: Path
+    holder: Who
+
+    @property
+    def authority(self) -> str:
+        return str(self.folder / AUTHORITY)
+
+    @property
+    def certificate(self) -> str:
+        return str(self.folder / CERTIFICATE)
+
+    @property
+    def private(self) -> str:
+        return str(self.folder / PRIVATE)
+
+    def holders(self) -> tuple[Holder, ...]:
+        """Read to whom this router gives access. Raises InputRefused."""
+        return tuple(_read(self.folder / HOLDERS, tuple[Holder, ...]))
+
+
+def read_keys(folder: str | Path, name: str) -> Keys:
+    """Read keys: those in the folder, or those of holder `name` in a folder within. Raises InputRefused."""
+    place = Path(folder)
+    if not (place / WHO).exists():
+        place = place / name
+        if not (place / WHO).exists():
+            there = sorted(each.parent.name for each in Path(folder).glob(f"*/{WHO}"))
+            known = f"there are keys of {', '.join(there)}: name that folder" if there else _ADVICE
+            raise InputRefused(Fault(reason=f"no keys of {name!r}", where=str(folder), advice=known))
+    holder = _read(place / WHO, Who)
+    for file in (AUTHORITY, CERTIFICATE, PRIVATE):
+        try:
+            (place / file).read_bytes()
+        except OSError as error:
+            raise InputRefused(Fault(reason=error.strerror or str(error), where=str(place / file))) from error
+    if mode := (place / PRIVATE).stat().st_mode & 0o077:
+        reason = f"others may read this private key (mode {mode:03o} for group and others)"
+        raise InputRefused(Fault(reason=reason, where=str(place / PRIVATE), advice="chmod 600"))
+    if holder.until <= time.time():
+        reason = f"the certificate of {holder.common_name} has expired"
+        raise InputRefused(Fault(reason=reason, where=str(place), advice="`engage keys renew`"))
+    return Keys(place, holder)
+
+
+def _read(path: Path, kind: type) -> Any:
+    try:
+        return msgspec.json.decode(path.read_bytes(), type=kind)
+    except OSError as error:
+        raise InputRefused(Fault(reason=error.strerror or str(error), where=str(path), advice=_ADVICE)) from error
+    except (msgspec.DecodeError, UnicodeDecodeError) as error:
+        raise InputRefused(Fault(reason=f"damaged: {error}", where=str(path), advice=_ADVICE)) from error

@@ -1,0 +1,210 @@
+"""History: what was published before, asked for on the messages' own keys by our processes and by any program.
+
+A `session.get` of all states (`keys.of_class`) brings them as they were published: encoding, attachment, Zenoh's
+timestamp. Parameters of the selector, joined by `;` as Zenoh has it: `format=json`; `age=SECONDS`, how far back
+commands and events go; `run=RUN`, to ask only that process.
+
+Our own processes send a `Missing` with the question. They get what is missing of a key in one reply, and at the end
+one with the `Counts` of all these keys: so they know that all has come, and that there is nothing else.
+"""
+
+import asyncio
+from collections import deque
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from functools import partial
+from math import isnan
+
+import msgspec
+import zenoh
+
+from engage_hri.schemas import keys
+from engage_hri.schemas.faults import EngageError, Fault, InputRefused
+from engage_hri.schemas.messages import Message, decode, encode, encode_json, encoding_of
+from engage_hri.schemas.units import Seconds
+from engage_hri.services.bus.zenoh.order import Counts, Envelope, Missing, Past, SentLog, Written
+from engage_hri.services.bus.zenoh.session import QOS, LoopBridge
+
+BATCH = 32
+"""Number of replies in one go: a question for everything must not hold up the loop."""
+CATCH_UP: Seconds = 1.0
+"""Time that a process has to hand out its past."""
+
+BAD = (msgspec.DecodeError, UnicodeDecodeError)
+"""Exceptions of decoding bytes from other programs."""
+pack = msgspec.msgpack.encode
+envelopes = msgspec.msgpack.Decoder(Envelope)
+_parts = msgspec.msgpack.Decoder(list[Written])
+_missings = msgspec.msgpack.Decoder(Missing)
+_counts = msgspec.msgpack.Decoder(Counts)
+
+
+class _Answer:
+    """The answer of one process so far. parts: the counts of each pattern that it has answered for."""
+
+    def __init__(self) -> None:
+        self.written: list[Written] = []
+        self.parts: list[Counts] = []
+
+    def past(self) -> Past:
+        counts: Counts = {}
+        for part in self.parts:
+            for key, nth in part.items():
+                counts[key] = max(nth, counts.get(key, 0))
+        return Past(counts, tuple(self.written))
+
+
+class History:
+    """Answers questions for what this process has published, and asks other processes the same."""
+
+    def __init__(self, session: zenoh.Session, bridge: LoopBridge, sent: SentLog) -> None:
+        self._loop = asyncio.get_running_loop()
+        self._session = session
+        self._bridge = bridge
+        self._sent = sent
+        self._open = True
+        self._declared = tuple(
+            session.declare_queryable(keys.of_class(kind), bridge.on_loop(partial(self._asked, kind)))
+            for kind in keys.KEPT_CLASSES
+        )
+
+    def close(self) -> None:
+        self._open = False
+        for declared in self._declared:
+            declared.undeclare()  # type: ignore[no-untyped-call]
+
+    # -- asking -------------------------------------------------------------------------------------------------
+
+    def ask(
+        self,
+        patterns: Sequence[str],
+        run: str,
+        missing: Missing,
+        told: Callable[[str, Past], None],
+        ended: Callable[[], None],
+    ) -> None:
+        """Ask for what is missing on these keys. run: of the process that is asked; empty: all processes.
+
+        Calls `told` with each process that has answered in full, and its answer; then `ended`. Both on the loop.
+        """
+        answers: dict[str, _Answer] = {}
+        waiting = len(patterns)
+
+        def replied(reply: zenoh.Reply) -> None:
+            if reply.ok is None or reply.replier_id is None:
+                return
+            # Zenoh says who answers: no process can answer for another.
+            replier = str(reply.replier_id.zid)
+            answer = answers.setdefault(replier, _Answer())
+            with suppress(*BAD):  # counts as no answer
+                if (key := str(reply.ok.key_expr)) != keys.own(replier, "counts"):
+                    answer.written += [one for one in _parts.decode(reply.ok.payload.to_bytes()) if one.key == key]
+                    return
+                answer.parts.append(_counts.decode(reply.ok.payload.to_bytes()))
+                if len(answer.parts) == len(patterns):
+                    told(replier, answer.past())
+
+        def one_ended(_: object) -> None:
+            nonlocal waiting
+            waiting -= 1
+            if not waiting:
+                ended()
+
+        payload, only = pack(missing), f"?run={run}" if run else ""
+        for pattern in patterns:
+            self._session.get(
+                f"{pattern}{only}",
+                self._bridge.on_loop(replied, one_ended),
+                target=zenoh.QueryTarget.ALL,
+                consolidation=zenoh.ConsolidationMode.NONE,
+                accept_replies=zenoh.ReplyKeyExpr.ANY,
+                allowed_destination=zenoh.Locality.REMOTE,
+                payload=payload,
+                timeout=CATCH_UP,
+                **QOS,
+            )
+
+    # -- answering ----------------------------------------------------------------------------------------------
+
+    def _asked(self, kind: keys.KeyClass, query: zenoh.Query) -> None:
+        if query.parameters.get("run") not in (None, self._sent.run):
+            finish(query)
+            return
+        form, age, missing = "", keys.HISTORY_MAX_AGE, None
+        try:
+            if query.payload is None:
+                form, age = form_asked(query, ""), _age(query.parameters)
+            else:
+                missing = _missings.decode(query.payload.to_bytes())
+        except (EngageError, *BAD) as error:
+            refuse(query, error.fault if isinstance(error, EngageError) else Fault(reason=str(error)), "json")
+            finish(query)
+            return
+
+        def is_wanted(key: str) -> bool:
+            return keys.key_class(key) == kind and query.key_expr.intersects(zenoh.KeyExpr(key))
+
+        past = self._sent.past(is_wanted, missing or Missing(), self._loop.time() - age)
+        if missing is None:
+            self._answer(query, deque(past.written), form)
+            return
+        parts: dict[str, list[object]] = {}
+        for one in past.written:
+            parts.setdefault(one.key, []).append((one.key, one.encoding, one.payload, one.envelope))
+        for key, part in parts.items():
+            query.reply(key, pack(part))
+        query.reply(keys.own(self._sent.run, "counts"), pack(past.counts))
+        finish(query)
+
+    def _answer(self, query: zenoh.Query, waiting: deque[Written], form: str) -> None:
+        for _ in range(min(BATCH, len(waiting)) if self._open else 0):
+            one = waiting.popleft()
+            payload, encoding = one.payload, one.encoding
+            if form and not encoding.startswith(f"application/{form}"):
+                payload, encoding = in_form(decode(payload, encoding), form)
+            attachment = pack(one.envelope)
+            query.reply(one.key, payload, encoding=encoding, attachment=attachment, timestamp=one.stamp)  # type: ignore[arg-type]
+        if waiting and self._open:
+            self._loop.call_soon(self._answer, query, waiting, form)
+        else:
+            finish(query)
+
+
+def form_asked(query: zenoh.Query, otherwise: str = "msgpack") -> str:
+    """Form of the answer: the selector's, or else that of the question. Raises InputRefused.
+
+    otherwise: for a question that is not in JSON.
+    """
+    form = query.parameters.get("format")
+    if form is None:
+        return "json" if str(query.encoding).startswith("application/json") else otherwise
+    if form not in ("json", "msgpack"):
+        raise InputRefused(Fault(reason=f"format {form!r}", where="selector", advice="json or msgpack"))
+    return form
+
+
+def in_form(message: Message, form: str) -> tuple[bytes, str]:
+    """Encode the message in this form; returns payload and encoding."""
+    return (encode_json if form == "json" else encode)(message), encoding_of(message, form)
+
+
+def refuse(query: zenoh.Query, fault: Fault, form: str) -> None:
+    """Answer the query with an error."""
+    payload, encoding = in_form(fault, form)
+    query.reply_err(payload, encoding=encoding)
+
+
+def finish(query: zenoh.Query) -> None:
+    """Tell Zenoh that there will be no more replies: the asking process waits for that."""
+    query.drop()  # type: ignore[no-untyped-call]
+
+
+def _age(parameters: zenoh.Parameters) -> Seconds:
+    text = parameters.get("age")
+    try:
+        age = keys.HISTORY_MAX_AGE if text is None else float(text)
+    except ValueError:
+        age = float("nan")
+    if isnan(age) or age < 0:
+        raise InputRefused(Fault(reason=f"age {text!r}", where="selector", advice="seconds: age=10"))
+    return age

@@ -1,0 +1,50 @@
+"""Rights of a process with keys. What it may not do is refused here, by name: the router drops it without a word."""
+
+from functools import lru_cache
+
+import zenoh
+
+from engage_hri.schemas import access
+from engage_hri.schemas.access import Does, Holder, owned
+from engage_hri.schemas.faults import Fault, InputRefused
+from engage_hri.services.bus.interface import LOG
+
+TOLD = 1000
+"""Number of forged messages that are told one by one, so that a flood of them does not fill the log."""
+_DOING = {"publishes": "publish on", "subscribes": "subscribe to", "serves": "answer on", "asks": "ask"}
+
+
+class Rights:
+    """Rights of a holder, and of those whose messages come in."""
+
+    def __init__(self, holder: Holder) -> None:
+        self.holder = holder
+        self._told: set[tuple[str, str]] = set()
+
+    def called(self, name: str) -> str:
+        """Name of a participant in this process."""
+        return self.holder.called(name)
+
+    def check(self, name: str, does: Does, key: str) -> None:
+        """Raise InputRefused for what the router would drop. name: of the participant that does it."""
+        if not _is_granted(self.holder.role, name, does, key):
+            reason = f"the keys of {self.holder.common_name} do not let it {_DOING[does]} {key}"
+            raise InputRefused(Fault(reason=reason, where=name, advice="schemas/access.py has who may do what"))
+
+    def trusts(self, run: str, key: str, source: str) -> bool:
+        """Tell whether a message on this key can be from this process; tells of one that is forged in the log."""
+        if access.may_have_sent(run, key):
+            return True
+        if (run, key) not in self._told and len(self._told) < TOLD:
+            self._told.add((run, key))
+            LOG.warning(
+                "dropped: a message on %s that says it is from process %s (%s), whose keys do not allow that;"
+                " so is all more of its kind",
+                key, run, source or "no name",
+            )  # fmt: skip
+        return False
+
+
+@lru_cache(4096)  # asked for every message
+def _is_granted(role: str, name: str, does: Does, key: str) -> bool:
+    return any(zenoh.KeyExpr(owned(row, name)).includes(key) for row in access.rows(role, does))

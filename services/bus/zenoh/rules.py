@@ -1,0 +1,86 @@
+"""Rules for Zenoh's access control, made from the table of access. Pure.
+
+A router checks each message twice: from the one who sends (ingress), and to the one who gets it (egress). What no
+rule allows is dropped.
+"""
+
+from collections.abc import Iterable, Iterator
+from typing import Any
+
+from engage_hri.schemas import access, keys
+from engage_hri.schemas.access import OWN, ROUTER, Holder, owned
+
+EVERY_KIND = (
+    "put", "delete", "declare_subscriber", "query", "reply", "declare_queryable",
+    "liveliness_token", "liveliness_query", "declare_liveliness_subscriber",
+)  # fmt: skip
+ANYTHING = ("**", f"*/{keys.ANY_TOKEN}")
+"""Expressions for all keys: no wildcard includes the `@` of the bus' own."""
+_ANY_PAST = tuple(map(keys.of_class, keys.KEPT_CLASSES))
+"""What all processes answer about what they have published. Each reply is checked under its own key."""
+
+
+def access_control(holders: Iterable[Holder]) -> dict[str, Any]:
+    """Make the section `access_control` of a router's configuration, for these holders: all others are denied."""
+    rules, subjects, policies = [], [], []
+    for holder in holders:
+        name = holder.common_name
+        subjects.append({"id": name, "cert_common_names": [name]})
+        own = [
+            {
+                "id": f"{name} {flow} {kind}",
+                "permission": "allow",
+                "flows": [flow],
+                "messages": [kind],
+                "key_exprs": sorted({_within(holder, key) for key in allowed}),
+            }
+            for flow, kind, allowed in _grants(holder)
+        ]
+        rules += own
+        policies.append({"rules": [rule["id"] for rule in own], "subjects": [name]})
+    section: dict[str, Any] = {"enabled": True, "default_permission": "deny"}
+    return section | {"rules": rules, "subjects": subjects, "policies": policies}
+
+
+def _within(holder: Holder, key: str) -> str:
+    return key if holder.role == ROUTER else f"{holder.robot}/{key}"
+
+
+def _grants(holder: Holder) -> Iterator[tuple[str, str, tuple[str, ...]]]:
+    """Flow, kind of message, and the keys allowed for it."""
+    if holder.role == ROUTER:
+        yield from ((flow, kind, ANYTHING) for flow in ("ingress", "egress") for kind in EVERY_KIND)
+        return
+    publishes, subscribes, serves, asks = (
+        tuple(_named(access.rows(holder.role, does), holder.name))
+        for does in ("publishes", "subscribes", "serves", "asks")
+    )
+    runs = f"{holder.mark}$*"
+    answered = tuple(keys.own(runs, subject) for subject in ("counts", "clock", "flush"))
+    shown = (
+        keys.own(runs, "process"), keys.own(runs, "at/**"), keys.own(runs, "answers/**"),
+        *_named((keys.own(runs, f"alive/{OWN}"),), holder.name),
+    )  # fmt: skip
+    asked = tuple(keys.own("*", subject) for subject in ("clock", "flush"))
+    yield "ingress", "put", (*publishes, keys.own(runs, "pulse"))
+    yield "ingress", "declare_subscriber", (*subscribes, keys.ANY_PULSE)
+    yield "ingress", "declare_queryable", (*serves, *answered, *_ANY_PAST)
+    yield "ingress", "reply", (*serves, *answered, *publishes)
+    yield "ingress", "query", (*asks, *asked, *subscribes)
+    yield "ingress", "liveliness_token", shown
+    yield "ingress", "declare_liveliness_subscriber", (keys.ANY_TOKEN,)
+    yield "ingress", "liveliness_query", (keys.ANY_TOKEN,)
+    yield "egress", "put", (*subscribes, keys.ANY_PULSE)
+    yield "egress", "declare_subscriber", (keys.EVERYTHING, keys.ANY_TOKEN)
+    yield "egress", "declare_queryable", (keys.EVERYTHING, keys.ANY_TOKEN)
+    yield "egress", "query", (*serves, access.ANY_STATUS, keys.ANY_TOKEN, *_ANY_PAST)
+    yield "egress", "reply", (*asks, *subscribes, keys.ANY_TOKEN)
+    yield "egress", "liveliness_token", (keys.ANY_TOKEN,)
+
+
+def _named(rows: Iterable[str], name: str) -> Iterator[str]:
+    """Keys of the rows, with the names that the holder's participants may have."""
+    for row in rows:
+        yield owned(row, name)
+        if OWN in row:
+            yield owned(row, f"{name}-$*")

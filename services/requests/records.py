@@ -1,0 +1,55 @@
+"""Records of requests at their server: what is known of each, and what a command that comes means for it. Pure."""
+
+from math import inf
+
+from msgspec.structs import replace
+
+from engage_hri.schemas.requests import Answer, Cancel, Request, kind_meant
+from engage_hri.schemas.units import Seconds
+from engage_hri.services.requests.serving_table import Event, State
+
+Key = tuple[str, str, str]
+"""Requester, life and id. Only one request of a key is live at a time."""
+
+
+class Record:
+    """One request. sender: the process that it came from. run: the requester's life by its token.
+
+    kind: of the request, or of what a cancellation ends.
+    """
+
+    __slots__ = ("answer", "ended_at", "key", "kind", "lease", "name", "request", "run", "sender", "state")
+
+    def __init__(self, name: str, request: Request, sender: str, run: str) -> None:
+        self.name = name
+        self.request = request
+        self.sender = sender
+        self.run = run
+        self.key = key_of(request)
+        self.kind = kind_meant(request)
+        self.lease = (Event.LEASE_OVER, name)
+        """Name of its lease among the deadlines."""
+        self.state = State.UNKNOWN
+        self.answer: Answer | None = None
+        self.ended_at: Seconds = inf
+
+
+def key_of(request: Request) -> Key:
+    return (request.requester, request.life, request.id)
+
+
+def event_of(record: Record, request: Request) -> Event:
+    """The event that this command is for the request of `record`."""
+    if isinstance(request, Cancel):
+        return Event.CANCEL
+    known = record.request
+    if record.state is State.UNKNOWN or isinstance(known, Cancel) or request == known:
+        return Event.CAME
+    if not request.is_updatable:
+        return Event.CAME if content_of(request) == content_of(known) else Event.DIFFERED
+    return Event.CAME if request.revision < known.revision else Event.CHANGED
+
+
+def content_of(request: Request) -> Request:
+    """The request without the fields that are no content."""
+    return replace(request, revision=0, lease=0.0)
