@@ -17,6 +17,7 @@ from engage_hri.schemas import (
     faults,
     feedback,
     fragments,
+    holds,
     nets,
     perception,
     presence,
@@ -28,8 +29,8 @@ from engage_hri.schemas import (
 )
 
 MODULES: tuple[ModuleType, ...] = (
-    fragments, blocks, behaviors, feedback, nets, recognition, attention, actions, perception, world, body, requests,
-    faults, presence, status, units,
+    fragments, blocks, behaviors, feedback, holds, nets, recognition, attention, actions, perception, world, body,
+    requests, faults, presence, status, units,
 )  # fmt: skip
 
 HEAD = """\

@@ -21,7 +21,6 @@ from engage_hri.services.realizer.plan.relations import BlockRefused, Equal, Ord
 from engage_hri.services.realizer.plan.steps import finished
 from engage_hri.services.realizer.points import ORIGIN, Point
 from tests.realizer.oracle import SEVEN, estimate, phases_of, points_of, relaxed
-from tests.realizer.planning import timed as at_times
 from tests.realizer.way_round import closed, read
 
 BEHAVIORS: tuple[BlockBehavior, ...] = (
@@ -285,23 +284,6 @@ def test_who_has_no_time_to_wait_for_another_block_is_told_what_that_has_and_unt
             "block; the behavior is dropped",
         )
     ]
-
-
-@pytest.mark.parametrize("taker", ["p", ""])
-def test_what_is_handed_over_by_plan_is_taken_by_the_next_plan_too(taker: str) -> None:
-    """It ends as the taker begins, and only for that: seen alone, the two do not even meet."""
-    ours = at_times(Pointing(id="p", target="a", mode="RIGHT_HAND"), start="3.5")
-    again = at_times(Pointing(id="q", target="a", mode="RIGHT_HAND"), start="12")
-    times = dict(zip(SEVEN, (-1.0, 0.0, 1.0, 2.0, 3.0, 3.5, 3.5), strict=True))
-    known = others(replace(THEIRS, mode="RIGHT_HAND"), times={f"other:x:{sync}": at for sync, at in times.items()})
-    holder = replace(known.holders["other:x"], kept=frozenset(), reached=1, taker=taker)
-    made = plan_block(
-        Block(id="b", behaviors=(ours, again)),
-        [estimate(ours), estimate(again)],
-        known=replace(known, holders={"other:x": holder}),
-    )
-
-    assert made.takes == ({"other:x": "p"} if taker else {})
 
 
 def test_a_point_of_another_block_that_comes_after_a_fixed_time_is_told_with_its_own() -> None:

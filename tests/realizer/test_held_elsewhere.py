@@ -1,0 +1,69 @@
+"""What is held in one block is waited for in others that are tied to it."""
+
+import asyncio
+
+import pytest
+
+from engage_hri.schemas.behaviors import Speech, Wait
+from engage_hri.schemas.feedback import SyncPointProgress
+from tests.realizer.planning import timed
+from tests.realizer.stage import Stage, block, stage, together
+from tests.realizer.test_holding import BEAT, NOD, steered
+
+
+def instants(seen: Stage) -> dict[str, float]:
+    """Time of each point of whatever block."""
+    points = [each for each in seen.feedback if isinstance(each, SyncPointProgress)]
+    return {f"{each.behavior}:{each.sync}": each.at.seconds for each in points}
+
+
+@pytest.mark.parametrize("held", ["", "beat"])
+@pytest.mark.parametrize("since", [0.2, 1.5, 2.3])
+@pytest.mark.parametrize("offset", [-0.2, 0.0])
+async def test_what_is_tied_to_a_held_behavior_of_another_block_does_not_go_on_without_it(
+    since: float, offset: float, held: str
+) -> None:
+    tied = (timed(NOD, stroke=f"b:beat:stroke{offset or ''}"), timed(Speech(id="s", text="one"), start="nod:stroke"))
+    async with stage() as seen:
+        first = seen.ask(block((Wait(id="w", duration=2.0), BEAT), together("beat:start", "w:end")))
+        await asyncio.sleep(0.1)
+        second = seen.ask(block(tied, id="c"))
+        await asyncio.sleep(since - 0.1)
+        await steered(seen, "hold", "b", held)
+        await asyncio.sleep(9.0)
+        await steered(seen, "continue", "b", held)
+        await asyncio.gather(first.outcome, second.outcome)
+
+    times = instants(seen)
+    assert times["beat:stroke"] > since + 9.0 - 0.5
+    assert times["nod:stroke"] - times["beat:stroke"] == pytest.approx(offset, abs=0.02)
+    assert times["s:start"] == pytest.approx(times["nod:stroke"], abs=0.02)
+
+
+async def test_what_is_tied_to_a_held_block_that_waits_for_its_turn_does_not_go_on_without_it() -> None:
+    async with stage() as seen:
+        first = seen.ask(block((Wait(id="w", duration=3.0),)))
+        second = seen.ask(block((BEAT,), id="c", composition="APPEND"))
+        third = seen.ask(block((timed(NOD, stroke="c:beat:stroke-0.5"),), id="d"))
+        await asyncio.sleep(1.0)
+        await steered(seen, "hold", "c")
+        await asyncio.sleep(9.0)
+        await steered(seen, "continue", "c")
+        await asyncio.gather(first.outcome, second.outcome, third.outcome)
+
+    times = instants(seen)
+    assert times["beat:stroke"] > 10.0
+    assert times["nod:stroke"] - times["beat:stroke"] == pytest.approx(-0.5, abs=0.02)
+
+
+async def test_who_is_tied_to_nothing_that_is_held_goes_on() -> None:
+    async with stage() as seen:
+        first = seen.ask(block((Wait(id="w", duration=2.0), BEAT), together("beat:start", "w:end")))
+        second = seen.ask(block((timed(NOD, start="b:w:end"),), id="c"))
+        await asyncio.sleep(1.0)
+        await steered(seen, "hold", "b", "beat")
+        await asyncio.sleep(5.0)
+        assert "nod:end" in instants(seen)
+        await steered(seen, "continue", "b", "beat")
+        await asyncio.gather(first.outcome, second.outcome)
+    assert seen.warnings() == []
