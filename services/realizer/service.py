@@ -205,9 +205,9 @@ class _Realizer:
         if replaces:
             for other in earlier:
                 other.stop(Ending("interrupted", replaced_by=block))
-        waiting = WaitingBlock(plan, self.live_blocks, self.bus.now)
-        self.live_blocks.perform(block, waiting)
         blocks = {other.request.block.id: other.request.block for other in reversed(earlier)}
+        waiting = WaitingBlock(plan, self.live_blocks, self.bus.now, blocks)
+        self.live_blocks.perform(block, waiting)
         ends = [qualified(id, BLOCK_END) for id in blocks] if not replaces else []
         with self.live_blocks.followed(waiting, ends, blocks):
             live.settle()

@@ -8,9 +8,9 @@ from random import Random
 import pytest
 
 from engage_hri.schemas import keys
-from engage_hri.schemas.behaviors import BlockBehavior, Gaze, Gesture, Head, Speech, Wait
+from engage_hri.schemas.behaviors import BlockBehavior, FaceLexeme, Gaze, Gesture, Head, Mark, Speech, Wait
 from engage_hri.schemas.blocks import Block, InterruptBehavior
-from engage_hri.services.control.config import Slow, Variability
+from engage_hri.services.control.config import Slow, Stall, Variability
 from engage_hri.services.requests.ends import RequestRefused
 from tests.realizer.fake_body import FakeBody, Script
 from tests.realizer.planning import timed
@@ -158,3 +158,45 @@ async def test_a_stroke_that_comes_after_words_waits_for_them_where_it_can() -> 
     assert times["s:end"] == 3.0
     assert times["l:stroke"] == 3.5  # half a second after its hold point
     assert [each.behavior for each in seen.warnings()] == ["s"]  # it is late itself
+
+
+async def test_a_block_does_not_wait_for_who_waits_for_a_block_behind_it() -> None:
+    """The face of `c` lasts until `d` begins, and that when `b` has ended, which wants the face: one has to lose."""
+    smile = timed(FaceLexeme(id="x", lexeme="SMILE"), relax="d:v:start")
+    async with robot(Variability()) as seen:
+        asked = [
+            seen.perform(block((Wait(id="w", duration=1.0),), id="a")),
+            seen.perform(block((FaceLexeme(id="y", lexeme="RAISE_BROWS"),), id="b", composition="APPEND")),
+            seen.perform(block((Wait(id="v", duration=0.5),), id="d", composition="APPEND")),
+            seen.perform(block((smile,), id="c")),
+        ]
+        outcomes = await asyncio.gather(*asked)
+
+    assert [outcome is not None and outcome.status for outcome in outcomes] == ["done", "done", "done", "failed"]
+    assert seen.kinds() == ["EXECUTION_FAILURE"]
+
+
+async def test_words_that_wait_at_a_gap_go_on_when_what_they_waited_for_is_given_up() -> None:
+    words = Speech(id="s", text="look at this one here", marks=(Mark("m", 8),))
+    look = timed(Gaze(id="g", target="a"), stroke="s:m")
+    async with robot(Variability(stall=(Stall(part="head", before="stroke"),))) as seen:
+        outcome = await seen.perform(block((words, look)))
+
+    assert outcome is not None
+    assert (outcome.status, outcome.dropped) == ("done", ("g",))
+    assert "s:end" in seen.times()
+
+
+@pytest.mark.parametrize("slow", [1.5, 2.0, 4.0])
+async def test_words_wait_for_a_voice_that_is_slower_than_anybody_foresaw(slow: float) -> None:
+    """Planned again while the other speaks, they were expected to come after it, and were not."""
+    last = timed(Speech(id="t", text="four five"), start="0.2", end="2.9")
+    async with robot(Variability(slow=(Slow(part="voice", factor=slow),))) as seen:
+        first = asyncio.create_task(seen.perform(block((timed(WORDS, start="0.5"),), id="a")))
+        await asyncio.sleep(1.5)
+        second = asyncio.create_task(seen.perform(block((last,), id="b")))
+        outcomes = [await first, await second]
+
+    assert [outcome is not None and outcome.dropped for outcome in outcomes] == [(), ()]
+    times = seen.times()
+    assert times["t:start"].at.seconds >= times["s:end"].at.seconds - 1e-6

@@ -67,6 +67,7 @@ class Decisions:
                 self.lateness_watch.forget(behavior)
             elif not self.facts.has_ended(behavior):
                 self.grants.look_again(behavior)
+                self.grants.touched.add(behavior)  # What it waited for may be gone, at a word gap, too.
                 self.foresight.expect_next(behavior)
 
     # -- facts ---------------------------------------------------------------------------------------------------

@@ -1,6 +1,6 @@
 """Knowledge about other live blocks, gathered for the planning of one: points, parts, and who depends on whom."""
 
-from collections.abc import Collection, Container, Iterable, Mapping, Sequence
+from collections.abc import Collection, Container, Iterable, Mapping
 from typing import Protocol
 
 from msgspec import Struct
@@ -10,6 +10,7 @@ from engage_hri.schemas.behaviors import BlockBehavior
 from engage_hri.schemas.blocks import Block
 from engage_hri.schemas.body import Estimate
 from engage_hri.schemas.references import type_name
+from engage_hri.schemas.syncref import BLOCK_ITSELF
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.realizer.decide.decisions import Decisions
 from engage_hri.services.realizer.perform.live_blocks import LiveBlocks
@@ -24,7 +25,6 @@ from engage_hri.services.realizer.plan.known import (
     qualified,
 )
 from engage_hri.services.realizer.plan.phases import ARMS, chain
-from engage_hri.services.realizer.plan.plan import Plan
 from engage_hri.services.realizer.plan.relations import Elsewhere
 from engage_hri.services.realizer.points import Point, performer
 
@@ -71,7 +71,7 @@ def knowledge(asker: Asker, others: Iterable[Performed], live_blocks: LiveBlocks
         waiting = live_blocks.times(block) if live_blocks.blocks.get(block) is content else {}
         for point, at in {**waiting, **live_blocks.reached(block, content)}.items():
             points[qualified(block, point)] = at - asker.since
-    dependent = _dependents(asker.block, [plan for plan in live_blocks.plans if plan.block.id != asker.block])
+    dependent = _dependents(asker.block, live_blocks)
     for each in concerned:
         plan, decisions = each.decisions.plan, each.decisions
         block = plan.block.id
@@ -101,26 +101,36 @@ def concerns(block: str, named: Iterable[Point], parts: Collection[str], other: 
     return any(part in parts and not has_ended(id) for id, each in plan.chains.items() for part in each.parts)
 
 
-def _dependents(block: str, plans: Sequence[Plan]) -> set[str]:
+def _dependents(block: str, live_blocks: LiveBlocks) -> set[str]:
     """Behaviors, by `block:behavior`, that wait for points of a block, or for others that do: they are not given.
 
     So no wait for a part closes a circle, whatever ties and waits there are: what a behavior of the block is to wait
-    for does not wait for the block. Blocks that wait for their turn count, too. Ties name blocks that came earlier.
+    for does not wait for the block. Nor may it wait for its turn behind that block. Ties name blocks that came
+    earlier; what has come by now is waited for no more.
 
     The end of a look that waits to be taken over by that block does not count.
     """
     found: set[str] = set()
-    tied = [(plan, foreign) for plan in plans if (foreign := plan.foreign)]
+    late = {block}
+    """Blocks that end later for it."""
+    others = [(plan, leaders) for plan, leaders in live_blocks.plans if plan.block.id != block]
+    coming = [[each for each in plan.foreign if not live_blocks.is_past(each)] for plan, _ in others]
+    tied = [(*each, foreign) for each, foreign in zip(others, coming, strict=True) if foreign or each[1]]
     while True:
         before = len(found)
-        for plan, foreign in tied:
+        for plan, leaders, foreign in tied:
+            if not late.isdisjoint(leaders):
+                late.add(plan.block.id)
+                found |= {f"{plan.block.id}:{id}" for id in (BLOCK_ITSELF, *plan.chains)}
+                continue
             sources = [plan.at[each] for each in foreign if block_of(each) == block or each.behavior in found]
             if sources:
                 later = plan.net.later(sources)
                 for id, each in plan.chains.items():
                     needed = (*each.points[: least(each) + 1], *plan.constrained)
                     if any(point.behavior == id and plan.at[point] in later for point in needed):
-                        found.add(f"{plan.block.id}:{id}")
+                        late.add(plan.block.id)
+                        found |= {f"{plan.block.id}:{id}", f"{plan.block.id}:{BLOCK_ITSELF}"}
         if len(found) == before:
             return found
 

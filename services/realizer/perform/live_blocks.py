@@ -1,7 +1,7 @@
 """Sync points of live blocks that other live blocks refer to: expected, reached or lost."""
 
 from collections import Counter, deque
-from collections.abc import Iterable, Iterator, Mapping, Set
+from collections.abc import Collection, Iterable, Iterator, Mapping, Set
 from contextlib import contextmanager
 from math import inf
 from typing import Protocol
@@ -39,6 +39,10 @@ class FollowedBlock(Protocol):
 
     def times(self) -> Mapping[Point, Seconds]:
         """Time of each point, measured or expected, by the loop's clock."""
+
+    @property
+    def leaders(self) -> Collection[str]:
+        """Blocks that have to end before it begins."""
 
     @property
     def newest_plan(self) -> Plan:
@@ -99,16 +103,21 @@ class LiveBlocks:
         tracked = self._find(block, content)
         return tracked.reached if tracked is not None else {}
 
+    def is_past(self, point: Point) -> bool:
+        """True if a point, named as other blocks name it, is reached, or its block not live any more."""
+        tracked = self._tracked.get(block := block_of(point))
+        return tracked is None or Point(point.behavior.removeprefix(f"{block}:"), point.sync) in tracked.reached
+
     def times(self, block: str) -> Mapping[Point, Seconds]:
         """Times of the points of a live block, measured or expected; none if it is yet to be planned."""
         tracked = self._tracked.get(block)
         return tracked.performance.times() if tracked is not None and tracked.performance is not None else {}
 
     @property
-    def plans(self) -> list[Plan]:
-        """Plans of all live blocks that have been planned."""
+    def plans(self) -> list[tuple[Plan, Collection[str]]]:
+        """Plans of all live blocks that have been planned, and the blocks that have to end before each begins."""
         performances = (tracked.performance for tracked in self._tracked.values())
-        return [each.newest_plan for each in performances if each is not None]
+        return [(each.newest_plan, each.leaders) for each in performances if each is not None]
 
     def _find(self, id: str, block: Block | None) -> _Tracked | None:
         """A live block, or one that has ended while others lived; another one that has taken its id is not meant."""

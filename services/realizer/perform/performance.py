@@ -77,6 +77,7 @@ class BlockPerformance:
         self._timer = Timer(self.take_in)
         self._afterwards = Afterwards(self.take_in)
         self._soon = Alarm(self.take_in)
+        self.leaders: Collection[str] = ()
         self._untold: list[News] = []
         self._needs_replan = False
 
@@ -128,8 +129,7 @@ class BlockPerformance:
 
     @property
     def _outcome(self) -> BlockOutcome:
-        ended = self._live.outcome
-        return completed(ended, self.plan.block, self.spoken.texts, self._dropped, self._interrupted)
+        return completed(self._live.outcome, self.plan.block, self.spoken.texts, self._dropped, self._interrupted)
 
     def _observers(self, plan: Plan, net: RunningNet, began: Seconds) -> tuple[Observer, ...]:
         self._net.planned(plan, net, began)

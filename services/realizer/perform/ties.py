@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Collection, Container, Iterable, Mapping
 from functools import partial
+from math import inf
 from typing import Protocol
 
 from engage_hri.schemas.blocks import Block
@@ -15,7 +16,7 @@ from engage_hri.services.realizer.plan.handover import is_overlaid
 from engage_hri.services.realizer.plan.known import Known, block_of, is_named_in
 from engage_hri.services.realizer.plan.plan import Plan
 from engage_hri.services.realizer.plan.relations import needing
-from engage_hri.services.realizer.points import Point
+from engage_hri.services.realizer.points import EPSILON, Point
 
 
 class Tied(Performed, Protocol):
@@ -63,8 +64,8 @@ class Ties:
         self.foreign_ties = frozenset(point for point in owner.plan.foreign if point in owner.plan.constrained)
         self.vanished: set[str] = set()
         self.given: dict[str, Point] = {}
-        self._met: set[tuple[str, str]] = set()
-        """Behaviors of this block, each with one of another block that had its part when it was to begin."""
+        self._met: dict[tuple[str, str], Seconds] = {}
+        """When a behavior of this block was to begin, and one of another block had a part of it."""
 
     # -- news of other blocks --------------------------------------------------------------------------------------
 
@@ -114,9 +115,9 @@ class Ties:
         """False if another block has a part of a behavior that is to begin, and the plan does not say what then.
 
         So it is where one comes sooner or later than was planned. The block is planned again with what is in the way,
-        once for two behaviors.
+        once at one time for two behaviors: it begins then if the new plan does not let it wait.
         """
-        plan = self._owner.decisions.plan
+        plan, now = self._owner.decisions.plan, self._owner.report.now()
         chain, met = plan.chains[behavior], set[tuple[str, str]]()
         for other in self._others() if chain.parts else ():
             if other is self._owner or other.is_ending:
@@ -126,9 +127,9 @@ class Ties:
                 is_shared = not set(chain.parts).isdisjoint(chains[id].parts)
                 if is_shared and not (is_overlaid(chains[id], chain) or is_overlaid(chain, chains[id])):
                     met.add((behavior, f"{block}:{id}"))
-        met = {(behavior, name) for behavior, name in met - self._met if name not in plan.takes}
+        met = {each for each in met if each[1] not in plan.takes and self._met.get(each, -inf) < now - EPSILON}
         if met:
-            self._met |= met
+            self._met |= dict.fromkeys(met, now)
             self._owner.plan_again()
         return not met
 
@@ -175,6 +176,7 @@ class Ties:
             given={id: point for id, point in self.given.items() if point not in decisions.facts.reached},
             kept=frozenset(self._live_blocks.named(plan.block.id)),
             begun=frozenset(begun),
+            due={behavior for (behavior, _), at in self._met.items() if at >= now - EPSILON},
         )
 
     @property

@@ -1,6 +1,6 @@
 """Blocks that wait for their turn: when their points are expected, for others that are tied to them."""
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.realizer.perform.live_blocks import LiveBlocks
@@ -16,7 +16,11 @@ class WaitingBlock:
     one that came earlier to one that came later: they never go round in a circle.
     """
 
-    def __init__(self, plan: Plan, live_blocks: LiveBlocks, now: Callable[[], Seconds]) -> None:
+    def __init__(
+        self, plan: Plan, live_blocks: LiveBlocks, now: Callable[[], Seconds], leaders: Collection[str] = ()
+    ) -> None:
+        """leaders: blocks that have to end first."""
+        self.leaders = leaders
         self._plan = plan
         self._live_blocks = live_blocks
         self._now = now

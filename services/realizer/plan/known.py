@@ -39,7 +39,7 @@ class Known(Struct, frozen=True, kw_only=True):
     have their parts.
     given: behaviors of this block that hand their parts over to another block by plan, and the start of the one there
     that takes them. kept: points of this block that other blocks wait for. begun: behaviors of this block that have
-    begun; they wait for nobody any more.
+    begun; they wait for nobody any more. due: those that would begin now, but for a behavior of another block.
     """
 
     blocks: Elsewhere = {}
@@ -48,6 +48,7 @@ class Known(Struct, frozen=True, kw_only=True):
     given: Mapping[str, Point] = {}
     kept: Set[Point] = frozenset()
     begun: frozenset[str] = frozenset()
+    due: Set[str] = frozenset()
 
     def with_own(self, times: Mapping[Point, Seconds]) -> Mapping[Point, Seconds]:
         """Times of a schedule for the block's own points, with those of others as they are known here.
@@ -59,11 +60,12 @@ class Known(Struct, frozen=True, kw_only=True):
         return {**self.points, **{point: at for point, at in times.items() if not is_foreign(point.behavior)}}
 
     def in_truth(self, chains: Iterable[Chain], times: Mapping[Point, Seconds]) -> Mapping[Point, Seconds]:
-        """The same, with behaviors of the block no earlier than they began, or can begin now."""
+        """The same, with behaviors of the block no earlier than they began or can begin now; who is due comes now."""
         late: dict[Point, Seconds] = {}
         for chain in chains if self.points else ():
             start = chain.points[0]
-            if (by := self.points.get(start, times[start]) - times[start]) > EPSILON:
+            by = self.points.get(start, times[start]) - times[start]
+            if by > EPSILON or chain.behavior.id in self.due:
                 late |= {point: times[point] + by for point in chain.points}
         return {**self.with_own(times), **late}
 
