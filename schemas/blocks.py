@@ -115,7 +115,7 @@ class SteerRobot(Request, frozen=True, kw_only=True, tag="steer_robot", omit_def
 class PerformanceSteered(Outcome, frozen=True, kw_only=True, tag="performance_steered", omit_defaults=True):
     """evt: realizer -> requester: what was asked for has been commanded; of a stop, it has ended.
 
-    blocks: ids of the live blocks that it concerns.
+    blocks: ids of the live blocks that it concerns; none, if what was to continue is held as a part of more.
     """
 
     blocks: tuple[str, ...] = ()

@@ -39,7 +39,8 @@ async def test_a_robot_is_held_goes_on_and_is_stopped_from_the_command_line() ->
             with robot.feedback() as feedback:
                 performing = asyncio.create_task(robot.realize("b", [BEAT]))
                 assert await feedback.next(PATIENCE) is not None
-            assert await said(await start("steer", "continue", "b", *where)) == (0, "continued: b", "")
+            still = "still held: b, as a part of more that is held (`engage watch --only holds` says what)"
+            assert await said(await start("steer", "continue", "b", *where)) == (0, still, "")
             code, _, error = await said(await start("steer", "hold", "b", "wave", *where))
             assert (code, error) == (2, "b: wave: it is not being performed")
             assert not performing.done()  # the robot is held still

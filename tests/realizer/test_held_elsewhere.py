@@ -67,3 +67,19 @@ async def test_who_is_tied_to_nothing_that_is_held_goes_on() -> None:
         await steered(seen, "continue", "b", "beat")
         await asyncio.gather(first.outcome, second.outcome)
     assert seen.warnings() == []
+
+
+@pytest.mark.parametrize(
+    ("held", "named"), [(("", ""), ("b", "")), (("", ""), ("b", "beat")), (("b", ""), ("b", "beat"))]
+)
+async def test_a_part_of_what_is_held_does_not_go_on_alone(held: tuple[str, str], named: tuple[str, str]) -> None:
+    async with stage() as seen:
+        performing = seen.ask(block((BEAT,)))
+        await seen.seen("beat:start")
+        await steered(seen, "hold", *held)
+        assert await steered(seen, "continue", *named) == ()
+        await asyncio.sleep(5.0)
+        assert not performing.outcome.done()
+        assert await steered(seen, "continue", *held) == ("b",)
+        await performing.outcome
+    assert seen.warnings() == []

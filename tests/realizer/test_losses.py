@@ -395,5 +395,5 @@ def test_what_a_required_behavior_says_is_not_given_up_but_the_block() -> None:
 
     assert tuple(planned(block).given_up) == ("s",)
     fixed: tuple[BlockBehavior, ...] = tuple(replace(each, required=True) for each in block.behaviors)
-    with pytest.raises(BlockRefused, match="circle"):
+    with pytest.raises(BlockRefused, match=r"cannot be on time.*it is required"):
         planned(replace(block, behaviors=fixed))

@@ -1,14 +1,27 @@
 """Blocks that wait for their turn: when their points are expected, and nobody waits for them in a circle."""
 
+import asyncio
 from itertools import pairwise
 
+import pytest
 from msgspec.structs import replace
 
-from engage_hri.schemas.behaviors import BlockBehavior, FaceLexeme, Gaze, Gesture, Pointing, Posture, Speech
-from engage_hri.schemas.blocks import Block
+from engage_hri.schemas import keys
+from engage_hri.schemas.behaviors import (
+    BlockBehavior,
+    FaceLexeme,
+    Gaze,
+    Gesture,
+    Head,
+    Pointing,
+    Posture,
+    Speech,
+    Wait,
+)
+from engage_hri.schemas.blocks import Block, InterruptBehavior
 from tests.realizer.fake_body import FakeBody, Script
 from tests.realizer.planning import timed
-from tests.realizer.stage import block
+from tests.realizer.stage import block, stage
 from tests.realizer.test_sharing import MORE, RIGHT, WORDS, instants, mispredicted, told
 
 SMILE = FaceLexeme(id="f", lexeme="SMILE")
@@ -123,3 +136,35 @@ async def test_a_look_to_the_end_of_a_turn_that_waits_does_not_last_for_ever() -
 
     assert [each.status for each in outcomes] == ["done"] * 3
     assert instants(seen)["three:q:start"] == instants(seen)["two:t:end"]
+
+
+async def test_other_points_of_a_block_and_its_losses_say_nothing_of_its_end() -> None:
+    """Others are tied to them; what is tied to a block that waits for that end sets out for the end alone."""
+    smile = timed(FaceLexeme(id="f", lexeme="SMILE"), start="second:x:end-0.5")
+    ties = [timed(Wait(id=id, duration=seconds), start="0") for id, seconds in (("u", 1.0), ("v", 4.0), ("w", 8.0))]
+    async with stage() as seen:
+        first = seen.ask(block(ties, id="first"))
+        second = seen.ask(block((Wait(id="x", duration=2.0),), id="second", composition="APPEND"))
+        third = seen.ask(block((timed(Wait(id="y", duration=1.0), start="first:u:end"), smile), id="third"))
+        await asyncio.sleep(2.0)
+        request = InterruptBehavior(id="i", requester="test", block="first", behavior="v")
+        await seen.requests.send(keys.BLOCK, request).outcome
+        await asyncio.gather(first.outcome, second.outcome, third.outcome)
+
+    assert seen.times("second")["x:start"] == 0.0
+    begun = [each.at.seconds for each in seen.progress("third") if (each.behavior, each.sync) == ("f", "start")]
+    assert begun == [pytest.approx(8.0 + 2.0 - 0.5, abs=0.02)]
+
+
+async def test_a_part_is_not_taken_by_plan_from_a_block_whose_end_the_taker_waits_for() -> None:
+    nods = (timed(Head(id="n", lexeme="NOD"), start="0.5"), Wait(id="w", duration=3.0))
+    async with stage() as seen:
+        asked = [
+            seen.ask(block(nods, id="first")),
+            seen.ask(block((Wait(id="x", duration=1.0),), id="second", composition="APPEND")),
+            seen.ask(block((timed(Wait(id="y", duration=1.0), start="first:n:relax"),), id="third")),
+            seen.ask(block((timed(Head(id="m", lexeme="NOD"), start="second:x:start"),), id="fourth")),
+        ]
+        await asyncio.wait_for(asyncio.gather(*(each.outcome for each in asked)), 60.0)
+
+    assert seen.warnings() == []

@@ -65,7 +65,8 @@ class Steering:
                     self._holds.let_go(block, behavior)
                     await self._stop(concerned, behavior, "" if behavior else "stopped on request")
             self._apply()
-            blocks = tuple(live.request.block.id for live in concerned)
+            is_stuck = request.to == "continue" and self._holds.is_within(block, behavior)
+            blocks = () if is_stuck else tuple(live.request.block.id for live in concerned)
             self._desk.end(PerformanceSteered(id=request.id, blocks=blocks))
 
     def tell(self) -> None:

@@ -35,18 +35,23 @@ class WaitingBlock:
 
     def hear(self, point: Point, at: Seconds) -> None:
         """Take the news that a point of another block is reached: its end, perhaps."""
-        if point == qualified(block_of(point), BLOCK_END):
-            self.foresee(point, at)
+        self.foresee(point, at)
 
     def foresee(self, point: Point, at: Seconds) -> None:
-        """Take the news that another block is expected to end at another time than before."""
-        self._ends[block_of(point)] = at
-        self._tell()
+        """Take the news that another block is expected to end at another time than before.
+
+        Points of it that others are tied to are told, too.
+        """
+        if point == qualified(block_of(point), BLOCK_END):
+            self._ends[block_of(point)] = at
+            self._tell()
 
     def miss(self, behaviors: Iterable[str]) -> None:
         """Take the news that another block is gone."""
-        for behavior in behaviors:
-            self._ends.pop(block_of(Point(behavior, "end")), None)
+        lost = set(behaviors)
+        for end in [qualified(block, BLOCK_END) for block in self._ends]:
+            if end.behavior in lost:
+                del self._ends[block_of(end)]
 
     @property
     def newest_plan(self) -> Plan:

@@ -87,7 +87,7 @@ def judge(
     """The losses of impossible circles, or the refusal of the block.
 
     A time that cannot be met costs a behavior, a speech only if there is no other, and of several the later in the
-    document; waiting for each other costs the block.
+    document; waiting for each other costs the block, and so does a time that only what is required cannot meet.
     Each circle costs a behavior, unless one that is lost already was part of it.
     """
     net = assembly.net
@@ -104,6 +104,13 @@ def judge(
             losses[loss.behavior] = loss
     if losses:
         return Losses(tuple(losses.values()))
+    everybody = {id: number for number, id in enumerate(chains)}
+    if (loss := _loss(impossible.circles[0], net, everybody, chains, ends)) is not None:
+        advice = "it is required; without `required` it would be dropped"
+        where, line = f"{block}: {loss.behavior}", chains[loss.behavior].behavior.line
+        return BlockRefused(
+            Fault(reason=loss.reason, where=where, line=line, advice=advice), "IMPOSSIBLE_TO_SCHEDULE"
+        )
     return _deadlock(impossible.circles[0], net, relations.orders, classes, block)
 
 
