@@ -14,6 +14,7 @@ from engage_hri.schemas.blocks import Block
 from engage_hri.schemas.body import Estimate
 from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.feedback import WarningKind
+from engage_hri.schemas.units import Seconds
 from engage_hri.services.realizer.plan import unsupported
 from engage_hri.services.realizer.plan.assembly import Assembler, Assembly, assembling
 from engage_hri.services.realizer.plan.deadlocks import Losses, clashes, judge
@@ -114,7 +115,9 @@ class _Planner:
                 if behavior.id not in self.dropped:
                     self._read(behavior)
             yield 4 * len(portion)
-        begun = sorted(self.known.begun & self.chains.keys(), key=lambda id: self.known.points[Point(id, "start")])
+        begun = sorted(
+            self.known.begun & self.chains.keys(), key=self._ends
+        )  # Neighbors come after the last of these.
         self.chains = {id: self.chains[id] for id in dict.fromkeys((*begun, *self.chains))}
         self.speeches = {id for id, chain in self.chains.items() if chain.type == "speech"}
         self.order = SpeakingOrder([id for id in self.chains if id in self.speeches], len(self.chains))
@@ -133,6 +136,10 @@ class _Planner:
             if estimate and estimate.degraded:
                 line = self.lines[behavior.id]
                 self.problems.append(Problem("DEGRADED", at_line(line, estimate.degraded), behavior.id))
+
+    def _ends(self, id: str) -> Seconds:
+        """Expected end of a behavior that has begun, if it goes on at its natural pace."""
+        return self.known.points[Point(id, "start")] + sum(each.natural for each in self.chains[id].segments)
 
     def _refuse_if_required(self, id: str, reason: str, kind: WarningKind) -> None:
         if id in self.relations.required:
