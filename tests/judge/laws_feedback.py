@@ -83,7 +83,8 @@ def losses(case: Case) -> Iterator[Finding]:
                 yield Finding("losses", id, f"{behavior} is lost, with {grave[behavior]} warnings")
         if outcome.status != "done":
             continue
-        named = {term.place.behavior for each in block.relations if each.required for term in each.terms}
+        places = [term.place for each in block.relations if each.required for term in each.terms]
+        named = {place.behavior for place in places if place.block == id}
         required = {each.id for each in block.behaviors.values() if each.required} | named
         for behavior in sorted(required.intersection(outcome.dropped)):
             yield Finding("required", id, f"{behavior} was dropped, and the block is done")
@@ -108,13 +109,19 @@ def _of_losses(case: Case, block: str) -> Counter[str]:
 
 
 def talked_over(case: Case) -> Iterator[Finding]:
-    """No words are lost because another block is speaking: they wait. Within one block an author may ask for both."""
+    """No words are lost because another block is speaking: they wait.
+
+    Within one block an author may ask for both at once, and of blocks that are tied to each other.
+    """
     record = case.record
     for told in record.told if case.is_told_true else ():
         message = told.message
         if not (isinstance(message, WarningFeedback) and "the voice is busy" in message.message):
             continue
         block, speaking = message.block, set[str]()
+        tied = {term.place.block for each in case.blocks[block].relations for term in each.terms}
+        if tied & case.blocks.keys() - {block}:
+            continue
         for point in record.points(block):
             if point.behavior in case.blocks[block].speeches and point.at.seconds <= told.at:
                 (speaking.discard if point.sync == "end" else speaking.add)(point.behavior)

@@ -124,10 +124,15 @@ class _Sharing:
                 self.takes[name] = id
 
     def keep_taking(self, id: str) -> None:
-        """Go on taking what is handed over to a behavior by plan: only for that does it end as this one begins."""
+        """Go on taking what is handed over to a behavior by plan: only for that does it end as this one begins.
+
+        But not if this block is tied to the way home that is lost by it: it would wait for itself.
+        """
         start = self.times[self.chains[id].points[0]]
         for begins, _, name in self._users_of(id):
-            if self.known.holders[name].taker == id and begins <= start + EPSILON:
+            holder = self.known.holders[name]
+            home = holder.chain.points[least(holder.chain) + 1 :]
+            if holder.taker == id and begins <= start + EPSILON and self.named.isdisjoint(home):
                 self.takes.setdefault(name, id)
 
     def give(self, id: str) -> None:
