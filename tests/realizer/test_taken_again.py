@@ -53,7 +53,7 @@ def test_who_comes_later_than_the_one_it_was_to_hand_over_to_hands_nothing_over(
 
 @pytest.mark.parametrize("is_begun", [True, False])
 def test_who_has_begun_takes_nothing_more(is_begun: bool) -> None:
-    """Its part it has already, from whomever it got it; only who is to begin takes one from who is on the way home."""
+    """It has its part already, from whomever it got it; who has yet to begin takes one from who goes home."""
     made = planned_with(GOING_HOME, OURS, reached=5, begun=frozenset("p" if is_begun else ""))
 
     assert made.takes == ({} if is_begun else {"other:x": "p"})
