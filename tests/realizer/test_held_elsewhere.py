@@ -40,6 +40,25 @@ async def test_what_is_tied_to_a_held_behavior_of_another_block_does_not_go_on_w
     assert times["s:start"] == pytest.approx(times["nod:stroke"], abs=0.02)
 
 
+@pytest.mark.parametrize("point", ["start", "stroke"])
+async def test_who_is_to_come_long_before_a_point_of_a_block_that_is_held_waits_for_it(point: str) -> None:
+    """Nobody is late yet: what is held has some seconds until then, which it is to spend once it goes on."""
+    tied = timed(NOD, **{point: "b:beat:stroke-2"})
+    async with stage() as seen:
+        first = seen.ask(block((Wait(id="w", duration=2.0), BEAT), together("beat:start", "w:end")))
+        second = seen.ask(block((tied,), id="c"))
+        await asyncio.sleep(0.2)
+        await steered(seen, "hold", "b")
+        await asyncio.sleep(9.0)
+        assert f"nod:{point}" not in instants(seen)
+        await steered(seen, "continue", "b")
+        await asyncio.gather(first.outcome, second.outcome)
+
+    times = instants(seen)
+    assert times["beat:stroke"] == pytest.approx(2.0 + 1.25 + 9.0)
+    assert times[f"nod:{point}"] == pytest.approx(times["beat:stroke"] - 2.0, abs=0.02)
+
+
 async def test_what_is_tied_to_a_held_block_that_waits_for_its_turn_does_not_go_on_without_it() -> None:
     async with stage() as seen:
         first = seen.ask(block((Wait(id="w", duration=3.0),)))
