@@ -1,13 +1,14 @@
-"""What is held in one block is waited for in others that are tied to it."""
+"""What is held is waited for by what is tied to it, in other blocks, too, and by nothing else."""
 
 import asyncio
 
 import pytest
 
-from engage_hri.schemas.behaviors import Speech, Wait
+from engage_hri.schemas.behaviors import Mark, Speech, Wait
 from engage_hri.schemas.feedback import SyncPointProgress
+from tests.realizer.fake_body import FakeBody
 from tests.realizer.planning import timed
-from tests.realizer.stage import Stage, block, stage, together
+from tests.realizer.stage import Stage, after, block, stage, together
 from tests.realizer.test_holding import BEAT, NOD, steered
 
 
@@ -86,3 +87,21 @@ async def test_who_is_tied_to_nothing_that_is_held_goes_on() -> None:
         await steered(seen, "continue", "b", "beat")
         await asyncio.gather(first.outcome, second.outcome)
     assert seen.warnings() == []
+
+
+async def test_words_before_a_gap_at_which_the_voice_can_wait_are_said_though_what_comes_after_it_is_held() -> None:
+    """The second word is tied to the stroke of a gesture that is held; the first is not, and ends with a gap."""
+    words = Speech(id="s", text="one two three", marks=(Mark("m1", 3), Mark("m2", 7)))
+    soon = Wait(id="w", duration=0.25)
+    async with stage(FakeBody(pauses=True)) as seen:
+        example = block((BEAT, words, soon), together("beat:stroke", "s:m2"), after("w:end", "s:m1"))
+        performing = seen.ask(example)
+        await asyncio.sleep(0.2)
+        await steered(seen, "hold", "b", "beat")
+        await asyncio.sleep(10.0)
+        assert "s:start" in seen.times()
+        assert "s:m2" not in seen.times()
+        await steered(seen, "continue", "b", "beat")
+        await performing.outcome
+
+    assert seen.times()["s:m2"] == pytest.approx(seen.times()["beat:stroke"], abs=0.02)
