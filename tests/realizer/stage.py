@@ -13,6 +13,7 @@ from engage_hri.schemas.blocks import Block, BlockOutcome, PerformBlock
 from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.feedback import BlockProgress, SyncPointProgress, WarningFeedback
 from engage_hri.schemas.recognition import EventOutcome, RequestEvent, SignalTurn, TurnOutcome
+from engage_hri.schemas.requests import Cancel
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.interface import Bus
 from engage_hri.services.bus.memory import MemoryHub
@@ -70,6 +71,8 @@ class FakeRecognition:
                             case SignalTurn() as signal:
                                 self.signals.append(signal)
                                 desk.end(TurnOutcome(id=signal.id, at=bus.stamp()))
+                            case Cancel(id=id):
+                                self.cancelled.append(id)
         finally:
             desk.close()
 

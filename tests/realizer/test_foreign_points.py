@@ -1,6 +1,7 @@
 """Points of other blocks in a plan: when they count, and the message about its net."""
 
 import pytest
+from msgspec.structs import replace
 
 from engage_hri.schemas.behaviors import Head, Wait
 from engage_hri.schemas.blocks import Block
@@ -61,6 +62,29 @@ def test_who_cannot_be_before_a_point_of_another_block_is_told(x: float, *, is_t
     assert starts(made) == 2.0
     told = [(str(each.point), each.direction, each.seconds) for each in made.broken]
     assert told == ([("n:start", "later", 1.0)] if is_told else [])
+
+
+@pytest.mark.parametrize("begins", [0.5, 1.25, 3.0])
+def test_who_begins_too_late_for_a_time_is_late_and_not_lost(begins: float) -> None:
+    """A nod that can be made in a second is to be over by 1.5 s; when it began, or can begin, is known."""
+    nod = timed(NOD, start="0.5", end="1.5")
+    known = Known(points={Point("n", "start"): begins}, begun=frozenset({"n"}))
+    made = plan_block(block((nod,)), [estimate(NOD)], known=known)
+
+    assert (made.dropped, made.problems) == ((), ())
+    assert starts(made) == 0.5
+
+
+@pytest.mark.parametrize("x", [0.0, 2.0])
+def test_who_is_given_too_little_time_between_points_of_another_block_is_lost_whenever_these_come(x: float) -> None:
+    """The nod is not lost for when the point comes, but for how near its own two are to it: the tie is no way out."""
+    other = timed(Head(id="m", lexeme="SHAKE"), start="other:x:end", end="other:x:end+5")
+    nod = timed(NOD, start="other:x:end", end="other:x:end+0.1")
+    known = Known(blocks=OTHERS, points={Point("other:x", "end"): x})
+    made = plan_block(block((other, nod)), [replace(estimate(other), parts=("arm",)), estimate(NOD)], known=known)
+
+    assert made.dropped == ("n",)
+    assert made.predicted(Point("m", "start")) == x
 
 
 # -- the message about a net -----------------------------------------------------------------------------------------

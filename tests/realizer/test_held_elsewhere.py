@@ -1,13 +1,14 @@
-"""What is held in one block is waited for in others that are tied to it."""
+"""What is held is waited for by what is tied to it, in other blocks, too, and by nothing else."""
 
 import asyncio
 
 import pytest
 
-from engage_hri.schemas.behaviors import Speech, Wait
+from engage_hri.schemas.behaviors import Mark, Speech, Wait
 from engage_hri.schemas.feedback import SyncPointProgress
+from tests.realizer.fake_body import FakeBody
 from tests.realizer.planning import timed
-from tests.realizer.stage import Stage, block, stage, together
+from tests.realizer.stage import Stage, after, block, stage, together
 from tests.realizer.test_holding import BEAT, NOD, steered
 
 
@@ -38,6 +39,25 @@ async def test_what_is_tied_to_a_held_behavior_of_another_block_does_not_go_on_w
     assert times["beat:stroke"] > since + 9.0 - 0.5
     assert times["nod:stroke"] - times["beat:stroke"] == pytest.approx(offset, abs=0.02)
     assert times["s:start"] == pytest.approx(times["nod:stroke"], abs=0.02)
+
+
+@pytest.mark.parametrize("point", ["start", "stroke"])
+async def test_who_is_to_come_long_before_a_point_of_a_block_that_is_held_waits_for_it(point: str) -> None:
+    """Nobody is late yet: what is held has some seconds until then, which it is to spend once it goes on."""
+    tied = timed(NOD, **{point: "b:beat:stroke-2"})
+    async with stage() as seen:
+        first = seen.ask(block((Wait(id="w", duration=2.0), BEAT), together("beat:start", "w:end")))
+        second = seen.ask(block((tied,), id="c"))
+        await asyncio.sleep(0.2)
+        await steered(seen, "hold", "b")
+        await asyncio.sleep(9.0)
+        assert f"nod:{point}" not in instants(seen)
+        await steered(seen, "continue", "b")
+        await asyncio.gather(first.outcome, second.outcome)
+
+    times = instants(seen)
+    assert times["beat:stroke"] == pytest.approx(2.0 + 1.25 + 9.0)
+    assert times[f"nod:{point}"] == pytest.approx(times["beat:stroke"] - 2.0, abs=0.02)
 
 
 async def test_what_is_tied_to_a_held_block_that_waits_for_its_turn_does_not_go_on_without_it() -> None:
@@ -83,3 +103,21 @@ async def test_a_part_of_what_is_held_does_not_go_on_alone(held: tuple[str, str]
         assert await steered(seen, "continue", *held) == ("b",)
         await performing.outcome
     assert seen.warnings() == []
+
+
+async def test_words_before_a_gap_at_which_the_voice_can_wait_are_said_though_what_comes_after_it_is_held() -> None:
+    """The second word is tied to the stroke of a gesture that is held; the first is not, and ends with a gap."""
+    words = Speech(id="s", text="one two three", marks=(Mark("m1", 3), Mark("m2", 7)))
+    soon = Wait(id="w", duration=0.25)
+    async with stage(FakeBody(pauses=True)) as seen:
+        example = block((BEAT, words, soon), together("beat:stroke", "s:m2"), after("w:end", "s:m1"))
+        performing = seen.ask(example)
+        await asyncio.sleep(0.2)
+        await steered(seen, "hold", "b", "beat")
+        await asyncio.sleep(10.0)
+        assert "s:start" in seen.times()
+        assert "s:m2" not in seen.times()
+        await steered(seen, "continue", "b", "beat")
+        await performing.outcome
+
+    assert seen.times()["s:m2"] == pytest.approx(seen.times()["beat:stroke"], abs=0.02)

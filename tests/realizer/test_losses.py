@@ -353,17 +353,18 @@ def test_a_time_of_a_speech_is_given_up_the_nearest_of_the_last_point_first(
     orders: list[Order | None] = list(known.orders)
     while True:
         candidates = []
-        for is_far in (False, True):
+        for far in range(3):  # what is tied to it through what is dropped goes last
             for last in range(len(points) - 1, -1, -1):
                 point = points[last]
                 for is_order, group in ((False, equals), (True, orders)):
                     for number, each in enumerate(group):
                         if each is None or not may_go(known, each, point):
                             continue
-                        others = {one for one in points_in(each) if one != point and one.behavior not in dropped}
-                        if others & among if not is_far else others:
+                        others = {one for one in points_in(each) if one != point}
+                        left_there = {one for one in others if one.behavior not in dropped}
+                        if (left_there & among, left_there, others)[far]:
                             is_own = isinstance(each, Equal) and each.behavior == point.behavior
-                            candidates.append((is_far, -last, is_order, not is_own, number, point))
+                            candidates.append((far, -last, is_order, not is_own, number, point))
         found = times.give_up(points, among, dropped)
         if not candidates:
             assert found is None

@@ -7,12 +7,12 @@ from contextlib import asynccontextmanager, suppress
 import pytest
 
 from engage_hri.schemas import keys
-from engage_hri.schemas.behaviors import Gaze, Pointing, Speech, Wait
+from engage_hri.schemas.behaviors import Event, Gaze, Pointing, Speech, Wait
 from engage_hri.schemas.blocks import Block, BlockOutcome, Composition
 from engage_hri.schemas.nets import Fired, NetMarked, NetPlanned, NetWaiting
 from engage_hri.services.bus.interface import Bus
 from tests.realizer.fake_body import FakeBody, Script
-from tests.realizer.stage import Stage, after, block, stage, together
+from tests.realizer.stage import FakeRecognition, Stage, after, block, stage, together
 from tests.realizer.test_figures import FIGURES
 
 GAZE = Gaze(id="gaze-1", target="can-1")
@@ -328,3 +328,29 @@ async def test_a_block_that_need_not_wait_tells_of_no_turn(asked: tuple[tuple[fl
 
     assert isinstance(told[0][1], NetPlanned)
     assert not any(isinstance(each, NetWaiting) for _, each in told)
+
+
+class Tokens(Watcher):
+    """Sees only where tokens are, whatever moved them."""
+
+    def take(self, message: object) -> None:
+        match message:
+            case NetPlanned():
+                self.plans.append(message)
+                self.seen.append(frozenset(message.marked))
+            case NetMarked():
+                self.seen.append((self.seen[-1] | set(message.put)) - set(message.taken))
+                self.is_over = message.is_over
+
+
+async def test_a_block_that_is_over_holds_the_tokens_that_it_began_with_though_an_event_goes_on() -> None:
+    """Recognition follows the event from then on; nobody has looked yet."""
+    watcher = Tokens()
+    event = Event(id="e", kind="directed_gaze", responder="human", objects=("can",))
+    async with stage(recognition=FakeRecognition({"e": None})) as seen, watching(seen, watcher):
+        outcome = await seen.perform(block((SPEECH, event)))
+
+    assert (outcome.status, "e:end" in seen.times()) == ("done", False)
+    assert watcher.is_over
+    assert "e:start" in watcher.under_way(watcher.seen[-2])
+    assert watcher.seen[-1] == watcher.initial()

@@ -1,8 +1,10 @@
 """Fixed times and durations: holding, slower, faster, late; and estimates corrected by what was measured."""
 
 import pytest
+from msgspec.structs import replace
 
-from engage_hri.schemas.behaviors import Gaze, GazeShift, Gesture, Mark, Pointing, Speech
+from engage_hri.schemas.behaviors import BlockBehavior, Gaze, GazeShift, Gesture, Mark, Pointing, Speech
+from engage_hri.schemas.body import Estimate
 from engage_hri.schemas.feedback import PredictionFeedback
 from engage_hri.services.realizer.config import RealizerConfig
 from engage_hri.services.realizer.decide.decisions import Decisions
@@ -180,3 +182,29 @@ def test_nobody_is_told_to_be_slower_than_its_body_can() -> None:
     paces = [dict(each.pace)["end"] for each in told if isinstance(each, Extend) and each.behavior == "shift"]
     assert 4.0 < paces[0] < 5.5
     assert max(paces) == pytest.approx(1.0 + 1.5 * 3.0)
+
+
+class OneJoint(FakeBody):
+    """Slower only until it is ready, at most by so many times; from then on it takes as long as it takes."""
+
+    def estimate(self, behavior: BlockBehavior) -> Estimate:
+        found = super().estimate(behavior)
+        if not isinstance(behavior, Pointing):
+            return found
+        first, *rest = (replace(each, hold=False) for each in found.phases)
+        return replace(found, phases=(first, *(replace(each, longest=each.natural) for each in rest)))
+
+
+async def test_who_can_be_slower_at_first_but_not_after_that_is_told_to_be_slower_at_first() -> None:
+    """The words are slower by half than planned, the arm by half than natural, and only at first."""
+    story = Speech(id="s", text="one two three four", marks=(Mark("m1", 3), Mark("m2", 7), Mark("m3", 13)))
+    natural = (1.25, 0.5, 0.5, 0.25, 0.25, 0.5)
+    body = OneJoint({"s": Script(slow=1.5), "p": Script(durations=natural)}, {"p": natural}, elastic=(1.0, 1.5))
+    pointing = Pointing(id="p", target="a")
+    async with stage(body) as seen:
+        await seen.perform(block((pointing, story), together("p:ready", "s:m2"), together("p:stroke", "s:m3")))
+
+    times = seen.times()
+    assert (times["p:start"], times["s:m2"]) == (0.75, 3.0)
+    assert times["p:ready"] == 0.75 + 1.5 * 1.25
+    assert times["p:stroke"] == pytest.approx(times["p:ready"] + 1.0, abs=0.02)

@@ -234,6 +234,16 @@ def test_who_is_cut_at_a_hold_point_is_never_let_go_there() -> None:
     assert told(made)["h"] == {"start": 4.0, "stroke_end": 8.0, "relax": 9.0}
 
 
+def test_who_is_cut_at_a_hold_point_by_another_block_is_not_let_go_there_either() -> None:
+    """Another look is on the head from 4 s on."""
+    start = Point("other:x", "start")
+    content = {"other": Block(id="other", behaviors=(Gaze(id="x", target="b"),))}
+    known = Known(blocks=content, points={start: 4.0}, given={"g": start})
+    made = planned(block((timed(GAZE, start="0"), timed(LEFT, start="0", end="6"))), known)
+
+    assert told(made)["g"] == {"start": 0.0, "stroke_end": 4.0, "relax": 5.0}
+
+
 def test_a_look_that_lasts_leaves_a_moment_after_all_else_has_ended() -> None:
     made = planned(block((GAZE, LEFT, replace(LEFT, id="q"))))
     ends = made.predicted(made.chains["q"].points[-1])
