@@ -3,13 +3,14 @@
 import asyncio
 
 import pytest
+from msgspec.structs import replace
 
-from engage_hri.schemas.behaviors import Mark, Speech, Wait
+from engage_hri.schemas.behaviors import Gesture, Mark, Speech, Wait
 from engage_hri.schemas.feedback import SyncPointProgress
 from tests.realizer.fake_body import FakeBody
 from tests.realizer.planning import timed
 from tests.realizer.stage import Stage, after, block, stage, together
-from tests.realizer.test_holding import BEAT, NOD, steered
+from tests.realizer.test_holding import BEAT, NOD, STORY, steered
 
 
 def instants(seen: Stage) -> dict[str, float]:
@@ -121,3 +122,47 @@ async def test_words_before_a_gap_at_which_the_voice_can_wait_are_said_though_wh
         await performing.outcome
 
     assert seen.times()["s:m2"] == pytest.approx(seen.times()["beat:stroke"], abs=0.02)
+
+
+OTHER = Gesture(id="h", lexeme="BEAT", mode="LEFT_HAND")
+WAITING = {
+    "it comes after the held one": (timed(OTHER, start="beat:end"), "h:stroke", True),
+    "it comes after the held one of another block": (timed(OTHER, start="b:beat:end"), "h:stroke", False),
+    "it waits for the arm of another block": (replace(OTHER, mode="RIGHT_HAND"), "h:stroke", False),
+}
+
+
+@pytest.mark.parametrize("why", WAITING)
+async def test_who_is_tied_to_one_that_waits_for_what_is_held_does_not_go_on_without_it(why: str) -> None:
+    waiting, point, is_one_block = WAITING[why]
+    mine = (waiting, timed(NOD, stroke=point))
+    async with stage() as seen:
+        asked = [seen.ask(block((BEAT, *mine) if is_one_block else (BEAT,)))]
+        if not is_one_block:
+            asked.append(seen.ask(block(mine, id="c")))
+        await asyncio.sleep(0.2)
+        await steered(seen, "hold", "b", "beat")
+        await asyncio.sleep(5.0)
+        assert "nod:stroke" not in instants(seen)
+        await steered(seen, "continue", "b", "beat")
+        await asyncio.gather(*(each.outcome for each in asked))
+
+    times = instants(seen)
+    assert times["nod:stroke"] == pytest.approx(times["h:stroke"], abs=0.05)
+    assert seen.warnings() == []
+
+
+async def test_a_word_that_waits_for_a_held_voice_is_not_pointed_at_before() -> None:
+    later = Speech(id="t", text="that one", marks=(Mark("m", 5),))
+    async with stage() as seen:
+        first = seen.ask(block((STORY,)))
+        second = seen.ask(block((later, timed(OTHER, stroke="t:m")), id="c"))
+        await asyncio.sleep(0.2)
+        await steered(seen, "hold", "b")
+        await asyncio.sleep(5.0)
+        assert "h:stroke" not in instants(seen)
+        await steered(seen, "continue", "b")
+        await asyncio.gather(first.outcome, second.outcome)
+
+    times = instants(seen)
+    assert times["h:stroke"] == pytest.approx(times["t:m"], abs=0.05)

@@ -7,7 +7,7 @@ prediction it comes on time. Only instants that something has changed for are lo
 
 import heapq
 from collections import defaultdict
-from collections.abc import Callable
+from collections.abc import Callable, Container
 from math import inf
 
 from engage_hri.schemas.behaviors import Speech
@@ -151,16 +151,40 @@ class Grants(Observer):
     def _is_held(self, member: Member) -> bool:
         return self._facts.is_held(member.behavior) and member.point not in self._facts.reached
 
+    def _is_stuck(self, member: Member, stuck: Container[int]) -> bool:
+        """True if the next point of a behavior is held, or comes after one that is (see `_stuck`)."""
+        if self._is_held(member):
+            return True
+        if (chain := self._plan.chains.get(member.behavior)) is None:
+            return self._plan.at[member.point] in stuck
+        number = self._facts.next_number(member.behavior)
+        return number < len(chain.points) and self._plan.at[chain.points[number]] in stuck
+
+    def _stuck(self) -> set[int]:
+        """Instants that do not come before what is held goes on: its own, and those that wait for them."""
+        held = {
+            number
+            for number, members in enumerate(self._plan.members)
+            if number not in self._net.instants and any(map(self._is_held, members))
+        }
+        return self._plan.net.later(held)
+
     def _waits_for_held(self, transition: int) -> bool:
         """True if an instant has to wait for a behavior that is held: one of its own, or of those tied to it.
+
+        So it is for one that waits for a behavior that is held.
 
         Of one that comes at a fixed time after this, what it has yet to do before that counts.
         """
         members = self._plan.members[transition]
-        if any(self._is_held(member) or self._goes_to_held(member) for member in members):
+        if any(map(self._is_held, members)):
             return True
+        stuck = self._stuck()
+        if any(self._goes_to_held(member, stuck) for member in members):
+            return True
+        own = {member.behavior for member in members}
         tied = (other for each in self._tied[transition] for other in self._plan.members[each])
-        held = [other for other in tied if self._is_held(other)]
+        held = [other for other in tied if other.behavior not in own and self._is_stuck(other, stuck)]
         return any(self._sets_out(each) <= self._plan.schedule[transition] + EPSILON for each in held)
 
     def _sets_out(self, member: Member) -> Seconds:
@@ -170,13 +194,13 @@ class Grants(Observer):
         points = chain.points
         return self._plan.predicted(points[min(self._facts.next_number(member.behavior), len(points) - 1)])
 
-    def _goes_to_held(self, member: Member) -> bool:
+    def _goes_to_held(self, member: Member, stuck: Container[int]) -> bool:
         """True if a behavior cannot wait any more before an instant that is tied to a point of one that is held."""
         chain = self._plan.chains.get(member.behavior)
         for point in chain.points[chain.points.index(member.point) + 1 :] if chain is not None else ():
             here = self._plan.at[point]
             together = (other for each in (here, *self._tied[here]) for other in self._plan.members[each])
-            if any(other.behavior != member.behavior and self._is_held(other) for other in together):
+            if any(other.behavior != member.behavior and self._is_stuck(other, stuck) for other in together):
                 return True
             if self._net.part_of[point].can_wait or point in self._pauses:
                 return False
