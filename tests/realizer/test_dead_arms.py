@@ -4,7 +4,8 @@ import asyncio
 
 import pytest
 
-from engage_hri.schemas.behaviors import Gesture
+from engage_hri.schemas.behaviors import Gesture, Speech
+from engage_hri.schemas.feedback import WarningFeedback
 from engage_hri.services.control.config import Stall, Variability
 from engage_hri.services.realizer.config import RealizerConfig
 from tests.realizer.planning import timed
@@ -48,3 +49,20 @@ async def test_two_that_are_tied_to_each_other(before: str) -> None:
     assert sorted(seen.kinds()) == ["EXECUTION_FAILURE", "EXECUTION_FAILURE", "LATE", "LATE"]
     assert sorted(outcome.dropped) == ["l", "r"]
     assert taken <= 2.5 + 2 * LIMIT + SETTLED
+
+
+async def test_an_arm_that_comes_after_all_is_told_with_the_constraint_and_by_how_much() -> None:
+    """That it is overdue was told before; by how much it came too late nobody knew then."""
+    words = Speech(id="s", text="this one here, please")
+    beat = timed(Gesture(id="r", lexeme="BEAT", mode="RIGHT_HAND", line=7), stroke="s:end")
+    stall = Stall(part="right_arm", before="stroke", seconds=1.5)
+    async with robot(Variability(stall=(stall,))) as seen:
+        await seen.perform(block((words, beat)))
+
+    late = [each.message for each in seen.feedback if isinstance(each, WarningFeedback)]
+    times = seen.times()
+    skew = times["r:stroke"].at.seconds - times["s:end"].at.seconds
+    assert skew > 1.0
+    assert len(late) == 2
+    assert "overdue" in late[0]
+    assert late[1].endswith(f"stroke came {skew:.2f} s later than it should: r:stroke = s:end")

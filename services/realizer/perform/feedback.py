@@ -145,10 +145,9 @@ class Reporter:
             self.late(instant, broken.told(verb))
 
     def overdue(self, decisions: Decisions, late: Late) -> None:
-        """Warn that a behavior takes too long."""
-        instant = decisions.net.part_of[Point(late.behavior, late.sync)].point
+        """Warn that a behavior takes too long. How much too late it comes in the end is told when it comes."""
         line = decisions.plan.chains[late.behavior].behavior.line
-        self.late(instant, at_line(line, f"{late.sync} is {late.overdue:.1f} s overdue"))
+        self.warn("LATE", at_line(line, f"{late.sync} is {late.overdue:.1f} s overdue"), late.behavior)
 
     def late(self, instant: Point, message: str) -> None:
         """Warn that a behavior is late for an instant: once for each."""
