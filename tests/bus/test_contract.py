@@ -278,6 +278,7 @@ async def test_leaving_ends_readers_and_publishes_no_more(place: Place):
 
 
 async def test_closing_leaves_no_task_and_no_thread(place: Place):
+    before = {*threading.enumerate()}  # callbacks of Zenoh, in other tests, leave threads on this list
     hub, other = await place.process(), await place.process()
     bus = hub.join("one")
     bus.declare_alive()
@@ -292,6 +293,6 @@ async def test_closing_leaves_no_task_and_no_thread(place: Place):
     await hub.close()
 
     assert asyncio.all_tasks() == {asyncio.current_task()}
-    assert threading.active_count() == 1
+    assert {*threading.enumerate()} <= before
     while await inbox.next() is not None:
         pass
