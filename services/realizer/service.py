@@ -186,9 +186,9 @@ class _Realizer:
             if plan is None:
                 await self._end(live, live.outcome)
                 return
-            there = {**self.live_blocks.blocks, **elsewhere}
+            elsewhere = {**self.live_blocks.blocks, **elsewhere}
             performance = self.performances[live.request.id] = BlockPerformance(
-                live, plan, self.shared, there, self.steering.held(block.id), is_held=self.steering.is_holding
+                live, plan, self.shared, elsewhere, self.steering.held(block.id), is_held=self.steering.is_holding
             )
             live.settle()
             await self._end(live, await performance.run())

@@ -45,7 +45,7 @@ class BlockPerformance:
         live: Live,
         plan: Plan,
         shared: SharedContext,
-        elsewhere: Mapping[str, Block],
+        elsewhere: dict[str, Block],
         held: Collection[str] | None = (),
         *,
         is_held: bool = False,

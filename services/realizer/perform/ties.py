@@ -53,13 +53,13 @@ class Ties:
         owner: Tied,
         others: Callable[[], Iterable[Tied]],
         live_blocks: LiveBlocks,
-        blocks: Mapping[str, Block],
+        blocks: dict[str, Block],
     ) -> None:
         """others: all performances, in the order in which they began. blocks: those that the plan may name."""
         self._owner = owner
         self._others = others
         self._live_blocks = live_blocks
-        self.blocks = dict(blocks)
+        self.blocks = blocks
         self.foreign = set(owner.plan.foreign)
         self.foreign_ties = frozenset(point for point in owner.plan.foreign if point in owner.plan.constrained)
         self.vanished: set[str] = set()
