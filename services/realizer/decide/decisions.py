@@ -107,7 +107,7 @@ class Decisions:
     def _under_way(self) -> dict[str, int]:
         """Behaviors that are on their way to a point, with its number."""
         facts = self.facts
-        going = {id: facts.next_number(id) for id in facts.begun if not facts.has_ended(id)}
+        going = {id: facts.next_number(id) for id in facts.under_way}
         return {id: number for id, number in going.items() if not facts.holds(self.plan.chains[id].points[number])}
 
     def hold(self, behaviors: Collection[str] | None, now: Seconds) -> list[Effect]:
@@ -116,13 +116,13 @@ class Decisions:
         The marking stays, and clocks before their instants stop. Those that were held and are not go on from there.
         """
         facts = self.facts
-        before = {each for each in facts.begun if facts.is_held(each)}
+        under_way = sorted(facts.under_way)
+        before = {each for each in under_way if facts.is_held(each)}
         facts.hold(behaviors, now)
         self.net.hold(behaviors, now)
         self.foresight.prolong()
         self.foresight.none_before(now)
-        changed = [each for each in sorted(facts.begun) if facts.is_held(each) != (each in before)]
-        changed = [each for each in changed if not facts.has_ended(each)]
+        changed = [each for each in under_way if facts.is_held(each) != (each in before)]
         going_on = [each for each in changed if each in before]
         for behavior in going_on:
             self.foresight.go_on(behavior, now)

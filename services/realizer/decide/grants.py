@@ -9,6 +9,7 @@ import heapq
 from collections import defaultdict
 from collections.abc import Callable, Container
 from math import inf
+from typing import NamedTuple
 
 from engage_hri.schemas.behaviors import Speech
 from engage_hri.schemas.units import Seconds
@@ -19,6 +20,13 @@ from engage_hri.services.realizer.net.running import Observer, RunningNet
 from engage_hri.services.realizer.plan.plan import Plan
 from engage_hri.services.realizer.plan.slack import UNNOTICED, slack
 from engage_hri.services.realizer.points import EPSILON, Member, Point
+
+
+class _Stuck(NamedTuple):
+    """Instants that wait for what is held. state: what that depends on, as it was then."""
+
+    state: tuple[object, int, int]
+    instants: set[int]
 
 
 class Grants(Observer):
@@ -55,6 +63,7 @@ class Grants(Observer):
         self._dirty: set[int] = set()
         """Instants that something has changed for."""
         self._pauses = _pauses(plan)
+        self._stuck_at: _Stuck | None = None
         self._tied: dict[int, list[int]] = defaultdict(list)
         """For each instant, those from which it comes at a fixed time."""
         for place in plan.net.places:
@@ -162,19 +171,21 @@ class Grants(Observer):
 
     def _stuck(self) -> set[int]:
         """Instants that do not come before what is held goes on: its own, and those that wait for them."""
-        held = {
-            number
-            for number, members in enumerate(self._plan.members)
-            if number not in self._net.instants and any(map(self._is_held, members))
-        }
-        return self._plan.net.later(held)
+        state = (self._facts.held, len(self._facts.reached), len(self._net.instants))
+        if self._stuck_at is None or self._stuck_at.state != state:
+            held = {
+                number
+                for number, members in enumerate(self._plan.members)
+                if number not in self._net.instants and any(map(self._is_held, members))
+            }
+            self._stuck_at = _Stuck(state, self._plan.net.later(held))
+        return self._stuck_at.instants
 
     def _waits_for_held(self, transition: int) -> bool:
-        """True if an instant has to wait for a behavior that is held: one of its own, or of those tied to it.
+        """True if an instant has to wait for a behavior that is held: one of its own, or one that is tied to it.
 
-        So it is for one that waits for a behavior that is held.
-
-        Of one that comes at a fixed time after this, what it has yet to do before that counts.
+        A behavior that waits for one that is held counts like that one. Of a behavior that comes at a fixed time
+        after this instant, what it has yet to do before that counts.
         """
         members = self._plan.members[transition]
         if any(map(self._is_held, members)):

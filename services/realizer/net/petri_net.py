@@ -80,17 +80,7 @@ class PetriNet(Struct, frozen=True, dict=True):
 
     def later(self, sources: Iterable[int]) -> set[int]:
         """Transitions that come after one of these, and these."""
-        found = set(sources)
-        out: dict[int, list[int]] = {}
-        for place in self.places:
-            if place.kind != "idle":
-                out.setdefault(place.source, []).append(place.target)
-        todo = list(found)
-        while todo:
-            fresh = set(out.get(todo.pop(), ())) - found
-            found |= fresh
-            todo += fresh
-        return found
+        return _reachable(self, sources, forward=True)
 
     @cached_property
     def initial(self) -> Marking:
@@ -190,16 +180,17 @@ def is_safe(net: PetriNet) -> bool:
     tokens = {pair for pair, count in ends if count}
     open_places = {pair for pair, count in ends if not count and pair[::-1] not in tokens}
     for source, target in tokens:
-        after, before = _reachable(net, target, forward=True), _reachable(net, source, forward=False)
+        after, before = _reachable(net, (target,), forward=True), _reachable(net, (source,), forward=False)
         if source not in after:
             return False  # No cycle limits the tokens that come to this one.
         open_places = {(since, to) for since, to in open_places if since not in after or to not in before}
     return not open_places and is_live(net)
 
 
-def _reachable(net: PetriNet, start: int, *, forward: bool) -> set[int]:
-    """The transitions that a path from `start` leads to, or back to, through places that hold no token."""
-    found, todo = {start}, [start]
+def _reachable(net: PetriNet, starts: Iterable[int], *, forward: bool) -> set[int]:
+    """These transitions, and those on paths from them, or back from them, through places without a token at rest."""
+    found = set(starts)
+    todo = list(found)
     while todo:
         here = todo.pop()
         for number in net.outputs[here] if forward else net.inputs[here]:

@@ -119,12 +119,13 @@ class Ties:
         """
         plan, now = self._owner.decisions.plan, self._owner.report.now()
         chain, met = plan.chains[behavior], set[tuple[str, str]]()
-        for other in self._others() if chain.parts else ():
+        parts = set(chain.parts)
+        for other in self._others() if parts else ():
             if other is self._owner or other.is_ending:
                 continue
             chains, block = other.decisions.plan.chains, other.decisions.plan.block.id
             for id in other.decisions.facts.under_way:
-                is_shared = not set(chain.parts).isdisjoint(chains[id].parts)
+                is_shared = not parts.isdisjoint(chains[id].parts)
                 if is_shared and not (is_overlaid(chains[id], chain) or is_overlaid(chain, chains[id])):
                     met.add((behavior, f"{block}:{id}"))
         met = {each for each in met if each[1] not in plan.takes and self._met.get(each, -inf) < now - EPSILON}

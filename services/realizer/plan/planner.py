@@ -115,10 +115,9 @@ class _Planner:
                 if behavior.id not in self.dropped:
                     self._read(behavior)
             yield 4 * len(portion)
-        begun = sorted(
-            self.known.begun & self.chains.keys(), key=self._ends
-        )  # Neighbors come after the last of these.
-        self.chains = {id: self.chains[id] for id in dict.fromkeys((*begun, *self.chains))}
+        if begun := sorted(self.known.begun & self.chains.keys(), key=self._ends):
+            # Who has begun comes first; neighbors come after the last of these to end.
+            self.chains = {id: self.chains[id] for id in dict.fromkeys((*begun, *self.chains))}
         self.speeches = {id for id, chain in self.chains.items() if chain.type == "speech"}
         self.order = SpeakingOrder([id for id in self.chains if id in self.speeches], len(self.chains))
 
