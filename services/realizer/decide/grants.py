@@ -7,7 +7,7 @@ prediction it comes on time. Only instants that something has changed for are lo
 
 import heapq
 from collections import defaultdict
-from collections.abc import Callable, Container
+from collections.abc import Callable, Collection, Container
 from math import inf
 from typing import NamedTuple
 
@@ -23,10 +23,14 @@ from engage_hri.services.realizer.points import EPSILON, Member, Point
 
 
 class _Stuck(NamedTuple):
-    """Instants that wait for what is held. state: what that depends on, as it was then."""
+    """Instants that wait for what is held, those with a held behavior among them.
 
-    state: tuple[object, int, int]
-    instants: set[int]
+    state: what is held, and how many points of it were reached by then.
+    """
+
+    state: tuple[Collection[str] | None, int]
+    held: Collection[int]
+    instants: Container[int]
 
 
 class Grants(Observer):
@@ -169,17 +173,24 @@ class Grants(Observer):
         number = self._facts.next_number(member.behavior)
         return number < len(chain.points) and self._plan.at[chain.points[number]] in stuck
 
-    def _stuck(self) -> set[int]:
+    def _stuck(self) -> Container[int]:
         """Instants that do not come before what is held goes on: its own, and those that wait for them."""
-        state = (self._facts.held, len(self._facts.reached), len(self._net.instants))
-        if self._stuck_at is None or self._stuck_at.state != state:
-            held = {
-                number
-                for number, members in enumerate(self._plan.members)
-                if number not in self._net.instants and any(map(self._is_held, members))
-            }
-            self._stuck_at = _Stuck(state, self._plan.net.later(held))
-        return self._stuck_at.instants
+        instants, held = self._net.instants, self._facts.held
+        state = (held, self._reached_of(held))
+        known = self._stuck_at
+        if known is None or known.state != state or any(number in instants for number in known.held):
+            unfired = (each for each in enumerate(self._plan.members) if each[0] not in instants)
+            first = {number for number, members in unfired if any(map(self._is_held, members))}
+            known = self._stuck_at = _Stuck(state, first, self._plan.net.later(first))
+        return known.instants
+
+    def _reached_of(self, held: Collection[str] | None) -> int:
+        """Number of points of these behaviors (None: of all) that are reached."""
+        facts = self._facts
+        if held is None:
+            return len(facts.reached)
+        theirs = sum(point in facts.reached for point in self._plan.foreign if point.behavior in held)
+        return theirs + sum(map(facts.next_number, held))
 
     def _waits_for_held(self, transition: int) -> bool:
         """True if an instant has to wait for a behavior that is held: one of its own, or one that is tied to it.
