@@ -85,6 +85,22 @@ def _constraint(constraint: Constraint, change: Callable[[str], str]) -> Constra
     return replace(constraint, operators=operators)
 
 
+def with_names(block: Block, names: Mapping[str, str]) -> Block:
+    """Give a block, and the blocks that it refers to, other names. names: by id; ids that are not among them stay.
+
+    A reference that cannot be read stays as it is.
+    """
+
+    def renamed(text: str) -> str:
+        try:
+            id = SyncRef.parse(text).block
+        except ValueError:
+            return text  # schemas.check says what is wrong, and where
+        return f"{names[id]}:{text.partition(':')[2]}" if id in names else text
+
+    return replace(rewritten(block, renamed), id=names.get(block.id, block.id))
+
+
 def disambiguated(thing: AnyInput) -> AnyInput:
     """Give an explicit offset to references to marks that look like an offset: `s:word-2` -> `s:word-2+0`."""
     known = marks(thing)

@@ -1,7 +1,7 @@
 """The realizer on the bus: takes blocks, answers each exactly once, and performs any number of them at a time."""
 
 import asyncio
-from collections.abc import Coroutine, Mapping
+from collections.abc import Coroutine
 from typing import Any, TypeVar
 
 from msgspec.structs import replace
@@ -9,7 +9,6 @@ from msgspec.structs import replace
 from engage_hri.schemas import keys
 from engage_hri.schemas.blocks import (
     BehaviorInterrupted,
-    Block,
     BlockOutcome,
     InterruptBehavior,
     PerformBlock,
@@ -118,13 +117,13 @@ class _Realizer:
     def cancel(self, cancel: Cancel) -> None:
         if live := self.live.get(cancel.id):
             reason = cancel.reason or "cancelled"
-            live.stop(Ending("interrupted", Fault(reason=reason, where=live.request.block.id)))
+            live.stop(Ending("interrupted", Fault(reason=reason, where=live.id)))
 
     async def interrupt(self, request: InterruptBehavior) -> None:
         """End one behavior of a block, and answer what came of it."""
         block, behavior = request.block, request.behavior
         with self.desk.serving(request):
-            performance = next((each for each in self.performing() if each.plan.block.id == block), None)
+            performance = next((each for each in self.performing() if each.id == block), None)
             if performance is None or not performance.is_going_on(behavior):
                 self.desk.refuse(request.id, Fault(reason="it is not being performed", where=f"{block}: {behavior}"))
                 return
@@ -137,12 +136,12 @@ class _Realizer:
 
     def _hear_word(self, word: WordSpoken) -> None:
         for performance in self.performing():
-            if performance.plan.block.id == word.block:
+            if performance.id == word.block:
                 performance.spoken.hear(word.behavior, word.position)
 
     async def _perform(self, live: Live) -> None:
         """Perform a block; an exception that nothing else catches ends this block only, and takes its parts home."""
-        with self.bus.containing(f"block {live.request.block.id}", lambda fault: self._abandon(live, fault)):
+        with self.bus.containing(str(live), lambda fault: self._abandon(live, fault)):
             await self.perform(live)
 
     def _abandon(self, live: Live, fault: Fault) -> None:
@@ -152,19 +151,18 @@ class _Realizer:
             self.desk.end(replace(live.outcome, status="failed", fault=fault))
             self._forget(live)
         if performance is not None:
-            with self.bus.containing(f"the rest of block {live.request.block.id}"):
+            with self.bus.containing(f"the rest of {live}"):
                 performance.abandon()
 
     async def perform(self, live: Live) -> None:
         """Answer a request for a block: refuse it, or perform the block to its outcome."""
         block = live.request.block
-        elsewhere = self.live_blocks.blocks
-        if block.id in elsewhere:
+        if self.live_blocks.is_live(block.id):
             advice = "give it another id, or wait until that has ended: a cancelled one ends with its word"
             fault = Fault(reason="a block of this id is still being performed", where=block.id, advice=advice)
             self._refuse(live, BlockRefused(fault))
             return
-        if absent := set(live.request.follows) - {each.request.block.id for each in live.leaders}:
+        if absent := set(live.request.follows) - {each.id for each in live.leaders}:
             fault = Fault(reason=f"it follows {', '.join(sorted(absent))}: no such live block", where=block.id)
             self._refuse(live, BlockRefused(fault))
             return
@@ -173,43 +171,43 @@ class _Realizer:
             fault = Fault(reason="it follows blocks that it replaces", where=block.id, advice=advice)
             self._refuse(live, BlockRefused(fault))
             return
-        with self.live_blocks.opened(block):
+        live.elsewhere = self.live_blocks.blocks
+        with self.live_blocks.opened(block) as live.block:
             try:
-                plan = await _result_or_stopped(live.ending, self.planning.plan(live, elsewhere))
+                plan = await _result_or_stopped(live.ending, self.planning.plan(live))
             except EngageError as error:
                 self._refuse(live, error)
                 return
             if plan is not None:
                 self.desk.accept(live.request.id)
                 with telling_of_turn(self.bus, live):
-                    plan = await _result_or_stopped(live.ending, self._await_turn(live, plan, elsewhere))
+                    plan = await _result_or_stopped(live.ending, self._await_turn(live, plan))
             if plan is None:
                 await self._end(live, live.outcome)
                 return
-            elsewhere = {**self.live_blocks.blocks, **elsewhere}
             performance = self.performances[live.request.id] = BlockPerformance(
-                live, plan, self.shared, elsewhere, self.steering.held(block.id), is_held=self.steering.is_holding
+                live, plan, self.shared, self.steering.held(live), is_held=self.steering.is_holding
             )
             live.settle()
             await self._end(live, await performance.run())
 
-    async def _await_turn(self, live: Live, plan: Plan, elsewhere: Mapping[str, Block]) -> Plan:
+    async def _await_turn(self, live: Live, plan: Plan) -> Plan:
         """Wait for earlier blocks if composition asks for that. Returns the plan, made anew if that took time."""
         earlier, live.earlier = live.earlier, []
-        replaces, block = live.request.block.composition == "REPLACE", live.request.block.id
+        replaces = live.block.composition == "REPLACE"
         is_free = not earlier and not (replaces and self.homing)
-        if live.request.block.composition == "MERGE" or is_free:
+        if live.block.composition == "MERGE" or is_free:
             return plan
         performed = (self.performances.get(other.request.id) for other in earlier)
         replaced = [each for each in performed if each is not None]
         if replaces:
             for other in earlier:
-                other.stop(Ending("interrupted", replaced_by=block))
-        blocks = {other.request.block.id: other.request.block for other in reversed(earlier)}
-        waiting = WaitingBlock(plan, self.live_blocks, self.bus.now, blocks)
-        self.live_blocks.perform(block, waiting)
-        ends = [qualified(id, BLOCK_END) for id in blocks] if not replaces else []
-        with self.live_blocks.followed(waiting, ends, blocks):
+                other.stop(Ending("interrupted", replaced_by=live.id))
+        leaders = {other.block.id for other in earlier}
+        waiting = WaitingBlock(plan, self.live_blocks, self.bus.now, leaders)
+        self.live_blocks.perform(live.block.id, waiting, live.elsewhere)
+        ends = [qualified(name, BLOCK_END) for name in leaders] if not replaces else []
+        with self.live_blocks.followed(waiting, ends):
             live.settle()
             if earlier:
                 await asyncio.wait([other.ended for other in earlier])
@@ -219,14 +217,14 @@ class _Realizer:
                 # Among them are parts sent home by a block that was itself replaced before it began.
                 _, lost = await asyncio.wait(self.homing, timeout=self.config.abort)
                 self.homing -= lost
-        await self.planning.planned(live.request.block, self.live.values())
+        await self.planning.planned(live.block, self.live.values())
         try:
             live.unsettle()
             # Asked again: the body is elsewhere by now.
-            return await self.planning.again(plan, elsewhere)
+            return await self.planning.again(plan, live.elsewhere)
         except EngageError as error:
             self._warn(live, error)
-            live.stop(Ending("failed", error.fault))
+            live.fail(live.told(error.fault))
             return plan
 
     def _send_home(self, live: Live, replaced: list[BlockPerformance]) -> None:
@@ -242,14 +240,14 @@ class _Realizer:
         kind = error.kind if isinstance(error, BlockRefused) else "PARSING_FAILURE"
         block = live.request.block
         warning = WarningFeedback(
-            block=block.id or None, kind=kind, message=str(error.fault), character_id=block.character_id
+            block=block.id or None, kind=kind, message=str(live.told(error.fault)), character_id=block.character_id
         )
         self.bus.publish(keys.FEEDBACK, warning)
 
     def _refuse(self, live: Live, error: EngageError) -> None:
         self._warn(live, error)
-        live.stop(Ending("failed", error.fault))
-        self.desk.refuse(live.request.id, error.fault)
+        live.fail(fault := live.told(error.fault))
+        self.desk.refuse(live.request.id, fault)
         self._forget(live)
 
     async def _end(self, live: Live, outcome: BlockOutcome) -> None:
@@ -261,7 +259,7 @@ class _Realizer:
 
     def _forget(self, live: Live) -> None:
         del self.live[live.request.id]
-        self.steering.forget(live.request.block.id)
+        self.steering.forget(live.id)
         self.performances.pop(live.request.id, None)
         live.settle()
         live.ended.set_result(None)

@@ -81,6 +81,8 @@ class Player:
         self.requests = requests
         self.record = record
         self.pending: dict[str, Pending] = {}
+        self.lives: dict[str, int] = {}
+        """For each id, the number of blocks that were asked for."""
         self.is_over = False
         """True once nobody waits for ends any more."""
         self._number = 0
@@ -91,12 +93,14 @@ class Player:
             case "perform":
                 block = decode_xml(deed.xml)
                 assert isinstance(block, Block)
-                request = PerformBlock(id=f"r-{deed.block}", requester="judge", block=block, follows=deed.follows)
+                number = self.lives[deed.block] = self.lives.get(deed.block, 0) + 1
+                id = f"r-{deed.block}-{number}"
+                request = PerformBlock(id=id, requester="judge", block=block, follows=deed.follows)
                 self.pending[deed.block] = asked = self.requests.send(keys.BLOCK, request)
                 self.record.asked[deed.block] = asyncio.get_running_loop().time()
                 asked.outcome.add_done_callback(partial(self._ended, deed.block))
             case "cancel":
-                self.requests.cancel(f"r-{deed.block}")
+                self.requests.cancel(f"r-{deed.block}-{self.lives[deed.block]}")
             case "interrupt":
                 self._number += 1
                 id = f"i-{self._number}"

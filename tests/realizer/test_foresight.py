@@ -154,7 +154,7 @@ def test_foresight_goes_through_a_chain_of_any_length() -> None:
             live.enter_context(live_blocks.opened(block((WORDS,), id=link.block)))
             if number:
                 ties = [Point(f"b{number - 1}:s", "end")]
-                live.enter_context(live_blocks.followed(link, ties, live_blocks.blocks))
+                live.enter_context(live_blocks.followed(link, ties))
         live_blocks.foresee("b0", {Point("s", "end"): 1.0})
 
     assert [link.told for link in links[1:]] == [[float(number)] for number in range(1, 2000)]

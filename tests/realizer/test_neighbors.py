@@ -184,11 +184,11 @@ def test_a_ledger_forgets_a_block_when_it_is_over() -> None:
     live_blocks, early, late = LiveBlocks(), Ears(), Ears()
     end, start = Point("one:s", "end"), Point("one:s", "start")
     one = block((Speech(id="s", text="so"),), id="one")
-    with live_blocks.followed(late, [end], {}):
+    with live_blocks.followed(late, [end]):
         pass
     with live_blocks.opened(one):
         live_blocks.reach("one", Point("s", "start"), 1.0)
-        follows = live_blocks.followed(early, [start, end], {"one": one})
+        follows = live_blocks.followed(early, [start, end])
         follows.__enter__()
     follows.__exit__(None, None, None)
 

@@ -188,7 +188,7 @@ def is_safe(net: PetriNet) -> bool:
 
 
 def _reachable(net: PetriNet, starts: Iterable[int], *, forward: bool) -> set[int]:
-    """These transitions, and those on paths from them, or back from them, through places without a token at rest."""
+    """Transitions of `starts`, and those on paths from them, or back from them, through places without a token at rest."""
     found = set(starts)
     todo = list(found)
     while todo:

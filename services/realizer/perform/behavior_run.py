@@ -26,6 +26,7 @@ from engage_hri.services.requests.ends import NeverEnded, Pending, RequestRefuse
 class Performing(Protocol):
     """The block, as the runs of its behaviors see it."""
 
+    id: str
     plan: Plan
     decisions: Decisions
     bus: Bus
@@ -108,7 +109,7 @@ class BehaviorRun:
             case Event():
                 await self._event(behavior)
             case TurnSignal():
-                block.recognition.signal(block.body.id(self.id), block.plan.block.id, behavior)
+                block.recognition.signal(block.body.id(self.id), block.id, behavior)
                 self._at_once()
             case _ if performer(behavior) == "clock":
                 await self._wait(0.0)
@@ -132,7 +133,7 @@ class BehaviorRun:
             return
         except EngageError as error:
             self.pending = None
-            block.lose_body(Fault(reason=error.fault.reason, where=block.plan.block.id))
+            block.lose_body(Fault(reason=error.fault.reason, where=block.id))
             return
         if not isinstance(outcome, BehaviorOutcome):
             block.lose(self.id, Fault(reason=f"control ended it with a {type(outcome).__name__}"))
@@ -177,7 +178,7 @@ class BehaviorRun:
         block = self._block
         began = block.bus.now()
         block.reach(Point(event.id, "start"), began)
-        pending = block.recognition.ask(block.body.id(event.id), block.plan.block.id, event, began)
+        pending = block.recognition.ask(block.body.id(event.id), block.id, event, began)
         if pending is not None:
             self.pending = pending
         try:

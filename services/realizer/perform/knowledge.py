@@ -67,9 +67,7 @@ def knowledge(asker: Asker, others: Iterable[Performed], live_blocks: LiveBlocks
     points: dict[Point, Seconds] = {}
     holders: dict[str, Holder] = {}
     for block in sorted({block_of(point) for point in asker.named} - there):
-        content = asker.blocks.get(block)
-        waiting = live_blocks.times(block) if live_blocks.blocks.get(block) is content else {}
-        for point, at in {**waiting, **live_blocks.reached(block, content)}.items():
+        for point, at in {**live_blocks.times(block), **live_blocks.reached(block)}.items():
             points[qualified(block, point)] = at - asker.since
     dependent = _dependents(asker.block, live_blocks)
     for each in concerned:

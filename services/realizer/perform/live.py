@@ -2,12 +2,13 @@
 
 import asyncio
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Literal
 
 from msgspec import Struct
+from msgspec.structs import replace
 
-from engage_hri.schemas.blocks import BlockOutcome, PerformBlock
+from engage_hri.schemas.blocks import Block, BlockOutcome, PerformBlock
 from engage_hri.schemas.faults import Fault
 
 Status = Literal["done", "failed", "interrupted"]
@@ -24,12 +25,16 @@ class Ending(Struct, frozen=True):
 class Live:
     """A block from its request to its outcome.
 
-    earlier: blocks that were live when it came. ended: resolved when its outcome is out. ending: how it is to end.
+    block: as it is performed, with names for ids (see `LiveBlocks`). elsewhere: other live blocks that it may refer
+    to, by name. earlier: blocks that were live when it came. ended: resolved when its outcome is out. ending: how it
+    is to end.
     """
 
     def __init__(self, request: PerformBlock, earlier: Sequence["Live"]) -> None:
         loop = asyncio.get_running_loop()
         self.request = request
+        self.block = request.block
+        self.elsewhere: Mapping[str, Block] = {}
         self.earlier = list(earlier)
         self.ended: asyncio.Future[None] = loop.create_future()
         self.ending: asyncio.Future[Ending] = loop.create_future()
@@ -37,7 +42,7 @@ class Live:
         """Resolved while it is being performed, has ended, or waits for its turn: others can be planned now."""
         self.is_planning = False
         """True while it is planned, with those in mind that are being performed: no other is to begin meanwhile."""
-        there = {each.request.block.id: each for each in reversed(earlier)}  # a second one with an id is refused
+        there = {each.id: each for each in reversed(earlier)}  # a second one with an id is refused
         self.leaders = tuple([there[id] for id in request.follows if id in there])
         """Blocks that it continues (`follows`): it ends with any of them that ends otherwise than done."""
         self.ended_by: Live | None = None
@@ -47,6 +52,11 @@ class Live:
             leader._followers.append(self)
             if leader.ending.done():
                 self._end_with(leader)
+
+    def told(self, fault: Fault) -> Fault:
+        """The fault as the block's manager is told it: with the block's id for its name."""
+        is_named = fault.where.startswith(self.block.id)
+        return replace(fault, where=self.id + fault.where.removeprefix(self.block.id)) if is_named else fault
 
     def settle(self) -> None:
         """Let blocks that came later be planned."""
@@ -76,13 +86,18 @@ class Live:
             return False
         verb = "failed" if ending.status == "failed" else "was interrupted"
         why = f": {ending.fault.reason}" if ending.fault else ""
-        fault = Fault(reason=f"{leader.request.block.id}, which it follows, {verb}{why}", where=self.request.block.id)
+        fault = Fault(reason=f"{leader.id}, which it follows, {verb}{why}", where=self.id)
         self.ended_by = leader
         self.ending.set_result(Ending("interrupted", fault, ending.replaced_by))
         return True
 
     def __str__(self) -> str:
-        return f"block {self.request.block.id}"
+        return f"block {self.id}"
+
+    @property
+    def id(self) -> str:
+        """Id of the block, as its manager knows it."""
+        return self.request.block.id
 
     def fail(self, fault: Fault) -> None:
         self.stop(Ending("failed", fault))
@@ -93,7 +108,7 @@ class Live:
         ending = self.ending.result()
         return BlockOutcome(
             id=self.request.id,
-            block=self.request.block.id,
+            block=self.id,
             status=ending.status,
             replaced_by=ending.replaced_by,
             fault=ending.fault,

@@ -1,13 +1,15 @@
 """Sync points of live blocks that other live blocks refer to: expected, reached or lost."""
 
 from collections import Counter, deque
-from collections.abc import Collection, Iterable, Iterator, Mapping, Set
+from collections.abc import Collection, Container, Iterable, Iterator, Mapping, Set
 from contextlib import contextmanager
+from itertools import chain, count
 from math import inf
 from typing import Protocol
 
 from engage_hri.schemas.blocks import Block
-from engage_hri.schemas.syncref import BLOCK_ITSELF
+from engage_hri.schemas.references import with_names
+from engage_hri.schemas.syncref import BLOCK_ITSELF, LONGEST_ID
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.realizer.plan.known import block_of, qualified
 from engage_hri.services.realizer.plan.plan import Plan
@@ -52,13 +54,15 @@ class FollowedBlock(Protocol):
 class _Tracked:
     """Points of one live block that others may be tied to.
 
-    others: blocks that were live when it came. lost: behaviors that were dropped. named: points that others are tied
-    to. expected: the last expected time of each of these points that was told.
+    others: blocks that were live when it came, and that it may name. number: of blocks that had come by then. lost:
+    behaviors that were dropped. named: points that others are tied to. expected: the last expected time of each of
+    these points that was told.
     """
 
-    def __init__(self, block: Block, others: Mapping[str, "_Tracked"]) -> None:
+    def __init__(self, block: Block, others: Mapping[str, "_Tracked"], number: int) -> None:
         self.block = block
         self.others = others
+        self.number = number
         self.performance: FollowedBlock | None = None
         self.named: set[Point] = set()
         self.expected: dict[Point, Seconds] = {}
@@ -68,39 +72,70 @@ class _Tracked:
 
 
 class LiveBlocks:
-    """All live blocks, from their request to their end. Ids are free again after that."""
+    """All live blocks, from their request to their end.
+
+    Ids are free again after that. But blocks that have lived beside it may still think of the one that has ended:
+    of its points, of the parts that it had. So another of its id has another name here, as long as they live.
+    """
 
     def __init__(self) -> None:
         self._tracked: dict[str, _Tracked] = {}
+        self._names: dict[str, str] = {}
+        """Name of each live block, by its id."""
+        self._ended: dict[str, int] = {}
+        """For each name that is not free yet, in the order of their ends, how many blocks had come by then."""
+        self._count = 0
         self._untold: deque[tuple[_Tracked, Point, Seconds]] = deque()
         """Expected times that followers have yet to be told. What these expect because of them is told after that."""
         self._is_telling = False
 
     @contextmanager
-    def opened(self, block: Block) -> Iterator[None]:
-        """Keep the block as live inside the `with`."""
-        tracked = self._tracked[block.id] = _Tracked(block, dict(self._tracked))
+    def opened(self, block: Block) -> Iterator[Block]:
+        """Keep the block as live inside the `with`. Gives it with names for ids: its own, and those it refers to."""
+        id, name = block.id, self._free_name(block.id)
+        self._names[id] = name
+        if changed := {each: other for each, other in self._names.items() if each != other}:
+            block = with_names(block, changed)
+        self._count += 1
+        tracked = self._tracked[name] = _Tracked(block, dict(self._tracked), self._count)
         try:
-            yield
+            yield block
         finally:
-            del self._tracked[block.id]
+            del self._tracked[name], self._names[id]
             tracked.others = {}  # Nobody asks any more what it referred to.
+            self._ended[name] = self._count
+            self._free_names()
             ends = (BLOCK_ITSELF, *(behavior.id for behavior in block.behaviors))
             for follower in list(tracked.followers):
-                follower.miss(f"{block.id}:{id}" for id in ends)
+                follower.miss(f"{name}:{id}" for id in ends)
+
+    def _free_name(self, id: str) -> str:
+        taken = self._tracked.keys() | self._ended.keys()
+        others = (f"{id[: LONGEST_ID - 9]}#{number}" for number in count(2))
+        return next(name for name in chain((id,), others) if name not in taken)
+
+    def _free_names(self) -> None:
+        """Free the names of blocks that have ended before any of the live ones came."""
+        oldest = next(iter(self._tracked.values())).number if self._tracked else inf
+        while self._ended and (first := next(iter(self._ended.items())))[1] < oldest:
+            del self._ended[first[0]]
+
+    def is_live(self, id: str) -> bool:
+        """True if a block of this id is live."""
+        return id in self._names
 
     @property
     def blocks(self) -> Mapping[str, Block]:
-        """The live blocks, by id."""
+        """The live blocks, by name."""
         return {id: tracked.block for id, tracked in self._tracked.items()}
 
     def named(self, block: str) -> Set[Point]:
         """Points of a live block that others wait for."""
         return self._tracked[block].named
 
-    def reached(self, block: str, content: Block | None) -> Mapping[Point, Seconds]:
-        """Points that a block has reached, by loop time, as long as blocks live that came before its end."""
-        tracked = self._find(block, content)
+    def reached(self, block: str) -> Mapping[Point, Seconds]:
+        """Points that a block has reached, by loop time, as long as blocks live that name it."""
+        tracked = self._find(block)
         return tracked.reached if tracked is not None else {}
 
     def is_past(self, point: Point) -> bool:
@@ -119,10 +154,10 @@ class LiveBlocks:
         performances = (tracked.performance for tracked in self._tracked.values())
         return [(each.newest_plan, each.leaders) for each in performances if each is not None]
 
-    def _find(self, id: str, block: Block | None) -> _Tracked | None:
-        """A live block, or one that has ended while others lived; another one that has taken its id is not meant."""
-        known = (tracked.get(id) for tracked in (self._tracked, *(each.others for each in self._tracked.values())))
-        return next((each for each in known if each is not None and each.block is block), None)
+    def _find(self, name: str) -> _Tracked | None:
+        """A live block, or one that has ended while blocks lived that name it."""
+        known = (tracked.get(name) for tracked in (self._tracked, *(each.others for each in self._tracked.values())))
+        return next((each for each in known if each is not None), None)
 
     def reach(self, block: str, point: Point, at: Seconds) -> None:
         """Tell followers that a point of a live block is reached. The block itself is the behavior `bml`."""
@@ -131,10 +166,15 @@ class LiveBlocks:
         for follower in list(tracked.followers):
             follower.hear(qualified(block, point), at)
 
-    def perform(self, block: str, performance: FollowedBlock) -> None:
-        """Note that `performance` performs the block now, or lets it wait: it is asked for its expected times."""
+    def perform(self, block: str, performance: FollowedBlock, named: Container[str] = ()) -> None:
+        """Note that `performance` performs the block now, or lets it wait: it is asked for its expected times.
+
+        named: other blocks that it refers to, whatever its plan says.
+        """
         tracked = self._tracked[block]
         tracked.performance = performance
+        planned = set(map(block_of, performance.newest_plan.foreign))
+        tracked.others = {id: each for id, each in tracked.others.items() if id in planned or id in named}
         performance.follow(tracked.named)
 
     def foresee(self, block: str, expected: Mapping[Point, Seconds]) -> None:
@@ -169,11 +209,9 @@ class LiveBlocks:
             follower.miss((f"{block}:{behavior}",))
 
     @contextmanager
-    def followed(
-        self, follower: TiedBlock, points: Iterable[Point], blocks: Mapping[str, Block | None]
-    ) -> Iterator[None]:
-        """Tell `follower` what becomes of these points of other `blocks`, and what already has."""
-        self.follow(follower, points, blocks)
+    def followed(self, follower: TiedBlock, points: Iterable[Point]) -> Iterator[None]:
+        """Tell `follower` what becomes of these points of other blocks, and what already has."""
+        self.follow(follower, points)
         try:
             yield
         finally:
@@ -181,13 +219,10 @@ class LiveBlocks:
                 if follower in tracked.followers:
                     tracked.followers.remove(follower)
 
-    def follow(self, follower: TiedBlock, points: Iterable[Point], blocks: Mapping[str, Block | None]) -> None:
-        """Tell `follower` from now on what becomes of these points of other `blocks`, and what already has.
-
-        A block that has taken the id of one of them since is another block.
-        """
+    def follow(self, follower: TiedBlock, points: Iterable[Point]) -> None:
+        """Tell `follower` from now on what becomes of these points of other blocks, and what already has."""
         wanted = sorted(points)
-        found = {id: self._find(id, blocks.get(id)) for id in map(block_of, wanted)}
+        found = {name: self._find(name) for name in map(block_of, wanted)}
         homes = {id: tracked for id, tracked in found.items() if tracked is not None}
         for tracked in homes.values():
             if follower not in tracked.followers:

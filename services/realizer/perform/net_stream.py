@@ -41,7 +41,7 @@ class NetStream(Observer):
         """Publish the net that runs from now on."""
         self._net = net
         self._began = began
-        self._message = described(plan, self._bus.stamp(began), net.marking, {})
+        self._message = replace(described(plan, self._bus.stamp(began), net.marking, {}), block=self._block)
         self._tell_all()
 
     def tell_soon(self) -> None:
@@ -92,7 +92,7 @@ def telling_of_turn(bus: Bus, live: Live) -> Iterator[None]:
     again = Timer(lambda: tell())
 
     def tell(_: object = None) -> None:
-        left = tuple(each.request.block.id for each in others if not each.ended.done())
+        left = tuple(each.id for each in others if not each.ended.done())
         bus.publish(keys.NET, NetWaiting(block=block.id, since=since, waits_for=left))
         again.set(bus.now() + AGAIN)
 

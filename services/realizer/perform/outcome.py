@@ -24,7 +24,7 @@ def completed(
     them that were ended on request, which is no failure.
     """
     dropped = {id: why for id, why in lost.items() if id not in interrupted}
-    nothing = _nothing_performed(block, dropped) if ended.status == "done" else None
+    nothing = _nothing_performed(block, dropped, ended.block) if ended.status == "done" else None
     return replace(
         ended,
         status="failed" if nothing else ended.status,
@@ -42,10 +42,10 @@ def nothing_is_left(block: Block, dropped: Container[str]) -> bool:
     return had_any and all(behavior.id in dropped for behavior in block.behaviors)
 
 
-def _nothing_performed(block: Block, dropped: Mapping[str, str]) -> Fault | None:
-    """Fault of a block of whose behaviors each was dropped; None if it had none, or another is left."""
+def _nothing_performed(block: Block, dropped: Mapping[str, str], id: str) -> Fault | None:
+    """Fault of a block of whose behaviors each was dropped; None if it had none, or another is left. id: of it."""
     if not nothing_is_left(block, dropped):
         return None
     left_out = [each.message for each in block.unread if each.kind in _BEHAVIORS]
     whys = [*(f"{id}: {why.removeprefix(f'{id}: ')}" if why else id for id, why in dropped.items()), *left_out]
-    return Fault(reason=f"no behavior of it came to its end ({'; '.join(whys)})", where=block.id)
+    return Fault(reason=f"no behavior of it came to its end ({'; '.join(whys)})", where=id)

@@ -8,7 +8,7 @@ import asyncio
 from collections.abc import Callable, Collection, Iterable, Mapping
 from functools import partial
 
-from engage_hri.schemas.blocks import Block, BlockOutcome
+from engage_hri.schemas.blocks import BlockOutcome
 from engage_hri.schemas.body import SyncPointArrived, SyncPointReached
 from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.feedback import WarningKind
@@ -38,32 +38,31 @@ from engage_hri.services.runtime.alarm import Afterwards, Alarm, Timer
 
 
 class BlockPerformance:
-    """A block being performed."""
+    """A block being performed. id: the manager's for it; its name among other blocks is that of its plan's block."""
 
     def __init__(
         self,
         live: Live,
         plan: Plan,
         shared: SharedContext,
-        elsewhere: dict[str, Block],
         held: Collection[str] | None = (),
         *,
         is_held: bool = False,
     ) -> None:
-        """elsewhere: other blocks, which the plan may name points of. held, is_held: see `hold`."""
-        self._live = live
+        """held, is_held: see `hold`."""
+        self._live, self.id = live, live.id
         self.plan = plan
         self._shared = shared
         self.bus = shared.bus
         self._requests = shared.requests
         self._config = shared.config
         self.recognition = RecognitionLink(shared.bus, shared.requests, shared.config, shared.peers)
-        self.body = ControlLink(shared.bus, shared.requests, live.request.id, plan.block.id)
+        self.body = ControlLink(shared.bus, shared.requests, live.request.id, live.id)
         self.futures = SyncPointFutures()
         self._held = held
         self._is_held = is_held
-        self._net = NetStream(shared.bus, plan.block.id)
-        self.report = Reporter(shared.bus, plan.block.id, shared.config.skew)
+        self._net = NetStream(shared.bus, live.id)
+        self.report = Reporter(shared.bus, live.id, shared.config.skew)
         self._runs = {id: BehaviorRun(self, id) for id in plan.chains}
         self._tasks: dict[str, asyncio.Task[None]] = {}
         why = {each.behavior: each.message.removesuffix(DROPPED) for each in reversed(plan.problems)}
@@ -71,7 +70,7 @@ class BlockPerformance:
         """Behaviors that were dropped, each with the reason."""
         self._interrupted: dict[str, str] = {}
         """Behaviors that are ended on request, each with the reason if one was given."""
-        self.ties = Ties(self, shared.others, shared.live_blocks, elsewhere)
+        self.ties = Ties(self, shared.others, shared.live_blocks, live.elsewhere)
         self.spoken = Spoken(plan.block.behaviors)
         self._ending = live.ending
         self._timer = Timer(self.take_in)
@@ -112,8 +111,8 @@ class BlockPerformance:
                     id: tasks.create_task(self._runs[id].perform(), name=f"{block}/{id}")
                     for id in self.plan.begun_in_order(self._runs)  # Those that begin with the block do so in order.
                 }
-                self._shared.live_blocks.perform(block, self)
-                with self._shared.live_blocks.followed(self.ties, set(self.ties.foreign), self.ties.blocks):
+                self._shared.live_blocks.perform(block, self, self._live.elsewhere)
+                with self._shared.live_blocks.followed(self.ties, set(self.ties.foreign)):
                     self.ties.begin()
                     self.take_in()
                     ending = await asyncio.shield(self._ending)  # others wait for it, too
@@ -189,7 +188,7 @@ class BlockPerformance:
         """End the block as failed, and say that it is because of this behavior."""
         self._tell()
         self.report.warn("EXECUTION_FAILURE", str(fault), behavior)
-        self._live.fail(Fault(reason=fault.reason, where=f"{self.plan.block.id}: {behavior}"))
+        self._live.fail(Fault(reason=fault.reason, where=f"{self.id}: {behavior}"))
 
     def follow(self, points: Iterable[Point]) -> None:
         """Tell from now on when these points are expected: other blocks are tied to them."""
@@ -296,7 +295,7 @@ class BlockPerformance:
     def _let_go(self, behavior: str) -> None:
         """Hold a behavior no more once it has ended: nothing else is to be late for it."""
         if self._held and behavior in self._held and not self.is_going_on(behavior):
-            self._shared.over(self.plan.block.id, behavior)
+            self._shared.over(self.id, behavior)
 
     # -- what behaviors report (see `Performing`) --------------------------------------------------------------------
 
@@ -339,7 +338,7 @@ class BlockPerformance:
             if id in self.decisions.facts.begun and not at_rest:
                 self._go_home(self.plan.parts(id), id)
             if id in self.plan.required:
-                self._live.stop(Ending("failed", Fault(reason=fault.reason, where=f"{self.plan.block.id}: {id}")))
+                self._live.stop(Ending("failed", Fault(reason=fault.reason, where=f"{self.id}: {id}")))
         self._let_go(id)
         self.plan_again()
 
@@ -362,7 +361,7 @@ class BlockPerformance:
         try:
             plan = plan_block(self.plan.block, self.plan.estimates.values(), dropped=gone, known=self.ties.known())
         except InputRefused as error:
-            self._live.stop(Ending("failed", error.fault))
+            self._live.fail(self._live.told(error.fault))
             return
         before = self.decisions.plan.given_up
         self.decisions.replan(plan)

@@ -41,9 +41,9 @@ class Planning:
         self._live_blocks = live_blocks
         self._performing = performing
 
-    async def plan(self, live: Live, elsewhere: Mapping[str, Block]) -> Plan:
-        """Plan a block. elsewhere: other live blocks, by id."""
-        block = live.request.block
+    async def plan(self, live: Live) -> Plan:
+        """Plan a block. Of the blocks that it may refer to (`elsewhere`), those stay that it does refer to."""
+        block = live.block
         for each in block.behaviors:
             if isinstance(each, Speech) and len(each.text) > self._config.utterance:
                 reason = f"{len(each.text)} characters of speech, at most {self._config.utterance} are said in one go"
@@ -55,7 +55,9 @@ class Planning:
             reason = f"{held} behaviors, marks and sync references; at most {self._config.most} are planned in time"
             advice = "send several (blocks with APPEND, fragments of one turn); `realizer.most` is the limit"
             raise BlockRefused(Fault(reason=reason, where=block.id, advice=advice))
-        relations = await unhurried(relation_steps(block, elsewhere))  # Bad references: before the body is asked.
+        # Bad references are refused before the body is asked.
+        relations = await unhurried(relation_steps(block, live.elsewhere))
+        elsewhere = live.elsewhere = {name: live.elsewhere[name] for name in sorted(relations.blocks)}
         named = frozenset(point for point in relations.named if is_foreign(point.behavior))
         block = validated(block)
         question = question_about(block)
@@ -116,18 +118,17 @@ class Planning:
 
     async def _earlier(self, live: Live, named: Iterable[Point]) -> None:
         """Wait until those of the earlier blocks are planned that this one is to be planned with in mind."""
-        block = live.request.block
+        block = live.block
         while awaited := [
             other
             for other in reversed(live.earlier)  # The last one waits for the others itself: one wait for all, mostly.
-            if not other.settled.done()
-            and (is_named_in(other.request.block.id, named) or may_share(block, other.request.block))
+            if not other.settled.done() and (is_named_in(other.block.id, named) or may_share(block, other.block))
         ]:
             await asyncio.wait([awaited[0].settled])
 
     async def planned(self, block: Block, others: Iterable[Live]) -> None:
         """Wait until those are planned that are being planned now, and that a block may share parts with."""
-        while awaited := [each for each in others if each.is_planning and may_share(block, each.request.block)]:
+        while awaited := [each for each in others if each.is_planning and may_share(block, each.block)]:
             await asyncio.wait([awaited[0].settled])
 
     def _known(

@@ -48,7 +48,7 @@ class Steering:
         block, behavior = ("", "") if isinstance(request, SteerRobot) else (request.block, request.behavior)
         with self._desk.serving(request):
             concerned = self._concerned(block)
-            performances = [each for each in self._performances.values() if each.plan.block.id == block]
+            performances = [each for each in self._performances.values() if each.id == block]
             going_on = any(each.is_going_on(behavior) for each in performances) if behavior else concerned
             if isinstance(request, SteerPerformance) and not (block and going_on):
                 where = f"{block}: {behavior}" if behavior else block
@@ -66,7 +66,7 @@ class Steering:
                     await self._stop(concerned, behavior, "" if behavior else "stopped on request")
             self._apply()
             is_stuck = request.to == "continue" and self._holds.is_within(block, behavior)
-            blocks = () if is_stuck else tuple(live.request.block.id for live in concerned)
+            blocks = () if is_stuck else tuple(live.id for live in concerned)
             self._desk.end(PerformanceSteered(id=request.id, blocks=blocks))
 
     def tell(self) -> None:
@@ -83,9 +83,9 @@ class Steering:
         )
         self._bus.publish(keys.HELD, Held(at=self._bus.stamp(), holds=holds))
 
-    def held(self, block: str) -> frozenset[str] | None:
+    def held(self, live: Live) -> frozenset[str] | None:
         """Behaviors of the block and of others that are held now (see `Holds`); None: all of the block."""
-        return self._holds.of_block(block, [live.request.block for live in self._live.values()])
+        return self._holds.of_block(live.id, {each.id: each.block for each in self._live.values()})
 
     @property
     def is_holding(self) -> bool:
@@ -106,13 +106,14 @@ class Steering:
 
     def _concerned(self, block: str) -> list[Live]:
         """Live blocks that this names; empty: all."""
-        return [live for live in self._live.values() if block in ("", live.request.block.id)]
+        return [live for live in self._live.values() if block in ("", live.id)]
 
     def _apply(self) -> None:
         # In the order in which they came: who is tied to another knows when that goes on before it decides itself.
-        performed = [self._performances[id] for id in self._live if id in self._performances]
-        for performance in performed:
-            performance.hold(self.held(performance.plan.block.id), is_held=self.is_holding)
+        performed = [(live, self._performances.get(id)) for id, live in self._live.items()]
+        for live, performance in performed:
+            if performance is not None:
+                performance.hold(self.held(live), is_held=self.is_holding)
         since = self._holds.earliest()
         self._timer.set(None if since is None else since + self._longest)
         if self._holds.in_force != self._told:
@@ -146,7 +147,7 @@ class Steering:
 
     def _warn(self, block: str, reason: str) -> None:
         """Warn that a block, or all, was held for too long; in order with the other feedback of the block."""
-        performed = [each for each in self._performances.values() if block and each.plan.block.id == block]
+        performed = [each for each in self._performances.values() if block and each.id == block]
         for each in performed:
             each.report.warn("INTERRUPTED", reason)
         if not performed:
@@ -157,4 +158,4 @@ class Steering:
 
 def _interrupt(concerned: Iterable[Live], reason: str) -> None:
     for live in concerned:
-        live.stop(Ending("interrupted", Fault(reason=reason, where=live.request.block.id)))
+        live.stop(Ending("interrupted", Fault(reason=reason, where=live.id)))

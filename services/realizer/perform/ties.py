@@ -53,13 +53,13 @@ class Ties:
         owner: Tied,
         others: Callable[[], Iterable[Tied]],
         live_blocks: LiveBlocks,
-        blocks: dict[str, Block],
+        blocks: Mapping[str, Block],
     ) -> None:
-        """others: all performances, in the order in which they began. blocks: those that the plan may name."""
+        """others: all performances, in the order in which they began. blocks: those that the block refers to."""
         self._owner = owner
         self._others = others
         self._live_blocks = live_blocks
-        self.blocks = blocks
+        self._blocks = blocks
         self.foreign = set(owner.plan.foreign)
         self.foreign_ties = frozenset(point for point in owner.plan.foreign if point in owner.plan.constrained)
         self.vanished: set[str] = set()
@@ -102,7 +102,7 @@ class Ties:
     def _go_on_without(self, missed: Collection[Point]) -> None:
         """Plan without points of other blocks; fail if a required behavior or constraint was tied to one of them."""
         owner = self._owner
-        needed = needing(owner.plan.block, self.blocks, missed)
+        needed = needing(owner.plan.block, self._blocks, missed)
         for id, point in needed:
             if id in owner.decisions.plan.chains and not owner.decisions.facts.has_ended(id):
                 owner.fail(id, Fault(reason=f"{point}, which it is tied to, does not come, and the tie is required"))
@@ -149,15 +149,13 @@ class Ties:
                 continue
             if is_later and not is_named_in(block, self.foreign_ties):
                 later.add(block)
-                content = self._live_blocks.blocks.get(block)
-                if content is None or not any(name.startswith(f"{block}:") for _, name in self._met):
+                if not any(name.startswith(f"{block}:") for _, name in self._met):
                     continue
-                self.blocks[block] = content
             others.append(each)
         met = frozenset(name for _, name in self._met)
         parts = parts_of(plan.block.behaviors, plan.estimates.values())
         now = owner.report.now()
-        asker = Asker(plan.block.id, decisions.began, now, self.foreign, parts, self.blocks, met, later)
+        asker = Asker(plan.block.id, decisions.began, now, self.foreign, parts, self._blocks, met, later)
         found = knowledge(asker, others, self._live_blocks)
         points = dict(found.points)
         performances = self._performances
@@ -171,7 +169,7 @@ class Ties:
         begun = decisions.facts.begun
         points |= {Point(id, "start"): begun.get(id, now) - decisions.began for id in plan.chains}
         return Known(
-            blocks=self.blocks,
+            blocks=self._blocks,
             points=points,
             holders={id: each for id, each in found.holders.items() if id not in self.vanished},
             given={id: point for id, point in self.given.items() if point not in decisions.facts.reached},
@@ -215,7 +213,6 @@ class Ties:
         owner = self._owner
         if self.given.get(behavior) != taker and behavior in owner.decisions.plan.chains:
             self.given[behavior] = taker
-            self.blocks[block_of(taker)] = self._live_blocks.blocks[block_of(taker)]
             owner.take_in(owner.replan)
 
     def renew(self) -> None:
@@ -223,5 +220,5 @@ class Ties:
         decisions = self._owner.decisions
         fresh = set(decisions.plan.foreign) - decisions.facts.reached.keys()
         self.foreign |= fresh
-        self._live_blocks.follow(self, fresh, self.blocks)
+        self._live_blocks.follow(self, fresh)
         self.take_over()

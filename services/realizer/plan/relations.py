@@ -92,7 +92,8 @@ def at_line(line: int, reason: str) -> str:
 class Relations(Struct, frozen=True, dict=True):
     """Everything that a block says about its points.
 
-    unusable: behaviors that cannot be performed as written. required: those without which the block fails.
+    unusable: behaviors that cannot be performed as written. required: those without which the block fails. blocks:
+    other blocks that it refers to.
     """
 
     equals: tuple[Equal, ...]
@@ -100,6 +101,7 @@ class Relations(Struct, frozen=True, dict=True):
     required: frozenset[str]
     problems: tuple[Problem, ...] = ()
     unusable: frozenset[str] = frozenset()
+    blocks: frozenset[str] = frozenset()
 
     @cached_property
     def named(self) -> frozenset[Point]:
@@ -190,9 +192,9 @@ class _Reader:
             advice = f"a block can be named from its request to its end; {advice}"
             raise self.refusal(f"{text!r}: no live block is called {ref.block!r}", where, line, advice)
         other = self.elsewhere[ref.block]
-        if other is not None and ref.block not in self.theirs:
-            self.theirs[ref.block] = {each.id: each for each in other.behaviors}
-        known = self.theirs.get(ref.block, {})
+        if ref.block not in self.theirs:
+            self.theirs[ref.block] = {each.id: each for each in other.behaviors} if other is not None else {}
+        known = self.theirs[ref.block]
         if isinstance(behavior := known.get(ref.behavior), Speech):
             ref = SyncRef.parse(text, [mark.id for mark in behavior.marks])
         sync = canonical_sync(ref.sync, type_name(behavior) if behavior else "", self.block.dialect)
@@ -293,6 +295,7 @@ class _Reader:
             frozenset(self.required),
             tuple(self.problems),
             frozenset(self.unusable),
+            frozenset(self.theirs),
         )
         message = "wait has neither a duration nor an end; it ends at once"
         endless = tuple(
