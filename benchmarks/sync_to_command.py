@@ -228,7 +228,8 @@ async def measure_inside(laps: int, trips: int, links: int, as_json: bool) -> No
 
 async def memory_per_block(behaviors: int, blocks: int = 100) -> float:
     """kB that a realizer keeps for a block whose first behavior runs: plan, authority, tasks, requests."""
-    async with MemoryHub(decodes=False) as hub, running(hub, {"realizer": partial(realize, config=RealizerConfig())}):
+    config = RealizerConfig(stall=3600.0)
+    async with MemoryHub(decodes=False) as hub, running(hub, {"realizer": partial(realize, config=config)}):
         bus = hub.join("control")
         desk, requests = RequestDesk(bus, "control", lambda cancel: None), Requester(bus)
         bus.answer(keys.ESTIMATE, estimate)
@@ -247,7 +248,7 @@ async def memory_per_block(behaviors: int, blocks: int = 100) -> float:
                     assert received is not None
                     if isinstance(command := desk.take(received), PerformBehavior):
                         desk.accept(command.id)
-                        begun += 1
+                        begun += command.block.startswith(f"block-{lap}-")  # Slow machines: others go on meanwhile.
                 await asyncio.sleep(0.1)
                 gc.collect()
                 ours = [tracemalloc.Filter(True, "*/services/realizer/*"), tracemalloc.Filter(True, "*/asyncio/*")]

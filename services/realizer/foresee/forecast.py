@@ -35,8 +35,6 @@ class Forecast(LongestPaths):
         self._factor = factor
         self._phase_to: dict[tuple[str, int], int] = {}
         self._phase_from: dict[tuple[str, int], int] = {}
-        self._natural: dict[int, tuple[Seconds, Seconds]] = {}
-        """Of the arcs of phases: `asked` and `least` as estimated."""
         self._of_behavior: dict[str, list[int]] = {}
         self._node_of: dict[str, int] = {}
         self._stopped: dict[int, Seconds] = {}
@@ -81,10 +79,9 @@ class Forecast(LongestPaths):
         number = len(self._arcs)
         factor = 1.0
         if behavior:
-            self._natural[number] = (asked, least)
             self._of_behavior.setdefault(behavior, []).append(number)
             factor = self._factor(behavior)
-        arc = Arc(source, target, asked * factor, least * factor, behavior, is_bound)
+        arc = Arc(source, target, asked * factor, least * factor, behavior, is_bound, natural=asked, shortest=least)
         arc.seconds = arc.asked
         self._arcs.append(arc)
         self._out[source].append(number)
@@ -212,8 +209,8 @@ class Forecast(LongestPaths):
         for behavior in behaviors:
             factor = self._factor(behavior)
             for number in self._of_behavior.get(behavior, ()):
-                arc, (asked, least) = self._arcs[number], self._natural[number]
-                arc.asked, arc.least = asked * factor, least * factor
+                arc = self._arcs[number]
+                arc.asked, arc.least = arc.natural * factor, arc.shortest * factor
                 if arc.is_on and number not in self._given_way:
                     self._set_seconds(number, arc.asked)
                 self._see_reasons_again(arc.source)

@@ -17,7 +17,8 @@ class Arc(Struct, gc=False):
     """Lower bound: `target` is no earlier than `source` + `seconds`.
 
     asked: what `seconds` is when nothing gives way. least: what it may give way to. behavior: set if it is a phase.
-    is_bound: may be broken if nothing else gives way. is_on: False once it has no effect any more.
+    is_bound: may be broken if nothing else gives way. is_on: False once it has no effect any more. natural, shortest:
+    of a phase, `asked` and `least` as estimated.
     """
 
     source: int
@@ -28,6 +29,8 @@ class Arc(Struct, gc=False):
     is_bound: bool = False
     seconds: Seconds = 0.0
     is_on: bool = True
+    natural: Seconds = 0.0
+    shortest: Seconds = 0.0
 
 
 class Circle(Exception):

@@ -97,11 +97,11 @@ class PetriNet(Struct, frozen=True, dict=True):
         """For each transition, the places that it puts a token into."""
         return self._by_transition([place.source for place in self.places])
 
-    def _by_transition(self, ends: list[int]) -> list[list[int]]:
+    def _by_transition(self, ends: list[int]) -> list[tuple[int, ...]]:
         found: list[list[int]] = [[] for _ in self.transitions]
         for place, transition in enumerate(ends):
             found[transition].append(place)
-        return found
+        return list(map(tuple, found))
 
 
 def enabled(net: PetriNet, marking: Marking, among: Iterable[int] | None = None) -> tuple[int, ...]:
@@ -188,7 +188,7 @@ def is_safe(net: PetriNet) -> bool:
 
 
 def _reachable(net: PetriNet, starts: Iterable[int], *, forward: bool) -> set[int]:
-    """Transitions of `starts`, and those on paths from them, or back from them, through places without a token at rest."""
+    """Transitions of `starts`, and those on paths from or to them through places without a token at rest."""
     found = set(starts)
     todo = list(found)
     while todo:

@@ -83,9 +83,8 @@ class RunningNet:
         self._into: dict[tuple[str, int], int] = {}
         self._out_of: dict[tuple[str, int], int] = {}
         """The phases of each behavior, by the transitions at their ends."""
-        self._inputs: list[list[int]] = [[] for _ in range(size)]
-        self._outputs: list[list[int]] = [[] for _ in range(size)]
-        """Places before and behind each transition, apart from phases."""
+        before: list[list[int]] = [[] for _ in range(size)]
+        behind: list[list[int]] = [[] for _ in range(size)]
         self._absent = [len(each) for each in members]
         """For each transition, the number of behaviors that have not passed it."""
         self._lacking = [0] * size
@@ -96,11 +95,13 @@ class RunningNet:
             if place.kind == "phase":
                 self._into[place.behavior, place.target] = self._out_of[place.behavior, place.source] = number
                 continue
-            self._inputs[place.target].append(number)
-            self._outputs[place.source].append(number)
+            before[place.target].append(number)
+            behind[place.source].append(number)
             if place.kind not in ("handover", "idle"):
                 self._lacking[place.target] += 1
                 self._missing[place.target] += 1
+        self._inputs, self._outputs = list(map(tuple, before)), list(map(tuple, behind))
+        """Places before and behind each transition, apart from phases."""
         self._stations: dict[str, list[int]] = {}
         """For each behavior, the transitions that it comes to later than with its start."""
         for transition, group in enumerate(members):

@@ -58,6 +58,8 @@ class BehaviorRun:
     pending: the request to what performs it.
     """
 
+    __slots__ = ("_asked", "_block", "_hold_changed", "behavior", "id", "pending")
+
     def __init__(self, block: Performing, id: str) -> None:
         self.id = id
         self.behavior: BlockBehavior | None = None

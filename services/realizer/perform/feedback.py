@@ -57,13 +57,11 @@ class Reporter:
         self._bus = bus
         self._block = block
         self._tolerance = tolerance
-        self._spelling: dict[Point, str | None] = {}
         self._late: set[Point] = set()
         """Instants of behaviors that were reported as late."""
         self._character = ""
         self._latest: Seconds = -inf
         """Time of the latest message; none after it has an earlier one."""
-        self._predicted: Mapping[Point, Seconds] = {}
         self._told: dict[Point, Seconds] = {}
         """The last prediction of each point, in seconds from the block's start."""
         self._not_before = 0.0
@@ -87,11 +85,10 @@ class Reporter:
         """Tell when the points still to come are expected, seconds from the block's start, if that is news."""
         ours = {point: times[point] for point in _points(plan) if point in times}
         self._not_before = self._bus.now() + AGAIN * len(ours)
-        if moved_noticeably(self._predicted, ours):
+        if moved_noticeably(self._told, ours):
             self._predict(plan, began, ours)
 
     def _predict(self, plan: Plan, began: Seconds, times: Mapping[Point, Seconds]) -> None:
-        self._predicted = times
         self._told.update(times)
         points = []
         for point, time in times.items():
@@ -194,11 +191,9 @@ class Reporter:
 
     def _spelled(self, point: Point, plan: Plan) -> str | None:
         """The point's name in the block's dialect; None if feedback does not tell it: no default point there."""
-        if point not in self._spelling:
-            is_repetition = point.sync.startswith("stroke:")
-            type = plan.chains[point.behavior].type
-            self._spelling[point] = None if is_repetition else dialect_sync(point.sync, type, plan.block.dialect)
-        return self._spelling[point]
+        if point.sync.startswith("stroke:"):
+            return None
+        return dialect_sync(point.sync, plan.chains[point.behavior].type, plan.block.dialect)
 
 
 def _points(plan: Plan) -> Iterable[Point]:

@@ -59,6 +59,8 @@ class _Tracked:
     these points that was told.
     """
 
+    __slots__ = ("block", "expected", "followers", "lost", "named", "number", "others", "performance", "reached")
+
     def __init__(self, block: Block, others: Mapping[str, "_Tracked"], number: int) -> None:
         self.block = block
         self.others = others
@@ -67,7 +69,7 @@ class _Tracked:
         self.named: set[Point] = set()
         self.expected: dict[Point, Seconds] = {}
         self.reached: dict[Point, Seconds] = {}
-        self.lost: set[str] = set()
+        self.lost: frozenset[str] = frozenset()
         self.followers: list[TiedBlock] = []
 
 
@@ -204,7 +206,7 @@ class LiveBlocks:
         tracked = self._tracked[block]
         if behavior in tracked.lost:
             return
-        tracked.lost.add(behavior)
+        tracked.lost |= {behavior}
         for follower in list(tracked.followers):
             follower.miss((f"{block}:{behavior}",))
 

@@ -16,7 +16,7 @@ from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.interface import Bus
 from engage_hri.services.realizer.net.running import Observer, RunningNet
 from engage_hri.services.realizer.perform.live import Live
-from engage_hri.services.realizer.perform.net_message import described, firings, tokens
+from engage_hri.services.realizer.perform.net_message import described, firings
 from engage_hri.services.realizer.plan.plan import Plan
 from engage_hri.services.runtime.alarm import Timer
 
@@ -41,7 +41,7 @@ class NetStream(Observer):
         """Publish the net that runs from now on."""
         self._net = net
         self._began = began
-        self._message = replace(described(plan, self._bus.stamp(began), net.marking, {}), block=self._block)
+        self._plan = plan
         self._tell_all()
 
     def tell_soon(self) -> None:
@@ -71,8 +71,8 @@ class NetStream(Observer):
         self._net.changes()
         self._fired.clear()
         fired = {each: at - self._began for each, at in self._net.instants.items()}
-        message = replace(self._message, marked=tokens(self._net.marking), fired=firings(fired))
-        self._bus.publish(keys.NET, message)
+        message = described(self._plan, self._bus.stamp(self._began), self._net.marking, fired)
+        self._bus.publish(keys.NET, replace(message, block=self._block))
         self._again.set(self._bus.now() + AGAIN)
 
     # -- what happens (see `Observer`) ---------------------------------------------------------------------------

@@ -62,7 +62,7 @@ class Ties:
         self._blocks = blocks
         self.foreign = set(owner.plan.foreign)
         self.foreign_ties = frozenset(point for point in owner.plan.foreign if point in owner.plan.constrained)
-        self.vanished: set[str] = set()
+        self.vanished: frozenset[str] = frozenset()
         self.given: dict[str, Point] = {}
         self._met: dict[tuple[str, str], Seconds] = {}
         """When a behavior of this block was to begin, and one of another block had a part of it."""

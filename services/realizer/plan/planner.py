@@ -186,13 +186,13 @@ class _Planner:
         return (yield from remaining(relations, self.chains, self.dropped, self.block.id))
 
     def _compared(self, plan: Plan, said: Relations) -> Steps[Plan]:
-        """The plan with what it cannot keep of what the block says."""
+        """The plan with what it cannot keep of what the block says, and a copy of that: it has worked out nothing."""
         if not self.known.points:
-            return plan
+            return replace(plan, relations=replace(plan.relations))
         times = self.known.with_own({point: plan.schedule[at] for point, at in plan.at.items()})
         yield len(times) // 4
         broken = yield from broken_by(said, times)
-        return replace(plan, relations=said, broken=tuple(broken))
+        return replace(plan, relations=replace(said), broken=tuple(broken))
 
     def _keep_words(self, id: str, said: str, reason: str) -> None:
         reason = f"{reason}; {said} is given up, so that the words are said"

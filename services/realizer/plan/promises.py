@@ -1,6 +1,7 @@
 """Promises of a block: what it says of its points, held against when they come. The one measure of what was kept."""
 
 from collections.abc import Iterator, Mapping
+from typing import NamedTuple
 
 from msgspec import Struct
 
@@ -46,9 +47,10 @@ class Broken(Struct, frozen=True):
 class _Same:
     """Terms that are one instant, and of those that have come the earliest and the latest."""
 
+    __slots__ = ("ends", "terms")
+
     def __init__(self, equal: Equal) -> None:
-        self.said = " = ".join([term.text for term in equal.terms])
-        self.line = max(term.line for term in equal.terms)
+        self.terms = equal.terms
         self.ends: tuple[tuple[Seconds, Point], tuple[Seconds, Point]] | None = None
 
     def come(self, term: Term, at: Seconds) -> Iterator[Broken]:
@@ -57,31 +59,41 @@ class _Same:
         self.ends = min(here, earliest), max(here, latest)
         for early, late in ((here, latest), (earliest, here)):
             if late[0] > early[0]:
-                yield Broken(early[1], late[1], late[0] - early[0], self.said, term.point, self.line)
+                said, line = " = ".join([each.text for each in self.terms]), max(each.line for each in self.terms)
+                yield Broken(early[1], late[1], late[0] - early[0], said, term.point, line)
 
 
 class _Ordered:
     """Two terms, of which the one is no earlier than the other."""
 
+    __slots__ = ("_came", "_order")
+
     def __init__(self, order: Order) -> None:
-        self.terms = (order.earlier, order.later)
-        self.said = f"{order.earlier.text} <= {order.later.text}"
-        self.line = max(order.earlier.line, order.later.line)
+        self._order = order
         self._came: dict[Term, Seconds] = {}
 
     def come(self, term: Term, at: Seconds) -> Iterator[Broken]:
         self._came[term] = at + term.offset
         if len(self._came) == 2:
-            before, after = self.terms
+            before, after = self._order.earlier, self._order.later
             if (seconds := self._came[before] - self._came[after]) > 0.0:
-                yield Broken(after.point, before.point, seconds, self.said, term.point, self.line)
+                said, line = f"{before.text} <= {after.text}", max(before.line, after.line)
+                yield Broken(after.point, before.point, seconds, said, term.point, line)
+
+
+class _Link(NamedTuple):
+    """Something said of a point, and the link to what was said of it before: most points have one, which is small."""
+
+    said: _Same | _Ordered
+    term: Term
+    before: "_Link | None"
 
 
 class Promises:
     """Everything that a block says of its points, to be held against when they come, whoever comes wrong."""
 
     def __init__(self) -> None:
-        self._of: dict[Point, list[tuple[_Same | _Ordered, Term]]] = {}
+        self._of: dict[Point, _Link] = {}
 
     def read(self, relations: Relations) -> Steps[None]:
         """Take in what these relations say."""
@@ -97,7 +109,7 @@ class Promises:
     def _take(self, said: "_Same | _Ordered", terms: tuple[Term, ...]) -> None:
         if any(not is_foreign(term.point.behavior) and term.point != ORIGIN for term in terms):
             for term in terms:
-                self._of.setdefault(term.point, []).append((said, term))
+                self._of[term.point] = _Link(said, term, self._of.get(term.point))
 
     @property
     def points(self) -> tuple[Point, ...]:
@@ -106,7 +118,12 @@ class Promises:
 
     def come(self, point: Point, at: Seconds) -> list[Broken]:
         """Note that a point comes `at` a time; returns what is broken with those that have come before."""
-        found = [broken for said, term in self._of.get(point, ()) for broken in said.come(term, at)]
+        links: list[_Link] = []
+        link = self._of.get(point)
+        while link is not None:
+            links.append(link)
+            link = link.before
+        found = [broken for each in reversed(links) for broken in each.said.come(each.term, at)]
         return [each for each in found if each.early != each.late]
 
 
