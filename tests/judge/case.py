@@ -41,6 +41,14 @@ class Done(Struct, frozen=True):
         return self.times.get(known)
 
 
+PART_OF = {
+    "speech": "voice", "gesture": "arm", "pointing": "arm", "gaze": "eyes", "gazeShift": "eyes",
+    "headDirectionShift": "eyes", "face": "face", "faceLexeme": "face", "faceFacs": "face", "faceShift": "face",
+    "posture": "torso", "postureShift": "torso",
+}  # fmt: skip
+"""For types of behaviors, the part that they may use; of others, as many as there are types."""
+
+
 class Case:
     """What a story asked for (`blocks`), and what came of it (`record`)."""
 
@@ -100,6 +108,23 @@ class Case:
                 later = (each.at for each in self.record.steered[number:] if not each.is_held and each.covers(hold))
                 found.append((hold.at, next(later, math.inf)))
         return merged(found)
+
+    def concerned(self, blocks: Iterable[str]) -> set[str]:
+        """These blocks, and those with which they share parts or points: they may have to wait for each other."""
+        found = set(blocks)
+        while True:
+            before = len(found)
+            shared = {each for block in found for each in self._uses(block)}
+            found |= {block for block in self.blocks if not shared.isdisjoint(self._uses(block))}
+            if len(found) == before:
+                return found
+
+    def _uses(self, block: str) -> set[str]:
+        """Parts that a block may use, and the blocks that it names, itself included."""
+        read = self.blocks[block]
+        parts = {PART_OF.get(asked.type, asked.type) for asked in read.behaviors.values() if asked.type != "wait"}
+        arms = {"arm"} if "torso" in parts else set[str]()  # Poses may be of the arms.
+        return {block, *parts, *arms, *(term.place.block for relation in read.relations for term in relation.terms)}
 
     @property
     def is_exact(self) -> bool:

@@ -65,11 +65,14 @@ def _counts(place: Place, block: str, case: Case) -> bool:
 
 
 def _held(case: Case, relation: Relation, *places: Place) -> float:
-    """Seconds that a relation may be off since something of these blocks was held between its points, or near."""
+    """Seconds that a relation may be off since something was held between its points, or near.
+
+    Something of these blocks, or of blocks that they share parts or points with, and may have to wait for.
+    """
     if any(_ends_by_itself(case, place) for place in places):
         return inf
     times = [case.times[place] for place in places]
-    held = merged(span for block in {place.block for place in places} for span in case.holds(block))
+    held = merged(span for block in case.concerned(place.block for place in places) for span in case.holds(block))
     seconds = within(held, min(times) - STANDING, max(times))
     return seconds + STANDING if seconds else 0.0
 
